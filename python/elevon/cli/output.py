@@ -1,0 +1,111 @@
+"""What commands print: one JSON object or a table on stdout, messages and progress on stderr."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any, Protocol
+
+
+def plain(value: Any) -> Any:
+    """Turn numpy scalars and arrays, paths, mappings and sequences into JSON's own types.
+
+    A number that is not finite becomes None: JSON has no way to write it.
+    """
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, float):
+        return value if value - value == 0.0 else None
+    if value is None or isinstance(value, (bool, int, str)):
+        return value
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple, set, frozenset)):
+        return [plain(item) for item in value]
+    return str(value)
+
+
+def print_json(value: Mapping[str, Any]) -> None:
+    """Write one JSON object, and nothing else, on stdout."""
+    sys.stdout.write(json.dumps(plain(value), allow_nan=False, indent=2) + "\n")
+
+
+def print_table(
+    columns: Sequence[str], rows: Sequence[Sequence[object]], *, title: str | None = None
+) -> None:
+    """Write a table on stdout: rich's for a terminal, aligned plain lines for a pipe."""
+    if sys.stdout.isatty():
+        from rich import box
+        from rich.console import Console
+        from rich.table import Table
+
+        table = Table(*columns, title=title, box=box.SIMPLE, title_justify="left")
+        for row in rows:
+            table.add_row(*(str(cell).replace("[", r"\[") for cell in row))
+        Console().print(table)
+        return
+    cells = [[str(cell) for cell in row] for row in [columns, *rows]]
+    widths = [max(len(row[k]) for row in cells) for k in range(len(columns))]
+    if title:
+        sys.stdout.write(title + "\n")
+    for row in cells:
+        line = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+        sys.stdout.write(line.rstrip() + "\n")
+
+
+def say(message: str) -> None:
+    """Write a message on stderr."""
+    sys.stderr.write(message + "\n")
+    sys.stderr.flush()
+
+
+class Advance(Protocol):
+    """Told how far the work is; returns False when the work should stop."""
+
+    def __call__(self, fraction: float, /) -> bool: ...
+
+
+@contextmanager
+def progress_bar(title: str) -> Iterator[Advance]:
+    """Show progress on stderr: a bar on a terminal, a line each tenth otherwise.
+
+    Yields
+    ------
+    callable
+        Takes the done fraction (0 to 1); returns True ("carry on").
+    """
+    if not sys.stderr.isatty():
+        yield _plain_progress(title)
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:3.0f} %"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task(title, total=1.0)
+
+        def advance(fraction: float) -> bool:
+            bar.update(task, completed=fraction)
+            return True
+
+        yield advance
+
+
+def _plain_progress(title: str) -> Advance:
+    tenths = 0
+
+    def advance(fraction: float) -> bool:
+        nonlocal tenths
+        if int(fraction * 10) > tenths:
+            tenths = int(fraction * 10)
+            say(f"{title}: {tenths * 10} %")
+        return True
+
+    return advance

@@ -1,0 +1,35 @@
+"""Which commands exist and where they live."""
+
+from __future__ import annotations
+
+import importlib.util
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One command: the module that holds its ``app`` and the line shown by ``elevon --help``."""
+
+    module: str
+    help: str
+
+    @property
+    def available(self) -> bool:
+        """Whether the module is part of this installation."""
+        return importlib.util.find_spec(self.module) is not None
+
+
+COMMANDS: dict[str, Command] = {
+    "list": Command("elevon.cli.list", "List actuators, signals, parameters, faults, waveforms."),
+    "show": Command("elevon.cli.show", "Show an actuator: parameters, sources, block diagram."),
+    "simulate": Command("elevon.cli.simulate", "Simulate one actuator and keep what it did."),
+    "batch": Command("elevon.cli.batch", "Run a plan of many simulations into a folder."),
+    "compare": Command("elevon.cli.compare", "Compare the high and the low fidelity model."),
+    "fit-low": Command("elevon.cli.fit_low", "Tune the low model against the high one."),
+    "bench": Command("elevon.cli.bench", "Run the virtual test bench's procedures."),
+    "design": Command("elevon.cli.design", "Design experiments and parts."),
+    "import": Command("elevon.cli.import_log", "Read bench and drive logs into recordings."),
+    "calibrate": Command("elevon.cli.calibrate", "Fit an actuator's parameters to logs."),
+    "validate": Command("elevon.cli.validate", "Check an actuator against logs it was not fitted to."),
+    "reproduce": Command("elevon.cli.reproduce", "Recompute a published table or figure."),
+}

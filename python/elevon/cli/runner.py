@@ -1,0 +1,124 @@
+"""The root command group, its lazy loading, and the mapping of errors to exit codes."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import typer
+import typer.core
+
+from elevon.cli.registry import COMMANDS
+from elevon.errors import ElevonError, nearest
+
+INTERRUPTED = 130
+USAGE = 2
+FAILED = 1
+
+# The root of the argument errors (bad option, missing argument, ...) of whichever click typer uses.
+_UsageError: Any = typer.BadParameter.__mro__[1]
+
+
+class LazyGroup(typer.core.TyperGroup):
+    """A group that imports a command's module only when that command is run."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Names of the commands of this installation, in the registry's order."""
+        return [name for name, command in COMMANDS.items() if command.available]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Load one command, or None when there is no such command."""
+        command = COMMANDS.get(cmd_name)
+        if command is None or not command.available:
+            return None
+        app = importlib.import_module(command.module).app
+        loaded = typer.main.get_command(app)
+        loaded.name = cmd_name
+        return loaded
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """As the base class, but an unknown command names the nearest ones."""
+        known = self.list_commands(ctx)
+        if args and not args[0].startswith("-") and args[0] not in known:
+            near = nearest(args[0], known)
+            hint = f" Did you mean {', '.join(near)}?" if near else f" Commands: {', '.join(known)}."
+            raise _UsageError(f"No such command '{args[0]}'.{hint}", ctx)
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the table of commands from the registry, importing none of them."""
+        rows = [(name, COMMANDS[name].help) for name in self.list_commands(ctx)]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
+
+
+app = typer.Typer(
+    name="elevon",
+    cls=LazyGroup,
+    rich_markup_mode=None,
+    add_completion=False,
+    help="Models, faults, virtual bench and diagnosis of electromechanical actuators.",
+)
+
+
+def _print_version(value: bool) -> None:
+    if value:
+        from elevon import __version__
+
+        typer.echo(__version__)
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def _root(
+    context: typer.Context,
+    version: bool = typer.Option(
+        False, "--version", callback=_print_version, is_eager=True, help="Print the version."
+    ),
+) -> None:
+    """Models, faults, virtual bench and diagnosis of electromechanical actuators."""
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+def run(argv: Sequence[str] | None = None) -> int:
+    """Run the command line, turning every expected failure into a message and an exit code."""
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    try:
+        outcome = typer.main.get_command(app).main(
+            args=arguments, prog_name="elevon", standalone_mode=False
+        )
+    except _UsageError as error:
+        return _usage(error)
+    except ElevonError as error:
+        return _fail(str(error), error.exit_code)
+    except (KeyboardInterrupt, typer.Abort):
+        return _fail("interrupted", INTERRUPTED)
+    except BrokenPipeError:
+        return _closed_pipe()
+    except OSError as error:
+        return _fail(str(error), FAILED)
+    return outcome if isinstance(outcome, int) else 0
+
+
+def _usage(error: Any) -> int:
+    context = getattr(error, "ctx", None)
+    if context is not None:
+        typer.echo(context.get_usage(), err=True)
+    return _fail(error.format_message(), USAGE)
+
+
+def _fail(message: str, code: int) -> int:
+    typer.echo(f"elevon: {message}", err=True)
+    return code
+
+
+def _closed_pipe() -> int:
+    # The reader (head, less) left: point stdout elsewhere so that the interpreter's last flush
+    # does not complain.
+    import os
+
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return FAILED
