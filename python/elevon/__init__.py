@@ -1,0 +1,78 @@
+"""Elevon: simulate, break, test and calibrate electromechanical actuators.
+
+The package imports nothing heavy by itself: every public name is looked up when it is first used.
+
+>>> import elevon
+>>> actuator = elevon.Actuator.load("torino-rotary")  # doctest: +SKIP
+"""
+
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator as Actuator
+    from elevon.errors import ElevonError as ElevonError
+    from elevon.errors import InputError as InputError
+    from elevon.recording import Channel as Channel
+    from elevon.recording import Clock as Clock
+    from elevon.recording import Recording as Recording
+    from elevon.scenario import Scenario as Scenario
+    from elevon.simulate import Run as Run
+    from elevon.simulate import simulate as simulate
+    from elevon.simulate import simulate_batch as simulate_batch
+
+_PUBLIC = {
+    "Actuator": "elevon.actuator",
+    "Channel": "elevon.recording",
+    "Clock": "elevon.recording",
+    "ElevonError": "elevon.errors",
+    "InputError": "elevon.errors",
+    "Recording": "elevon.recording",
+    "Run": "elevon.simulate",
+    "Scenario": "elevon.scenario",
+    "simulate": "elevon.simulate",
+    "simulate_batch": "elevon.simulate",
+}
+
+__all__ = [  # noqa: PLE0604 - the two names resolved without a module come first
+    "__version__",
+    *_PUBLIC,
+]
+
+
+class _Package(ModuleType):
+    """The package's own module type.
+
+    Importing `elevon.simulate` makes the import system bind the submodule to the name `simulate`
+    of the package, hiding the function of that name. Public names always win here.
+    """
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if not (name in _PUBLIC and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        value: Any = _version()
+    elif name in _PUBLIC:
+        value = getattr(import_module(_PUBLIC[name]), name)
+    else:
+        raise AttributeError(f"module 'elevon' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
+
+def _version() -> str:
+    from elevon import _core
+
+    return _core.version()

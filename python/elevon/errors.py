@@ -1,0 +1,180 @@
+"""The exception family, and the nearest valid names that every message offers.
+
+Every error raised on purpose is an `ElevonError`. Its `exit_code` is what the command line returns:
+2 for anything the caller can correct in the input, 1 for a failure of the work itself.
+"""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import ClassVar
+
+__all__ = [
+    "ElevonError",
+    "FormatError",
+    "InputError",
+    "Interrupted",
+    "OutputError",
+    "OutputExistsError",
+    "RangeError",
+    "SimulationError",
+    "UnitError",
+    "UnknownNameError",
+    "did_you_mean",
+    "nearest",
+    "unknown",
+]
+
+
+class ElevonError(Exception):
+    """Base of every error raised on purpose by Elevon.
+
+    Attributes
+    ----------
+    exit_code : int
+        Exit status of the command line for this error.
+    """
+
+    exit_code: ClassVar[int] = 1
+
+
+class InputError(ElevonError, ValueError):
+    """Something the caller gave is wrong: a name, a value, a unit, a file."""
+
+    exit_code: ClassVar[int] = 2
+
+
+class UnknownNameError(InputError, LookupError):
+    """A name that does not exist: actuator, parameter path, signal, key, file ending.
+
+    Attributes
+    ----------
+    name : str
+        The name as given.
+    nearest : list of str
+        The nearest valid names, best first; may be empty.
+    """
+
+    def __init__(self, message: str, name: str = "", near: Iterable[str] = ()) -> None:
+        super().__init__(message)
+        self.name = name
+        self.nearest = list(near)
+
+
+class UnitError(InputError):
+    """A unit that does not exist, or is of the wrong kind for its place."""
+
+
+class RangeError(InputError):
+    """A number outside its limits, or not finite."""
+
+
+class FormatError(InputError):
+    """A file whose content is not what its ending promises."""
+
+
+class OutputError(InputError, OSError):
+    """An output that cannot be written."""
+
+
+class OutputExistsError(OutputError):
+    """An output that exists already and may not be replaced."""
+
+
+class SimulationError(ElevonError):
+    """A run that could not be completed: it diverged or tripped.
+
+    Attributes
+    ----------
+    status : str
+        `diverged` or `tripped`.
+    """
+
+    def __init__(self, message: str, status: str = "diverged") -> None:
+        super().__init__(message)
+        self.status = status
+
+
+class Interrupted(ElevonError):  # noqa: N818 - an interruption is asked for, it is no error
+    """The work was stopped by the user before its end."""
+
+    exit_code: ClassVar[int] = 130
+
+
+def nearest(name: str, candidates: Iterable[str], count: int = 3) -> list[str]:
+    """Return the valid names that look most like a wrong one.
+
+    Parameters
+    ----------
+    name : str
+        The name as given.
+    candidates : iterable of str
+        The valid names.
+    count : int
+        The largest number of names returned.
+
+    Returns
+    -------
+    list of str
+        Best first. Case and the choice of `-`, `_`, `.` or space do not count as differences; a
+        name of which the given one is a whole part (`inertia` of `motor.inertia`) is near.
+    """
+    names = list(dict.fromkeys(candidates))
+    wanted = _plain(name)
+    plain: dict[str, list[str]] = {}
+    for candidate in names:
+        plain.setdefault(_plain(candidate), []).append(candidate)
+    keys = get_close_matches(wanted, plain, n=count, cutoff=0.6)
+    keys += [key for key in plain if len(wanted) > 2 and wanted in key.split() and key not in keys]
+    return [original for key in keys for original in plain[key]][:count]
+
+
+def did_you_mean(name: str, candidates: Iterable[str]) -> str:
+    """Return the end of an error message: the nearest names, or the valid ones when they are few.
+
+    Returns
+    -------
+    str
+        Such as ``; did you mean 'motor.inertia'?`` or ``; valid: 'a', 'b'``, or an empty text.
+    """
+    names = list(dict.fromkeys(candidates))
+    near = nearest(name, names)
+    if near:
+        return f"; did you mean {_listed(near, ' or ')}?"
+    if 0 < len(names) <= 12:
+        return f"; valid: {_listed(names, ', ')}"
+    return ""
+
+
+def unknown(
+    what: str, name: str, candidates: Iterable[str], place: str | None = None
+) -> UnknownNameError:
+    """Build the error for a name that does not exist.
+
+    Parameters
+    ----------
+    what : str
+        What the name should have been: "signal", "parameter", "key".
+    name : str
+        The name as given.
+    candidates : iterable of str
+        The valid names.
+    place : str, optional
+        Where it was found: a file, a path, an option.
+
+    Returns
+    -------
+    UnknownNameError
+        To be raised by the caller.
+    """
+    names = list(candidates)
+    start = f"{place}: " if place else ""
+    message = f"{start}unknown {what} {name!r}{did_you_mean(name, names)}"
+    return UnknownNameError(message, name, nearest(name, names))
+
+
+def _plain(name: str) -> str:
+    return " ".join(name.lower().replace("-", " ").replace("_", " ").replace(".", " ").split())
+
+
+def _listed(names: list[str], joint: str) -> str:
+    return joint.join(repr(name) for name in names)
