@@ -1,0 +1,107 @@
+"""An actuator: a name, a wiring, and an immutable set of parameters."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from elevon.parameters import ParameterSet, load_set
+
+__all__ = ["Actuator"]
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """An electromechanical actuator, as an immutable value.
+
+    Attributes
+    ----------
+    name, title : str
+        From the set's header.
+    wiring : str
+        Which of the core's wirings it is.
+    parameters : ParameterSet
+        Every parameter, complete and checked.
+    references : mapping
+        Citations the sources point to.
+    default_scenario : mapping or None
+        What runs when no scenario is given.
+    path : Path or None
+        The file it was loaded from.
+
+    Examples
+    --------
+    >>> actuator = Actuator.load("torino-rotary")  # doctest: +SKIP
+    >>> heavier = actuator.with_values({"motor.inertia": "9 kg cm2"})  # doctest: +SKIP
+    """
+
+    name: str
+    wiring: str
+    parameters: ParameterSet
+    title: str = ""
+    references: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
+    default_scenario: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
+    path: Path | None = field(default=None, compare=False, repr=False)
+
+    @classmethod
+    def load(cls, reference: str | os.PathLike[str]) -> Actuator:
+        """Load an actuator by the name of its set, or from a TOML file.
+
+        Raises
+        ------
+        UnknownNameError
+            No such set; the message holds the nearest names.
+        InputError
+            The file is wrong; the message holds file, line, path and limit.
+        """
+        found = load_set(reference)
+        return cls(
+            name=found.name,
+            wiring=found.wiring,
+            parameters=found.parameters,
+            title=found.title,
+            references=found.references,
+            default_scenario=found.scenario,
+            path=found.path,
+        )
+
+    def with_values(
+        self, values: Mapping[str, str | float], *, source: str = "set by the caller", place: str = ""
+    ) -> Actuator:
+        """Return an actuator with some values changed.
+
+        Parameters
+        ----------
+        values : mapping
+            Path to a number (SI) or a text with a unit (``"7.7 kg cm2"``) or a choice.
+        source : str
+            Kept as the source of the changed values.
+        place : str
+            Named in errors, such as the file the values come from.
+
+        Raises
+        ------
+        UnknownNameError, UnitError, RangeError
+            The message names the path, the value, the limit, the nearest paths.
+        """
+        if not values:
+            return self
+        return replace(self, parameters=self.parameters.replaced(values, source=source, place=place))
+
+    @property
+    def hash(self) -> str:
+        """Sixteen hexadecimal digits over the wiring and every value."""
+        return self.parameters.hash
+
+    def findings(self, fidelity: str = "high") -> list[dict[str, Any]]:
+        """Return what the core says against these values together (empty when nothing).
+
+        Each finding has ``path``, ``value``, ``limit`` and ``message``: a step too large for a
+        named pole, gains that cannot be stable, limits the wrong way round.
+        """
+        from elevon import _core
+
+        return list(_core.check(self.wiring, fidelity, self.parameters.vector()))

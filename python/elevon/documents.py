@@ -1,0 +1,171 @@
+"""TOML documents: read them, say where a key stands, turn a failed validation into one message."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from elevon.errors import FormatError, InputError, did_you_mean
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel, ValidationError
+
+    Model = TypeVar("Model", bound=BaseModel)
+
+__all__ = ["Document", "dotted", "read_toml", "validated"]
+
+Location = tuple[str | int, ...]
+
+_HEADER = re.compile(r"^\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(#.*)?$")
+_KEY = re.compile(r"""^\s*((?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*')(?:\s*\.\s*[A-Za-z0-9_-]+)*)\s*=""")
+
+
+@dataclass(frozen=True)
+class Document:
+    """A TOML document and where it came from."""
+
+    origin: str
+    text: str
+    data: dict[str, Any]
+    folder: Path | None = None
+    prefix: Location = ()
+
+    def within(self, prefix: Sequence[str | int]) -> Document:
+        """Return the document seen from one of its tables: places are given from there on."""
+        return replace(self, prefix=(*self.prefix, *prefix))
+
+    def place(self, location: Sequence[str | int] = ()) -> str:
+        """Name a place: the file, the line where one is found, and the dotted key."""
+        location = (*self.prefix, *location)
+        line = self._line(location)
+        start = f"{self.origin}:{line}" if line else self.origin
+        return f"{start}: {dotted(location)}" if location else start
+
+    def _line(self, location: Location) -> int | None:
+        while location:
+            if location in self._lines:
+                return self._lines[location]
+            location = location[:-1]
+        return None
+
+    @cached_property
+    def _lines(self) -> dict[Location, int]:
+        """Line number of each table header and each `key =` line."""
+        lines: dict[Location, int] = {}
+        counts: dict[Location, int] = {}
+        table: Location = ()
+        for number, text in enumerate(self.text.splitlines(), start=1):
+            if header := _HEADER.match(text):
+                array = header.group(1) == "[["
+                table = _table(_split(header.group(2)), counts, array=array)
+                lines.setdefault(table, number)
+            elif key := _KEY.match(text):
+                lines.setdefault(table + _split(key.group(1)), number)
+        return lines
+
+
+def read_toml(path: str | Path) -> Document:
+    """Read a TOML file.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read.
+    FormatError
+        It is not TOML; the message holds the line.
+    """
+    file = Path(path).expanduser()
+    try:
+        text = file.read_bytes().decode("utf-8")
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise FormatError(f"{file}: is not UTF-8 text: {error}") from error
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise FormatError(f"{file}: not valid TOML: {error}") from error
+    return Document(str(file), text, data, file.parent)
+
+
+def validated(model: type[Model], data: Mapping[str, Any], document: Document) -> Model:
+    """Build a pydantic model, or raise one `InputError` that lists every finding with its place."""
+    from pydantic import ValidationError
+
+    try:
+        return model.model_validate(dict(data))
+    except ValidationError as error:
+        raise InputError(_explain(error, model, document)) from error
+
+
+def dotted(location: Sequence[str | int]) -> str:
+    """Write a location as a dotted key with indices: ``command.terms[0].kind``."""
+    text = ""
+    for part in location:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return text
+
+
+def _explain(error: ValidationError, model: type[BaseModel], document: Document) -> str:
+    findings = []
+    for item in error.errors(include_url=False):
+        location = tuple(item["loc"])
+        message = item["msg"].removeprefix("Value error, ")
+        if item["type"] == "extra_forbidden":
+            name = str(location[-1])
+            valid = _fields(model, location[:-1])
+            message = f"unknown key {name!r}{did_you_mean(name, valid)}"
+        elif item["type"] == "missing":
+            message = "is missing"
+        elif not item["type"].startswith("value_error"):
+            message = f"{message} (given: {item['input']!r})"
+        findings.append(f"{document.place(location)}: {message}")
+    return "\n".join(findings)
+
+
+def _fields(model: Any, location: Sequence[str | int]) -> list[str]:
+    """Names of the fields of the model found at a location, following lists and mappings."""
+    from pydantic import BaseModel
+
+    for part in location:
+        if isinstance(model, type) and issubclass(model, BaseModel) and part in model.model_fields:
+            model = _inner_model(model.model_fields[str(part)].annotation)
+    if isinstance(model, type) and issubclass(model, BaseModel):
+        return [field.alias or name for name, field in model.model_fields.items()]
+    return []
+
+
+def _inner_model(annotation: Any) -> Any:
+    from typing import get_args
+
+    from pydantic import BaseModel
+
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for argument in get_args(annotation):
+        found = _inner_model(argument)
+        if found is not None:
+            return found
+    return None
+
+
+def _split(key: str) -> Location:
+    return tuple(part.strip().strip("\"'") for part in key.split("."))
+
+
+def _table(path: Location, counts: dict[Location, int], *, array: bool) -> Location:
+    """Location of a table header, with the index of each array of tables on the way."""
+    location: Location = ()
+    for depth, part in enumerate(path):
+        location = (*location, part)
+        last = depth == len(path) - 1
+        if last and array:
+            counts[location] = counts.get(location, -1) + 1
+        if location in counts:
+            location = (*location, counts[location])
+    return location

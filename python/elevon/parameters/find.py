@@ -1,0 +1,69 @@
+"""Where parameter sets are found: shipped with the package, in folders of the user, or a file."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from elevon.errors import InputError, unknown
+
+__all__ = ["VARIABLE", "find_set", "set_names", "set_paths"]
+
+#: Folders with more sets, separated like PATH.
+VARIABLE = "ELEVON_SETS"
+
+_SHIPPED = Path(__file__).parent / "sets"
+
+
+def set_paths() -> dict[str, Path]:
+    """Return every set by name; a set of the user hides a shipped one of the same name."""
+    folders = [_SHIPPED, *_user_folders()]
+    return {file.stem: file for folder in folders for file in sorted(folder.glob("*.toml"))}
+
+
+def set_names() -> list[str]:
+    """Return the names of the sets that can be loaded by name, sorted."""
+    return sorted(set_paths())
+
+
+def find_set(reference: str | os.PathLike[str], folder: Path | None = None) -> Path:
+    """Find a set by name or by file.
+
+    Parameters
+    ----------
+    reference : str or path
+        The name of a set, or a TOML file.
+    folder : Path, optional
+        Where a relative file is looked for first: the folder of the set that names it as `base`.
+
+    Raises
+    ------
+    UnknownNameError
+        No set of that name; the message holds the nearest.
+    InputError
+        The file does not exist.
+    """
+    text = os.fspath(reference)
+    if text.endswith(".toml") or os.sep in text:
+        return _file(text, folder)
+    known = set_paths()
+    if text not in known:
+        raise unknown("actuator", text, known)
+    return known[text]
+
+
+def _file(text: str, folder: Path | None) -> Path:
+    path = Path(text).expanduser()
+    if folder is not None and not path.is_absolute() and (folder / path).is_file():
+        path = folder / path
+    if not path.is_file():
+        raise InputError(f"{path}: no such actuator file")
+    return path
+
+
+def _user_folders() -> list[Path]:
+    folders = [Path(part).expanduser() for part in os.environ.get(VARIABLE, "").split(os.pathsep) if part]
+    for folder in folders:
+        if not folder.is_dir():
+            raise InputError(f"{VARIABLE}: {folder} is not a folder")
+    return folders

@@ -1,0 +1,52 @@
+"""What a set file may hold (checked by pydantic before anything is computed)."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, StrictStr, field_validator
+
+__all__ = ["Entry", "Header", "Reference"]
+
+Number = StrictInt | StrictFloat
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Reference(_Strict):
+    """A publication the sources point to."""
+
+    key: StrictStr = Field(min_length=1, description="Short name used in the sources")
+    text: StrictStr = Field(min_length=1, description="The full citation")
+
+
+class Entry(_Strict):
+    """One parameter as written in the file."""
+
+    value: Number | StrictStr = Field(description="The number, or the name of a choice")
+    unit: StrictStr = Field("", description="Unit of value, old and interval")
+    source: StrictStr = Field(description="Where the number comes from; 'ASSUMED: reason' is legal")
+    note: StrictStr = Field("", description="Derivation, or what to know before using it")
+    confidence: Literal["published", "derived", "assumed", "calibrated"]
+    old: Number | StrictStr | None = Field(None, description="The value before calibration")
+    interval: tuple[Number, Number] | None = Field(None, description="Interval of the calibrated value")
+
+    @field_validator("source")
+    @classmethod
+    def _not_silent(cls, source: str) -> str:
+        if not source.strip() or source.strip().rstrip(":") == "ASSUMED":
+            raise ValueError("a source is needed: a reference, or 'ASSUMED: ' with the reason")
+        return source
+
+
+class Header(_Strict):
+    """The keys of a set file that are not parameters."""
+
+    name: StrictStr = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
+    title: StrictStr = ""
+    wiring: StrictStr | None = Field(None, description="Which wiring of the core; from the base if absent")
+    base: StrictStr | None = Field(None, description="Set name or file this one overrides")
+    references: tuple[Reference, ...] = ()
+    scenario: dict[str, Any] | None = Field(None, description="What runs when none is given")

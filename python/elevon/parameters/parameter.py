@@ -1,0 +1,55 @@
+"""One parameter: its value in SI and everything a reader needs to trust it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from elevon.units import format_quantity
+
+__all__ = ["CONFIDENCES", "Confidence", "Parameter"]
+
+Confidence = Literal["published", "derived", "assumed", "calibrated", "default", "override"]
+
+#: What a set file may say; `default` and `override` are given by the program.
+CONFIDENCES = ("published", "derived", "assumed", "calibrated")
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A value of an actuator, with its provenance.
+
+    Attributes
+    ----------
+    path : str
+        Dotted path, such as ``motor.inertia``.
+    value : float or str
+        SI value, or the name of a choice.
+    unit : str
+        The unit as written in the set; empty for choices and pure numbers.
+    source : str
+        Where the number comes from; starts with ``ASSUMED`` when nobody published it.
+    note : str
+        How it was derived, what to know before using it.
+    confidence : str
+        published, derived, assumed, calibrated; ``default`` for a healthy value the model itself
+        gives, ``override`` for one set by the caller.
+    old : float, optional
+        SI value before calibration or override.
+    interval : tuple of float, optional
+        SI limits of the calibrated value's interval.
+    """
+
+    path: str
+    value: float | str
+    unit: str = ""
+    source: str = ""
+    note: str = ""
+    confidence: Confidence = "assumed"
+    old: float | str | None = None
+    interval: tuple[float, float] | None = None
+
+    @property
+    def text(self) -> str:
+        """The value with its unit, as written: ``"7.7 kg cm2"``."""
+        return self.value if isinstance(self.value, str) else format_quantity(self.value, self.unit)

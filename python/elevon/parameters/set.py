@@ -1,0 +1,136 @@
+"""A complete, checked, immutable collection of parameters of one wiring."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from elevon.errors import InputError, unknown
+from elevon.parameters.parameter import Parameter
+from elevon.parameters.records import record_of, records
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+__all__ = ["ParameterSet"]
+
+
+class ParameterSet(Mapping[str, Parameter]):
+    """All parameters of one wiring: a mapping from path to `Parameter`.
+
+    Parameters
+    ----------
+    wiring : str
+        The core's wiring.
+    entries : mapping
+        Path to `Parameter`. Where the core has a default, the entry may be absent.
+    place : str, optional
+        Named in the errors: the file.
+
+    Raises
+    ------
+    UnknownNameError
+        A path the wiring does not have, with the nearest.
+    RangeError
+        A value outside its range or not finite.
+    InputError
+        A parameter without a default is missing.
+    """
+
+    __slots__ = ("_items", "wiring")
+
+    def __init__(self, wiring: str, entries: Mapping[str, Parameter], place: str = "") -> None:
+        known = records(wiring)
+        start = f"{place}: " if place else ""
+        for path, entry in entries.items():
+            record = record_of(wiring, path, place or None)
+            record.read(entry.value, f"{start}{path}")
+        missing = [p for p, r in known.items() if p not in entries and r.default is None]
+        if missing:
+            listed = ", ".join(missing[:8]) + (" ..." if len(missing) > 8 else "")
+            raise InputError(f"{start}{len(missing)} parameter(s) missing: {listed}")
+        self._hold(wiring, {path: entries.get(path) or _default(wiring, path) for path in known})
+
+    def _hold(self, wiring: str, items: dict[str, Parameter]) -> None:
+        self.wiring = wiring
+        self._items = MappingProxyType(items)
+
+    def __getitem__(self, path: str) -> Parameter:
+        try:
+            return self._items[path]
+        except KeyError:
+            raise unknown("parameter", path, self._items) from None
+
+    def __contains__(self, path: object) -> bool:
+        return path in self._items
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._items)
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def __repr__(self) -> str:
+        return f"ParameterSet(wiring={self.wiring!r}, {len(self)} parameters, hash={self.hash})"
+
+    def __reduce__(self) -> tuple[type[ParameterSet], tuple[str, dict[str, Parameter]]]:
+        return ParameterSet, (self.wiring, dict(self._items))
+
+    def value(self, path: str) -> float:
+        """Return one number in SI; a choice as its index."""
+        return records(self.wiring)[path].number(self[path].value)
+
+    def vector(self) -> npt.NDArray[np.float64]:
+        """Return all values, shape (n,), in the core's order, SI, choices as indices."""
+        import numpy as np
+
+        known = records(self.wiring)
+        return np.array([known[path].number(item.value) for path, item in self._items.items()])
+
+    def replaced(
+        self, values: Mapping[str, str | float], *, source: str = "set by the caller", place: str = ""
+    ) -> ParameterSet:
+        """Return a set with some values changed; a number alone is SI, text may carry a unit.
+
+        Raises
+        ------
+        UnknownNameError, UnitError, RangeError
+            As the constructor.
+        """
+        items = dict(self._items)
+        for path, given in values.items():
+            record = record_of(self.wiring, path, place or None)
+            value = record.read(given, f"{place}: {path}" if place else path)
+            old = items[path]
+            items[path] = replace(
+                old,
+                value=value,
+                unit=old.unit or record.unit,
+                source=source,
+                note="",
+                confidence="override",
+                old=old.value,
+                interval=None,
+            )
+        # Everything else was checked when this set was made.
+        result = ParameterSet.__new__(ParameterSet)
+        result._hold(self.wiring, items)
+        return result
+
+    @property
+    def hash(self) -> str:
+        """Sixteen hexadecimal digits over the wiring and every value, not over the notes."""
+        lines = [self.wiring, *(f"{path}={item.value!r}" for path, item in self._items.items())]
+        return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:16]
+
+
+def _default(wiring: str, path: str) -> Parameter:
+    record = records(wiring)[path]
+    value = record.default_value()
+    assert value is not None
+    unit = record.unit if record.unit != "1" and record.choices is None else ""
+    return Parameter(path, value, unit, "the model's default", record.text, "default")

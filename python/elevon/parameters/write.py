@@ -1,0 +1,127 @@
+"""Write values back into a set file, keeping its comments and order."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from elevon.errors import InputError
+from elevon.files import write_text
+from elevon.parameters.parameter import CONFIDENCES, Parameter
+from elevon.units import to_display
+
+__all__ = ["updated_set", "write_set"]
+
+
+def updated_set(text: str, changes: Iterable[Parameter]) -> str:
+    """Return the text of a set file with some entries replaced or added.
+
+    Comments, order and every untouched entry stay as they are.
+
+    Parameters
+    ----------
+    text : str
+        TOML text.
+    changes : iterable of Parameter
+        New entries; values are written in the parameter's own unit.
+
+    Returns
+    -------
+    str
+        TOML text.
+    """
+    import tomlkit
+
+    document = tomlkit.parse(text)
+    for parameter in changes:
+        parts = parameter.path.split(".")
+        table: Any = document
+        for part in parts[:-1]:
+            if part not in table:
+                table.add(part, tomlkit.table(is_super_table=True))
+            table = table[part]
+        if parts[-1] not in table:
+            table.add(parts[-1], tomlkit.table())
+        _fill(table[parts[-1]], parameter)
+    return tomlkit.dumps(document)
+
+
+def write_set(
+    path: str | os.PathLike[str],
+    *,
+    name: str,
+    changes: Iterable[Parameter],
+    base: str | None = None,
+    title: str = "",
+    force: bool = False,
+) -> Path:
+    """Write a set file that overrides a base (or extends the file that is there).
+
+    Parameters
+    ----------
+    path : path
+        The file; written whole or not at all.
+    name : str
+        The set's name.
+    changes : iterable of Parameter
+        Entries to write.
+    base : str, optional
+        The set or file the new one overrides.
+    title : str
+        One line.
+    force : bool
+        Whether an existing file may be replaced.
+
+    Returns
+    -------
+    Path
+        The file written.
+    """
+    import tomlkit
+
+    head = tomlkit.document()
+    head.add("name", tomlkit.item(name))
+    if title:
+        head.add("title", tomlkit.item(title))
+    if base:
+        head.add("base", tomlkit.item(base))
+    return write_text(path, updated_set(tomlkit.dumps(head), changes), force=force)
+
+
+def _fill(table: Any, parameter: Parameter) -> None:
+    if parameter.confidence not in CONFIDENCES:
+        raise InputError(
+            f"{parameter.path}: a value of confidence {parameter.confidence!r} cannot be written; "
+            "give it a source and a confidence first"
+        )
+    new = {
+        "value": _written(parameter.value, parameter.unit),
+        "unit": parameter.unit,
+        "source": parameter.source,
+        "note": parameter.note,
+        "confidence": parameter.confidence,
+        "old": None if parameter.old is None else _written(parameter.old, parameter.unit),
+        "interval": parameter.interval
+        and [_written(limit, parameter.unit) for limit in parameter.interval],
+    }
+    for key, value in new.items():
+        if value is None or value == "":
+            table.pop(key, None)
+        else:
+            table[key] = value
+
+
+def _written(value: float | str, unit: str) -> float | str:
+    """Return the shortest number in the entry's own unit that reads back as the same SI float."""
+    if isinstance(value, str):
+        return value
+    from elevon.units import parse_quantity
+
+    exact = float(to_display(value, unit))
+    for digits in range(6, 17):
+        short = float(f"{exact:.{digits}g}")
+        if parse_quantity(f"{short!r} {unit}".strip(), unit or "1") == value:
+            return short
+    return exact
