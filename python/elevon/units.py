@@ -28,8 +28,10 @@ __all__ = [
     "convert",
     "format_quantity",
     "kind_name",
+    "known_units",
     "parse_quantity",
     "parse_unit",
+    "si_unit",
     "to_display",
     "to_si",
 ]
@@ -127,6 +129,16 @@ def kind_name(unit_text: str) -> str:
         if parse_unit(example).dimension == dimension:
             return name
     return "another quantity"
+
+
+def si_unit(unit_text: str) -> str:
+    """Return the SI unit of the same kind: ``"rad/s"`` for ``"rpm"``."""
+    dimension = parse_unit(unit_text).dimension
+    for _, example in KINDS:
+        if parse_unit(example).dimension == dimension:
+            return example
+    symbols = zip(("m", "kg", "s", "A", "K", "rad"), dimension, strict=True)
+    return " ".join(f"{name}{power if power != 1 else ''}" for name, power in symbols if power)
 
 
 @overload

@@ -1,0 +1,95 @@
+"""One recorded quantity."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.errors import InputError, UnitError
+from elevon.recording.clock import Clock, frozen
+from elevon.recording.names import check_name
+from elevon.units import parse_unit, to_display
+
+__all__ = ["Channel"]
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """A named quantity sampled on a clock, in SI units.
+
+    Parameters
+    ----------
+    name : str
+        ASCII identifier of at most 31 characters.
+    unit : str
+        SI unit (``"rad"``, ``"N m"``, ``"1"``). `Recording.build` converts other units.
+    values : array_like, shape (n,)
+        One value for each instant of the clock; NaN marks a missing sample.
+    clock : Clock
+        The time base.
+    text : str
+        What the quantity is, for labels and documentation.
+
+    Raises
+    ------
+    InputError
+        Bad name, not one value an instant, values that are not numbers.
+    UnitError
+        Unknown unit, or one that is not of the SI.
+    """
+
+    name: str
+    unit: str
+    values: npt.NDArray[np.float64]
+    clock: Clock
+    text: str = ""
+
+    def __init__(
+        self, name: str, unit: str, values: npt.ArrayLike, clock: Clock, text: str = ""
+    ) -> None:
+        check_name(name)
+        parsed = parse_unit(unit, f"channel {name!r}")
+        if parsed.factor != 1.0 or parsed.offset:
+            raise UnitError(f"channel {name!r}: unit {unit!r} is not SI; Recording.build converts")
+        vector = frozen(values, f"channel {name!r}")
+        if vector.size != len(clock):
+            raise InputError(
+                f"channel {name!r}: {vector.size} values for the {len(clock)} instants "
+                f"of clock {clock.name!r}"
+            )
+        pairs = {"name": name, "unit": unit, "values": vector, "clock": clock, "text": text}
+        for key, value in pairs.items():
+            object.__setattr__(self, key, value)
+
+    @property
+    def time(self) -> npt.NDArray[np.float64]:
+        """Instants of the samples in s, shape (n,), read-only."""
+        return self.clock.time
+
+    def __len__(self) -> int:
+        return int(self.values.size)
+
+    def __repr__(self) -> str:
+        return f"Channel({self.name!r}, {self.unit!r}, {len(self)} samples on {self.clock.name!r})"
+
+    def to(self, unit: str) -> npt.NDArray[np.float64]:
+        """Return the values in another unit of the same kind, shape (n,).
+
+        Raises
+        ------
+        UnitError
+            Unknown unit, or one of another kind.
+        """
+        from elevon.units import check_kind
+
+        check_kind(unit, self.unit, f"channel {self.name!r}")
+        return to_display(self.values, unit)
+
+    def equals(self, other: "Channel") -> bool:
+        """Tell whether two channels are the same, to the last bit of every value."""
+        same = (self.name, self.unit, self.text) == (other.name, other.unit, other.text)
+        return (
+            same
+            and self.clock.equals(other.clock)
+            and self.values.tobytes() == other.values.tobytes()
+        )

@@ -1,0 +1,405 @@
+"""The recording: what a run, or a bench, has to say."""
+
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.errors import InputError, unknown
+from elevon.recording.channel import Channel
+from elevon.recording.clock import Clock
+from elevon.recording.header import plain
+from elevon.units import parse_unit, si_unit, to_si
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+__all__ = ["Recording"]
+
+MAX_BYTES = 8 * 2**30
+
+
+class Recording:
+    """Named channels on one or several clocks, with what is known about them.
+
+    A simulated run and a measured log are the same type. Channels are found by name
+    (``recording["user_position"]``); values are SI and read-only.
+
+    Parameters
+    ----------
+    channels : iterable of Channel
+        Channels; two of them on one clock must hold the same `Clock`.
+    clocks : iterable of Clock, optional
+        Clocks that carry no channel, kept as well.
+    meta : mapping, optional
+        What is known about the run: status, message, actuator, fidelity, seed, parameter hash,
+        version, steps... Text, numbers, sequences and mappings only.
+    labels : sequence or mapping, optional
+        The faults really present.
+    final : mapping, optional
+        Signal name to last value (SI).
+
+    Attributes
+    ----------
+    names : list of str
+        Names of the channels.
+    clocks : dict of str to Clock
+        The clocks by name.
+    meta, labels, final
+        As given, in plain Python types.
+
+    Raises
+    ------
+    InputError
+        A name given twice (names differing only by case count as one), two clocks of one name, a
+        `meta` that no file could hold.
+    """
+
+    def __init__(
+        self,
+        channels: Iterable[Channel],
+        *,
+        clocks: Iterable[Clock] = (),
+        meta: Mapping[str, Any] | None = None,
+        labels: Sequence[Any] | Mapping[str, Any] | None = None,
+        final: Mapping[str, float] | None = None,
+    ) -> None:
+        self._channels: dict[str, Channel] = {}
+        self.clocks: dict[str, Clock] = {}
+        for clock in clocks:
+            self._add_clock(clock)
+        seen: dict[str, str] = {}
+        for channel in channels:
+            other = seen.setdefault(channel.name.lower(), channel.name)
+            if channel.name in self._channels or other != channel.name:
+                raise InputError(f"channel {channel.name!r}: the name is given twice")
+            self._add_clock(channel.clock)
+            self._channels[channel.name] = channel
+        self.meta: dict[str, Any] = plain(dict(meta or {}), "meta")
+        self.labels: Any = plain(labels if labels is not None else [], "labels")
+        self.final: dict[str, float] = plain(dict(final or {}), "final")
+
+    def _add_clock(self, clock: Clock) -> None:
+        if self.clocks.setdefault(clock.name, clock) is not clock:
+            raise InputError(f"clock {clock.name!r}: two different clocks have this name")
+
+    @classmethod
+    def build(
+        cls,
+        time: npt.ArrayLike,
+        values: Mapping[str, npt.ArrayLike],
+        units: Mapping[str, str],
+        *,
+        clock: str = "main",
+        rate: float | None = None,
+        gaps: Sequence[int] | None = None,
+        meta: Mapping[str, Any] | None = None,
+        labels: Sequence[Any] | Mapping[str, Any] | None = None,
+    ) -> "Recording":
+        """Make a recording on one clock from arrays in any units; `joined` adds further clocks.
+
+        Parameters
+        ----------
+        time : array_like, shape (n,)
+            Instants in s, strictly increasing, regular or not.
+        values : mapping of str to array_like, shape (n,)
+            Channel name to values; NaN marks a missing sample.
+        units : mapping of str to str
+            The unit of every channel; values are converted to SI.
+        clock : str
+            Name of the clock.
+        rate : float, optional
+            Nominal rate in Hz.
+        gaps : sequence of int, optional
+            As for `Clock`; found from the rate when absent.
+        meta, labels
+            As for `Recording`.
+
+        Returns
+        -------
+        Recording
+            On one clock.
+
+        Raises
+        ------
+        InputError
+            A channel without unit, a unit without channel, or as for `Clock` and `Channel`.
+        """
+        for name in units:
+            if name not in values:
+                raise unknown("channel", name, values, "units")
+        missing = [name for name in values if name not in units]
+        if missing:
+            raise InputError(f"units: no unit for the channels {', '.join(missing)}")
+        base = Clock(clock, time, rate, gaps)
+        channels = [_in_si(name, units[name], values[name], base) for name in values]
+        return cls(channels, clocks=[base], meta=meta, labels=labels)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the channels, in recorded order."""
+        return list(self._channels)
+
+    @property
+    def channels(self) -> list[Channel]:
+        """The channels, in recorded order."""
+        return list(self._channels.values())
+
+    @property
+    def status(self) -> str:
+        """`ok`, `tripped`, `diverged`, `interrupted`; `measured` when nothing was simulated."""
+        return str(self.meta.get("status", "measured"))
+
+    def __getitem__(self, name: str) -> Channel:
+        try:
+            return self._channels[name]
+        except KeyError:
+            raise unknown("channel", str(name), self._channels, "recording") from None
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._channels
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._channels)
+
+    def __len__(self) -> int:
+        return len(self._channels)
+
+    def __repr__(self) -> str:
+        clocks = ", ".join(repr(clock) for clock in self.clocks.values())
+        return f"<Recording {self.status}: {len(self)} channels on [{clocks}]>"
+
+    def clock(self, name: str | None = None) -> Clock:
+        """Return a clock by name, or the only one.
+
+        Raises
+        ------
+        InputError
+            No such clock, or no name and several clocks.
+        """
+        if name is None and len(self.clocks) == 1:
+            return next(iter(self.clocks.values()))
+        if name is None:
+            raise InputError(
+                f"the recording has {len(self.clocks)} clocks; name one of "
+                f"{', '.join(map(repr, self.clocks)) or 'none'}"
+            )
+        if name not in self.clocks:
+            raise unknown("clock", name, self.clocks, "recording")
+        return self.clocks[name]
+
+    def on_clock(self, name: str | None = None) -> list[Channel]:
+        """Return the channels of one clock, in recorded order; errors as `clock`."""
+        clock = self.clock(name)
+        return [channel for channel in self._channels.values() if channel.clock is clock]
+
+    def select(
+        self, names: Iterable[str] | None = None, *, clock: str | None = None
+    ) -> "Recording":
+        """Return a recording with some of the channels, sharing their values.
+
+        Parameters
+        ----------
+        names : iterable of str, optional
+            Channels kept, in this order; default all.
+        clock : str, optional
+            Only the channels of this clock.
+
+        Raises
+        ------
+        UnknownNameError
+            No such channel or clock, with the nearest names.
+        """
+        kept = self.channels if names is None else [self[name] for name in names]
+        clocks: list[Clock] = []
+        if clock is not None:
+            base = self.clock(clock)
+            kept, clocks = [channel for channel in kept if channel.clock is base], [base]
+        elif names is None:
+            clocks = list(self.clocks.values())
+        return self._with(kept, clocks)
+
+    def window(self, start: float = -np.inf, stop: float = np.inf) -> "Recording":
+        """Return the part with start <= time <= stop (s), on every clock, sharing the values."""
+        cut: dict[str, tuple[Clock, slice]] = {}
+        for clock in self.clocks.values():
+            first = int(np.searchsorted(clock.time, start, "left"))
+            last = max(first, int(np.searchsorted(clock.time, stop, "right")))
+            gaps = [gap - first for gap in clock.gaps if first <= gap < last - 1]
+            part = slice(first, last)
+            cut[clock.name] = Clock(clock.name, clock.time[part], clock.rate, gaps), part
+        channels = []
+        for channel in self.channels:
+            base, part = cut[channel.clock.name]
+            values = channel.values[part]
+            channels.append(Channel(channel.name, channel.unit, values, base, channel.text))
+        return self._with(channels, [clock for clock, _ in cut.values()])
+
+    def joined(self, other: "Recording") -> "Recording":
+        """Return a recording with the channels and clocks of both; meta of `other` wins.
+
+        Raises
+        ------
+        InputError
+            A channel or a clock of the same name in both.
+        """
+        labels = self.labels or other.labels
+        return Recording(
+            [*self.channels, *other.channels],
+            clocks=[*self.clocks.values(), *other.clocks.values()],
+            meta={**self.meta, **other.meta},
+            labels=labels,
+            final={**self.final, **other.final},
+        )
+
+    def with_meta(self, **entries: Any) -> "Recording":
+        """Return the same recording with entries of `meta` added or replaced."""
+        return Recording(
+            self.channels,
+            clocks=self.clocks.values(),
+            meta={**self.meta, **entries},
+            labels=self.labels,
+            final=self.final,
+        )
+
+    def _with(self, channels: Iterable[Channel], clocks: Iterable[Clock]) -> "Recording":
+        return Recording(
+            channels, clocks=clocks, meta=self.meta, labels=self.labels, final=self.final
+        )
+
+    def equals(self, other: "Recording") -> bool:
+        """Tell whether two recordings are the same, to the last bit of every value."""
+        from elevon.recording.header import Header
+
+        return (
+            Header.of(self).to_json() == Header.of(other).to_json()
+            and all(self.clocks[name].equals(other.clocks[name]) for name in self.clocks)
+            and all(self[name].equals(other[name]) for name in self.names)
+        )
+
+    def to_pandas(self, clock: str | None = None) -> "pd.DataFrame":
+        """Return one clock's channels as a table indexed by time (s); units in ``attrs``."""
+        from elevon.recording.convert import to_pandas
+
+        return to_pandas(self, clock)
+
+    def to_xarray(self) -> "xr.Dataset":
+        """Return all channels as a dataset, one time dimension a clock, units as attributes.
+
+        The dimension is ``time`` for a single clock, ``time_NAME`` for each of several.
+        """
+        from elevon.recording.convert import to_xarray
+
+        return to_xarray(self)
+
+    def to_arrow(self, clock: str | None = None) -> "pa.Table":
+        """Return one clock's time and channels as an Arrow table, units in the field metadata."""
+        from elevon.recording.convert import to_arrow
+
+        return to_arrow(self, clock)
+
+    def plot(
+        self,
+        names: Iterable[str] | None = None,
+        path: str | os.PathLike[str] | None = None,
+        *,
+        units: Mapping[str, str] | None = None,
+        title: str | None = None,
+        force: bool = False,
+    ) -> "Figure | Path":
+        """Plot channels over time, one panel for each unit and clock.
+
+        Parameters
+        ----------
+        names : iterable of str, optional
+            Channels; default all.
+        path : path, optional
+            ``.png``, ``.svg`` or ``.pdf`` for a picture, ``.html`` for one self-contained
+            interactive page. Without it the matplotlib figure is returned and nothing written.
+        units : mapping of str to str, optional
+            Channel name to the unit shown; default degrees, rpm and degC for angles, angular speeds
+            and temperatures, else SI.
+        title : str, optional
+            Title; default the actuator's name.
+        force : bool
+            Whether an existing file may be replaced.
+
+        Returns
+        -------
+        Figure or Path
+            The figure, or the file written.
+
+        Raises
+        ------
+        UnknownNameError
+            Unknown channel or file ending.
+        OutputError
+            The file exists already or cannot be written.
+        """
+        from elevon.recording.plot import plot
+
+        return plot(self, names, path, units=units or {}, title=title, force=force)
+
+    def save(self, path: str | os.PathLike[str], *, force: bool = False) -> Path:
+        """Write the recording to a file, whole or not at all.
+
+        Parameters
+        ----------
+        path : path
+            The ending chooses the format: ``.parquet``, ``.nc``, ``.csv`` (one clock only),
+            ``.mat`` (version 5, at most 2 GB). All give back every bit on load.
+        force : bool
+            Whether an existing file may be replaced.
+
+        Returns
+        -------
+        Path
+            The file written.
+
+        Raises
+        ------
+        UnknownNameError
+            Another ending.
+        InputError
+            Something this format cannot hold.
+        OutputError
+            The file exists already or cannot be written.
+        """
+        from elevon.recording.formats import save
+
+        return save(self, path, force=force)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], *, max_bytes: int = MAX_BYTES) -> "Recording":
+        """Read a file written by `save`. No code in it is ever run.
+
+        Parameters
+        ----------
+        path : path
+            The file.
+        max_bytes : int
+            The largest size in memory that is accepted; default 8 GiB.
+
+        Raises
+        ------
+        FormatError
+            Damaged, not a recording, or larger than `max_bytes`.
+        InputError
+            No such file, or an ending that is not a format.
+        """
+        from elevon.recording.formats import load
+
+        return load(path, max_bytes=max_bytes)
+
+
+def _in_si(name: str, unit: str, values: npt.ArrayLike, clock: Clock) -> Channel:
+    parsed = parse_unit(unit, f"channel {name!r}")
+    if parsed.factor == 1.0 and not parsed.offset:
+        return Channel(name, unit or "1", values, clock)
+    return Channel(name, si_unit(unit), to_si(values, unit), clock)
