@@ -1,0 +1,149 @@
+"""From a flight to the load terms of a scenario."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.errors import InputError, RangeError
+from elevon.loads.airspeed import dynamic_pressure, mach_number
+from elevon.loads.atmosphere import standard_atmosphere
+from elevon.loads.flight import FlightData
+from elevon.loads.hinge import HingeMoment
+
+__all__ = ["LoadTable", "flight_load"]
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LoadTable:
+    """Load and position of an actuator over a flight, ready for a scenario.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n,)
+        s, from 0.
+    load : ndarray, shape (n,)
+        N on a ram (or N m on an output shaft), after scaling; positive opposes positive motion.
+    position : ndarray, shape (n,)
+        m of the ram (or rad of the shaft), after scaling.
+    load_scale, position_scale : float
+        What the aircraft's values were multiplied by.
+    dynamic_pressure, mach : ndarray, shape (n,)
+        Pa, and 1; for plots and checks, never scaled.
+    """
+
+    time: Array
+    load: Array
+    position: Array
+    load_scale: float
+    position_scale: float
+    dynamic_pressure: Array
+    mach: Array
+
+    def load_term(self, *, repeat: bool = False) -> dict[str, Any]:
+        """Return the table as one entry of ``load.user.terms``."""
+        return _term(self.time, self.load, repeat)
+
+    def command_term(self, *, repeat: bool = False) -> dict[str, Any]:
+        """Return the position as one entry of ``command.terms``."""
+        return _term(self.time, self.position, repeat)
+
+    def scenario(self) -> dict[str, Any]:
+        """Return a scenario that flies the flight: command, load and duration, in SI units."""
+        return {
+            "duration": float(self.time[-1]),
+            "command": {"mode": "position", "terms": [self.command_term()]},
+            "load": {"user": {"terms": [self.load_term()]}},
+        }
+
+
+def flight_load(
+    flight: FlightData,
+    surface: HingeMoment,
+    *,
+    arm: float | None = None,
+    limit: float | None = None,
+    travel: float | None = None,
+    temperature_offset: float = 0.0,
+) -> LoadTable:
+    """Return what a flight asks of the actuator of one surface.
+
+    Parameters
+    ----------
+    flight : FlightData
+        The flight.
+    surface : HingeMoment
+        The surface's area, chord and coefficients.
+    arm : float, optional
+        m. Lever between hinge and ram, taken constant: position = arm * deflection, load =
+        -moment/arm. Without it the actuator is rotary and sits on the hinge line. A negative arm is
+        a ram that retracts when the deflection grows.
+    limit : float, optional
+        N (or N m). The load is scaled so that its largest magnitude is this. Without it the load is
+        the aircraft's.
+    travel : float, optional
+        m (or rad). The position is scaled so that its largest magnitude is this.
+    temperature_offset : float
+        K, on the standard atmosphere.
+
+    Returns
+    -------
+    LoadTable
+        With the two scales used. The load follows the RECORDED deflection, not the simulated ram.
+
+    Raises
+    ------
+    RangeError
+        An argument out of range, an altitude outside the standard atmosphere, a calibrated airspeed
+        above Mach 1, a Mach number outside the coefficients' breakpoints.
+    InputError
+        A scale was asked for and the load or the position is zero throughout.
+
+    Notes
+    -----
+    The hinge moment turns the surface towards positive deflection; a load opposes positive motion
+    when positive, so the sign changes: a stable surface (c_delta < 0) loads the ram against its
+    deflection.
+    """
+    lever = 1.0 if arm is None else _finite("arm", arm)
+    if lever == 0.0:
+        raise RangeError("arm: 0 m carries no moment; give a lever, or none for a rotary actuator")
+    air = standard_atmosphere(flight.altitude, temperature_offset=temperature_offset)
+    mach = mach_number(flight.airspeed, flight.airspeed_kind, air)
+    pressure = dynamic_pressure(flight.airspeed, flight.airspeed_kind, air)
+    moment = surface.moment(pressure, mach, flight.angle_of_attack, flight.deflection)
+    load, load_scale = _scaled("limit", -moment / lever, limit)
+    position, position_scale = _scaled("travel", lever * flight.deflection, travel)
+    return LoadTable(
+        flight.time - flight.time[0], load, position, load_scale, position_scale, pressure, mach
+    )
+
+
+def _scaled(name: str, values: Array, peak: float | None) -> tuple[Array, float]:
+    if peak is None:
+        return values, 1.0
+    if _finite(name, peak) <= 0.0:
+        raise RangeError(f"{name}: {peak:g} must be above 0")
+    largest = float(np.abs(values).max())
+    if largest == 0.0:
+        raise InputError(f"{name}: what should be scaled to {peak:g} is zero in the whole flight")
+    factor = peak / largest
+    return np.clip(values * factor, -peak, peak), factor  # the clip is one rounding at the peak
+
+
+def _finite(name: str, value: float) -> float:
+    if not np.isfinite(value):
+        raise RangeError(f"{name}: {value!r} is not a finite number")
+    return float(value)
+
+
+def _term(time: Array, values: Array, repeat: bool) -> dict[str, Any]:
+    return {
+        "kind": "table",
+        "times": time.tolist(),
+        "values": values.tolist(),
+        "repeat": repeat,
+    }
