@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 __all__ = ["Document", "dotted", "read_toml", "validated"]
 
 Location = tuple[str | int, ...]
+
+#: The kinds of plain value a key may hold, as pydantic names the branches of a union.
+_BRANCHES = frozenset({"int", "float", "str", "bool"})
 
 _HEADER = re.compile(r"^\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(#.*)?$")
 _KEY = re.compile(r"""^\s*((?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*')(?:\s*\.\s*[A-Za-z0-9_-]+)*)\s*=""")
@@ -112,20 +116,32 @@ def dotted(location: Sequence[str | int]) -> str:
 
 
 def _explain(error: ValidationError, model: type[BaseModel], document: Document) -> str:
-    findings = []
+    """List the findings, those of the branches of one union as one."""
+    findings: dict[str, str] = {}
     for item in error.errors(include_url=False):
         location = tuple(item["loc"])
-        message = item["msg"].removeprefix("Value error, ")
-        if item["type"] == "extra_forbidden":
-            name = str(location[-1])
-            valid = _fields(model, location[:-1])
-            message = f"unknown key {name!r}{did_you_mean(name, valid)}"
-        elif item["type"] == "missing":
-            message = "is missing"
-        elif not item["type"].startswith("value_error"):
-            message = f"{message} (given: {item['input']!r})"
-        findings.append(f"{document.place(location)}: {message}")
+        if location and location[-1] in _BRANCHES:
+            place, message = document.place(location[:-1]), _not_a_value(item["input"])
+        else:
+            place, message = document.place(location), _finding(item, location, model)
+        findings[f"{place}: {message}"] = ""
     return "\n".join(findings)
+
+
+def _finding(item: Any, location: Location, model: type[BaseModel]) -> str:
+    if item["type"] == "extra_forbidden":
+        valid = _fields(model, location[:-1])
+        return f"unknown key {location[-1]!r}{did_you_mean(str(location[-1]), valid)}"
+    if item["type"] == "missing":
+        return "is missing"
+    message = str(item["msg"]).removeprefix("Value error, ")
+    return message if item["type"] == "value_error" else f"{message} (given: {item['input']!r})"
+
+
+def _not_a_value(given: Any) -> str:
+    if isinstance(given, float) and not math.isfinite(given):
+        return f"{given} is not a finite number"
+    return f"{given!r} is not a number or a text with a number and unit"
 
 
 def _fields(model: Any, location: Sequence[str | int]) -> list[str]:

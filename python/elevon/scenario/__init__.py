@@ -1,0 +1,14 @@
+"""Scenarios: what is asked of an actuator, what acts on it, and what breaks."""
+
+from elevon.scenario.compile import CompiledScenario, compile_scenario
+from elevon.scenario.scenario import Command, Load, Scenario, Term, Terms
+
+__all__ = [
+    "Command",
+    "CompiledScenario",
+    "Load",
+    "Scenario",
+    "Term",
+    "Terms",
+    "compile_scenario",
+]

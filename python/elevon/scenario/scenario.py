@@ -1,0 +1,282 @@
+"""The scenario file and its objects (pydantic: unknown keys are errors, values are frozen)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StrictBool,
+    StrictFloat,
+    StrictInt,
+    StrictStr,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+
+from elevon.documents import Document, read_toml, validated
+from elevon.errors import InputError, did_you_mean
+from elevon.faults import Fault
+from elevon.scenario.waveforms import TABLE, wave_records
+from elevon.series import check_series, read_series
+from elevon.units import parse_quantity
+
+__all__ = ["Command", "Load", "Scenario", "Term", "Terms"]
+
+Quantity = StrictInt | StrictFloat | StrictStr
+
+
+class _Frozen(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Term(BaseModel):
+    """One waveform of a sum; its own parameters are further keys, named by the core's records.
+
+    Attributes
+    ----------
+    kind : str
+        A waveform: constant, step, ramp, sine, chirp, triangle, trapezoid, rectangle, table, ...
+    enabled : bool
+        A switch; a disabled term adds nothing.
+    times, values : tuple of float
+        Points of a table, in `time_unit` and `unit`; instead of them `file`, a CSV file of two
+        columns.
+    """
+
+    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
+    __pydantic_extra__: dict[str, StrictBool | Quantity]
+
+    kind: StrictStr
+    enabled: StrictBool = True
+    times: tuple[StrictInt | StrictFloat, ...] | None = None
+    values: tuple[StrictInt | StrictFloat, ...] | None = None
+    file: StrictStr | None = None
+    unit: StrictStr = ""
+    time_unit: StrictStr = "s"
+
+    @model_validator(mode="after")
+    def _known(self, info: ValidationInfo) -> Self:
+        known = wave_records()
+        if self.kind not in known:
+            raise ValueError(f"unknown waveform {self.kind!r}{did_you_mean(self.kind, known)}")
+        record = known[self.kind]
+        points = ["times", "values", "file", "unit", "time_unit"] if self.kind == TABLE else []
+        valid = ["kind", "enabled", *record.names, *points]
+        for name in (*self.arguments, *(self.model_fields_set - {"kind", "enabled"})):
+            if name not in valid:
+                raise ValueError(f"unknown key {name!r} of a {self.kind}{did_you_mean(name, valid)}")
+        needed = [p.name for p in record.parameters if p.default is None]
+        for name in needed:
+            if name not in self.arguments:
+                raise ValueError(f"a {self.kind} needs {name!r}")
+        if self.kind == TABLE:
+            self._check_points()
+        return self
+
+    @property
+    def arguments(self) -> dict[str, bool | float | str]:
+        """The waveform's own parameters as given."""
+        return dict(self.model_extra or {})
+
+    def points(self) -> tuple[Any, Any]:
+        """Return times and values of a table as given, shape (n,) each, from the file if any."""
+        if self.file is not None:
+            return check_series(*read_series(self.file, "table"), f"table {self.file}")
+        return check_series(self.times or (), self.values or (), "table")
+
+    def _check_points(self) -> None:
+        inline = self.times is not None or self.values is not None
+        if inline == (self.file is not None):
+            raise ValueError("a table needs either 'times' and 'values' or a 'file'")
+        try:
+            self.points()
+        except InputError as error:
+            raise ValueError(str(error)) from error
+
+
+class Terms(_Frozen):
+    """A sum of waveforms acting at one place."""
+
+    terms: tuple[Term, ...] = ()
+
+
+class Command(Terms):
+    """What is asked: the user's position, the motor's speed, or the motor's torque."""
+
+    mode: Literal["position", "speed", "torque"] = "position"
+
+
+class Load(_Frozen):
+    """What acts on the actuator from outside; zero where nothing is given.
+
+    Attributes
+    ----------
+    brake : Terms
+        N m on the fast shaft, resistive: adds to the dry friction.
+    shaft : Terms
+        N m on the fast shaft, positive when it opposes positive motion.
+    user : Terms
+        N m (N for linear actuators) on the user side, positive when it opposes positive motion.
+    """
+
+    brake: Terms = Terms()
+    shaft: Terms = Terms()
+    user: Terms = Terms()
+
+
+def _flat(given: Any) -> Any:
+    """Turn the nested tables TOML makes of ``motor.inertia = 1`` back into dotted keys."""
+    if not isinstance(given, Mapping):
+        return given
+    flat: dict[str, Any] = {}
+    for key, value in given.items():
+        if isinstance(value, Mapping):
+            flat.update({f"{key}.{name}": item for name, item in _flat(value).items()})
+        else:
+            flat[str(key)] = value
+    return flat
+
+
+def _fault_table(given: Any) -> Any:
+    """Accept `Fault` objects and texts of the fault grammar beside tables; return tables."""
+    if not isinstance(given, (list, tuple)):
+        return given
+    read = []
+    for index, item in enumerate(given):
+        try:
+            fault = _fault(item, index)
+        except InputError as error:
+            raise ValueError(str(error)) from error
+        read.append(fault)
+    return tuple(read)
+
+
+def _fault(item: Any, index: int) -> Any:
+    if isinstance(item, str):
+        return Fault.parse(item)
+    if isinstance(item, Mapping):
+        return Fault.from_dict(item, f"fault[{index}]")
+    return item
+
+
+Values = Annotated[dict[str, Quantity], BeforeValidator(_flat)]
+
+
+class Scenario(_Frozen):
+    """What is asked of an actuator, what acts on it, what breaks, and for how long.
+
+    Attributes
+    ----------
+    duration : float or str
+        Simulated time; a bare number is in s.
+    command : Command
+        Mode and sum of waveforms; nothing asked means a constant zero.
+    loads : Load
+        Key ``load`` of the file: loads on the fast shaft and the user side.
+    supply : Terms
+        V; when empty, the set's own supply voltage.
+    fault : tuple of Fault
+        What breaks. Texts of the fault grammar and tables are accepted.
+    initial : mapping
+        Signal name to value at the start.
+    parameters : mapping
+        Parameter path to value: overrides of the actuator.
+    text : str
+        A line for the reader.
+
+    Examples
+    --------
+    >>> scenario = Scenario.from_dict({
+    ...     "duration": "2 s",
+    ...     "command": {"terms": [{"kind": "sine", "amplitude": "7 deg", "frequency": "0.2 Hz"}]},
+    ... })  # doctest: +SKIP
+    """
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, arbitrary_types_allowed=True
+    )
+
+    text: StrictStr = ""
+    duration: Quantity
+    command: Command = Command()
+    loads: Load = Field(default=Load(), alias="load")
+    supply: Terms = Terms()
+    fault: Annotated[tuple[Fault, ...], BeforeValidator(_fault_table)] = ()
+    initial: Values = Field(default_factory=dict)
+    parameters: Values = Field(default_factory=dict)
+
+    @field_validator("duration")
+    @classmethod
+    def _positive(cls, duration: float | str) -> float | str:
+        try:
+            seconds = parse_quantity(duration, "s")
+        except InputError as error:
+            raise ValueError(str(error)) from error
+        if seconds <= 0.0:
+            raise ValueError(f"{duration} must be longer than zero")
+        return duration
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Scenario:
+        """Read a scenario file (TOML).
+
+        Raises
+        ------
+        InputError
+            The message lists every finding with file, line, key, limit and the nearest names.
+        """
+        document = read_toml(Path(path))
+        return validated(cls, _located(document.data, document.folder), document)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], place: str = "scenario") -> Scenario:
+        """Build a scenario from nested mappings of the file's form.
+
+        Raises
+        ------
+        InputError
+            The message lists every finding with its place, limit and the nearest names.
+        """
+        return validated(cls, data, Document(place, "", {}))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return nested mappings of the file's form, without what was left at its default."""
+        data = self.model_dump(exclude_unset=True, exclude={"fault"}, mode="json", by_alias=True)
+        if self.fault:
+            data["fault"] = [fault.to_dict() for fault in self.fault]
+        return data
+
+    @property
+    def seconds(self) -> float:
+        """The duration in s."""
+        return parse_quantity(self.duration, "s")
+
+    def replaced(self, **changes: Any) -> Scenario:
+        """Return a scenario with some of its fields changed, checked as a whole."""
+        return Scenario.from_dict({**self.to_dict(), **changes})
+
+    def with_faults(self, faults: Iterable[Fault | str | Mapping[str, Any]]) -> Scenario:
+        """Return a scenario with further faults."""
+        return self.replaced(fault=[*self.fault, *faults])
+
+
+def _located(data: Any, folder: Path | None) -> Any:
+    """Make the files named in tables relative to the scenario's folder."""
+    if isinstance(data, list):
+        return [_located(item, folder) for item in data]
+    if not isinstance(data, dict):
+        return data
+    return {
+        key: str((folder / item).resolve())
+        if key == "file" and isinstance(item, str) and folder is not None
+        else _located(item, folder)
+        for key, item in data.items()
+    }
