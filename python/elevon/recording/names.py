@@ -12,8 +12,28 @@ LONGEST_NAME = 31
 
 _FORM = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _MATLAB = frozenset(
-    "break case catch classdef continue else elseif end for function global if otherwise parfor "
-    "persistent return spmd switch try while".split()
+    {
+        "break",
+        "case",
+        "catch",
+        "classdef",
+        "continue",
+        "else",
+        "elseif",
+        "end",
+        "for",
+        "function",
+        "global",
+        "if",
+        "otherwise",
+        "parfor",
+        "persistent",
+        "return",
+        "spmd",
+        "switch",
+        "try",
+        "while",
+    }
 )
 _RESERVED = frozenset({"time", "clock", "units", "elevon"})
 
@@ -39,7 +59,7 @@ def check_name(name: str, what: str = "channel") -> str:
         Not an ASCII identifier of at most 31 characters starting with a letter, or a word that
         Python, MATLAB or the file formats reserve.
     """
-    if not isinstance(name, str) or not _FORM.fullmatch(name):
+    if not _FORM.fullmatch(str(name)):
         raise InputError(
             f"{what} {name!r}: a name is a letter followed by letters, digits and underscores"
         )

@@ -1,0 +1,62 @@
+"""Recordings as pandas tables, xarray datasets and Arrow tables."""
+
+from typing import TYPE_CHECKING
+
+from elevon.recording.header import Header
+from elevon.recording.recording import Recording
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+    import xarray as xr
+
+__all__ = ["time_name", "to_arrow", "to_pandas", "to_xarray"]
+
+
+def time_name(recording: Recording, clock: str) -> str:
+    """Return the name of a clock's dimension: ``time``, or ``time_NAME`` beside others."""
+    return "time" if len(recording.clocks) == 1 else f"time_{clock}"
+
+
+def to_pandas(recording: Recording, clock: str | None) -> "pd.DataFrame":
+    """See `Recording.to_pandas`."""
+    import pandas as pd
+
+    base = recording.clock(clock)
+    channels = recording.on_clock(base.name)
+    index = pd.Index(base.time, name="time")
+    table = pd.DataFrame({c.name: c.values for c in channels}, index=index)
+    table.attrs["units"] = {"time": "s", **{c.name: c.unit for c in channels}}
+    return table
+
+
+def to_xarray(recording: Recording) -> "xr.Dataset":
+    """See `Recording.to_xarray`."""
+    import xarray as xr
+
+    coordinates, variables = {}, {}
+    for clock in recording.clocks.values():
+        dimension = time_name(recording, clock.name)
+        attributes: dict[str, object] = {"units": "s", "clock": clock.name}
+        if clock.rate is not None:
+            attributes["rate_hz"] = clock.rate
+        coordinates[dimension] = xr.Variable((dimension,), clock.time, attributes)
+        for channel in recording.on_clock(clock.name):
+            notes = {"units": channel.unit, "long_name": channel.text or channel.name}
+            variables[channel.name] = xr.Variable((dimension,), channel.values, notes)
+    return xr.Dataset(variables, coordinates, {"elevon": Header.of(recording).to_json()})
+
+
+def to_arrow(recording: Recording, clock: str | None) -> "pa.Table":
+    """See `Recording.to_arrow`."""
+    import pyarrow as pa
+
+    base = recording.clock(clock)
+    channels = recording.on_clock(base.name)
+    fields = [pa.field("time", pa.float64(), nullable=False, metadata={"unit": "s"})]
+    fields += [
+        pa.field(c.name, pa.float64(), metadata={"unit": c.unit, "text": c.text}) for c in channels
+    ]
+    arrays = [pa.array(base.time), *(pa.array(c.values) for c in channels)]
+    header = Header.of(recording.select(clock=base.name)).to_json()
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata={"elevon": header}))

@@ -1,0 +1,99 @@
+"""The file formats of recordings, chosen by the file's ending."""
+
+import os
+from pathlib import Path
+from typing import Protocol
+
+from elevon.errors import FormatError, InputError, UnknownNameError, nearest, unknown
+from elevon.files import atomic_path, check_output
+from elevon.recording.recording import Recording
+
+__all__ = ["ENDINGS", "check_ending", "load", "save"]
+
+ENDINGS = (".parquet", ".nc", ".csv", ".mat")
+
+
+class _Format(Protocol):
+    def check(self, recording: Recording) -> None:
+        """Refuse what the format cannot hold, before anything is written."""
+
+    def write(self, recording: Recording, path: Path) -> None:
+        """Write to a fresh temporary path."""
+
+    def read(self, path: Path, max_bytes: int) -> Recording:
+        """Read a file that nobody vouches for."""
+
+
+def save(recording: Recording, path: str | os.PathLike[str], *, force: bool) -> Path:
+    """Write a recording; see `Recording.save`."""
+    target = Path(path).expanduser()
+    handler = _handler(target)
+    check_output(target, force=force)
+    handler.check(recording)
+    with atomic_path(target, force=force) as temporary:
+        handler.write(recording, temporary)
+    return target
+
+
+def load(path: str | os.PathLike[str], *, max_bytes: int) -> Recording:
+    """Read a recording; see `Recording.load`."""
+    source = Path(path).expanduser()
+    handler = _handler(source)
+    if not source.is_file():
+        near = _neighbours(source)
+        raise InputError(f"{source}: no such file{near}")
+    try:
+        with source.open("rb"):
+            pass
+        return handler.read(source, max_bytes)
+    except OSError as error:
+        raise FormatError(f"{source}: cannot be read: {error}") from error
+
+
+def check_ending(path: str | os.PathLike[str]) -> str:
+    """Return the ending of a path when it is a recording format.
+
+    Raises
+    ------
+    UnknownNameError
+        It is not; the message lists those that are.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in ENDINGS:
+        raise _unknown_ending(Path(path), ENDINGS)
+    return suffix
+
+
+def _handler(path: Path) -> _Format:
+    suffix = check_ending(path)
+    if suffix == ".parquet":
+        from elevon.recording import parquet
+
+        return parquet
+    if suffix == ".nc":
+        from elevon.recording import netcdf
+
+        return netcdf
+    if suffix == ".csv":
+        from elevon.recording import csv
+
+        return csv
+    from elevon.recording import mat
+
+    return mat
+
+
+def _unknown_ending(path: Path, endings: tuple[str, ...]) -> UnknownNameError:
+    if not path.suffix:
+        return UnknownNameError(f"{path}: has no ending; valid: {', '.join(endings)}")
+    return unknown("ending", path.suffix, endings, str(path))
+
+
+def _neighbours(path: Path) -> str:
+    """Name files of nearly the same name in the same folder."""
+    try:
+        names = [entry.name for entry in path.parent.iterdir() if entry.is_file()]
+    except OSError:
+        return ""
+    near = nearest(path.name, names)
+    return f"; did you mean {' or '.join(repr(name) for name in near)}?" if near else ""

@@ -1,0 +1,111 @@
+"""Recordings in NetCDF 4: a dimension for each clock, units as attributes.
+
+The dimension and time variable are ``time`` for a single clock, ``time_NAME`` beside others. The
+character variable ``elevon`` holds the description (`Header`); an attribute could not, HDF5 limits
+those to 64 kB. Time and values are compressed without loss.
+
+A file is read through h5py with every link, layout and type checked first: HDF5 files can refer to
+other files on the disk, and those of strangers may.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.errors import FormatError
+from elevon.recording.assemble import check_size, header_bytes, rebuild
+from elevon.recording.convert import time_name
+from elevon.recording.header import Header
+from elevon.recording.recording import Recording
+
+__all__ = ["check", "read", "write"]
+
+
+def check(recording: Recording) -> None:
+    """NetCDF holds every recording."""
+    del recording
+
+
+def write(recording: Recording, path: Path) -> None:
+    """Write the description, the times and the channels."""
+    import h5netcdf
+
+    text = np.frombuffer(Header.of(recording).to_json().encode("ascii"), dtype="S1")
+    with h5netcdf.File(path, "w") as file:
+        file.dimensions = {"elevon_length": text.size}
+        file.create_variable("elevon", ("elevon_length",), "S1", data=text)
+        for clock in recording.clocks.values():
+            dimension = time_name(recording, clock.name)
+            # a length of zero would declare an unlimited dimension, which is empty as well
+            file.dimensions[dimension] = len(clock) or None
+            attributes: dict[str, Any] = {"units": "s", "clock": clock.name}
+            if clock.rate is not None:
+                attributes["rate_hz"] = clock.rate
+            _variable(file, dimension, dimension, clock.time, attributes)
+            for channel in recording.on_clock(clock.name):
+                notes = {"units": channel.unit, "long_name": channel.text or channel.name}
+                _variable(file, channel.name, dimension, channel.values, notes)
+
+
+def read(path: Path, max_bytes: int) -> Recording:
+    """Read the description, then what it names."""
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            raw = _dataset(path, file, "elevon", "S", max_bytes)
+            header = Header.from_json(raw.tobytes(), str(path))
+            check_size(str(path), header_bytes(header), max_bytes)
+            several = len(header.clocks) > 1
+
+            def columns(name: str) -> dict[str, npt.NDArray[np.float64]]:
+                entry = next(clock for clock in header.clocks if clock.name == name)
+                time = f"time_{name}" if several else "time"
+                arrays = {"time": _dataset(path, file, time, "f", max_bytes)}
+                for channel in entry.channels:
+                    arrays[channel] = _dataset(path, file, channel, "f", max_bytes)
+                return arrays
+
+            return rebuild(header, columns, str(path))
+    except (OSError, RuntimeError, KeyError, ValueError) as error:
+        if isinstance(error, FormatError):
+            raise
+        raise FormatError(f"{path}: is not a readable NetCDF 4 file: {error}") from error
+
+
+def _variable(
+    file: Any,
+    name: str,
+    dimension: str,
+    values: npt.NDArray[np.float64],
+    attributes: dict[str, Any],
+) -> None:
+    packing: dict[str, Any] = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
+    if not values.size:
+        variable = file.create_variable(name, (dimension,), np.float64)
+    else:
+        variable = file.create_variable(name, (dimension,), np.float64, data=values, **packing)
+    for key, value in attributes.items():
+        variable.attrs[key] = value
+
+
+def _dataset(path: Path, file: Any, name: str, kind: str, max_bytes: int) -> npt.NDArray[Any]:
+    """Read one vector stored in the file itself, of plain numbers or characters."""
+    import h5py
+
+    if name not in file:
+        if name == "elevon":
+            raise FormatError(f"{path}: is HDF5, but no recording (no variable 'elevon')")
+        raise FormatError(f"{path}: columns are missing: {name}")
+    if not isinstance(file.get(name, getlink=True), h5py.HardLink):
+        raise FormatError(f"{path}: {name!r} is a link to elsewhere; refused")
+    data = file[name]
+    if not isinstance(data, h5py.Dataset) or data.external or data.is_virtual:
+        raise FormatError(f"{path}: {name!r} is not stored in the file itself; refused")
+    if data.dtype.kind != kind or data.ndim != 1:
+        raise FormatError(f"{path}: {name!r} is {data.ndim}-dimensional {data.dtype}; refused")
+    check_size(str(path), data.size * data.dtype.itemsize, max_bytes)
+    values: npt.NDArray[Any] = data[()]
+    return values
