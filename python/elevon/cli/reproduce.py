@@ -1,0 +1,110 @@
+"""`elevon reproduce`: recompute a published table or figure, with checks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from elevon.cli.output import print_json, print_table, say
+
+if TYPE_CHECKING:
+    from elevon.report import Report
+
+app = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="Recompute a published table or figure; exit code 1 when a check fails.",
+)
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+Out = Annotated[
+    Path | None, typer.Option("--out", help="Folder for report.html and the rows as CSV.")
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of every random number.")]
+Date = Annotated[str | None, typer.Option("--date", help="Date printed in the report.")]
+
+
+@app.callback()
+def _group() -> None:
+    """Recompute a published table or figure; exit code 1 when a check fails."""
+
+
+@app.command("torino-compliance")
+def torino_compliance(
+    as_json: Json = False,
+    out: Out = None,
+    force: Force = False,
+    seed: Seed = 0,
+    date: Date = None,
+) -> int:
+    """Estimate the transmission's stiffness from the forty printed drops of a weight."""
+    from elevon.reproduce.compliance import reproduce_compliance
+    from elevon.reproduce.compliance.page import compliance_report
+
+    _check_folder(out, force)
+    result = reproduce_compliance(seed=seed)
+    values = result.to_dict()
+    if out is not None:
+        _write(out, compliance_report(result, date=date, seed=seed), values["rows"], force)
+    if as_json:
+        print_json(values)
+    else:
+        columns = ("load_on_loss_n_per_deg", "loss_on_load_n_per_deg", "theil_sen_n_per_deg")
+        rows = [[v["name"], *(f"{v[key]:.2f}" for key in columns)] for v in values["variants"]]
+        print_table(["rows used [N/deg]", "load on loss", "loss on load", "Theil-Sen"], rows)
+        low, high = values["interval_nm_per_rad"]
+        print_table(
+            ["answer", ""],
+            [
+                ["robust fit", f"{values['robust_n_per_deg']:.1f} N/deg"],
+                ["stiffness", f"{values['stiffness_nm_per_rad']:.0f} N m/rad"],
+                ["95 % interval", f"{low:.0f} to {high:.0f} N m/rad"],
+                ["rows wrong", ", ".join(map(str, values["rows_inconsistent"]))],
+                ["rows swapped", ", ".join(map(str, values["rows_swapped"]))],
+            ],
+        )
+        _print_checks(values)
+    return _exit_code(values)
+
+
+def _check_folder(out: Path | None, force: bool) -> None:
+    """Refuse an output that cannot be written before the work, not after it."""
+    if out is not None:
+        from elevon.files import check_output
+
+        for name in ("report.html", "rows.csv"):
+            check_output(out / name, force=force)
+
+
+def _write(out: Path, report: Report, rows: list[dict[str, Any]], force: bool) -> None:
+    import csv
+    import io
+
+    from elevon.files import write_text
+
+    stream = io.StringIO()
+    writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    write_text(out / "rows.csv", stream.getvalue(), force=force)
+    say(f"report: {report.save(out / 'report.html', force=force)}")
+
+
+def _print_checks(values: dict[str, Any]) -> None:
+    rows = [
+        [
+            check["name"],
+            f"{check['value']:.5g}",
+            f"{'>=' if check['at_least'] else '<='} {check['limit']:.5g} {check['unit']}",
+            "pass" if check["passed"] else "FAIL",
+        ]
+        for check in values["checks"]
+    ]
+    print_table(["check", "found", "limit", ""], rows)
+
+
+def _exit_code(values: dict[str, Any]) -> int:
+    return 0 if values["status"] == "pass" else 1

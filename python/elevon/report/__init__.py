@@ -1,0 +1,12 @@
+"""Reports: one self-contained HTML page of text, tables, figures and checks.
+
+>>> from elevon.report import Check, Report
+>>> report = Report("A measured play")
+>>> report.section("What was checked").checks([Check("play", 0.36, 0.37, "deg")])
+>>> path = report.save("report.html")  # doctest: +SKIP
+"""
+
+from elevon.report.checks import Check, all_passed
+from elevon.report.document import Report, Section, Table
+
+__all__ = ["Check", "Report", "Section", "Table", "all_passed"]

@@ -1,0 +1,59 @@
+"""One checked number: what it is, what it may be at most, and whether it is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+__all__ = ["Check", "all_passed"]
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """A number held against its limit.
+
+    Attributes
+    ----------
+    name : str
+        What is checked, in words.
+    value : float
+        The number found.
+    limit : float
+        What it is held against.
+    unit : str
+        Unit of both, as shown.
+    at_least : bool
+        Whether `limit` is the smallest allowed value instead of the largest.
+    """
+
+    name: str
+    value: float
+    limit: float
+    unit: str = ""
+    at_least: bool = False
+
+    @property
+    def passed(self) -> bool:
+        """Whether the value keeps its limit; a value that is not finite never does."""
+        if not math.isfinite(self.value):
+            return False
+        return self.value >= self.limit if self.at_least else self.value <= self.limit
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the check as the command line prints it."""
+        return {
+            "name": self.name,
+            "value": self.value,
+            "limit": self.limit,
+            "unit": self.unit,
+            "at_least": self.at_least,
+            "passed": self.passed,
+        }
+
+
+def all_passed(checks: Iterable[Check]) -> bool:
+    """Tell whether there is at least one check and none failed."""
+    results = [check.passed for check in checks]
+    return bool(results) and all(results)

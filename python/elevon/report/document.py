@@ -1,0 +1,209 @@
+"""The report builder: sections of text, tables, figures and checks into one HTML file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from elevon.report.checks import Check, all_passed
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+    from matplotlib.figure import Figure
+
+__all__ = ["Report", "Section", "Table"]
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table of cells.
+
+    Attributes
+    ----------
+    columns : sequence of str
+        Headings.
+    rows : sequence of sequences
+        Cells; floats are shown with `digits` significant digits, True and False as yes and no.
+    caption : str
+        One sentence under the table.
+    digits : int
+        Significant digits of floats.
+    marked : collection of int
+        Indices of rows that are set apart by colour.
+    """
+
+    columns: Sequence[str]
+    rows: Sequence[Sequence[object]]
+    caption: str = ""
+    digits: int = 5
+    marked: frozenset[int] = frozenset()
+
+    def cell(self, value: object) -> str:
+        """Return the text of one cell."""
+        if isinstance(value, bool):
+            return "yes" if value else "no"
+        if isinstance(value, float):
+            return f"{value:#.{self.digits}g}".rstrip(".")
+        return "" if value is None else str(value)
+
+    def numeric(self, column: int) -> bool:
+        """Tell whether a column holds numbers only, to be set to the right."""
+        cells = [row[column] for row in self.rows if row[column] is not None]
+        return bool(cells) and all(
+            isinstance(cell, (int, float)) and not isinstance(cell, bool) for cell in cells
+        )
+
+
+@dataclass(slots=True)
+class Section:
+    """One headed part of a report; its methods add to its end and return it."""
+
+    title: str
+    number: int
+    items: list[dict[str, Any]] = field(default_factory=list)
+
+    @property
+    def anchor(self) -> str:
+        """Name of the section inside the page."""
+        return f"section-{self.number}"
+
+    def text(self, *paragraphs: str) -> Section:
+        """Add paragraphs of plain text (escaped: nothing in them is read as HTML)."""
+        self.items += [{"kind": "text", "text": paragraph} for paragraph in paragraphs]
+        return self
+
+    def points(self, points: Sequence[str]) -> Section:
+        """Add a list of points."""
+        self.items.append({"kind": "points", "points": list(points)})
+        return self
+
+    def table(self, table: Table) -> Section:
+        """Add a table."""
+        self.items.append({"kind": "table", "table": table})
+        return self
+
+    def code(self, text: str) -> Section:
+        """Add preformatted text, such as a command."""
+        self.items.append({"kind": "code", "text": text})
+        return self
+
+    def checks(self, checks: Sequence[Check]) -> Section:
+        """Add a table of checks with pass or fail."""
+        self.items.append({"kind": "checks", "checks": list(checks)})
+        return self
+
+    def figure(self, figure: Figure, caption: str) -> Section:
+        """Add a matplotlib figure as an inline drawing that follows the page's colours.
+
+        Parameters
+        ----------
+        figure : Figure
+            Best made by `elevon.report.figures.new_figure`.
+        caption : str
+            What it shows; also read out in place of the picture.
+        """
+        from elevon.report.figures import inline_svg
+
+        name = f"{self.number}-{len(self.items)}"
+        self.items.append(
+            {"kind": "figure", "svg": inline_svg(figure, name, caption), "caption": caption}
+        )
+        return self
+
+    def markup(self, markup: Markup, caption: str = "") -> Section:
+        """Add trusted markup, such as an interactive plot.
+
+        Parameters
+        ----------
+        markup : Markup
+            `markupsafe.Markup` only: whoever builds it has escaped what it holds.
+        caption : str
+            One sentence under it.
+
+        Raises
+        ------
+        TypeError
+            A plain text was given.
+        """
+        if not hasattr(markup, "__html__"):
+            raise TypeError("Section.markup takes markupsafe.Markup; use text() for plain text")
+        self.items.append({"kind": "markup", "markup": markup, "caption": caption})
+        return self
+
+
+class Report:
+    """A report under construction.
+
+    Parameters
+    ----------
+    title : str
+        Heading of the page.
+    lead : str
+        One or two sentences under the heading: the answer, before the details.
+    date : str, optional
+        Date printed on the page. Never taken from the clock: the same work gives the same bytes.
+    """
+
+    def __init__(self, title: str, lead: str = "", *, date: str | None = None) -> None:
+        self.title = title
+        self.lead = lead
+        self.date = date
+        self.sections: list[Section] = []
+        self.facts: list[tuple[str, str, str]] = []
+        self._provenance: dict[str, str] = {}
+
+    def section(self, title: str, *paragraphs: str) -> Section:
+        """Start a section, with its first paragraphs."""
+        section = Section(title, len(self.sections) + 1)
+        self.sections.append(section)
+        return section.text(*paragraphs)
+
+    def fact(self, label: str, value: str, note: str = "") -> None:
+        """Add one headline number, shown in a row of them under the lead."""
+        self.facts.append((label, value, note))
+
+    def provenance(self, entries: Mapping[str, object]) -> None:
+        """Add what is needed to make the report again: version, hashes, seed, command."""
+        self._provenance |= {key: str(value) for key, value in entries.items()}
+
+    @property
+    def checks(self) -> list[Check]:
+        """Every check of every section."""
+        items = [item for section in self.sections for item in section.items]
+        return [check for item in items if item["kind"] == "checks" for check in item["checks"]]
+
+    @property
+    def status(self) -> str | None:
+        """`pass` or `fail` when the report holds checks, else None."""
+        if not self.checks:
+            return None
+        return "pass" if all_passed(self.checks) else "fail"
+
+    def html(self) -> str:
+        """Return the whole page: no file, script or font is fetched from anywhere."""
+        from importlib.resources import files
+
+        import jinja2
+
+        folder = files("elevon.report") / "templates"
+        environment = jinja2.Environment(
+            autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        )
+        template = environment.from_string((folder / "report.html.j2").read_text("utf-8"))
+        style = (folder / "style.css").read_text("utf-8")
+        return template.render(report=self, style=style, entries=self._provenance)
+
+    def save(self, path: str | os.PathLike[str], *, force: bool = False) -> Path:
+        """Write the page, whole or not at all.
+
+        Raises
+        ------
+        OutputExistsError, OutputError
+            As `elevon.files.write_text`.
+        """
+        from elevon.files import write_text
+
+        return write_text(path, self.html(), force=force)

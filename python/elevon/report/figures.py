@@ -1,0 +1,169 @@
+"""Figures of one look, drawn once and readable on light and on dark pages."""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+    from matplotlib.figure import Figure
+
+__all__ = ["COLOURS", "inline_svg", "new_figure", "save_figure"]
+
+COLOURS: dict[str, str] = {
+    "blue": "#2f7fd1",
+    "orange": "#e0782f",
+    "green": "#2f9e6e",
+    "red": "#d1483c",
+    "violet": "#8a6fd0",
+    "grey": "#8a929d",
+}
+"""Colours of middle lightness, legible on white and on near-black, distinct to the colour-blind."""
+
+# Stand-ins that matplotlib writes as they are and that inline_svg turns into the page's colours.
+_INK = "#010203"
+_RULE = "#030201"
+
+_STYLE: dict[str, Any] = {
+    "axes.edgecolor": _INK,
+    "axes.facecolor": "none",
+    "axes.grid": True,
+    "axes.labelcolor": _INK,
+    "axes.labelsize": 9.5,
+    "axes.linewidth": 0.8,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlelocation": "left",
+    "axes.titlesize": 10.5,
+    "axes.titleweight": "bold",
+    "figure.facecolor": "none",
+    "font.family": "sans-serif",
+    "font.size": 9.5,
+    "grid.color": _RULE,
+    "grid.linewidth": 0.7,
+    "legend.fontsize": 9,
+    "legend.frameon": False,
+    "lines.linewidth": 1.5,
+    "savefig.facecolor": "none",
+    "svg.fonttype": "none",
+    "text.color": _INK,
+    "xtick.color": _INK,
+    "xtick.labelsize": 9,
+    "ytick.color": _INK,
+    "ytick.labelsize": 9,
+}
+
+
+@contextmanager
+def _style(**more: Any) -> Iterator[None]:
+    import matplotlib as mpl
+    from cycler import cycler
+
+    settings: Any = _STYLE | {"axes.prop_cycle": cycler(color=list(COLOURS.values()))} | more
+    with mpl.rc_context(settings):
+        yield
+
+
+@contextmanager
+def new_figure(
+    rows: int = 1, columns: int = 1, *, width: float = 8.0, height: float = 3.6, **options: Any
+) -> Iterator[tuple[Figure, Any]]:
+    """Give a figure and its axes in the house style; draw inside the block.
+
+    Parameters
+    ----------
+    rows, columns : int
+        Grid of axes.
+    width, height : float
+        Size in inches.
+    **options
+        Passed to `Figure.subplots` (`sharex`, `width_ratios`, ...).
+
+    Yields
+    ------
+    (Figure, axes)
+        As `Figure.subplots` returns them; no global pyplot state is touched.
+    """
+    from matplotlib.figure import Figure
+
+    with _style():
+        figure = Figure(figsize=(width, height), layout="constrained")
+        yield figure, figure.subplots(rows, columns, **options)
+
+
+def inline_svg(figure: Figure, name: str, description: str) -> Markup:
+    """Draw a figure as an SVG element whose ink follows the page.
+
+    Parameters
+    ----------
+    figure : Figure
+        The figure.
+    name : str
+        Unique in its page; keeps the drawing's inner names apart from other drawings'.
+    description : str
+        Read out in place of the picture.
+
+    Returns
+    -------
+    Markup
+        The same bytes each time.
+    """
+    from markupsafe import Markup
+
+    text = _svg_text(figure, name)
+    start = text.index("<svg")
+    body = text[start:].replace(_INK, "currentColor").replace(_RULE, "var(--rule)")
+    body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.S)
+    body = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", body, count=1)
+    body = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", body, count=1)
+    label = f'<svg role="img" aria-label="{escape(description, quote=True)}"'
+    # Safe: matplotlib escapes every text it writes, and the description is escaped above.
+    return Markup(body.replace("<svg", label, 1))  # noqa: S704
+
+
+def save_figure(
+    figure: Figure, path: str | os.PathLike[str], *, force: bool = False, dpi: int = 150
+) -> Path:
+    """Write a figure to a file (.svg, .png, .pdf) with dark ink on white.
+
+    Raises
+    ------
+    OutputExistsError, OutputError
+        As `elevon.files.write_bytes`.
+    """
+    from elevon.files import write_bytes
+
+    target = Path(path)
+    if target.suffix.lower() == ".svg":
+        text = _svg_text(figure, target.stem, facecolor="white")
+        data = text.replace(_INK, "#1f2630").replace(_RULE, "#d9dee5").encode()
+    else:
+        stream = io.BytesIO()
+        with _style():
+            _repaint_rules(figure)
+            figure.savefig(
+                stream, format=target.suffix.lower().lstrip("."), dpi=dpi, facecolor="white"
+            )
+        data = stream.getvalue()
+    return write_bytes(target, data, force=force)
+
+
+def _svg_text(figure: Figure, name: str, **options: Any) -> str:
+    stream = io.StringIO()
+    with _style(**{"svg.hashsalt": name, "svg.id": None}):
+        figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None}, **options)
+    return stream.getvalue()
+
+
+def _repaint_rules(figure: Figure) -> None:
+    """Give grid lines a visible grey: outside SVG the stand-in would print as near-black."""
+    for axes in figure.axes:
+        for line in (*axes.get_xgridlines(), *axes.get_ygridlines()):
+            line.set_color("#d9dee5")

@@ -1,0 +1,1 @@
+"""Published tables and figures, recomputed: each module returns rows and checks."""

@@ -1,0 +1,235 @@
+"""The compliance campaign of the Torino bench: what the forty printed drops say about stiffness."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from elevon.report.checks import Check, all_passed
+from elevon.reproduce.compliance.fit import (
+    Array,
+    ComplianceFit,
+    bootstrap_interval,
+    deming_stiffness,
+    fit_compliance,
+    load_on_loss,
+    loss_on_load,
+)
+from elevon.reproduce.compliance.slips import Drop, Slip, find_slips, printed_drops
+
+__all__ = ["ComplianceResult", "Variant", "reproduce_compliance"]
+
+GUIDE_RADIUS_M = 0.08
+"""Radius of the winding guide (160 mm across), thesis Table 5.1 set-up."""
+NM_PER_RAD = 2.0 * GUIDE_RADIUS_M * 180.0 / math.pi
+"""N m/rad for each N/deg, when the printed load hangs on EACH of the two cables (ASSUMED)."""
+STANDARD_GRAVITY_FACTOR = 0.980665
+"""True newtons for each printed newton: the table takes g = 10 m/s2."""
+PUBLISHED_N_PER_DEG = 68.23
+SLIPS_BY_HAND = frozenset({1, 3, 10, 14, 28, 29})
+"""Rows found wrong in a number or a sign when the table was read by eye."""
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """Both regressions over one reading of the table [N/deg]."""
+
+    name: str
+    rows: int
+    load_on_loss: float
+    loss_on_load: float
+    theil_sen: float
+    r2: float
+
+
+@dataclass(frozen=True, slots=True)
+class ComplianceResult:
+    """Everything `elevon reproduce torino-compliance` reports; stiffnesses in N/deg."""
+
+    printed: list[Drop]
+    repaired: list[Drop]
+    slips: list[Slip]
+    variants: list[Variant]
+    robust_printed: ComplianceFit
+    robust: ComplianceFit
+    interval: tuple[float, float]
+    deming: float
+    curvature_p: float
+    checks: list[Check]
+
+    @property
+    def rows_inconsistent(self) -> list[int]:
+        """Rows wrong in a number or a sign, swapped columns alone not counted."""
+        return sorted({slip.row for slip in self.slips if slip.kind != "swapped"})
+
+    @property
+    def rows_swapped(self) -> list[int]:
+        """Rows whose motor and encoder columns are exchanged."""
+        return sorted(slip.row for slip in self.slips if slip.kind == "swapped")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object of the command."""
+        low, high = self.interval
+        stiffness = self.robust.stiffness * NM_PER_RAD
+        return {
+            "status": "pass" if all_passed(self.checks) else "fail",
+            "load_on_loss_n_per_deg": self.variants[0].load_on_loss,
+            "loss_on_load_n_per_deg": self.variants[0].loss_on_load,
+            "robust_n_per_deg": self.robust.stiffness,
+            "stiffness_nm_per_rad": stiffness,
+            "interval_nm_per_rad": [low * NM_PER_RAD, high * NM_PER_RAD],
+            "interval_level": 0.95,
+            "rows_inconsistent": self.rows_inconsistent,
+            "rows_swapped": self.rows_swapped,
+            "loss_at_zero_load_deg": self.robust.offset,
+            "first_drop_offset_deg": float(self.robust.group_offsets[0]),
+            "alternatives_nm_per_rad": {
+                "standard gravity instead of 10 m/s2": stiffness * STANDARD_GRAVITY_FACTOR,
+                "printed load is the sum of both cables": stiffness / 2.0,
+            },
+            "deming_n_per_deg": self.deming,
+            "robust_on_printed_rows_n_per_deg": self.robust_printed.stiffness,
+            "curvature_p_value": self.curvature_p,
+            "variants": [_variant_dict(variant) for variant in self.variants],
+            "slips": [{"row": s.row, "kind": s.kind, "reason": s.reason} for s in self.slips],
+            "rows": [_row(a, b) for a, b in zip(self.printed, self.repaired, strict=True)],
+            "checks": [check.to_dict() for check in self.checks],
+        }
+
+
+def reproduce_compliance(*, seed: int = 0, resamples: int = 2000) -> ComplianceResult:
+    """Estimate the transmission's stiffness from the forty printed drops.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of the bootstrap.
+    resamples : int
+        Resamples of the bootstrap.
+
+    Returns
+    -------
+    ComplianceResult
+    """
+    printed = printed_drops()
+    repaired, slips = find_slips(printed)
+    variants = _variants(printed, repaired, slips)
+    load, loss = _columns(repaired)
+    first = np.array([drop.drop == 1 for drop in repaired], dtype=int)
+    robust = fit_compliance(load, loss, first)
+    weight = np.unique(load, return_inverse=True)[1]
+    interval = bootstrap_interval(load, loss, first, cluster=weight, seed=seed, resamples=resamples)
+    load_sd = 0.05 / math.sqrt(3.0)  # loads are printed to 0.1 N
+    return ComplianceResult(
+        printed=printed,
+        repaired=repaired,
+        slips=slips,
+        variants=variants,
+        robust_printed=fit_compliance(*_columns(printed), first),
+        robust=robust,
+        interval=interval,
+        deming=deming_stiffness(load, loss, load_sd, robust.scale),
+        curvature_p=_curvature(load, loss, first),
+        checks=_checks(variants, slips),
+    )
+
+
+def _variants(
+    printed: Sequence[Drop], repaired: Sequence[Drop], slips: Sequence[Slip]
+) -> list[Variant]:
+    load, loss = _columns(printed)
+    fixed = _columns(repaired)[1]
+    own = np.array([abs(drop.encoder_deg - drop.motor_deg) for drop in printed])
+    signed = np.array([drop.encoder_deg - drop.motor_deg for drop in printed])
+    worst = int(np.argmax(loss))
+    keep = np.arange(len(load)) != worst
+    wrong = {slip.row for slip in slips if slip.kind != "swapped"}
+    sound = np.array([drop.row not in wrong for drop in printed])
+    return [
+        _variant("as printed", load, loss),
+        _variant("each loss from its own printed positions", load, own),
+        _variant(f"as printed, without row {worst + 1} ({loss[worst]:.2f} deg)",
+                 load[keep], loss[keep]),
+        _variant("encoder minus motor, swapped columns left swapped", load, signed),
+        _variant("inconsistent rows left out", load[sound], loss[sound]),
+        _variant("repaired", load, fixed),
+    ]  # fmt: skip
+
+
+def _variant(name: str, load: Array, loss: Array) -> Variant:
+    from scipy.stats import theilslopes
+
+    slope = float(theilslopes(loss, load)[0])
+    r2 = float(np.corrcoef(load, loss)[0, 1] ** 2)
+    return Variant(
+        name, len(load), load_on_loss(load, loss), loss_on_load(load, loss), 1.0 / slope, r2
+    )
+
+
+def _curvature(load: Array, loss: Array, group: np.ndarray[Any, Any]) -> float:
+    """Return the p value of the F test for a quadratic term in the load."""
+    from scipy.stats import f as f_distribution
+
+    straight = np.column_stack([load, np.ones_like(load), group])
+    squares = [
+        float(np.sum((loss - design @ np.linalg.lstsq(design, loss, rcond=None)[0]) ** 2))
+        for design in (straight, np.column_stack([straight, load**2]))
+    ]
+    freedom = len(load) - 4
+    return float(f_distribution.sf((squares[0] - squares[1]) / (squares[1] / freedom), 1, freedom))
+
+
+def _checks(variants: Sequence[Variant], slips: Sequence[Slip]) -> list[Check]:
+    printed, own, repaired = variants[0], variants[1], variants[-1]
+    found = {slip.row for slip in slips if slip.kind != "swapped"}
+    return [
+        Check("load on loss, printed rows, from 68.16", abs(printed.load_on_loss - 68.16),
+              0.005, "N/deg"),
+        Check("loss on load, printed rows, from 114.6", abs(printed.loss_on_load - 114.6),
+              0.05, "N/deg"),
+        Check("published 68.23 from losses of the rows' own positions",
+              abs(own.load_on_loss - PUBLISHED_N_PER_DEG), 0.005, "N/deg"),
+        Check("load on loss, repaired, from 85.7", abs(repaired.load_on_loss - 85.7), 0.05,
+              "N/deg"),
+        Check("loss on load, repaired, from 113.4", abs(repaired.loss_on_load - 113.4), 0.05,
+              "N/deg"),
+        Check("ratio of the two regressions less r squared",
+              abs(printed.load_on_loss / printed.loss_on_load - printed.r2), 1e-9),
+        Check("rows called wrong by only one of program and eye", len(found ^ SLIPS_BY_HAND), 0,
+              "rows"),
+    ]  # fmt: skip
+
+
+def _columns(drops: Sequence[Drop]) -> tuple[Array, Array]:
+    return (
+        np.array([drop.load_n for drop in drops]),
+        np.array([drop.loss_deg for drop in drops]),
+    )
+
+
+def _variant_dict(variant: Variant) -> dict[str, Any]:
+    return {
+        "name": variant.name,
+        "rows": variant.rows,
+        "load_on_loss_n_per_deg": variant.load_on_loss,
+        "loss_on_load_n_per_deg": variant.loss_on_load,
+        "theil_sen_n_per_deg": variant.theil_sen,
+        "r2": variant.r2,
+    }
+
+
+def _row(printed: Drop, repaired: Drop) -> dict[str, Any]:
+    return {
+        "row": printed.row,
+        "load_n": printed.load_n,
+        "motor_deg": printed.motor_deg,
+        "encoder_deg": printed.encoder_deg,
+        "loss_deg": printed.loss_deg,
+        "motor_repaired_deg": repaired.motor_deg,
+        "encoder_repaired_deg": repaired.encoder_deg,
+        "loss_repaired_deg": repaired.loss_deg,
+    }
