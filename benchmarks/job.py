@@ -1,0 +1,128 @@
+"""The common job (README.md) and its variants, as an actuator and a scenario of the public API."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import elevon
+
+KP, KI, KT = 0.3, 6.0, 1.1
+COMMON: dict[str, Any] = {
+    "solver.step": 1e-6,
+    "solver.method": "semi_implicit",
+    "drive.kind": "hysteresis",
+    "motor.pole_pairs": 4,
+    "motor.inertia": 7.7e-4,
+    "motor.winding_resistance": 2.75,
+    "motor.winding_inductance": 30.5e-3,
+    "motor.emf_constant": KT / 1.5,
+    "motor.torque_limit": 1e6,
+    "motor.electrical_offset": "90 deg",
+    "gear.ratio": 124.0,
+    "gear.inertia": 1.9e-3,
+    "gear.efficiency": 1.0,
+    "gear.efficiency_aiding": 1.0,
+    "friction.static": 0.12,
+    "friction.dynamic": 0.06,
+    "friction.viscous": 1e-3,
+    "friction.viscous_slope": 0.0,
+    "play.model": "operator",
+    "play.total": "0.2 deg",
+    "stop.upper": "30 deg",
+    "stop.lower": "-30 deg",
+    "inverter.supply_voltage": 380.0,
+    "inverter.hysteresis_band": 0.5,
+    "inverter.on_resistance": 0.0,
+    "inverter.diode_drop": 0.0,
+    "inverter.dead_time": 0.0,
+    "inverter.trip_current": 0.0,
+    "control.position_gain": 20 * 124.0,
+    "control.speed_gain": KP,
+    "control.integral_time": KP / KI,
+    "control.derivative_time": 0.0,
+    "control.speed_limit": 1e6,
+    "control.current_limit": 22.0 / KT,
+    "control.torque_constant": KT,
+    "control.anti_windup_rest": "off",
+    "control.anti_windup_error": "off",
+    "control.anti_windup_back_calculation": 0.0,
+    "control.conditional_integration": "on",
+    "control.sample_time": 0.0,
+    "control.noise_deviation": 0.0,
+    "control.position_feedback": "user",
+    "sensor.current.noise_deviation": 0.0,
+    "sensor.current.bits": 0,
+}
+# Every option of the high model at once: faults in winding and air gap, a lossy bridge,
+# load-dependent friction,
+# the second mass behind an elastic play, every branch of the controller, imperfect sensors that
+# close the loop.
+FULL: dict[str, Any] = {
+    "motor.turns_a": 0.9,
+    "motor.short_model": "loop",
+    "motor.short_contact_resistance": 0.01,
+    "motor.eccentricity_static": 0.05,
+    "motor.eccentricity_dynamic": 0.05,
+    "motor.temperature_coefficient": 3.93e-3,
+    "motor.winding_temperature": 340.0,
+    "gear.efficiency": 0.9,
+    "gear.efficiency_aiding": 0.891,
+    "friction.viscous_slope": -1e-4,
+    "play.model": "elastic",
+    "play.stiffness": 1e4,
+    "play.damping": 5.0,
+    "load.inertia": 0.05,
+    "load.stiffness": 0.8,
+    "inverter.on_resistance": 0.1,
+    "inverter.diode_drop": 1.0,
+    "inverter.dead_time": 2e-6,
+    "inverter.trip_current": 40.0,
+    "control.derivative_time": 0.002,
+    "control.derivative_filter": 100.0,
+    "control.anti_windup_rest": "on",
+    "control.anti_windup_error": "below",
+    "control.anti_windup_threshold": 1e-5,
+    "control.anti_windup_back_calculation": 20.0,
+    "control.noise_deviation": 1e-5,
+    "control.position_feedback": "encoder",
+    "sensor.current.gain_a": 1.01,
+    "sensor.current.offset_b": 0.02,
+    "sensor.current.noise_deviation": 0.01,
+    "sensor.current.bits": 12,
+    "sensor.resolver.mismatch": 0.01,
+}
+RECORD = [
+    "user_position,motor_position,motor_speed,current_a,current_b,current_c,motor_torque@400 Hz"
+]
+FULL_LOAD: dict[str, Any] = {
+    "brake": {"terms": [{"kind": "sine", "amplitude": 0.2, "bias": 0.5, "frequency": 0.5}]},
+    "user": {"terms": [{"kind": "triangle", "amplitude": 20.0, "frequency": 0.3}]},
+}
+
+
+def actuator(full: bool = False) -> Any:
+    """The loop of benchmark_job.c; with `full`, every option of the high model switched on."""
+    return elevon.Actuator.load("torino-rotary").with_values(COMMON | (FULL if full else {}))
+
+
+def scenario(
+    duration: float,
+    amplitude_deg: float = 7.0,
+    faults: list[dict[str, Any]] | None = None,
+    full: bool = False,
+) -> Any:
+    """Sine of 0.2 Hz from rest; with `full`, loads on both shafts as well."""
+    return elevon.Scenario.from_dict(
+        {
+            "duration": duration,
+            "command": {
+                "mode": "position",
+                "terms": [
+                    {"kind": "sine", "amplitude": math.radians(amplitude_deg), "frequency": 0.2}
+                ],
+            },
+            "fault": faults or [],
+            "load": FULL_LOAD if full else {},
+        }
+    )

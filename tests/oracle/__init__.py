@@ -1,0 +1,1 @@
+"""Independent models used by tests only. Nothing in ``elevon`` may import them."""

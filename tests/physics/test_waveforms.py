@@ -1,0 +1,161 @@
+"""Every waveform against its formula written another way, sampled off and on its corners."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from elevon import _core
+from tests.physics.rig import FREE_SHAFT, run, term
+
+DURATION, RATE = 2.0, 1000.0
+Formula = Callable[[np.ndarray], np.ndarray]
+
+
+def between(start: float, end: float, formula: Formula) -> Formula:
+    """The formula on [start, end], its end values held outside."""
+    return lambda t: formula(np.clip(t, start, end))
+
+
+def triangle(
+    amplitude: float, frequency: float, phase: float, bias: float, start: float
+) -> Formula:
+    """By scipy's sawtooth, a quarter period ahead: rising through the bias at start."""
+
+    def formula(t: np.ndarray) -> np.ndarray:
+        angle = 2 * math.pi * frequency * (t - start) + phase + math.pi / 2
+        return bias + amplitude * signal.sawtooth(angle, width=0.5)
+
+    return formula
+
+
+def chirp(amplitude: float, first: float, last: float, sweep: float, phase: float) -> Formula:
+    """By scipy's chirp (a cosine: 90 deg behind gives the sine)."""
+
+    def formula(t: np.ndarray) -> np.ndarray:
+        return amplitude * signal.chirp(t, first, sweep, last, phi=math.degrees(phase) - 90.0)
+
+    return formula
+
+
+def trapezoid(low: float, high: float, corners: list[float], start: float) -> Formula:
+    """Interpolation through the corners of one period, repeated."""
+    x = np.concatenate([[0.0], np.cumsum(corners)])
+    y = np.array([low, high, high, low, low])
+
+    def formula(t: np.ndarray) -> np.ndarray:
+        inside = np.interp(np.mod(t - start, x[-1]), x, y)
+        return np.where(t < start, low, inside)
+
+    return formula
+
+
+TIMES, VALUES = [0.0, 0.3, 0.5, 0.8], [0.1, 0.4, -0.2, 0.1]
+CASES: dict[str, tuple[dict[str, object], Formula]] = {
+    "constant": (term("constant", value=0.3), lambda t: np.full_like(t, 0.3)),
+    "step": (
+        term("step", initial=0.1, final=0.4, time="0.7 s"),
+        lambda t: np.where(t < 0.7 - 1e-9, 0.1, 0.4),
+    ),
+    "ramp": (
+        term("ramp", initial=0.1, slope=0.5, start="0.25 s", end="1.25 s"),
+        lambda t: 0.1 + 0.5 * np.clip(t - 0.25, 0.0, 1.0),
+    ),
+    "sine": (
+        term(
+            "sine",
+            amplitude=0.2,
+            bias=0.1,
+            frequency="3 Hz",
+            phase="30 deg",
+            start="0.2 s",
+            end="1.45 s",
+        ),
+        between(0.2, 1.45, lambda t: 0.1 + 0.2 * np.sin(2 * math.pi * 3 * (t - 0.2) + math.pi / 6)),
+    ),
+    "chirp": (
+        term(
+            "chirp",
+            amplitude=0.2,
+            start_frequency="1 Hz",
+            end_frequency="15 Hz",
+            sweep_time="1.5 s",
+            phase="20 deg",
+        ),
+        between(0.0, 1.5, chirp(0.2, 1.0, 15.0, 1.5, math.radians(20))),
+    ),
+    "triangle": (
+        term(
+            "triangle",
+            amplitude=0.2,
+            bias=-0.1,
+            frequency="1.7 Hz",
+            phase="50 deg",
+            start="0.1 s",
+            end="1.33 s",
+        ),
+        between(0.1, 1.33, triangle(0.2, 1.7, math.radians(50), -0.1, 0.1)),
+    ),
+    "trapezoid": (
+        term(
+            "trapezoid",
+            low=-0.1,
+            high=0.3,
+            rise="0.1 s",
+            hold_high="0.2 s",
+            fall="0.15 s",
+            hold_low="0.07 s",
+            start="0.05 s",
+            repeat=True,
+        ),
+        trapezoid(-0.1, 0.3, [0.1, 0.2, 0.15, 0.07], 0.05),
+    ),
+    "rectangle": (
+        term("rectangle", low=-0.1, high=0.2, period="0.3 s", duty=0.25, start="0.1 s"),
+        lambda t: np.where(
+            (t > 0.1 - 1e-9) & (np.mod(t - 0.1 + 1e-9, 0.3) < 0.25 * 0.3), 0.2, -0.1
+        ),
+    ),
+    "table": (
+        term("table", times=TIMES, values=VALUES, repeat=False),
+        lambda t: np.interp(t, TIMES, VALUES),
+    ),
+}
+
+
+def command_of(terms: list[dict[str, object]]) -> tuple[np.ndarray, np.ndarray]:
+    """Time and command signal of a run whose motor is off."""
+    rec = run(FREE_SHAFT, duration=DURATION, command=terms, record=f"command@{RATE:g} Hz")
+    return rec["command"].time, rec["command"].values
+
+
+def test_every_kind_of_waveform_has_a_case() -> None:
+    """A waveform added to the core without a formula here is an untested one."""
+    assert {record["kind"] for record in _core.waveforms()} == set(CASES)
+
+
+@pytest.mark.parametrize("kind", CASES)
+def test_waveform_follows_its_formula(kind: str) -> None:
+    """1e-9 of a radian: rounding of a 2 s time base, and corners fall on steps."""
+    given, formula = CASES[kind]
+    time, command = command_of([given])
+    assert command == pytest.approx(formula(time), abs=1e-9)
+
+
+def test_repeating_table_starts_again() -> None:
+    """Period = last time - first time."""
+    time, command = command_of([term("table", times=TIMES, values=VALUES, repeat=True)])
+    assert command == pytest.approx(np.interp(np.mod(time, 0.8), TIMES, VALUES), abs=1e-9)
+
+
+def test_terms_add_and_disabled_terms_do_not() -> None:
+    """The sum of every kind, one of them switched off."""
+    chosen = ["constant", "ramp", "sine", "chirp", "triangle", "trapezoid"]
+    terms = [CASES[kind][0] for kind in chosen] + [{**CASES["sine"][0], "enabled": False}]
+    time, command = command_of(terms)
+    expected = sum(CASES[kind][1](time) for kind in chosen)
+    assert command == pytest.approx(expected, abs=1e-9)
