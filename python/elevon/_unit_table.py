@@ -165,9 +165,8 @@ KINDS: tuple[tuple[str, str], ...] = (
     ("a torsional viscous damping", "N m s/rad"),
     ("a torque per angular speed squared", "N m s2/rad2"),
     ("a torque per angular speed cubed", "N m s3/rad3"),
-    ("a torque rate", "N m/s"),
     ("a pressure", "Pa"),
-    ("a power", "W"),
+    ("a power or torque rate", "W"),
     ("a current", "A"),
     ("a current rate", "A/s"),
     ("a voltage", "V"),
@@ -227,7 +226,7 @@ def parse_unit(text: str, place: str | None = None) -> Unit:
     at = f"{place}: " if place else ""
     if len(text) > _LONGEST:
         raise UnitError(f"{at}unit {text[:20]!r}... is longer than {_LONGEST} characters")
-    plain = " ".join(text.translate(_SAME).replace("**", "^").split()) or "1"
+    plain = " ".join(text.replace("**", "^").translate(_SAME).split()) or "1"
     factors = [(plain, 1)] if plain in _SYMBOLS else _factors(plain, text, at)
     symbols = [(_symbol(name, text, at), power) for name, power in factors]
     if len(symbols) == 1 and symbols[0][1] == 1:
@@ -288,6 +287,7 @@ def _registry() -> Any:
 
     registry = pint.UnitRegistry(on_redefinition="ignore", cache_folder=None)
     registry.define("radian = [angle] = rad")
+    registry._build_cache()  # degrees and turns follow the radian only once this is done again
     return registry
 
 

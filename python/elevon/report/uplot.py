@@ -42,12 +42,12 @@ _SCRIPT = """
     const spec = JSON.parse(host.querySelector("script").textContent);
     const plot = host.querySelector(".plot");
     const grid = { stroke: "rgba(128,128,128,.25)", width: 1 };
-    const axis = label => ({ label, stroke: ink, grid, ticks: grid, labelSize: 24, size: 56 });
+    const axis = (label, size) => ({ label, stroke: ink, grid, ticks: grid, labelSize: 22, size });
     const width = () => Math.max(200, plot.clientWidth);
     const number = (u, v) => v == null ? "--" : Number(v.toPrecision(7)).toString();
     const options = {
       width: width(), height: spec.height, cursor: { sync: { key: sync.key } },
-      scales: { x: { time: false } }, axes: [axis(spec.x), axis(spec.y)],
+      scales: { x: { time: false } }, axes: [axis(spec.x, 34), axis(spec.y, 60)],
       series: [{ label: spec.x, value: number }, ...spec.series.map(s => ({
         label: s.name, stroke: s.colour, width: 1.4, value: number, points: { show: false } }))],
     };

@@ -1,0 +1,79 @@
+# Needs python3 (3.11 or newer), cargo, a C compiler and make. Everything else goes into .venv.
+#   make setup   the environment and the extension        make test    all checks but the long ones
+#   make demo    the first result, out/demo/report.html   make help    the other targets
+
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+STAMPS := .stamps
+
+# Modules compiled once are imported faster ever after, also where the environment forbids writing.
+unexport PYTHONDONTWRITEBYTECODE
+# Another environment that happens to be active must not be taken for ours.
+unexport VIRTUAL_ENV
+unexport CONDA_PREFIX
+
+RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name Cargo.toml)
+DEMO := $(BIN)/elevon reproduce torino-backlash --out out/demo --force
+
+.DELETE_ON_ERROR:
+.PHONY: help setup demo test test-rust test-python test-long lint stubs bench format lock clean
+
+help: ## this list
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
+
+setup: $(STAMPS)/extension ## make .venv, install the locked packages, build the extension
+
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+		|| { echo "elevon needs Python 3.11 or newer; try make PYTHON=python3.12" >&2; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+
+$(STAMPS)/packages: requirements.lock | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
+	@mkdir -p $(STAMPS) && touch $@
+
+$(STAMPS)/extension: $(STAMPS)/packages pyproject.toml $(RUST_SOURCES)
+	VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop --release --quiet --skip-install-deps
+	@touch $@
+
+demo: setup ## the torino-backlash table and its report
+	$(DEMO)
+
+test: setup lint test-rust test-python ## every check but the long ones
+
+test-rust: $(STAMPS)/extension
+	cargo test --locked --release --workspace --quiet
+
+test-python: setup
+	$(BIN)/python -m pytest -q -n 2 -m "not long and not bench"
+
+test-long: setup ## the checks that take minutes
+	$(BIN)/python -m pytest -q -n 2 -m "long and not bench"
+
+lint: setup stubs ## formatting, style and types of both languages
+	$(BIN)/ruff format --check
+	$(BIN)/ruff check
+	$(BIN)/mypy
+	cargo fmt --all --check
+	cargo clippy --locked --release --workspace --all-targets --quiet -- -D warnings
+
+stubs: $(STAMPS)/extension ## the hand-written stub against the built extension
+	cd $(STAMPS) && ../$(BIN)/python -m mypy.stubtest elevon._core
+
+bench: setup ## the timed comparisons
+	$(BIN)/python -m pytest -q -m bench
+
+format: setup ## rewrite the sources in the house's form
+	$(BIN)/ruff format
+	$(BIN)/ruff check --fix
+	cargo fmt --all
+
+lock: $(BIN)/python ## choose the newest packages again, for Python 3.11 and up
+	$(BIN)/uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 \
+		--no-emit-index-url --no-emit-find-links --upgrade --quiet \
+		--custom-compile-command "make lock" --output-file requirements.lock
+
+clean: ## remove what was built; .venv stays
+	rm -rf $(STAMPS) out target .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
+	find python -name '_core*.so' -delete

@@ -1,0 +1,33 @@
+"""What all tests share."""
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+ROOT = Path(__file__).resolve().parents[1]
+
+settings.register_profile(
+    "elevon", deadline=None, max_examples=50, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.register_profile("ci", parent=settings.get_profile("elevon"), derandomize=True)
+settings.load_profile("ci" if os.environ.get("CI") else "elevon")
+
+
+def shared_folder() -> Path:
+    """The folder of reference data: ELEVON_SHARED, or `shared` beside the repository."""
+    return Path(os.environ.get("ELEVON_SHARED", ROOT.parent / "shared"))
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    folder = shared_folder()
+    if not folder.is_dir():
+        pytest.skip(f"the reference data folder {folder} is absent (set ELEVON_SHARED)")
+    return folder
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    if item.get_closest_marker("shared") and not shared_folder().is_dir():
+        pytest.skip(f"the reference data folder {shared_folder()} is absent (set ELEVON_SHARED)")

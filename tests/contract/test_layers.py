@@ -1,0 +1,77 @@
+"""Imports point only leftwards: data flows one way, and every room has one job."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[2] / "python" / "elevon"
+
+# From left to right; rooms in one row do not import each other. A new room is added here with
+# thought: what it may know of is everything left of it, and nothing else.
+ROWS = [
+    ["errors", "_core"],
+    ["_unit_table"],
+    ["units", "files", "progress", "memory", "data"],
+    ["documents", "series", "report"],
+    ["recording"],
+    ["parameters", "loads"],
+    ["actuator", "faults"],
+    ["scenario"],
+    ["record_plan"],
+    ["simulate"],
+    ["bench", "campaign"],
+    ["calibrate"],
+    ["reproduce"],
+    ["cli"],
+]
+RANK = {room: rank for rank, row in enumerate(ROWS) for room in row}
+
+
+def _room(path):
+    relative = path.relative_to(PACKAGE)
+    return relative.parts[0].removesuffix(".py") if len(relative.parts) > 1 else relative.stem
+
+
+def _imported(tree):
+    """Yield the rooms of the package that a module imports at run time, also inside functions."""
+    skipped = {
+        id(inner)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+        for inner in ast.walk(node)
+    }
+    for node in ast.walk(tree):
+        if id(node) in skipped:
+            continue
+        names = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "imports are absolute"
+            if node.module == "elevon":
+                names = [f"elevon.{alias.name}" for alias in node.names]
+            else:
+                names = [node.module]
+        for name in names:
+            parts = name.split(".")
+            if parts[0] == "elevon" and len(parts) > 1 and not parts[1].startswith("__"):
+                yield parts[1], node.lineno
+
+
+MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__init__.py")
+
+
+def test_every_room_has_its_place():
+    rooms = {_room(path) for path in MODULES}
+    assert "recording" in rooms
+    assert rooms <= RANK.keys()
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_imports_point_left(path):
+    room = _room(path)
+    for other, line in _imported(ast.parse(path.read_text(encoding="utf-8"))):
+        place = f"{path.relative_to(PACKAGE)}:{line}"
+        assert other in RANK, f"{place}: {other} is no room"
+        assert other == room or RANK[other] < RANK.get(room, -1), f"{place}: {room} imports {other}"
