@@ -31,6 +31,16 @@ MOTOR = {
     "control.speed_limit": 1e4,
     "inverter.supply_voltage": SUPPLY,
     "inverter.hysteresis_band": 0.5,
+    "motor.temperature_coefficient": 0.0,
+    "load.inertia": 0.0,
+    "load.stiffness": 0.0,
+    "friction.viscous_slope": 0.0,
+    "control.derivative_time": 0.0,
+    "control.anti_windup_back_calculation": 0.0,
+    "control.conditional_integration": "on",
+    "control.sample_time": 0.0,
+    "control.noise_deviation": 0.0,
+    "sensor.current.noise_deviation": 0.0,
 }
 # Nothing on the shaft but its inertia: no friction, no losses in the gear, stops out of reach,
 # inverter off.
