@@ -1,0 +1,298 @@
+"""A waveform fitted to a reconstructed command, with an honest uncertainty."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.bench.command import CommandTrace
+from elevon.bench.covariance import robust_covariance
+from elevon.bench.guess_command import guesses
+from elevon.bench.waveforms import WAVEFORMS, evaluate
+from elevon.errors import InputError, unknown
+
+__all__ = ["FREE", "WaveformFit", "best_waveform", "fit_waveform"]
+
+FloatArray = npt.NDArray[np.float64]
+
+#: Parameters fitted for each waveform; the others keep their guess or the value given.
+FREE: dict[str, tuple[str, ...]] = {
+    "constant": ("value",),
+    "step": ("initial", "final", "time"),
+    "ramp": ("initial", "slope", "start", "end"),
+    "sine": ("amplitude", "frequency", "phase", "bias"),
+    "triangle": ("amplitude", "frequency", "phase", "bias"),
+    "chirp": ("amplitude", "start_frequency", "end_frequency", "phase", "bias"),
+    "trapezoid": ("low", "high", "rise", "hold_high", "fall", "hold_low", "start"),
+}
+_ANGLES = {"phase"}
+_OUTLIER = 6.0
+_LEAST = 20
+
+
+@dataclass(frozen=True, slots=True)
+class WaveformFit:
+    """A fitted command.
+
+    Attributes
+    ----------
+    kind : str
+        Waveform.
+    values : dict of str to float
+        All its parameters (SI; phase at the log's time zero, within -pi to pi).
+    std : dict of str to float
+        Standard deviation of each fitted parameter, for coloured residuals.
+    covariance : ndarray, shape (p, p)
+        Of the fitted parameters, in the order of `std`.
+    rms : float
+        RMS of the residual [rad].
+    samples : int
+        Samples used.
+    window : (float, float)
+        First and last instant used [s]: before it the command had not begun, or was another.
+    converged : bool
+        Whether the optimiser met its tolerance.
+    """
+
+    kind: str
+    values: dict[str, float]
+    std: dict[str, float]
+    covariance: FloatArray
+    rms: float
+    samples: int
+    window: tuple[float, float]
+    converged: bool
+
+    def at(self, time: npt.ArrayLike) -> FloatArray:
+        """Return the fitted command [rad] at instants [s]."""
+        return evaluate(self.kind, self.values, np.asarray(time, dtype=np.float64))
+
+    def as_term(self) -> dict[str, float | str]:
+        """Return the command as a scenario's term: SI numbers, infinite ends left out."""
+        kept = {name: v for name, v in self.values.items() if math.isfinite(v)}
+        return {"kind": self.kind, **kept}
+
+
+def fit_waveform(
+    trace: CommandTrace,
+    kind: str = "sine",
+    *,
+    fixed: Mapping[str, float] | None = None,
+    window: tuple[float, float] | None = None,
+    timing_std: float = 0.0,
+) -> WaveformFit:
+    """Fit a waveform to the valid samples of a command trace.
+
+    Parameters
+    ----------
+    trace : CommandTrace
+        From `elevon.bench.command.reconstruct`.
+    kind : str
+        Waveform (see `elevon.bench.waveforms.WAVEFORMS`).
+    fixed : mapping of str to float, optional
+        Parameters that are known and not fitted (SI).
+    window : (float, float), optional
+        Seconds used. By default the command's beginning and end are found in the trace: a span at
+        rest at either end, and samples that no waveform of this kind explains.
+    timing_std : float
+        Standard deviation [s] of the log's own time offset, added to the phase's.
+
+    Returns
+    -------
+    WaveformFit
+        With standard deviations that hold for coloured residuals.
+
+    Raises
+    ------
+    InputError
+        Unknown waveform or parameter, or too few valid samples.
+    """
+    known = dict(fixed or {})
+    if kind not in WAVEFORMS:
+        raise unknown("waveform", kind, WAVEFORMS)
+    for name in known:
+        if name not in WAVEFORMS[kind]:
+            raise unknown("parameter", name, WAVEFORMS[kind], f"waveform {kind}")
+    t, y = _selected(trace, window)
+    moving = window is None and kind not in {"constant", "step", "ramp", "trapezoid"}
+    if moving:
+        t, y = _without_rest(t, y)
+    free = [name for name in FREE[kind] if name not in known]
+    values, jacobian, residual, converged = _best(kind, t, y, known, free=free)
+    for _ in range(3 if moving else 0):
+        first = _first_explained(t, residual)
+        if first == 0 or len(t) - first < max(_LEAST, len(t) // 4):
+            break
+        t, y = t[first:], y[first:]
+        values, jacobian, residual, converged = _best(kind, t, y, known, free=free, start=values)
+    solution = (jacobian, residual, converged)
+    return _result(kind, values, free, t, solution, timing_std=timing_std)
+
+
+def best_waveform(
+    trace: CommandTrace,
+    kinds: Sequence[str] = ("sine", "triangle", "trapezoid", "chirp", "ramp", "step"),
+) -> WaveformFit:
+    """Fit several waveforms and return the one of least Bayesian information criterion.
+
+    All are scored on the same samples, with as many degrees of freedom as each has parameters.
+
+    Raises
+    ------
+    InputError
+        Too few valid samples for any of them.
+    """
+    t, y = _selected(trace, None)
+    scored = []
+    for kind in kinds:
+        fit = fit_waveform(trace, kind)
+        inside = (t >= fit.window[0]) & (t <= fit.window[1])
+        # Samples a kind leaves out are charged at the spread of the whole trace: a fit to a
+        # fragment must not win against one that explains everything.
+        rest = np.where(inside, y - fit.at(t), y - y.mean())
+        power = max(float(np.mean(rest**2)), 1e-300)
+        scored.append((len(t) * math.log(power) + len(fit.std) * math.log(len(t)), fit))
+    return min(scored, key=lambda item: item[0])[1]
+
+
+def _selected(
+    trace: CommandTrace, window: tuple[float, float] | None
+) -> tuple[FloatArray, FloatArray]:
+    mask = trace.valid.copy()
+    if window is not None:
+        mask &= (trace.time >= window[0]) & (trace.time <= window[1])
+    if int(mask.sum()) < _LEAST:
+        raise InputError(
+            f"command: {int(mask.sum())} samples with the speed set point inside its limit; "
+            f"{_LEAST} are needed"
+        )
+    return trace.time[mask], trace.position[mask]
+
+
+def _without_rest(t: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Drop a span at rest before and after the motion: there the command holds one value."""
+    noise = 1.4826 * float(np.median(np.abs(np.diff(y)))) / math.sqrt(2.0)
+    band = max(_OUTLIER * noise, 0.005 * float(np.ptp(y)))
+    away = np.flatnonzero(np.abs(y - np.median(y[:_LEAST])) > band)
+    back = np.flatnonzero(np.abs(y - np.median(y[-_LEAST:])) > band)
+    first = int(away[0]) if away.size and away[0] > len(y) // 20 else 0
+    last = int(back[-1]) + 1 if back.size and back[-1] < len(y) - len(y) // 20 else len(y)
+    return (t[first:last], y[first:last]) if last - first >= _LEAST else (t, y)
+
+
+def _first_explained(t: FloatArray, residual: FloatArray) -> int:
+    """Index after the last sample of the first half that the second half's spread cannot explain."""
+    half = len(t) // 2
+    spread = 1.4826 * float(np.median(np.abs(residual[half:] - np.median(residual[half:]))))
+    off = np.flatnonzero(np.abs(residual[:half]) > max(_OUTLIER * spread, 1e-12))
+    return int(off[-1]) + 1 if off.size > 3 else 0
+
+
+def _best(
+    kind: str,
+    t: FloatArray,
+    y: FloatArray,
+    known: Mapping[str, float],
+    *,
+    free: Sequence[str],
+    start: Mapping[str, float] | None = None,
+) -> tuple[dict[str, float], FloatArray, FloatArray, bool]:
+    """Least squares from each guess; the best one's values, Jacobian (n, p), residual."""
+    from scipy.optimize import least_squares
+
+    spread = float(np.ptp(t))
+    results = []
+    for guess in [start] if start is not None else guesses(kind, t, y, known):
+        base = {**guess, **known}
+        if not free:
+            return base, np.empty((len(t), 0)), y - evaluate(kind, base, t), True
+        x0 = np.array([base[name] for name in free])
+
+        def residual(x: FloatArray, base: dict[str, float] = base) -> FloatArray:
+            return _model(kind, base, free, x, t) - y
+
+        scale = np.array([_typical(name, y, spread) for name in free])
+        solution = least_squares(
+            residual,
+            x0,
+            jac="3-point",
+            x_scale=scale,
+            xtol=1e-13,
+            ftol=1e-13,
+            gtol=1e-13,
+            max_nfev=200,
+        )
+        results.append((float(solution.cost), base, solution))
+    _, base, solution = min(results, key=lambda item: item[0])
+    values = {**base, **dict(zip(free, map(float, solution.x), strict=True))}
+    return values, np.asarray(solution.jac), -np.asarray(solution.fun), bool(solution.success)
+
+
+def _model(
+    kind: str, base: Mapping[str, float], free: Sequence[str], x: FloatArray, t: FloatArray
+) -> FloatArray:
+    values = {**base, **dict(zip(free, map(float, x), strict=True))}
+    for name in ("rise", "fall", "hold_high", "hold_low", "sweep_time"):
+        if name in values:
+            values[name] = max(values[name], 1e-6)
+    return evaluate(kind, values, t)
+
+
+def _typical(name: str, y: FloatArray, spread: float) -> float:
+    """Size of a meaningful change of a parameter, for the optimiser's scaling."""
+    if "frequency" in name:
+        return 0.05 / spread
+    if name in _ANGLES:
+        return 0.1
+    if name in {"time", "start", "end", "rise", "fall", "hold_high", "hold_low", "sweep_time"}:
+        return 0.01 * spread
+    if name == "slope":
+        return max(float(np.ptp(y)) / spread, 1e-12)
+    return max(float(np.ptp(y)), 1e-12)
+
+
+def _result(
+    kind: str,
+    values: dict[str, float],
+    free: Sequence[str],
+    t: FloatArray,
+    solution: tuple[FloatArray, FloatArray, bool],
+    *,
+    timing_std: float,
+) -> WaveformFit:
+    jacobian, residual, converged = solution
+    if values.get("amplitude", 1.0) < 0.0 and "phase" in free:
+        values["amplitude"], values["phase"] = -values["amplitude"], values["phase"] + math.pi
+        jacobian = jacobian * np.where(np.array(free) == "amplitude", -1.0, 1.0)
+    if "phase" in values:
+        values["phase"] = math.remainder(values["phase"], 2.0 * math.pi)
+    covariance = _covariance(kind, free, t, jacobian, residual)
+    if timing_std and "phase" in free:
+        place = list(free).index("phase")
+        rate = 2.0 * math.pi * values.get("frequency", values.get("start_frequency", 0.0))
+        covariance[place, place] += (rate * timing_std) ** 2
+    std = {name: float(math.sqrt(covariance[k, k])) for k, name in enumerate(free)}
+    rms = float(np.sqrt(np.mean(residual**2)))
+    window = (float(t[0]), float(t[-1]))
+    return WaveformFit(kind, values, std, covariance, rms, len(t), window, converged)
+
+
+def _covariance(
+    kind: str, free: Sequence[str], t: FloatArray, jacobian: FloatArray, residual: FloatArray
+) -> FloatArray:
+    """Covariance of the fitted parameters, shape (p, p).
+
+    A step's instant has no derivative: it is uniform between the two samples that enclose it.
+    """
+    smooth = [k for k, name in enumerate(free) if (kind, name) != ("step", "time")]
+    covariance = np.zeros((len(free), len(free)))
+    if smooth:
+        part = robust_covariance(jacobian[:, smooth], residual)
+        covariance[np.ix_(smooth, smooth)] = part
+    for k in set(range(len(free))) - set(smooth):
+        covariance[k, k] = float(np.median(np.diff(t))) ** 2 / 12.0
+    return covariance

@@ -1,0 +1,75 @@
+"""What an import has to say: nothing is repaired without a line here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+__all__ = ["Finding", "ImportReport"]
+
+Level = Literal["info", "warning"]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing seen: its level, the channel or clock, a code for programs, a text for people."""
+
+    level: Level
+    place: str
+    code: str
+    text: str
+
+    def to_dict(self) -> dict[str, str]:
+        """Return it as plain types."""
+        return {"level": self.level, "place": self.place, "code": self.code, "text": self.text}
+
+
+@dataclass(slots=True)
+class ImportReport:
+    """The report of one import.
+
+    Attributes
+    ----------
+    source : str
+        The log.
+    file_format : str
+        Reader and layout.
+    clocks : dict of str to dict
+        Samples, rate, jitter, gaps, duplicates of each clock.
+    channels : list of dict
+        Name, column in the file, unit, range, missing samples of each channel.
+    findings : list of Finding
+        In the order they were made.
+    synchronisation : dict or None
+        Offset and drift of the load cell's clock with their uncertainty.
+    """
+
+    source: str
+    file_format: str
+    clocks: dict[str, dict[str, Any]] = field(default_factory=dict)
+    channels: list[dict[str, Any]] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
+    synchronisation: dict[str, Any] | None = None
+
+    def note(self, place: str, code: str, text: str) -> None:
+        """Add a fact."""
+        self.findings.append(Finding("info", place, code, text))
+
+    def warn(self, place: str, code: str, text: str) -> None:
+        """Add something the user should look at."""
+        self.findings.append(Finding("warning", place, code, text))
+
+    def has(self, code: str) -> bool:
+        """Whether a finding of this code was made."""
+        return any(finding.code == code for finding in self.findings)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the report as plain types."""
+        return {
+            "source": self.source,
+            "format": self.file_format,
+            "clocks": self.clocks,
+            "channels": self.channels,
+            "findings": [finding.to_dict() for finding in self.findings],
+            "synchronisation": self.synchronisation,
+        }
