@@ -32,6 +32,40 @@ def _group() -> None:
     """Recompute a published table or figure; exit code 1 when a check fails."""
 
 
+@app.command("torino-backlash")
+def torino_backlash(
+    as_json: Json = False,
+    out: Out = None,
+    force: Force = False,
+    seed: Seed = 0,
+    date: Date = None,
+) -> int:
+    """Simulate the no-load campaign at all fifteen measured plays and recover each play."""
+    from elevon.cli.output import progress_bar
+    from elevon.reproduce.backlash import reproduce_backlash
+    from elevon.reproduce.backlash.page import backlash_report
+
+    _check_folder(out, force)
+    with progress_bar("simulating 16 runs") as advance:
+        result = reproduce_backlash(seed=seed, progress=advance)
+    values = result.to_dict()
+    if out is not None:
+        _write(out, backlash_report(result, date=date), values["rows"], force)
+    if as_json:
+        print_json(values)
+    else:
+        columns = ("row", "measured_total_deg", "formula_deg", "play_in_deg", "play_out_deg",
+                   "error_deg", "limit_deg", "lost_motion_deg")  # fmt: skip
+        rows = [[f"{row[key]:.4f}" for key in columns[1:]] for row in values["rows"]]
+        print_table(
+            [name.removesuffix("_deg").replace("_", " ") for name in columns],
+            [[str(number), *row] for number, row in enumerate(rows, 1)],
+            title="total play at the user side [deg]",
+        )
+        _print_checks(values)
+    return _exit_code(values)
+
+
 @app.command("torino-compliance")
 def torino_compliance(
     as_json: Json = False,

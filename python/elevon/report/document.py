@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from elevon.report.checks import Check, all_passed
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
@@ -113,6 +114,18 @@ class Section:
         )
         return self
 
+    def chart(
+        self, title: str, time: npt.ArrayLike, lines: Mapping[str, npt.ArrayLike], **options: Any
+    ) -> Section:
+        """Add an interactive chart; arguments as `elevon.report.uplot.chart`."""
+        from markupsafe import Markup
+
+        from elevon.report.uplot import chart
+
+        # Safe: the chart escapes its texts and carries its data as base64.
+        self.items.append({"kind": "chart", "markup": Markup(chart(title, time, lines, **options))})  # noqa: S704
+        return self
+
     def markup(self, markup: Markup, caption: str = "") -> Section:
         """Add trusted markup, such as an interactive plot.
 
@@ -194,7 +207,17 @@ class Report:
         )
         template = environment.from_string((folder / "report.html.j2").read_text("utf-8"))
         style = (folder / "style.css").read_text("utf-8")
-        return template.render(report=self, style=style, entries=self._provenance)
+        return template.render(
+            report=self, style=style, entries=self._provenance, assets=self._assets()
+        )
+
+    def _assets(self) -> str:
+        """Script and style of interactive charts, only when there are any."""
+        if not any(item["kind"] == "chart" for part in self.sections for item in part.items):
+            return ""
+        from elevon.report.uplot import assets
+
+        return assets()
 
     def save(self, path: str | os.PathLike[str], *, force: bool = False) -> Path:
         """Write the page, whole or not at all.

@@ -118,9 +118,9 @@ def inline_svg(figure: Figure, name: str, description: str) -> Markup:
     from markupsafe import Markup
 
     text = _svg_text(figure, name)
-    start = text.index("<svg")
-    body = text[start:].replace(_INK, "currentColor").replace(_RULE, "var(--rule)")
+    body = text[text.index("<svg") :].replace(_INK, "currentColor").replace(_RULE, "var(--rule)")
     body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.S)
+    body = re.sub(r'( id="|xlink:href="#|url\(#)', rf"\1f{name}-", body)
     body = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", body, count=1)
     body = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", body, count=1)
     label = f'<svg role="img" aria-label="{escape(description, quote=True)}"'

@@ -90,7 +90,12 @@ def deming_stiffness(load: Array, loss: Array, load_sd: float, loss_sd: float) -
         raise InputError(f"errors in both: needs positive deviations, got {load_sd} and {loss_sd}")
     x, y = (load - load.mean()) / load_sd, (loss - loss.mean()) / loss_sd
     difference, cross = float(y @ y - x @ x), float(x @ y)
-    slope = (difference + np.hypot(difference, 2.0 * cross)) / (2.0 * cross)
+    root = float(np.hypot(difference, 2.0 * cross))
+    # Two forms of one root: the sum of numbers of one sign loses no digits.
+    if difference >= 0.0:
+        slope = (root + difference) / (2.0 * cross)
+    else:
+        slope = 2.0 * cross / (root - difference)
     return float(load_sd / (loss_sd * slope))
 
 
@@ -127,7 +132,8 @@ def fit_compliance(
     weights = np.ones(len(load))
     for _ in range(100 if robust else 1):
         root = np.sqrt(weights)
-        beta: Array = np.linalg.lstsq(design * root[:, None], loss * root, rcond=None)[0]
+        solved = np.linalg.lstsq(design * root[:, None], loss * root, rcond=None)[0]
+        beta: Array = np.asarray(solved, dtype=np.float64)
         residuals: Array = np.asarray(loss - design @ beta, dtype=np.float64)
         scale = 1.4826 * float(np.median(np.abs(residuals)))
         fresh = _weights(residuals, scale) if robust else weights

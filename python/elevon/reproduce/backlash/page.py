@@ -1,0 +1,193 @@
+"""The report of the backlash campaign."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elevon.report import Report, Table
+from elevon.report.figures import COLOURS, new_figure
+from elevon.reproduce.backlash.campaign import FREQUENCY, START, BacklashResult
+from elevon.reproduce.provenance import provenance
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["backlash_report", "summary_figure"]
+
+SHOWN = (1, 7, 14)
+"""Rows whose traces the paper shows."""
+
+
+def backlash_report(result: BacklashResult, *, date: str | None = None) -> Report:
+    """Return the report of a backlash result."""
+    worst = max(result.rows, key=lambda row: abs(row.error_deg) / row.limit_deg)
+    report = Report(
+        "Backlash of the Torino bench",
+        "Fifteen measured plays, put into the simulated actuator and recovered from its encoder "
+        f"alone. Largest error against its limit: row {worst.measured.row}, "
+        f"{abs(worst.error_deg):.4f} of {worst.limit_deg:.4f} deg.",
+        date=date,
+    )
+    errors = np.array([row.error_deg for row in result.rows])
+    gaps = np.array([row.formula_deg - row.play_in_deg for row in result.rows])
+    report.fact("Error of recovery", f"{np.sqrt(np.mean(errors**2)):.4f} deg", "RMS, fifteen rows")
+    report.fact("Encoder count", f"{result.encoder_count_deg:.4f} deg", "at the user side")
+    report.fact("Formula less measured", f"{gaps.min():+.2f} deg", "largest, at the widest spacing")
+    values = result.to_dict()
+    report.fact("Simulated", f"{values['sim_s']:.0f} s", f"in {values['wall_s']:.1f} s of one core")
+    _comparison(report, result)
+    _traces(report, result)
+    _method(report, result)
+    report.section("Checks").checks(result.checks)
+    report.provenance(
+        provenance(
+            "elevon reproduce torino-backlash --out DIR",
+            **{
+                "Parameter hash (no play)": values["parameter_hash"],
+                "Seed": values["seed"],
+                "Core": values["version"],
+            },
+        )
+    )
+    return report
+
+
+def summary_figure(result: BacklashResult) -> Figure:
+    """Draw measured, calculated and recovered play over the spacing."""
+    spacing = np.array([row.measured.spacing_mm for row in result.rows])
+    with new_figure(width=8.0, height=3.8) as (figure, axes):
+        axes.plot(
+            spacing,
+            [row.formula_deg for row in result.rows],
+            color=COLOURS["grey"],
+            label="geometric formula, with the intrinsic play",
+        )
+        axes.plot(
+            spacing,
+            [row.measured.measured_total_deg for row in result.rows],
+            "o",
+            ms=8,
+            mfc="none",
+            color=COLOURS["blue"],
+            label="measured on the bench",
+        )
+        axes.plot(
+            spacing,
+            [row.play_out_deg for row in result.rows],
+            "x",
+            color=COLOURS["orange"],
+            label="recovered from the simulated encoder",
+        )
+        axes.set(
+            xlabel="Radial spacing of the gears [mm]", ylabel="Total play [deg]", ylim=(0, 2.8)
+        )
+        axes.legend(loc="upper left")
+    return figure
+
+
+def _comparison(report: Report, result: BacklashResult) -> None:
+    section = report.section(
+        "Measured, calculated, simulated",
+        "The formula is that of ideal teeth. Above some 2 mm of spacing the printed gears' flanks "
+        "are no involutes any more and the bench shows more play than the formula.",
+    )
+    section.figure(summary_figure(result), "Total play against the spacing of the gears.")
+    columns = [
+        "Row", "Micrometer [mm]", "Measured [deg]", "Formula [deg]", "Put in [deg]",
+        "Recovered [deg]", "Error [deg]", "Limit [deg]", "Motor less encoder [deg]", "Flat [s]",
+    ]  # fmt: skip
+    rows = [
+        [
+            row.measured.row,
+            row.measured.micrometer_mm,
+            f"{row.measured.measured_total_deg:.4f}",
+            f"{row.formula_deg:.4f}",
+            f"{row.play_in_deg:.4f}",
+            f"{row.play_out_deg:.4f}",
+            f"{row.error_deg:+.4f}",
+            f"{row.limit_deg:.4f}",
+            f"{row.lost_motion_deg:.4f}",
+            f"{row.flat_s:.3f}",
+        ]
+        for row in result.rows
+    ]
+    section.table(Table(columns, rows, "Total play at the user side.", 4))
+    section.figure(
+        _errors(result), "Error of the recovered play; the band is one count and 2 % of the play."
+    )
+
+
+def _traces(report: Report, result: BacklashResult) -> None:
+    section = report.section(
+        "What the encoder sees",
+        "While the gap is crossed the encoder stands still. The loop, closed on the encoder, "
+        "drives the motor on: it overshoots by the play and the flat ends with a step in speed.",
+    )
+    section.figure(
+        _trace_figure(result),
+        f"One period after {START:g} s at rows 1, 7 and 14: command, motor divided by the gear "
+        "ratio, encoder.",
+    )
+
+
+def _method(report: Report, result: BacklashResult) -> None:
+    edges = f"{result.encoder_count_deg:g} deg"
+    report.section(
+        "How the play is recovered",
+        "From encoder signals only. Over half a period, from before one reversal to before the "
+        "next, the motor turns the encoder's own travel plus the play. The loop's integral action "
+        "makes the time integral of command less encoder, times the position gain, equal to that "
+        "travel, up to what friction takes to turn round. The same command without play (a blank "
+        "run) takes the same for friction. So the play is the position gain times the area between "
+        "the two encoder signals over half a period: no inertia, friction or timing enters. The "
+        f"areas of the reversals after {START:g} s are averaged; a count is {edges}.",
+        "Second estimate, for comparison: the range of motor position less encoder, which a bench "
+        "with a motor sensor sees directly, to within a count.",
+    )
+
+
+def _errors(result: BacklashResult) -> Figure:
+    with new_figure(width=8.0, height=2.6) as (figure, axes):
+        play = np.array([row.play_in_deg for row in result.rows])
+        limit = np.array([row.limit_deg for row in result.rows])
+        axes.fill_between(play, -limit, limit, color=COLOURS["green"], alpha=0.15, lw=0)
+        axes.axhline(0.0, color=COLOURS["grey"], lw=0.8)
+        axes.errorbar(
+            play,
+            [row.error_deg for row in result.rows],
+            [row.spread_deg for row in result.rows],
+            fmt="o",
+            ms=4.5,
+            lw=1,
+            color=COLOURS["orange"],
+        )
+        axes.set(xlabel="Play put in [deg]", ylabel="Error [deg]")
+    return figure
+
+
+def _trace_figure(result: BacklashResult) -> Figure:
+    with new_figure(1, 3, width=9.0, height=3.4, sharey=True) as (figure, axes):
+        for axis, number in zip(axes, SHOWN, strict=True):
+            _draw_trace(axis, result, number)
+        axes[0].set_ylabel("Position at the user [deg]")
+        axes[0].legend(loc="lower left")
+    return figure
+
+
+def _draw_trace(axis: Any, result: BacklashResult, number: int) -> None:
+    recording = result.recordings[number - 1]
+    encoder = recording["encoder_position"]
+    shown = (encoder.time >= START) & (encoder.time < START + 1.0 / FREQUENCY)
+    time = encoder.time[shown]
+    motor = recording["motor_position"].values / result.gear_ratio
+    lines = [
+        ("command", recording["command"].values, "grey", 1.0),
+        ("motor / ratio", motor, "blue", 1.2),
+        ("encoder", encoder.values, "orange", 1.6),
+    ]
+    for label, values, colour, width in lines:
+        axis.plot(time, np.degrees(values[shown]), color=COLOURS[colour], lw=width, label=label)
+    play = result.rows[number - 1].play_in_deg
+    axis.set(xlabel="Time [s]", title=f"Row {number}: {play:.2f} deg")
