@@ -130,7 +130,7 @@ def phasor_solution(
         w, iq, i_d = x
         error = math.hypot(reference - iq, i_d)
         ripple = (math.pi**2 / 9 - 1) * peak / (P * w * L)
-        # i_j = i_q sin a - i_d cos a: a positive i_d lags. A voltage lagging by g has v_d = v sin g.
+        # i_j = i_q sin a - i_d cos a: positive i_d lags; a voltage lagging by g has v_d = v sin g.
         angle = math.atan2(-i_d, reference - iq) + math.asin((band - ripple) / error)
         vq, vd = peak * math.cos(angle), peak * math.sin(angle)
         return [

@@ -45,26 +45,29 @@ def test_recording_does_not_change_the_run(drive: str, record: str) -> None:
 
 
 def batch(count: int = 19) -> list[Any]:
-    """Runs that differ in parameters, command, fault and seed: none may disturb its neighbour."""
+    """Runs that differ in all that may differ: none may disturb its neighbour."""
     runs = []
     for i in range(count):
         faults = (
             [{"kind": "short", "place": "motor.phase_a", "severity": 0.02 * i}] if i % 3 else []
         )
+        if i % 5 == 2:
+            profile = {"kind": "intermittent", "start": f"{i} ms", "period": "5 ms", "duty": 0.5}
+            faults.append(
+                {"kind": "friction", "place": "transmission", "severity": 1.0, "profile": profile}
+            )
+        settings = {
+            "motor.inertia": 7e-4 + 1e-5 * i,
+            "sensor.current.bits": (0, 8, 10, 12)[i % 4],
+            "inverter.dead_time": 2e-6 if i % 6 == 5 else 0.0,
+        }
         scenario = make_scenario(
             duration=0.02,
             command=[term("sine", amplitude=f"{3 + i} deg", frequency="2 Hz")],
             extra={"fault": faults},
         )
         drive = PWM if i % 4 == 3 else HYSTERESIS
-        runs.append(
-            elevon.Run(
-                actuator(drive | NOISY | {"motor.inertia": 7e-4 + 1e-5 * i}),
-                scenario,
-                i,
-                f"run {i}",
-            )
-        )
+        runs.append(elevon.Run(actuator(drive | NOISY | settings), scenario, i, f"run {i}"))
     return runs
 
 

@@ -66,8 +66,8 @@ def test_profile_follows_its_formula(kind: str) -> None:
     expected = SEVERITY * formula(time)
     late = SEVERITY * formula(np.maximum(time - GRID, 0.0))
     low, high = np.minimum(expected, late), np.maximum(expected, late)
-    assert np.all(applied >= low - 1e-9)
-    assert np.all(applied <= high + 1e-9)
+    assert np.all(applied >= low - 1e-5)
+    assert np.all(applied <= high + 1e-5)
     assert np.ptp(applied) > 0.9 * np.ptp(expected)
 
 
