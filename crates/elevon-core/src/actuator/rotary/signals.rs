@@ -1,0 +1,85 @@
+//! What a run of the rotary actuator can record.
+
+use crate::signals;
+
+signals! {
+    /// Signals of the high fidelity.
+    HighSignal, HIGH {
+        Command => "command", "-", "rad", "command with its noise (rad at the user, rad/s or N m by the control mode)";
+        UserPosition => "user_position", "theta_u", "rad", "user position";
+        UserSpeed => "user_speed", "omega_u", "rad/s", "user speed";
+        MotorPosition => "motor_position", "theta_m", "rad", "motor angle";
+        MotorSpeed => "motor_speed", "omega_m", "rad/s", "motor speed";
+        SpeedRef => "speed_ref", "omega_ref", "rad/s", "speed reference";
+        TorqueRef => "torque_ref", "T_ref", "N m", "torque reference after its limit";
+        CurrentRef => "current_ref", "i_q_ref", "A", "quadrature current reference, peak";
+        CurrentA => "current_a", "i_a", "A", "phase current a";
+        CurrentB => "current_b", "i_b", "A", "phase current b";
+        CurrentC => "current_c", "i_c", "A", "phase current c";
+        CurrentQ => "current_q", "i_q", "A", "quadrature current, peak";
+        CurrentD => "current_d", "i_d", "A", "direct current, peak";
+        VoltageA => "voltage_a", "v_a", "V", "phase-to-neutral voltage a";
+        VoltageB => "voltage_b", "v_b", "V", "phase-to-neutral voltage b";
+        VoltageC => "voltage_c", "v_c", "V", "phase-to-neutral voltage c";
+        VoltageQRef => "voltage_q_ref", "v_q_ref", "V", "quadrature voltage set point (PWM drive)";
+        CurrentQMeas => "current_q_meas", "i_q_meas", "A", "measured quadrature current, filtered";
+        CurrentDMeas => "current_d_meas", "i_d_meas", "A", "measured direct current, filtered";
+        VoltageQMeas => "voltage_q_meas", "v_q_meas", "V", "quadrature voltage, filtered";
+        CurrentAMeas => "current_a_meas", "i_a_meas", "A", "current sensor a";
+        CurrentBMeas => "current_b_meas", "i_b_meas", "A", "current sensor b";
+        CurrentCMeas => "current_c_meas", "i_c_meas", "A", "current sensor c";
+        LoopCurrentA => "loop_current_a", "i_fa", "A", "current in the shorted turns of phase a";
+        LoopCurrentB => "loop_current_b", "i_fb", "A", "current in the shorted turns of phase b";
+        LoopCurrentC => "loop_current_c", "i_fc", "A", "current in the shorted turns of phase c";
+        MotorTorque => "motor_torque", "T_m", "N m", "electromagnetic torque";
+        FrictionTorque => "friction_torque", "T_fric", "N m", "dry and viscous friction on the fast shaft, the brake's included";
+        BrakeTorque => "brake_torque", "T_b", "N m", "torque the brake can oppose";
+        LoadTorque => "load_torque", "T_load", "N m", "signed load referred to the fast shaft";
+        UserTorque => "user_torque", "T_u", "N m", "load on the user side, spring included";
+        TransmissionTorque => "transmission_torque", "T_t", "N m", "torque through the play at the user (elastic model)";
+        SupplyVoltage => "supply_voltage", "V_dc", "V", "DC link voltage";
+        WindingTemperature => "winding_temperature", "T_w", "K", "winding temperature";
+        EncoderPosition => "encoder_position", "-", "rad", "user position the encoder shows";
+        ResolverPosition => "resolver_position", "-", "rad", "motor angle the resolver shows";
+        ResolverSpeed => "resolver_speed", "-", "rad/s", "motor speed the resolver shows";
+        LegTransitions => "leg_transitions", "-", "1", "leg transitions since the start";
+        Tripped => "tripped", "-", "1", "1 once the drive has tripped";
+        EnergySupply => "energy_supply", "-", "J", "energy drawn from the DC link";
+        EnergyCopper => "energy_copper", "-", "J", "copper losses, shorted turns included";
+        EnergyInverter => "energy_inverter", "-", "J", "losses in switches and diodes";
+        EnergyFriction => "energy_friction", "-", "J", "work against friction, without the brake";
+        EnergyBrake => "energy_brake", "-", "J", "work against the brake";
+        EnergyLoad => "energy_load", "-", "J", "work against the signed loads";
+        EnergyImpact => "energy_impact", "-", "J", "kinetic energy lost at the end stops and in the contact";
+        EnergyKinetic => "energy_kinetic", "-", "J", "kinetic energy";
+        EnergyMagnetic => "energy_magnetic", "-", "J", "magnetic energy of the windings";
+    }
+}
+
+signals! {
+    /// Signals of the low fidelity: the same names where they mean the same.
+    LowSignal, LOW {
+        Command => "command", "-", "rad", "command (rad at the user, rad/s or N m by the control mode)";
+        UserPosition => "user_position", "theta_u", "rad", "user position";
+        UserSpeed => "user_speed", "omega_u", "rad/s", "user speed";
+        MotorPosition => "motor_position", "theta_m", "rad", "motor angle";
+        MotorSpeed => "motor_speed", "omega_m", "rad/s", "motor speed";
+        SpeedRef => "speed_ref", "omega_ref", "rad/s", "speed reference";
+        TorqueRef => "torque_ref", "T_ref", "N m", "torque reference after its limit";
+        CurrentRef => "current_ref", "i_q_ref", "A", "quadrature current reference, peak";
+        CurrentQ => "current_q", "i_q", "A", "quadrature current of the equivalent phase, peak";
+        CurrentQMeas => "current_q_meas", "i_q_meas", "A", "measured quadrature current, filtered";
+        VoltageQRef => "voltage_q_ref", "v_q", "V", "quadrature voltage of the equivalent phase";
+        VoltageQMeas => "voltage_q_meas", "v_q_meas", "V", "quadrature voltage, filtered";
+        MotorTorque => "motor_torque", "T_m", "N m", "electromagnetic torque";
+        FrictionTorque => "friction_torque", "T_fric", "N m", "dry and viscous friction on the fast shaft, the brake's included";
+        BrakeTorque => "brake_torque", "T_b", "N m", "torque the brake can oppose";
+        LoadTorque => "load_torque", "T_load", "N m", "signed load referred to the fast shaft";
+        SupplyVoltage => "supply_voltage", "V_dc", "V", "DC link voltage";
+        WindingTemperature => "winding_temperature", "T_w", "K", "winding temperature";
+        EncoderPosition => "encoder_position", "-", "rad", "user position the encoder shows";
+        ResolverPosition => "resolver_position", "-", "rad", "motor angle the resolver shows";
+        ResolverSpeed => "resolver_speed", "-", "rad/s", "motor speed the resolver shows";
+        Tripped => "tripped", "-", "1", "1 once the drive has tripped";
+    }
+}

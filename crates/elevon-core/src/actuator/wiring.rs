@@ -1,0 +1,103 @@
+//! What the solver asks of a wiring. The model is constant, all of a run lives in its state.
+
+use crate::command::Source;
+use crate::fault::FaultKind;
+use crate::scalar::Scalar;
+use crate::time::Steps;
+use crate::variable::{Group, Signal};
+use std::fmt::Debug;
+use std::hash::Hash;
+
+/// An input of a wiring that waveforms drive.
+#[derive(Clone, Copy, Debug)]
+pub struct Port {
+    pub name: &'static str,
+    pub unit: &'static str,
+    pub text: &'static str,
+    /// Path of the parameter that is its value when no waveform is given; empty: zero.
+    pub parameter: &'static str,
+}
+
+/// The inputs of one chunk of lanes, in the order of `Wiring::PORTS`.
+pub type Inputs<S> = Vec<Source<S>>;
+
+/// Parameters of a run and which of them faults will move: what decides its structure.
+#[derive(Clone, Copy, Debug)]
+pub struct Setup<'a> {
+    pub raw: &'a [f64],
+    pub touched: &'a [bool],
+    /// A port is driven by waveforms (in the order of `PORTS`).
+    pub driven: &'a [bool],
+    /// Indices of the recorded signals.
+    pub recorded: &'a [usize],
+}
+
+impl Setup<'_> {
+    /// Is the parameter away from its healthy value, now or later?
+    pub fn departs(&self, index: usize, healthy: f64) -> bool {
+        self.raw[index] != healthy || self.touched[index]
+    }
+}
+
+/// A periodic event of the run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Tick {
+    pub period: Steps,
+    /// What the wiring does then.
+    pub kind: u8,
+}
+
+/// A finding of the cross-parameter checks.
+#[derive(Clone, Debug)]
+pub struct Finding {
+    pub path: String,
+    pub value: f64,
+    pub limit: f64,
+    pub message: String,
+}
+
+/// A quantity watched for divergence.
+#[derive(Clone, Copy, Debug)]
+pub struct Watch<S> {
+    pub name: &'static str,
+    pub value: S,
+    pub limit: f64,
+}
+
+pub trait Wiring: Sized + Send + Sync + 'static {
+    type Structure: Clone + Eq + Hash + Debug + Send + Sync;
+    type Model<S: Scalar>: Clone + Send + Sync;
+    type State<S: Scalar>: Clone + Send + Sync;
+
+    const PORTS: &'static [Port];
+    /// Signals whose initial value a scenario may set.
+    const INITIAL: &'static [&'static str];
+
+    fn groups() -> &'static [Group];
+    fn signals() -> &'static [Signal];
+    fn faults() -> Vec<FaultKind>;
+
+    /// Solver step, s.
+    fn step(raw: &[f64]) -> f64;
+    /// Grid on which smooth fault profiles are held, s.
+    fn fault_grid(raw: &[f64]) -> f64;
+    fn structure(setup: &Setup) -> Self::Structure;
+    fn ticks(raw: &[f64], structure: &Self::Structure) -> Vec<Tick>;
+    fn check(raw: &[f64]) -> Vec<Finding>;
+
+    fn derive<S: Scalar>(raw: &[S], structure: &Self::Structure) -> Self::Model<S>;
+    /// State at the start; `initial` holds the values given for `INITIAL`, NaN where none was.
+    fn start<S: Scalar>(model: &Self::Model<S>, raw: &[S], initial: &[S]) -> Self::State<S>;
+    /// After a fault changed parameters.
+    fn refresh<S: Scalar>(_raw: &[S], _state: &mut Self::State<S>) {}
+    fn tick<S: Scalar>(kind: u8, structure: &Self::Structure, model: &Self::Model<S>, inputs: &Inputs<S>, state: &mut Self::State<S>, t: S, noise: &mut dyn FnMut(u64) -> S);
+    /// `count` steps from step `from`, all chunks of the block side by side.
+    fn advance<S: Scalar>(structure: &Self::Structure, models: &[Self::Model<S>], inputs: &[Inputs<S>], states: &mut [Self::State<S>], from: Steps, count: Steps);
+    /// All signals, in the order of `signals()`.
+    fn observe<S: Scalar>(structure: &Self::Structure, model: &Self::Model<S>, inputs: &Inputs<S>, state: &Self::State<S>, t: S, out: &mut [S]);
+    fn watch<S: Scalar>(state: &Self::State<S>) -> Vec<Watch<S>>;
+    /// Positive once the drive of a lane has tripped.
+    fn tripped<S: Scalar>(_state: &Self::State<S>) -> S {
+        S::zero()
+    }
+}

@@ -1,0 +1,13 @@
+//! Waveforms: commands, loads and the supply are sums of them.
+//!
+//! A sum is compiled to one straight line (all piecewise linear terms together) plus a list of
+//! oscillators (sine, chirp); the straight line is renewed at breakpoints, which are events of the
+//! solver. So the inner loop pays for a line and the sines, whatever the sum holds.
+
+mod source;
+mod term;
+mod wave;
+
+pub use source::{Source, SourceLanes, SourcePlan};
+pub use term::Term;
+pub use wave::{catalogue, Wave, WaveRecord};

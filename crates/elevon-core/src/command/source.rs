@@ -1,0 +1,116 @@
+//! A sum of waveforms, compiled for a lane block.
+
+use super::term::{Oscillation, Term};
+use crate::scalar::Scalar;
+use crate::time::{step_at, Steps};
+
+/// The terms of one port of one run.
+#[derive(Clone, Debug, Default)]
+pub struct SourcePlan {
+    pub terms: Vec<Term>,
+}
+
+/// What the inner loop evaluates: a line and oscillators, one value a lane.
+#[derive(Clone, Debug)]
+pub struct Source<S> {
+    at: S,
+    value: S,
+    slope: S,
+    oscillators: Vec<[S; 5]>,
+}
+
+impl SourcePlan {
+    pub fn constant(value: f64) -> Self {
+        let term = Term { wave: super::Wave::Constant, enabled: true, parameters: vec![value], times: [].into(), values: [].into() };
+        Self { terms: vec![term] }
+    }
+
+    pub fn oscillators(&self) -> usize {
+        self.terms.iter().filter(|t| t.oscillates()).count()
+    }
+
+    /// Line at step `k` as (at, value, slope) and the step of the next breakpoint.
+    fn line(&self, k: Steps, dt: f64) -> ([f64; 3], Steps) {
+        let t = k as f64 * dt;
+        // Half a step of grace: a breakpoint that falls on the step belongs to what follows it.
+        let looked_up = t + 0.5 * dt;
+        let (mut value, mut slope, mut next) = (0.0, 0.0, Steps::MAX);
+        for term in &self.terms {
+            let line = term.line(looked_up);
+            value += line.value + line.slope * (t - line.at);
+            slope += line.slope;
+            next = next.min(step_at(line.until, dt).max(k + 1));
+        }
+        ([t, value, slope], next)
+    }
+
+    fn oscillations(&self, k: Steps, dt: f64) -> impl Iterator<Item = Oscillation> + '_ {
+        let looked_up = (k as f64 + 0.5) * dt;
+        self.terms.iter().filter(|t| t.oscillates()).map(move |t| t.oscillation(looked_up))
+    }
+}
+
+/// The ports of one kind over the lanes of a block, each lane renewed at its own breakpoints.
+#[derive(Clone, Debug)]
+pub struct SourceLanes {
+    plans: Vec<SourcePlan>,
+    lines: Vec<[f64; 3]>,
+    oscillations: Vec<Vec<Oscillation>>,
+    next: Vec<Steps>,
+}
+
+impl SourceLanes {
+    pub fn new(plans: Vec<SourcePlan>) -> Self {
+        let n = plans.len();
+        Self { plans, lines: vec![[0.0; 3]; n], oscillations: vec![Vec::new(); n], next: vec![0; n] }
+    }
+
+    pub fn next(&self) -> Steps {
+        self.next.iter().copied().min().unwrap_or(Steps::MAX)
+    }
+
+    /// Renews the lanes whose breakpoint is step `k`; true if any did.
+    pub fn renew(&mut self, k: Steps, dt: f64) -> bool {
+        let mut renewed = false;
+        for lane in 0..self.plans.len() {
+            if self.next[lane] > k {
+                continue;
+            }
+            let (line, mut next) = self.plans[lane].line(k, dt);
+            self.lines[lane] = line;
+            self.oscillations[lane] = self.plans[lane].oscillations(k, dt).collect();
+            for o in &self.oscillations[lane] {
+                next = next.min(step_at(o.until, dt).max(k + 1));
+            }
+            self.next[lane] = next;
+            renewed = true;
+        }
+        renewed
+    }
+
+    /// Packs the present lines and oscillators of lanes `first..first + S::LANES`.
+    pub fn pack<S: Scalar>(&self, first: usize) -> Source<S> {
+        let lane = |f: &dyn Fn(usize) -> f64| S::from_fn(|i| f(first + i));
+        let count = self.oscillations[first].len();
+        let oscillators = (0..count)
+            .map(|j| {
+                let get = |f: &dyn Fn(&Oscillation) -> f64| lane(&|i| f(&self.oscillations[i][j]));
+                [get(&|o| o.at), get(&|o| o.amplitude), get(&|o| o.phase), get(&|o| o.rate), get(&|o| o.sweep)]
+            })
+            .collect();
+        Source { at: lane(&|i| self.lines[i][0]), value: lane(&|i| self.lines[i][1]), slope: lane(&|i| self.lines[i][2]), oscillators }
+    }
+}
+
+impl<S: Scalar> Source<S> {
+    #[inline(always)]
+    pub fn at(&self, t: S) -> S {
+        let mut sum = self.value + self.slope * (t - self.at);
+        for [at, amplitude, phase, rate, sweep] in &self.oscillators {
+            let tau = t - *at;
+            let (sin, _) = (*phase + (*rate + *sweep * tau) * tau).sin_cos();
+            sum = sum + *amplitude * sin;
+        }
+        sum
+    }
+}

@@ -1,0 +1,175 @@
+//! Position P and speed PID with limits and anti-windup (T2, T3; reference sheet 1.3).
+
+use crate::scalar::Scalar;
+use crate::variables;
+
+variables! {
+    /// What the actuator control electronics believe and do.
+    ControlParameter, CONTROL {
+        Mode => "mode", "-", "1", Choice(&["position", "speed", "torque"]), Controller, Some(0.0), "what the command is: a position, a speed (bypasses the position loop) or a torque (bypasses both loops)";
+        PositionGain => "position_gain", "G", "1/s", NonNegative, Controller, None, "user position error to fast-shaft speed reference";
+        PositionGainScale => "position_gain_scale", "-", "1", NonNegative, Controller, Some(1.0), "healthy 1; drift of the position gain";
+        SpeedGain => "speed_gain", "K_p", "N m s/rad", NonNegative, Controller, None, "proportional gain of the speed PID, on all branches";
+        SpeedGainScale => "speed_gain_scale", "-", "1", NonNegative, Controller, Some(1.0), "healthy 1; drift of the speed gain";
+        IntegralTime => "integral_time", "T_i", "s", NonNegative, Controller, Some(0.0), "K_i = K_p / T_i; 0: no integral action";
+        DerivativeTime => "derivative_time", "T_d", "s", NonNegative, Controller, Some(0.0), "derivative time; 0: no derivative action";
+        DerivativeFilter => "derivative_filter", "N", "1", Positive, Controller, Some(1000.0), "the derivative's filter pole stands at N / T_d";
+        SpeedLimit => "speed_limit", "omega_max", "rad/s", Positive, Controller, None, "limit of the speed reference";
+        CurrentLimit => "current_limit", "I_max", "A", Positive, Controller, None, "limit of the quadrature current reference, peak";
+        TorqueConstant => "torque_constant", "k_t", "N m/A", Positive, Controller, None, "torque per peak ampere that the controller believes, 1.5 k when it knows the motor";
+        AntiWindupRest => "anti_windup_rest", "AW1", "1", Choice(&["off", "on"]), Controller, Some(0.0), "freeze the integrator while the speed is zero for more than one step";
+        AntiWindupError => "anti_windup_error", "AW2", "1", Choice(&["off", "below", "above"]), Controller, Some(0.0), "freeze the integrator while the position error is below (T2) or above (T3) the threshold";
+        AntiWindupThreshold => "anti_windup_threshold", "-", "rad", NonNegative, Controller, Some(0.0), "position error threshold of anti_windup_error, at the user";
+        BackCalculation => "anti_windup_back_calculation", "AW3", "1/s", NonNegative, Controller, Some(0.0), "gain from (saturated - demanded) torque back to the integrator; 0: off";
+        ConditionalIntegration => "conditional_integration", "-", "1", Choice(&["off", "on"]), Controller, Some(0.0), "integrate only while the torque reference is not limited";
+        SampleTime => "sample_time", "T_s", "s", NonNegative, Controller, Some(0.0), "sample time of the controller; 0: every solver step";
+        NoiseDeviation => "noise_deviation", "-", "rad", NonNegative, Controller, Some(0.0), "standard deviation of the band-limited noise on the command line (unit of the user position)";
+        NoiseSampleTime => "noise_sample_time", "-", "s", Positive, Controller, Some(1e-3), "the noise is held over this time, which sets its band";
+        PositionFeedback => "position_feedback", "-", "1", Choice(&["user", "encoder", "resolver"]), Controller, Some(0.0), "what closes the position loop: the user position itself (the papers' model), the user encoder's counts, or the motor resolver divided by the ratio";
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Mode {
+    Position,
+    Speed,
+    Torque,
+}
+
+/// The switches that give a controller its structure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ControlStructure {
+    pub mode: Mode,
+    pub derivative: bool,
+    pub hold_at_rest: bool,
+    /// 0 off, 1 below, 2 above.
+    pub hold_on_error: u8,
+    pub back_calculation: bool,
+    pub conditional: bool,
+    /// 0 user, 1 encoder, 2 resolver.
+    pub feedback: u8,
+}
+
+impl ControlStructure {
+    pub fn read(raw: &[f64]) -> Self {
+        use ControlParameter as P;
+        let on = |p: P| raw[p as usize] != 0.0;
+        Self {
+            mode: match raw[P::Mode as usize] as u8 {
+                0 => Mode::Position,
+                1 => Mode::Speed,
+                _ => Mode::Torque,
+            },
+            derivative: on(P::DerivativeTime),
+            hold_at_rest: on(P::AntiWindupRest),
+            hold_on_error: raw[P::AntiWindupError as usize] as u8,
+            back_calculation: on(P::BackCalculation),
+            conditional: on(P::ConditionalIntegration),
+            feedback: raw[P::PositionFeedback as usize] as u8,
+        }
+    }
+}
+
+/// Constants of the controller at its tick `ts`, discretised exactly for inputs held over a tick.
+#[derive(Clone, Copy, Debug)]
+pub struct PositionSpeed<S> {
+    position_gain: S,
+    speed_gain: S,
+    integral_step: S,
+    derivative_gain: S,
+    derivative_decay: S,
+    speed_limit: S,
+    torque_limit: S,
+    per_torque_constant: S,
+    threshold: S,
+    back_step: S,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct PositionSpeedState<S> {
+    pub integral: S,
+    pub filtered_error: S,
+    /// 1 if the speed was zero at the previous tick.
+    pub rested: S,
+    pub speed_ref: S,
+    pub torque_ref: S,
+}
+
+impl<S: Scalar> PositionSpeed<S> {
+    pub fn derive(raw: &[S], ts: f64) -> Self {
+        use ControlParameter as P;
+        let g = |p: P| raw[p as usize];
+        let gain = g(P::SpeedGain) * g(P::SpeedGainScale);
+        let guarded = |x: S| S::select(x.equals(S::zero()), S::one(), x);
+        let present = |x: S| S::indicator(S::zero().lt(x));
+        let (ti, td, filter) = (g(P::IntegralTime), g(P::DerivativeTime), g(P::DerivativeFilter));
+        let dt = S::splat(ts);
+        Self {
+            position_gain: g(P::PositionGain) * g(P::PositionGainScale),
+            speed_gain: gain,
+            integral_step: present(ti) * gain / guarded(ti) * dt,
+            derivative_gain: present(td) * gain * filter,
+            derivative_decay: S::one() - (-(filter * dt / guarded(td))).exp(),
+            speed_limit: g(P::SpeedLimit),
+            torque_limit: g(P::TorqueConstant) * g(P::CurrentLimit),
+            per_torque_constant: S::one() / g(P::TorqueConstant),
+            threshold: g(P::AntiWindupThreshold),
+            back_step: g(P::BackCalculation) * dt,
+        }
+    }
+
+    /// One tick: the quadrature current reference from the command and what the sensors say.
+    #[inline(always)]
+    pub fn step(&self, structure: &ControlStructure, s: &mut PositionSpeedState<S>, command: S, position: S, speed: S) -> S {
+        let position_error = command - position;
+        let demanded = match structure.mode {
+            Mode::Position => self.position_gain * position_error,
+            Mode::Speed => command,
+            Mode::Torque => {
+                s.torque_ref = command.clamp_abs(self.torque_limit);
+                return s.torque_ref * self.per_torque_constant;
+            }
+        };
+        s.speed_ref = demanded.clamp_abs(self.speed_limit);
+        let error = s.speed_ref - speed;
+        let mut torque = self.speed_gain * error + s.integral;
+        if structure.derivative {
+            let difference = error - s.filtered_error;
+            torque = torque + self.derivative_gain * difference;
+            s.filtered_error = s.filtered_error + self.derivative_decay * difference;
+        }
+        s.torque_ref = torque.clamp_abs(self.torque_limit);
+        self.integrate(structure, s, error, torque, position_error, speed);
+        s.torque_ref * self.per_torque_constant
+    }
+
+    #[inline(always)]
+    fn integrate(&self, structure: &ControlStructure, s: &mut PositionSpeedState<S>, error: S, torque: S, position_error: S, speed: S) {
+        let mut change = self.integral_step * error;
+        if structure.conditional {
+            change = S::select(s.torque_ref.equals(torque), change, S::zero());
+        }
+        if structure.back_calculation {
+            change = change + self.back_step * (s.torque_ref - torque);
+        }
+        if structure.hold_at_rest {
+            let rest = speed.equals(S::zero());
+            let held = rest & S::zero().lt(s.rested);
+            change = S::select(held, S::zero(), change);
+            s.rested = S::indicator(rest);
+        }
+        if structure.hold_on_error != 0 {
+            let below = position_error.abs().lt(self.threshold);
+            let held = if structure.hold_on_error == 1 { below } else { !below };
+            change = S::select(held, S::zero(), change);
+        }
+        s.integral = s.integral + change;
+    }
+}
+
+impl<S: Scalar> PositionSpeedState<S> {
+    pub fn rest() -> Self {
+        let zero = S::zero();
+        Self { integral: zero, filtered_error: zero, rested: zero, speed_ref: zero, torque_ref: zero }
+    }
+}

@@ -1,0 +1,56 @@
+//! The form in which a wiring lists its faults.
+
+use crate::variable::Range;
+
+/// What a severity `s` does to a parameter `x`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Op {
+    /// x (1 - s): a fraction lost.
+    Lose,
+    /// x (1 + s): a fraction added.
+    Grow,
+    /// x + s.
+    Add,
+    /// s, where it is not zero.
+    Set,
+    /// 1 during the fraction s of each period (attribute `period`), else x.
+    Pulse,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Target {
+    pub path: &'static str,
+    pub op: Op,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    pub name: &'static str,
+    pub targets: &'static [Target],
+}
+
+/// A further number of a fault. It sets the parameter `path` (if any) when given; `flag` is a parameter set to
+/// zero because the attribute was given.
+#[derive(Clone, Copy, Debug)]
+pub struct Attribute {
+    pub name: &'static str,
+    pub unit: &'static str,
+    pub default: Option<f64>,
+    pub path: &'static str,
+    pub flag: &'static str,
+    pub text: &'static str,
+}
+
+/// One line of the catalogue.
+#[derive(Clone, Copy, Debug)]
+pub struct FaultKind {
+    pub kind: &'static str,
+    pub unit: &'static str,
+    pub range: Range,
+    pub places: &'static [Place],
+    pub attributes: &'static [Attribute],
+    pub effect: &'static str,
+    pub source: &'static str,
+    /// Does the low fidelity see it?
+    pub low: bool,
+}

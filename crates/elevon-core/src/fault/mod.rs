@@ -1,0 +1,10 @@
+//! Faults are data: a kind, a place, a severity in a physical unit over time, mapped to parameters that every
+//! component always contains in their healthy form.
+
+mod catalogue;
+mod profile;
+mod schedule;
+
+pub use catalogue::{Attribute, FaultKind, Op, Place, Target};
+pub use profile::{profiles, Profile, ProfileRecord};
+pub use schedule::{FaultLanes, FaultSpec, Write};

@@ -1,0 +1,136 @@
+//! Faults compiled to parameter writes: edges exact to a step, smooth profiles held on a grid. The label of a
+//! sample is the severity held then.
+
+use super::{Op, Profile};
+use crate::scalar::Scalar;
+use crate::time::{step_at, Steps};
+
+/// One parameter that a fault changes.
+#[derive(Clone, Copy, Debug)]
+pub struct Write {
+    pub index: usize,
+    pub op: Op,
+}
+
+/// A fault of one run, resolved to parameter indices.
+#[derive(Clone, Debug)]
+pub struct FaultSpec {
+    pub severity: f64,
+    pub profile: Profile,
+    pub writes: Vec<Write>,
+    /// Parameters the attributes set, whatever the severity.
+    pub settings: Vec<(usize, f64)>,
+    /// Period of a pulsed fault, s.
+    pub period: f64,
+}
+
+impl FaultSpec {
+    /// Parameters that differ from healthy at some time; none when the severity is zero.
+    pub fn touched(&self) -> impl Iterator<Item = usize> + '_ {
+        let live = self.severity != 0.0;
+        self.writes.iter().filter(move |_| live).map(|w| w.index)
+    }
+
+    /// Held (label, profile factor, pulse state) at step `k` and the step of the next change.
+    fn at(&self, k: Steps, dt: f64, grid: Steps) -> (Held, Steps) {
+        let t = (k as f64 + 0.5) * dt;
+        let (factor, until) = self.profile.factor(t);
+        let smooth = until <= t;
+        let mut next = if smooth { (k / grid + 1) * grid } else { step_at(until, dt).max(k + 1) };
+        let label = factor * self.severity;
+        let mut pulse = false;
+        if self.writes.iter().any(|w| w.op == Op::Pulse) && label > 0.0 {
+            let origin = (t / self.period).floor() * self.period;
+            let off = origin + label * self.period;
+            pulse = t < off;
+            let edge = if pulse { off } else { origin + self.period };
+            next = next.min(step_at(edge, dt).max(k + 1));
+        }
+        (Held { label, factor, pulse }, next)
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Held {
+    label: f64,
+    factor: f64,
+    pulse: bool,
+}
+
+/// The faults of the lanes of a block.
+#[derive(Clone, Debug)]
+pub struct FaultLanes {
+    faults: Vec<Vec<FaultSpec>>,
+    held: Vec<Vec<Held>>,
+    next: Vec<Steps>,
+    grid: Steps,
+}
+
+impl FaultLanes {
+    pub fn new(faults: Vec<Vec<FaultSpec>>, grid: Steps) -> Self {
+        let held = faults.iter().map(|f| vec![Held::default(); f.len()]).collect();
+        let next = faults.iter().map(|f| if f.is_empty() { Steps::MAX } else { 0 }).collect();
+        Self { faults, held, next, grid: grid.max(1) }
+    }
+
+    pub fn next(&self) -> Steps {
+        self.next.iter().copied().min().unwrap_or(Steps::MAX)
+    }
+
+    pub fn labels(&self, lane: usize) -> impl Iterator<Item = f64> + '_ {
+        self.held[lane].iter().map(|h| h.label)
+    }
+
+    pub fn count(&self, lane: usize) -> usize {
+        self.faults[lane].len()
+    }
+
+    /// Renews the lanes whose next change is step `k`.
+    pub fn renew(&mut self, k: Steps, dt: f64) {
+        for lane in 0..self.faults.len() {
+            if self.next[lane] > k {
+                continue;
+            }
+            let mut next = Steps::MAX;
+            for (held, fault) in self.held[lane].iter_mut().zip(&self.faults[lane]) {
+                let (now, change) = fault.at(k, dt, self.grid);
+                *held = now;
+                next = next.min(change);
+            }
+            self.next[lane] = next;
+        }
+    }
+
+    /// Writes the held severities of lanes `first..` into a copy of the healthy parameters. `severity(lane,
+    /// fault)` is the severity as a scalar, so that a dual number can carry its derivative.
+    pub fn apply<S: Scalar>(&self, first: usize, raw: &mut [S], severity: &dyn Fn(usize, usize) -> S) {
+        let numbers = S::from_fn(|i| i as f64);
+        for i in 0..S::LANES {
+            let lane = first + i;
+            let mine = numbers.equals(S::splat(i as f64));
+            for (j, fault) in self.faults[lane].iter().enumerate() {
+                for &(index, value) in &fault.settings {
+                    raw[index] = S::select(mine, S::splat(value), raw[index]);
+                }
+                let held = self.held[lane][j];
+                let s = severity(lane, j) * S::splat(held.factor);
+                for write in &fault.writes {
+                    let changed = changed(raw[write.index], s, write.op, held);
+                    raw[write.index] = S::select(mine, changed, raw[write.index]);
+                }
+            }
+        }
+    }
+}
+
+fn changed<S: Scalar>(x: S, s: S, op: Op, held: Held) -> S {
+    match op {
+        Op::Lose => x * (S::one() - s),
+        Op::Grow => x * (S::one() + s),
+        Op::Add => x + s,
+        Op::Set if held.label == 0.0 => x,
+        Op::Set => s,
+        Op::Pulse if held.pulse => S::one(),
+        Op::Pulse => x,
+    }
+}

@@ -1,0 +1,204 @@
+//! The six-switch bridge in detail: dead time, on-resistance, diodes, open and shorted switches, open phases.
+//!
+//! A leg is high, low or off. Off, its diodes conduct by the sign of the phase current; at zero current the
+//! phase floats until its terminal voltage v_n + e_j leaves the rails. The neutral voltage sums the
+//! connected phases only. A shorted switch whose partner is gated shoots through: the drive trips.
+
+use crate::scalar::Scalar;
+use crate::variables;
+
+variables! {
+    /// The bridge and its supply.
+    InverterParameter, INVERTER {
+        SupplyVoltage => "supply_voltage", "V_dc", "V", Positive, Plant, None, "DC link voltage, unless the scenario drives it";
+        SupplyScale => "supply_scale", "-", "1", Unit, Plant, Some(1.0), "healthy 1; less: the supply sags";
+        HysteresisBand => "hysteresis_band", "h", "A", Positive, Controller, Some(0.5), "half band of the relays around the commanded phase current";
+        OnResistance => "on_resistance", "R_on", "ohm", NonNegative, Plant, Some(0.0), "resistance of a conducting switch";
+        DiodeDrop => "diode_drop", "V_d", "V", NonNegative, Plant, Some(0.0), "forward voltage of a free-wheeling diode";
+        DeadTime => "dead_time", "t_d", "s", NonNegative, Plant, Some(0.0), "both switches of a leg are off for this time at each transition";
+        TripCurrent => "trip_current", "I_trip", "A", NonNegative, Controller, Some(0.0), "the drive trips when a phase current exceeds it; 0: no over-current trip";
+        OpenAHigh => "open_a_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg a never closes";
+        OpenALow => "open_a_low", "-", "1", Unit, Plant, Some(0.0), "1: the lower switch of leg a never closes";
+        OpenBHigh => "open_b_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg b never closes";
+        OpenBLow => "open_b_low", "-", "1", Unit, Plant, Some(0.0), "1: the lower switch of leg b never closes";
+        OpenCHigh => "open_c_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg c never closes";
+        OpenCLow => "open_c_low", "-", "1", Unit, Plant, Some(0.0), "1: the lower switch of leg c never closes";
+        ShortedAHigh => "shorted_a_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg a is always closed";
+        ShortedALow => "shorted_a_low", "-", "1", Unit, Plant, Some(0.0), "1: the lower switch of leg a is always closed";
+        ShortedBHigh => "shorted_b_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg b is always closed";
+        ShortedBLow => "shorted_b_low", "-", "1", Unit, Plant, Some(0.0), "1: the lower switch of leg b is always closed";
+        ShortedCHigh => "shorted_c_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg c is always closed";
+        ShortedCLow => "shorted_c_low", "-", "1", Unit, Plant, Some(0.0), "1: the lower switch of leg c is always closed";
+    }
+}
+
+impl InverterParameter {
+    /// Any of these away from zero needs the detailed bridge.
+    pub const DETAIL: std::ops::RangeInclusive<usize> = Self::OnResistance as usize..=Self::ShortedCLow as usize;
+}
+
+/// Constants of the detailed bridge.
+#[derive(Clone, Copy, Debug)]
+pub struct Bridge<S> {
+    on_resistance: S,
+    diode_drop: S,
+    dead_time: S,
+    trip_current: S,
+    open: [[S; 2]; 3],
+    shorted: [[S; 2]; 3],
+    dt: S,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct BridgeState<S> {
+    /// Time left before the newly commanded switch closes.
+    blanking: [S; 3],
+    /// 1 once the drive has tripped: no gate signals any more.
+    pub tripped: S,
+}
+
+/// The electrical condition of the three legs during one step.
+#[derive(Clone, Copy, Debug)]
+pub struct Legs<S: Scalar> {
+    /// Terminal voltage against the middle of the link; meaningless where not connected.
+    pub voltage: [S; 3],
+    /// The rail a connected leg draws its current from (+-V/2), for the energy account.
+    pub rail: [S; 3],
+    /// The phase carries or may carry current.
+    pub connected: [S::Mask; 3],
+    /// No switch holds the leg: its current may only fall to zero.
+    pub passive: [S::Mask; 3],
+}
+
+/// What the windings show to the bridge at the start of a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Windings<S> {
+    pub current: [S; 3],
+    pub emf: [S; 3],
+    /// v_n weighs the phases by 1 / L_j.
+    pub per_inductance: [S; 3],
+    pub resistance: [S; 3],
+    /// 1: the phase is interrupted (as soon as its current has passed zero).
+    pub open: [S; 3],
+}
+
+impl<S: Scalar> Bridge<S> {
+    pub fn derive(raw: &[S], dt: f64) -> Self {
+        use InverterParameter as P;
+        let g = |p: P| raw[p as usize];
+        let pairs = |first: P| -> [[S; 2]; 3] { std::array::from_fn(|j| std::array::from_fn(|i| raw[first as usize + 2 * j + i])) };
+        Self {
+            on_resistance: g(P::OnResistance),
+            diode_drop: g(P::DiodeDrop),
+            dead_time: g(P::DeadTime),
+            trip_current: g(P::TripCurrent),
+            open: pairs(P::OpenAHigh),
+            shorted: pairs(P::ShortedAHigh),
+            dt: S::splat(dt),
+        }
+    }
+
+    /// Legs from the commands (+1 high, -1 low, 0 off) and the windings; `v_n` in the second place.
+    #[inline(always)]
+    pub fn connect(&self, s: &mut BridgeState<S>, old: [S; 3], new: [S; 3], half_supply: S, w: &Windings<S>) -> (Legs<S>, S) {
+        let zero = S::zero();
+        let tiny = S::splat(0.5);
+        let mut legs = Legs { voltage: [zero; 3], rail: [zero; 3], connected: [S::mask(false); 3], passive: [S::mask(false); 3] };
+        for j in 0..3 {
+            let changed = !old[j].equals(new[j]);
+            s.blanking[j] = S::select(changed, self.dead_time, (s.blanking[j] - self.dt).maximum(zero));
+            let live = s.blanking[j].le(tiny * self.dt) & s.tripped.le(tiny);
+            let gate_high = live & zero.lt(new[j]);
+            let gate_low = live & new[j].lt(zero);
+            let high = (gate_high & self.open[j][0].le(tiny)) | tiny.lt(self.shorted[j][0]);
+            let low = (gate_low & self.open[j][1].le(tiny)) | tiny.lt(self.shorted[j][1]);
+            self.watch(s, high & low, w.current[j]);
+            let switched = self.on_resistance * w.current[j];
+            let diode = half_supply + self.diode_drop;
+            let positive = zero.lt(w.current[j]);
+            let carrying = !w.current[j].equals(zero);
+            let off_voltage = S::select(positive, -diode, diode);
+            let held = high | low;
+            let rail_held = S::select(high, half_supply, -half_supply);
+            legs.rail[j] = S::select(held, rail_held, S::select(positive, -half_supply, half_supply));
+            legs.voltage[j] = S::select(held, rail_held - switched, off_voltage);
+            let intact = w.open[j].le(tiny);
+            legs.connected[j] = carrying | (held & intact);
+            legs.passive[j] = !(held & intact);
+        }
+        let neutral = self.turn_on(&mut legs, half_supply, w);
+        (legs, neutral)
+    }
+
+    #[inline(always)]
+    fn watch(&self, s: &mut BridgeState<S>, shoot_through: S::Mask, current: S) {
+        let zero = S::zero();
+        let over = self.trip_current.lt(current.abs()) & zero.lt(self.trip_current);
+        s.tripped = S::select(shoot_through | over, S::one(), s.tripped);
+    }
+
+    /// Floating phases turn on when their terminal leaves the rails; the neutral follows.
+    #[inline(always)]
+    fn turn_on(&self, legs: &mut Legs<S>, half_supply: S, w: &Windings<S>) -> S {
+        let diode = half_supply + self.diode_drop;
+        let tiny = S::splat(0.5);
+        let neutral = self.neutral(legs, w);
+        let mut any = S::mask(false);
+        for j in 0..3 {
+            let terminal = neutral + w.emf[j];
+            let floating = !legs.connected[j] & w.open[j].le(tiny);
+            let up = floating & diode.lt(terminal);
+            let down = floating & terminal.lt(-diode);
+            legs.voltage[j] = S::select(up, diode, S::select(down, -diode, legs.voltage[j]));
+            legs.rail[j] = S::select(up, half_supply, S::select(down, -half_supply, legs.rail[j]));
+            legs.connected[j] = legs.connected[j] | up | down;
+            any = any | up | down;
+        }
+        if S::any(any) {
+            self.neutral(legs, w)
+        } else {
+            neutral
+        }
+    }
+
+    /// v_n over the connected phases; with none connected the EMFs float symmetrically between the rails.
+    #[inline(always)]
+    fn neutral(&self, legs: &Legs<S>, w: &Windings<S>) -> S {
+        let (mut sum, mut weight) = (S::zero(), S::zero());
+        for j in 0..3 {
+            let g = S::select(legs.connected[j], w.per_inductance[j], S::zero());
+            sum = sum + g * (legs.voltage[j] - w.emf[j] - w.resistance[j] * w.current[j]);
+            weight = weight + g;
+        }
+        let none = weight.equals(S::zero());
+        let highest = w.emf[0].maximum(w.emf[1]).maximum(w.emf[2]);
+        let lowest = w.emf[0].minimum(w.emf[1]).minimum(w.emf[2]);
+        let floating = S::splat(-0.5) * (highest + lowest);
+        S::select(none, floating, sum / S::select(none, S::one(), weight))
+    }
+}
+
+impl<S: Scalar> BridgeState<S> {
+    pub fn rest() -> Self {
+        Self { blanking: [S::zero(); 3], tripped: S::zero() }
+    }
+}
+
+/// A passive leg's current stops at zero; what is left over is taken from the phases that still carry, so that the
+/// star's currents keep summing to zero.
+#[inline(always)]
+pub fn quench<S: Scalar>(legs: &Legs<S>, old: [S; 3], new: [S; 3]) -> [S; 3] {
+    let zero = S::zero();
+    let mut current = new;
+    let mut carrying = [zero; 3];
+    for j in 0..3 {
+        let crossed = legs.passive[j] & !zero.lt(old[j] * new[j]) & !old[j].equals(zero);
+        let stopped = crossed | !legs.connected[j];
+        current[j] = S::select(stopped, zero, new[j]);
+        carrying[j] = S::select(stopped, zero, S::one());
+    }
+    let count = carrying[0] + carrying[1] + carrying[2];
+    let residue = current[0] + current[1] + current[2];
+    let share = S::select(count.equals(zero), zero, residue / count.maximum(S::one()));
+    std::array::from_fn(|j| current[j] - carrying[j] * share)
+}

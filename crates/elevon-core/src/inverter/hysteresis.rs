@@ -1,0 +1,19 @@
+//! Three hysteresis relays on the phase current errors (T2; reference sheet 1.4).
+
+use crate::scalar::Scalar;
+
+/// New leg commands (+1 high, -1 low): beyond the half band they follow the error's sign, inside it they stay.
+#[inline(always)]
+pub fn relays<S: Scalar>(half_band: S, legs: [S; 3], error: [S; 3]) -> [S; 3] {
+    std::array::from_fn(|j| {
+        let lowered = S::select(error[j].lt(-half_band), -S::one(), legs[j]);
+        S::select(half_band.lt(error[j]), S::one(), lowered)
+    })
+}
+
+/// Leg transitions between two sets of commands.
+#[inline(always)]
+pub fn transitions<S: Scalar>(old: [S; 3], new: [S; 3]) -> S {
+    let sum = (new[0] - old[0]).abs() + (new[1] - old[1]).abs() + (new[2] - old[2]).abs();
+    S::splat(0.5) * sum
+}

@@ -1,0 +1,86 @@
+//! The single equivalent phase of the low fidelity (reference sheet 1.9): the quadrature current.
+//!
+//! A current-controlled drive imposes i_j = i_q sin a_j, so the three-phase model collapses to one phase
+//! whose coefficients depend on the rotor angle (derivation: docs/theory/low-fidelity.md):
+//! k_T = sum k_j sin a_j, R_q = 2/3 sum R_j sin^2 a_j, L_q likewise, v_q = R_q i + L_q di/dt + 2/3 k_T omega.
+
+use crate::scalar::Scalar;
+use crate::variables;
+
+variables! {
+    /// The few numbers that only the low fidelity has.
+    LowParameter, LOW {
+        Step => "step", "dt", "s", Positive, Solver, Some(2.5e-4), "solver step of the low fidelity";
+        VoltageRatio => "voltage_ratio", "-", "1", Positive, Plant, Some(0.636_619_772_367_581_4), "largest phase voltage, peak, over the DC link: 2/pi in six-step, 1/sqrt 3 for a linear PWM";
+        BandRatio => "band_ratio", "-", "1", Between(0.0, 2.0), Plant, Some(0.5), "mean current error the relays allow before they act, in half bands";
+    }
+}
+
+/// What the equivalent phase shows at a rotor angle.
+#[derive(Clone, Copy, Debug)]
+pub struct Equivalent<S> {
+    pub torque_constant: S,
+    pub resistance: S,
+    pub inductance: S,
+}
+
+/// Coefficients for currents i_q `imposed[j]` in phases of `k`, `resistance`, `inductance`; `sensed[j]`
+/// projects phase quantities on the quadrature axis.
+#[inline(always)]
+pub fn equivalent<S: Scalar>(k: [S; 3], resistance: [S; 3], inductance: [S; 3], imposed: [S; 3]) -> Equivalent<S> {
+    let two_thirds = S::splat(2.0 / 3.0);
+    let weight: [S; 3] = imposed.map(|x| two_thirds * x * x);
+    let dot = |a: [S; 3], b: [S; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    Equivalent { torque_constant: dot(k, imposed), resistance: dot(resistance, weight), inductance: dot(inductance, weight) }
+}
+
+/// Shape of the phase currents per ampere of i_q: sin a_j; with phase j interrupted the other two carry half
+/// the difference of theirs, so that the star's sum stays zero.
+#[inline(always)]
+pub fn imposed_shape<S: Scalar>(sines: [S; 3], open: [S; 3]) -> [S; 3] {
+    let mut shape = sines;
+    for j in 0..3 {
+        let (x, y) = ((j + 1) % 3, (j + 2) % 3);
+        let half = S::splat(0.5) * (shape[x] - shape[y]);
+        let cut = S::splat(0.5).lt(open[j]);
+        shape[j] = S::select(cut, S::zero(), shape[j]);
+        shape[x] = S::select(cut, half, shape[x]);
+        shape[y] = S::select(cut, -half, shape[y]);
+    }
+    shape
+}
+
+/// One step of the equivalent R-L circuit, exact for held voltages and stable at any step: exp(-x) by its
+/// diagonal Pade form of order 3 (error x^7 / 100800, x = R dt / L).
+#[derive(Clone, Copy, Debug)]
+pub struct Circuit<S> {
+    resistance: S,
+    /// exp(-x) = numerator / denominator.
+    numerator: S,
+    denominator: S,
+}
+
+impl<S: Scalar> Circuit<S> {
+    #[inline(always)]
+    pub fn new(resistance: S, inductance: S, dt: S) -> Self {
+        let x = resistance * dt / inductance;
+        let square = x * x;
+        let even = S::one() + square * S::splat(0.1);
+        let odd = x * (S::splat(0.5) + square * S::splat(1.0 / 120.0));
+        Self { resistance, numerator: even - odd, denominator: even + odd }
+    }
+
+    /// Current after the step under the driving voltage (terminal voltage less EMF).
+    #[inline(always)]
+    pub fn current(&self, start: S, driving: S) -> S {
+        let settled = driving / self.resistance;
+        settled + (start - settled) * (self.numerator / self.denominator)
+    }
+
+    /// Driving voltage that brings the current from `start` to `end` in the step.
+    #[inline(always)]
+    pub fn voltage(&self, start: S, end: S) -> S {
+        let settled = (end * self.denominator - start * self.numerator) / (self.denominator - self.numerator);
+        self.resistance * settled
+    }
+}

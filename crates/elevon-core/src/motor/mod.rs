@@ -1,0 +1,4 @@
+//! Motor electromagnetics.
+
+pub mod equivalent;
+pub mod star;

@@ -1,0 +1,222 @@
+//! Three-phase star with floating neutral, faults in the winding and the air gap included in
+//! their healthy form (T2; reference sheet 1.5).
+
+use crate::scalar::Scalar;
+use crate::variables;
+
+variables! {
+    /// The motor.
+    MotorParameter, MOTOR {
+        PolePairs => "pole_pairs", "p", "1", AtLeast(1.0), Plant, None, "pole pairs";
+        Inertia => "inertia", "J_m", "kg m2", Positive, Plant, None, "rotor inertia";
+        Resistance => "winding_resistance", "R", "ohm", Positive, Plant, None, "phase resistance at the reference temperature";
+        Inductance => "winding_inductance", "L", "H", Positive, Plant, None, "phase inductance, mutual part included";
+        EmfConstant => "emf_constant", "k", "V s/rad", Positive, Plant, None, "peak phase EMF per mechanical rad/s; torque per peak ampere is 1.5 k";
+        TorqueLimit => "torque_limit", "T_max", "N m", Positive, Plant, None, "the flux saturates the torque at this value";
+        EmfShape => "emf_shape", "-", "1", Choice(&["sinusoidal", "trapezoidal"]), Plant, Some(0.0), "shape of the EMF over the electrical angle";
+        EmfFlatWidth => "emf_flat_width", "beta", "rad", Between(0.0, 3.0), Plant, Some(2.094_395_102_393_195_3), "width of the trapezoid's flat";
+        TurnsA => "turns_a", "N_a", "1", Fraction, Plant, Some(1.0), "healthy fraction of the turns of phase a";
+        TurnsB => "turns_b", "N_b", "1", Fraction, Plant, Some(1.0), "healthy fraction of the turns of phase b";
+        TurnsC => "turns_c", "N_c", "1", Fraction, Plant, Some(1.0), "healthy fraction of the turns of phase c";
+        FluxFraction => "flux_fraction", "-", "1", Fraction, Plant, Some(1.0), "healthy 1; less: the magnets have lost flux";
+        EccentricityStatic => "eccentricity_static", "zeta", "1", Unit, Plant, Some(0.0), "amplitude of the static eccentricity";
+        EccentricityStaticPhase => "eccentricity_static_phase", "phi", "rad", Any, Plant, Some(0.0), "its electrical phase angle";
+        EccentricityDynamic => "eccentricity_dynamic", "zeta_d", "1", Unit, Plant, Some(0.0), "dynamic eccentricity, fraction of the air gap; its modulation turns with the shaft";
+        EccentricityDynamicPhase => "eccentricity_dynamic_phase", "phi_d", "rad", Any, Plant, Some(0.0), "its mechanical phase angle";
+        OpenA => "open_a", "-", "1", Unit, Plant, Some(0.0), "1: phase a is interrupted (from its next current zero on)";
+        OpenB => "open_b", "-", "1", Unit, Plant, Some(0.0), "1: phase b is interrupted (from its next current zero on)";
+        OpenC => "open_c", "-", "1", Unit, Plant, Some(0.0), "1: phase c is interrupted (from its next current zero on)";
+        ShortModel => "short_model", "-", "1", Choice(&["reduced", "loop"]), Plant, Some(0.0), "shorted turns only missing (the paper), or a loop of their own with circulating current";
+        ShortCoupling => "short_coupling", "kappa", "1", Between(0.0, 0.99), Plant, Some(0.9), "magnetic coupling of shorted and healthy turns of a phase";
+        ShortContact => "short_contact_resistance", "R_c", "ohm", NonNegative, Plant, Some(0.0), "resistance of the short itself";
+        WindingTemperature => "winding_temperature", "T_w", "K", Positive, Plant, Some(293.15), "temperature of the winding, an input unless a thermal network drives it";
+        ReferenceTemperature => "reference_temperature", "T_0", "K", Positive, Plant, Some(293.15), "temperature at which the resistance is given";
+        TemperatureCoefficient => "temperature_coefficient", "alpha", "1/K", NonNegative, Plant, Some(0.0), "relative rise of the resistance per kelvin";
+        FluxTemperatureCoefficient => "flux_temperature_coefficient", "alpha_k", "1/K", Any, Plant, Some(0.0), "relative change of the EMF constant per kelvin of winding temperature";
+        ElectricalOffset => "electrical_offset", "theta_0", "rad", Any, Plant, Some(0.0), "electrical angle at the rotor's zero";
+    }
+}
+
+/// What of the motor needs the detailed step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct MotorStructure {
+    pub trapezoidal: bool,
+    pub shorted_loop: bool,
+    pub dynamic_eccentricity: bool,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Star<S> {
+    pub pole_pairs: S,
+    offset: S,
+    pub emf_constant: [S; 3],
+    pub resistance: [S; 3],
+    pub per_inductance: [S; 3],
+    /// Weight of each phase in the neutral voltage, all connected.
+    neutral_weight: [S; 3],
+    torque_limit: S,
+    eccentric_cos: S,
+    eccentric_sin: S,
+    dynamic_cos: S,
+    dynamic_sin: S,
+    flat_slope: S,
+    pub open: [S; 3],
+    /// Shorted loops: coupling ratio M / L_f, resistance, 1 / L_f and turns of the loop.
+    loop_ratio: [S; 3],
+    loop_resistance: [S; 3],
+    loop_per_inductance: [S; 3],
+    loop_turns: [S; 3],
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct StarState<S> {
+    pub current: [S; 3],
+    pub loop_current: [S; 3],
+    /// Factors by which temperature changes resistance and EMF constant.
+    pub resistance_factor: S,
+    pub flux_factor: S,
+}
+
+fn phases<S: Scalar>(raw: &[S], first: MotorParameter) -> [S; 3] {
+    std::array::from_fn(|j| raw[first as usize + j])
+}
+
+impl<S: Scalar> Star<S> {
+    pub fn derive(raw: &[S], structure: &MotorStructure) -> Self {
+        use MotorParameter as P;
+        let g = |p: P| raw[p as usize];
+        let (one, zero) = (S::one(), S::zero());
+        let turns = phases(raw, P::TurnsA);
+        let k = g(P::EmfConstant) * g(P::FluxFraction);
+        let coupling = if structure.shorted_loop { g(P::ShortCoupling) } else { zero };
+        let shorted = turns.map(|n| if structure.shorted_loop { one - n } else { zero });
+        let has_loop = shorted.map(|mu| zero.lt(mu));
+        let guarded: [S; 3] = std::array::from_fn(|j| S::select(has_loop[j], shorted[j], one));
+        let factor: [S; 3] = std::array::from_fn(|j| S::select(has_loop[j], one - coupling * coupling, one));
+        let per_inductance: [S; 3] = std::array::from_fn(|j| one / (turns[j] * turns[j] * g(P::Inductance) * factor[j]));
+        let total = per_inductance[0] + per_inductance[1] + per_inductance[2];
+        let (sin_s, cos_s) = g(P::EccentricityStaticPhase).sin_cos();
+        let (sin_d, cos_d) = g(P::EccentricityDynamicPhase).sin_cos();
+        let pi = S::splat(std::f64::consts::PI);
+        Self {
+            pole_pairs: g(P::PolePairs),
+            offset: g(P::ElectricalOffset),
+            emf_constant: turns.map(|n| n * k),
+            resistance: turns.map(|n| n * g(P::Resistance)),
+            per_inductance,
+            neutral_weight: per_inductance.map(|x| x / total),
+            torque_limit: g(P::TorqueLimit),
+            eccentric_cos: g(P::EccentricityStatic) * cos_s,
+            eccentric_sin: g(P::EccentricityStatic) * sin_s,
+            dynamic_cos: g(P::EccentricityDynamic) * cos_d,
+            dynamic_sin: g(P::EccentricityDynamic) * sin_d,
+            flat_slope: pi / (pi - g(P::EmfFlatWidth)),
+            open: phases(raw, P::OpenA),
+            loop_ratio: std::array::from_fn(|j| S::select(has_loop[j], coupling * turns[j] / guarded[j], zero)),
+            loop_resistance: std::array::from_fn(|j| shorted[j] * g(P::Resistance) + g(P::ShortContact)),
+            loop_per_inductance: std::array::from_fn(|j| S::select(has_loop[j], one / (guarded[j] * guarded[j] * g(P::Inductance)), zero)),
+            loop_turns: std::array::from_fn(|j| shorted[j] * k),
+        }
+    }
+
+    #[inline(always)]
+    pub fn electrical_angle(&self, theta: S) -> S {
+        self.pole_pairs * theta + self.offset
+    }
+
+    /// k_j of the three phases (sheet 1.5), sinusoidal: `shape` is sin of the three phase angles.
+    #[inline(always)]
+    pub fn coefficients(&self, shape: [S; 3], gap: [S; 3]) -> [S; 3] {
+        std::array::from_fn(|j| self.emf_constant[j] * shape[j] * gap[j])
+    }
+
+    /// 1 + zeta cos(theta_e - phi + 2 pi (j-1)/3), the static eccentricity's modulation of phase j.
+    #[inline(always)]
+    pub fn static_gap(&self, sin: S, cos: S) -> [S; 3] {
+        let x = self.eccentric_cos * cos + self.eccentric_sin * sin;
+        let y = self.eccentric_cos * sin - self.eccentric_sin * cos;
+        let half = S::splat(-0.5) * x;
+        let root = S::splat(0.866_025_403_784_438_6) * y;
+        [S::one() + x, S::one() + (half - root), S::one() + (half + root)]
+    }
+
+    /// 1 + zeta_d cos(theta_m - phi_d - 2 pi (j-1)/3): the narrow gap sweeps the phases once a turn.
+    #[inline(always)]
+    pub fn dynamic_gap(&self, theta: S) -> [S; 3] {
+        let (sin, cos) = theta.sin_cos();
+        let x = self.dynamic_cos * cos + self.dynamic_sin * sin;
+        let y = self.dynamic_cos * sin - self.dynamic_sin * cos;
+        let half = S::splat(-0.5) * x;
+        let root = S::splat(0.866_025_403_784_438_6) * y;
+        [S::one() + x, S::one() + (half + root), S::one() + (half - root)]
+    }
+
+    /// Trapezoid of the three phase angles theta_e - 2 pi (j-1)/3: a triangle cut at +-1.
+    #[inline(always)]
+    pub fn trapezoid(&self, angle: S) -> [S; 3] {
+        std::array::from_fn(|j| {
+            let turns = angle * S::splat(1.0 / std::f64::consts::TAU) - S::splat(j as f64 / 3.0) + S::splat(0.25);
+            let triangle = S::one() - S::splat(4.0) * (turns - turns.floor() - S::splat(0.5)).abs();
+            (triangle * self.flat_slope).clamp_abs(S::one())
+        })
+    }
+
+    /// v_n of three connected phases.
+    #[inline(always)]
+    pub fn neutral(&self, drop: [S; 3]) -> S {
+        self.neutral_weight[0] * drop[0] + self.neutral_weight[1] * drop[1] + self.neutral_weight[2] * drop[2]
+    }
+
+    /// Torque of phase and loop currents before saturation.
+    #[inline(always)]
+    pub fn torque(&self, k: [S; 3], current: [S; 3]) -> S {
+        k[0] * current[0] + k[1] * current[1] + k[2] * current[2]
+    }
+
+    #[inline(always)]
+    pub fn saturate(&self, torque: S) -> S {
+        torque.clamp_abs(self.torque_limit)
+    }
+
+    /// EMF that the loops' currents add to their phases: -(M / L_f)(R_f i_f + mu k_j' omega).
+    #[inline(always)]
+    pub fn loop_emf(&self, s: &StarState<S>, loop_k: [S; 3], speed: S) -> [S; 3] {
+        std::array::from_fn(|j| -self.loop_ratio[j] * (self.loop_resistance[j] * s.resistance_factor * s.loop_current[j] + loop_k[j] * speed))
+    }
+
+    /// k of the shorted turns alone, from the unit shape and gap of the phase.
+    #[inline(always)]
+    pub fn loop_coefficients(&self, shape: [S; 3], gap: [S; 3]) -> [S; 3] {
+        std::array::from_fn(|j| self.loop_turns[j] * shape[j] * gap[j])
+    }
+
+    /// Explicit step of the loop currents, given the phases' di/dt.
+    #[inline(always)]
+    pub fn step_loops(&self, s: &StarState<S>, loop_k: [S; 3], speed: S, slope: [S; 3], dt: S) -> [S; 3] {
+        std::array::from_fn(|j| {
+            let own = self.loop_resistance[j] * s.resistance_factor * s.loop_current[j] + loop_k[j] * speed;
+            let change = -own * self.loop_per_inductance[j] - self.loop_ratio[j] * slope[j];
+            s.loop_current[j] + dt * change
+        })
+    }
+
+    /// Copper loss in the loops, W.
+    #[inline(always)]
+    pub fn loop_loss(&self, s: &StarState<S>, current: [S; 3]) -> S {
+        (0..3).fold(S::zero(), |sum, j| sum + self.loop_resistance[j] * s.resistance_factor * current[j] * current[j])
+    }
+}
+
+impl<S: Scalar> StarState<S> {
+    pub fn rest() -> Self {
+        Self { current: [S::zero(); 3], loop_current: [S::zero(); 3], resistance_factor: S::one(), flux_factor: S::one() }
+    }
+
+    /// Sets the temperature factors for a winding at `temperature` (K).
+    pub fn heat(&mut self, raw: &[S], temperature: S) {
+        use MotorParameter as P;
+        let rise = temperature - raw[P::ReferenceTemperature as usize];
+        self.resistance_factor = S::one() + raw[P::TemperatureCoefficient as usize] * rise;
+        self.flux_factor = S::one() + raw[P::FluxTemperatureCoefficient as usize] * rise;
+    }
+}

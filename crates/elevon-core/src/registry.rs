@@ -1,0 +1,81 @@
+//! The wirings by name, and one entry for each thing a caller may ask of any of them.
+
+use crate::actuator::{rotary, Finding, Port, Wiring};
+use crate::fault::FaultKind;
+use crate::solver::{self, Clock, Monitor, RunOutput, RunSpec, Width};
+use crate::variable::{Group, Signal};
+
+/// A wiring of one fidelity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Model {
+    RotaryHigh,
+    RotaryLow,
+}
+
+/// A kind of actuator and its fidelities.
+#[derive(Clone, Copy, Debug)]
+pub struct Kind {
+    pub name: &'static str,
+    pub text: &'static str,
+    pub fidelities: &'static [(&'static str, Model)],
+}
+
+/// Every kind of actuator.
+pub const KINDS: &[Kind] = &[Kind {
+    name: "rotary",
+    text: "three-phase motor, inverter, gearbox with friction and play",
+    fidelities: &[("high", Model::RotaryHigh), ("low", Model::RotaryLow)],
+}];
+
+macro_rules! dispatch {
+    ($model:expr, $w:ident => $body:expr) => {
+        match $model {
+            Model::RotaryHigh => {
+                type $w = rotary::High;
+                $body
+            }
+            Model::RotaryLow => {
+                type $w = rotary::Low;
+                $body
+            }
+        }
+    };
+}
+
+impl Model {
+    pub fn find(kind: &str, fidelity: &str) -> Option<Self> {
+        let kind = KINDS.iter().find(|k| k.name == kind)?;
+        kind.fidelities.iter().find(|f| f.0 == fidelity).map(|f| f.1)
+    }
+    pub fn groups(self) -> &'static [Group] {
+        dispatch!(self, W => W::groups())
+    }
+    pub fn signals(self) -> &'static [Signal] {
+        dispatch!(self, W => W::signals())
+    }
+    pub fn ports(self) -> &'static [Port] {
+        dispatch!(self, W => W::PORTS)
+    }
+    pub fn initial(self) -> &'static [&'static str] {
+        dispatch!(self, W => W::INITIAL)
+    }
+    pub fn faults(self) -> Vec<FaultKind> {
+        dispatch!(self, W => W::faults())
+    }
+    pub fn check(self, raw: &[f64]) -> Vec<Finding> {
+        dispatch!(self, W => W::check(raw))
+    }
+    pub fn step(self, raw: &[f64]) -> f64 {
+        dispatch!(self, W => W::step(raw))
+    }
+    pub fn run_all(self, runs: &[RunSpec], clocks: &[Clock], threads: usize, width: Width, monitor: &Monitor) -> Vec<RunOutput> {
+        dispatch!(self, W => solver::run_all::<W>(runs, clocks, threads, width, monitor))
+    }
+    /// Low fidelities only: the relays of a switching inverter have no useful derivative.
+    pub fn sensitivities(self, run: &RunSpec, parameters: &[usize], faults: &[usize], clocks: &[Clock], monitor: &Monitor) -> Option<Vec<RunOutput>> {
+        match self {
+            Self::RotaryLow => Some(solver::sensitivities::<rotary::Low>(run, parameters, faults, clocks, monitor)),
+            Self::RotaryHigh => None,
+        }
+    }
+}

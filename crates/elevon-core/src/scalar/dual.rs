@@ -1,0 +1,150 @@
+//! Dual numbers: exact derivatives of a run with respect to `N` parameters at once.
+//!
+//! Selections follow the real part, so a derivative is that of the branch taken: at a stick-slip
+//! switch the true function has a kink and the derivative is one-sided.
+
+use super::{trig, Kernel, Scalar};
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+#[derive(Clone, Copy, Debug)]
+pub struct Dual<const N: usize> {
+    pub value: f64,
+    pub slope: [f64; N],
+}
+
+impl<const N: usize> Dual<N> {
+    /// The independent variable number `index`.
+    pub fn variable(value: f64, index: usize) -> Self {
+        Self { value, slope: std::array::from_fn(|i| if i == index { 1.0 } else { 0.0 }) }
+    }
+    #[inline(always)]
+    fn chain(self, value: f64, derivative: f64) -> Self {
+        Self { value, slope: self.slope.map(|d| d * derivative) }
+    }
+}
+
+impl<const N: usize> Add for Dual<N> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Self { value: self.value + o.value, slope: std::array::from_fn(|i| self.slope[i] + o.slope[i]) }
+    }
+}
+impl<const N: usize> Sub for Dual<N> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, o: Self) -> Self {
+        Self { value: self.value - o.value, slope: std::array::from_fn(|i| self.slope[i] - o.slope[i]) }
+    }
+}
+impl<const N: usize> Mul for Dual<N> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, o: Self) -> Self {
+        let slope = std::array::from_fn(|i| self.slope[i] * o.value + self.value * o.slope[i]);
+        Self { value: self.value * o.value, slope }
+    }
+}
+impl<const N: usize> Div for Dual<N> {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, o: Self) -> Self {
+        let value = self.value / o.value;
+        Self { value, slope: std::array::from_fn(|i| (self.slope[i] - value * o.slope[i]) / o.value) }
+    }
+}
+impl<const N: usize> Neg for Dual<N> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self { value: -self.value, slope: self.slope.map(|d| -d) }
+    }
+}
+
+impl<const N: usize> Scalar for Dual<N> {
+    type Mask = bool;
+    const LANES: usize = 1;
+
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        Self { value, slope: [0.0; N] }
+    }
+    #[inline(always)]
+    fn from_fn(mut f: impl FnMut(usize) -> f64) -> Self {
+        Self::splat(f(0))
+    }
+    #[inline(always)]
+    fn lane(self, _i: usize) -> f64 {
+        self.value
+    }
+    #[inline(always)]
+    fn lt(self, o: Self) -> bool {
+        self.value < o.value
+    }
+    #[inline(always)]
+    fn le(self, o: Self) -> bool {
+        self.value <= o.value
+    }
+    #[inline(always)]
+    fn equals(self, o: Self) -> bool {
+        self.value == o.value
+    }
+    #[inline(always)]
+    fn select(mask: bool, yes: Self, no: Self) -> Self {
+        if mask {
+            yes
+        } else {
+            no
+        }
+    }
+    #[inline(always)]
+    fn any(mask: bool) -> bool {
+        mask
+    }
+    #[inline(always)]
+    fn mask(value: bool) -> bool {
+        value
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        if self.value < 0.0 {
+            -self
+        } else {
+            self
+        }
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        let root = self.value.sqrt();
+        // The slope at zero is infinite; a model never differentiates there, zero keeps it finite.
+        self.chain(root, if root == 0.0 { 0.0 } else { 0.5 / root })
+    }
+    #[inline(always)]
+    fn round(self) -> Self {
+        Self::splat(self.value.round_ties_even())
+    }
+    #[inline(always)]
+    fn floor(self) -> Self {
+        Self::splat(self.value.floor())
+    }
+    fn exp(self) -> Self {
+        let value = libm::exp(self.value);
+        self.chain(value, value)
+    }
+    fn powf(self, exponent: f64) -> Self {
+        let value = libm::pow(self.value, exponent);
+        self.chain(value, exponent * libm::pow(self.value, exponent - 1.0))
+    }
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        let (s, c) = trig::sin_cos(self.value);
+        (self.chain(s, c), self.chain(c, -s))
+    }
+    #[inline(always)]
+    fn vectorize<K: Kernel>(kernel: K) -> K::Output {
+        f64::vectorize(kernel)
+    }
+    fn finite(self) -> bool {
+        self.value.is_finite() && self.slope.iter().all(|d| d.is_finite())
+    }
+}

@@ -1,0 +1,142 @@
+//! The one scalar trait: components are written over it once and run as one
+//! `f64`, as a vector of lanes (one run a lane) or as a dual number.
+//!
+//! Every operation of a lane type is the IEEE operation of its lanes, in the same order: that is
+//! what makes batch and single runs equal to the last bit. No fused multiply-add anywhere.
+
+mod dual;
+mod portable;
+mod single;
+mod trig;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+pub use dual::Dual;
+pub use portable::Portable;
+#[cfg(target_arch = "x86_64")]
+pub use x86::{Avx2x4, Avx512x8};
+
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+
+/// A piece of work that a scalar type runs with its own instruction set enabled.
+/// `run` must be `#[inline(always)]`, and so must everything hot below it.
+pub trait Kernel {
+    type Output;
+    fn run(self) -> Self::Output;
+}
+
+/// Arithmetic, selection by mask and the few elementary functions that models need.
+pub trait Scalar:
+    Copy
+    + Send
+    + Sync
+    + std::fmt::Debug
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + 'static
+{
+    type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask> + Not<Output = Self::Mask>;
+    const LANES: usize;
+
+    fn splat(x: f64) -> Self;
+    fn from_fn(f: impl FnMut(usize) -> f64) -> Self;
+    /// Value of lane `i` (the real part of a dual number).
+    fn lane(self, i: usize) -> f64;
+
+    fn lt(self, other: Self) -> Self::Mask;
+    fn le(self, other: Self) -> Self::Mask;
+    fn equals(self, other: Self) -> Self::Mask;
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    fn any(mask: Self::Mask) -> bool;
+    fn mask(value: bool) -> Self::Mask;
+
+    fn abs(self) -> Self;
+    fn sqrt(self) -> Self;
+    /// Nearest integer, ties to even.
+    fn round(self) -> Self;
+    fn floor(self) -> Self;
+    fn exp(self) -> Self;
+    fn powf(self, exponent: f64) -> Self;
+    /// Sine and cosine by our own polynomials: the same bits on every platform and lane width.
+    fn sin_cos(self) -> (Self, Self);
+
+    /// Runs `kernel` with the instruction set of this type enabled.
+    fn vectorize<K: Kernel>(kernel: K) -> K::Output;
+
+    #[inline(always)]
+    fn zero() -> Self {
+        Self::splat(0.0)
+    }
+    #[inline(always)]
+    fn one() -> Self {
+        Self::splat(1.0)
+    }
+    #[inline(always)]
+    fn gt(self, other: Self) -> Self::Mask {
+        other.lt(self)
+    }
+    #[inline(always)]
+    fn ge(self, other: Self) -> Self::Mask {
+        other.le(self)
+    }
+    #[inline(always)]
+    fn minimum(self, other: Self) -> Self {
+        Self::select(other.lt(self), other, self)
+    }
+    #[inline(always)]
+    fn maximum(self, other: Self) -> Self {
+        Self::select(self.lt(other), other, self)
+    }
+    /// `self` held inside `[low, high]`.
+    #[inline(always)]
+    fn clamp(self, low: Self, high: Self) -> Self {
+        let upper = Self::select(high.lt(self), high, self);
+        Self::select(upper.lt(low), low, upper)
+    }
+    /// `self` held inside `[-limit, limit]`.
+    #[inline(always)]
+    fn clamp_abs(self, limit: Self) -> Self {
+        self.clamp(-limit, limit)
+    }
+    /// `magnitude` with the sign of `self`; zero counts as positive.
+    #[inline(always)]
+    fn signed(self, magnitude: Self) -> Self {
+        Self::select(self.lt(Self::zero()), -magnitude, magnitude)
+    }
+    /// -1, 0 or 1.
+    #[inline(always)]
+    fn sign(self) -> Self {
+        let negative_or_zero = Self::select(self.lt(Self::zero()), -Self::one(), Self::zero());
+        Self::select(Self::zero().lt(self), Self::one(), negative_or_zero)
+    }
+    #[inline(always)]
+    fn square(self) -> Self {
+        self * self
+    }
+    /// Is the condition true: 1 or 0.
+    #[inline(always)]
+    fn indicator(mask: Self::Mask) -> Self {
+        Self::select(mask, Self::one(), Self::zero())
+    }
+    /// Angle of the vector `(x, y)` for `x > 0`, by the same polynomial everywhere.
+    #[inline(always)]
+    fn atan2_right(y: Self, x: Self) -> Self {
+        trig::atan2_right(y, x)
+    }
+    fn finite(self) -> bool {
+        (0..Self::LANES).all(|i| self.lane(i).is_finite())
+    }
+}
+
+/// Sine and cosine of three angles 120 degrees apart: `[a, a - 2 pi/3, a + 2 pi/3]`.
+#[inline(always)]
+pub fn three_phase<S: Scalar>(sin: S, cos: S) -> ([S; 3], [S; 3]) {
+    let half = S::splat(0.5);
+    let root = S::splat(0.866_025_403_784_438_6);
+    let (hs, hc) = (half * sin, half * cos);
+    let (rs, rc) = (root * sin, root * cos);
+    ([sin, -hs - rc, rc - hs], [cos, rs - hc, -hc - rs])
+}

@@ -1,0 +1,293 @@
+//! Lanes on x86-64: four in an AVX2 register, eight in an AVX-512 one.
+//!
+//! The intrinsics need `unsafe` because they may only run on a processor that has them. Values of these types
+//! are created only below `Scalar::vectorize`, and the solver chooses a type only after detecting its instruction
+//! set (`solver::width`): that is the whole of the safety argument for this file.
+
+use super::{trig, Kernel, Scalar};
+use std::arch::x86_64::*;
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+
+/// # Safety
+/// The processor must have AVX2.
+#[target_feature(enable = "avx2")]
+pub unsafe fn with_avx2<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run()
+}
+
+/// # Safety
+/// The processor must have AVX-512 F, DQ and VL.
+#[target_feature(enable = "avx2,avx512f,avx512dq,avx512vl")]
+unsafe fn with_avx512<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run()
+}
+
+macro_rules! vector_type {
+    ($name:ident, $mask:ident, $lanes:literal, $align:literal, $register:ty,
+     $add:ident, $sub:ident, $mul:ident, $div:ident, $splat:ident, $load:ident, $store:ident,
+     $sqrt:ident, $with:ident) => {
+        #[derive(Clone, Copy, Debug)]
+        pub struct $name($register);
+
+        impl Add for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn add(self, o: Self) -> Self {
+                // SAFETY: see the head of this file; the same for every block below.
+                Self(unsafe { $add(self.0, o.0) })
+            }
+        }
+        impl Sub for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn sub(self, o: Self) -> Self {
+                Self(unsafe { $sub(self.0, o.0) })
+            }
+        }
+        impl Mul for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn mul(self, o: Self) -> Self {
+                Self(unsafe { $mul(self.0, o.0) })
+            }
+        }
+        impl Div for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn div(self, o: Self) -> Self {
+                Self(unsafe { $div(self.0, o.0) })
+            }
+        }
+
+        impl $name {
+            #[inline(always)]
+            fn array(self) -> [f64; $lanes] {
+                let mut out = [0.0; $lanes];
+                unsafe { $store(out.as_mut_ptr(), self.0) };
+                out
+            }
+            #[inline(always)]
+            fn from_array(values: [f64; $lanes]) -> Self {
+                Self(unsafe { $load(values.as_ptr()) })
+            }
+        }
+
+        impl Scalar for $name {
+            type Mask = $mask;
+            const LANES: usize = $lanes;
+
+            #[inline(always)]
+            fn splat(x: f64) -> Self {
+                Self(unsafe { $splat(x) })
+            }
+            #[inline(always)]
+            fn from_fn(f: impl FnMut(usize) -> f64) -> Self {
+                Self::from_array(std::array::from_fn(f))
+            }
+            #[inline(always)]
+            fn lane(self, i: usize) -> f64 {
+                self.array()[i]
+            }
+            #[inline(always)]
+            fn lt(self, o: Self) -> $mask {
+                $mask::less(self, o)
+            }
+            #[inline(always)]
+            fn le(self, o: Self) -> $mask {
+                $mask::less_equal(self, o)
+            }
+            #[inline(always)]
+            fn equals(self, o: Self) -> $mask {
+                $mask::equal(self, o)
+            }
+            #[inline(always)]
+            fn select(mask: $mask, yes: Self, no: Self) -> Self {
+                mask.blend(yes, no)
+            }
+            #[inline(always)]
+            fn any(mask: $mask) -> bool {
+                mask.bits() != 0
+            }
+            #[inline(always)]
+            fn mask(value: bool) -> $mask {
+                $mask::uniform(value)
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                self.absolute()
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                Self(unsafe { $sqrt(self.0) })
+            }
+            #[inline(always)]
+            fn round(self) -> Self {
+                self.rounded::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>()
+            }
+            #[inline(always)]
+            fn floor(self) -> Self {
+                self.rounded::<{ _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC }>()
+            }
+            fn exp(self) -> Self {
+                Self::from_array(self.array().map(libm::exp))
+            }
+            fn powf(self, exponent: f64) -> Self {
+                Self::from_array(self.array().map(|x| libm::pow(x, exponent)))
+            }
+            #[inline(always)]
+            fn sin_cos(self) -> (Self, Self) {
+                trig::sin_cos(self)
+            }
+            #[inline(always)]
+            fn vectorize<K: Kernel>(kernel: K) -> K::Output {
+                unsafe { $with(kernel) }
+            }
+        }
+    };
+}
+
+vector_type!(
+    Avx2x4, Avx2Mask, 4, 32, __m256d, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd,
+    _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd, _mm256_sqrt_pd, with_avx2
+);
+vector_type!(
+    Avx512x8, Avx512Mask, 8, 64, __m512d, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd,
+    _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd, _mm512_sqrt_pd, with_avx512
+);
+
+#[derive(Clone, Copy, Debug)]
+pub struct Avx2Mask(__m256d);
+
+impl Avx2Mask {
+    #[inline(always)]
+    fn less(a: Avx2x4, b: Avx2x4) -> Self {
+        Self(unsafe { _mm256_cmp_pd::<_CMP_LT_OQ>(a.0, b.0) })
+    }
+    #[inline(always)]
+    fn less_equal(a: Avx2x4, b: Avx2x4) -> Self {
+        Self(unsafe { _mm256_cmp_pd::<_CMP_LE_OQ>(a.0, b.0) })
+    }
+    #[inline(always)]
+    fn equal(a: Avx2x4, b: Avx2x4) -> Self {
+        Self(unsafe { _mm256_cmp_pd::<_CMP_EQ_OQ>(a.0, b.0) })
+    }
+    #[inline(always)]
+    fn blend(self, yes: Avx2x4, no: Avx2x4) -> Avx2x4 {
+        Avx2x4(unsafe { _mm256_blendv_pd(no.0, yes.0, self.0) })
+    }
+    #[inline(always)]
+    fn bits(self) -> i32 {
+        unsafe { _mm256_movemask_pd(self.0) }
+    }
+    #[inline(always)]
+    fn uniform(value: bool) -> Self {
+        let bits = if value { -1 } else { 0 };
+        Self(unsafe { _mm256_castsi256_pd(_mm256_set1_epi64x(bits)) })
+    }
+}
+impl BitAnd for Avx2Mask {
+    type Output = Self;
+    #[inline(always)]
+    fn bitand(self, o: Self) -> Self {
+        Self(unsafe { _mm256_and_pd(self.0, o.0) })
+    }
+}
+impl BitOr for Avx2Mask {
+    type Output = Self;
+    #[inline(always)]
+    fn bitor(self, o: Self) -> Self {
+        Self(unsafe { _mm256_or_pd(self.0, o.0) })
+    }
+}
+impl Not for Avx2Mask {
+    type Output = Self;
+    #[inline(always)]
+    fn not(self) -> Self {
+        Self(unsafe { _mm256_xor_pd(self.0, Self::uniform(true).0) })
+    }
+}
+impl Neg for Avx2x4 {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(unsafe { _mm256_xor_pd(self.0, _mm256_set1_pd(-0.0)) })
+    }
+}
+impl Avx2x4 {
+    #[inline(always)]
+    fn absolute(self) -> Self {
+        Self(unsafe { _mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0) })
+    }
+    #[inline(always)]
+    fn rounded<const MODE: i32>(self) -> Self {
+        Self(unsafe { _mm256_round_pd::<MODE>(self.0) })
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Avx512Mask(__mmask8);
+
+impl Avx512Mask {
+    #[inline(always)]
+    fn less(a: Avx512x8, b: Avx512x8) -> Self {
+        Self(unsafe { _mm512_cmp_pd_mask::<_CMP_LT_OQ>(a.0, b.0) })
+    }
+    #[inline(always)]
+    fn less_equal(a: Avx512x8, b: Avx512x8) -> Self {
+        Self(unsafe { _mm512_cmp_pd_mask::<_CMP_LE_OQ>(a.0, b.0) })
+    }
+    #[inline(always)]
+    fn equal(a: Avx512x8, b: Avx512x8) -> Self {
+        Self(unsafe { _mm512_cmp_pd_mask::<_CMP_EQ_OQ>(a.0, b.0) })
+    }
+    #[inline(always)]
+    fn blend(self, yes: Avx512x8, no: Avx512x8) -> Avx512x8 {
+        Avx512x8(unsafe { _mm512_mask_blend_pd(self.0, no.0, yes.0) })
+    }
+    #[inline(always)]
+    fn bits(self) -> i32 {
+        i32::from(self.0)
+    }
+    #[inline(always)]
+    fn uniform(value: bool) -> Self {
+        Self(if value { 0xff } else { 0 })
+    }
+}
+impl BitAnd for Avx512Mask {
+    type Output = Self;
+    #[inline(always)]
+    fn bitand(self, o: Self) -> Self {
+        Self(self.0 & o.0)
+    }
+}
+impl BitOr for Avx512Mask {
+    type Output = Self;
+    #[inline(always)]
+    fn bitor(self, o: Self) -> Self {
+        Self(self.0 | o.0)
+    }
+}
+impl Not for Avx512Mask {
+    type Output = Self;
+    #[inline(always)]
+    fn not(self) -> Self {
+        Self(!self.0)
+    }
+}
+impl Neg for Avx512x8 {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(unsafe { _mm512_xor_pd(self.0, _mm512_set1_pd(-0.0)) })
+    }
+}
+impl Avx512x8 {
+    #[inline(always)]
+    fn absolute(self) -> Self {
+        Self(unsafe { _mm512_abs_pd(self.0) })
+    }
+    #[inline(always)]
+    fn rounded<const MODE: i32>(self) -> Self {
+        Self(unsafe { _mm512_roundscale_pd::<MODE>(self.0) })
+    }
+}

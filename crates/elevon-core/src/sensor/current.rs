@@ -1,0 +1,69 @@
+//! Phase current sensors: gain, offset, noise, quantisation.
+
+use crate::scalar::Scalar;
+use crate::variables;
+
+variables! {
+    /// The three phase current sensors and the acquisition filter.
+    CurrentSensorParameter, CURRENT_SENSOR {
+        GainA => "current.gain_a", "-", "1", Any, Sensor, Some(1.0), "gain of the sensor of phase a";
+        GainB => "current.gain_b", "-", "1", Any, Sensor, Some(1.0), "gain of the sensor of phase b";
+        GainC => "current.gain_c", "-", "1", Any, Sensor, Some(1.0), "gain of the sensor of phase c";
+        OffsetA => "current.offset_a", "-", "A", Any, Sensor, Some(0.0), "offset of the sensor of phase a";
+        OffsetB => "current.offset_b", "-", "A", Any, Sensor, Some(0.0), "offset of the sensor of phase b";
+        OffsetC => "current.offset_c", "-", "A", Any, Sensor, Some(0.0), "offset of the sensor of phase c";
+        NoiseDeviation => "current.noise_deviation", "-", "A", NonNegative, Sensor, Some(0.0), "standard deviation of the noise of each sensor";
+        NoiseSampleTime => "current.noise_sample_time", "-", "s", Positive, Sensor, Some(1e-5), "the noise is held over this time, which sets its band";
+        Bits => "current.bits", "-", "1", Between(0.0, 32.0), Sensor, Some(0.0), "resolution over twice the range; 0: not quantised";
+        FullScale => "current.full_scale", "-", "A", Positive, Sensor, Some(40.0), "largest current the quantised sensor shows";
+        FilterCutoff => "filter_cutoff", "f_c", "Hz", Positive, Sensor, Some(100.0), "cut-off of the first-order filters of the logged d and q quantities";
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct CurrentSensor<S> {
+    gain: [S; 3],
+    offset: [S; 3],
+    pub noise_deviation: S,
+    resolution: S,
+    per_resolution: S,
+    full_scale: S,
+}
+
+impl<S: Scalar> CurrentSensor<S> {
+    pub fn derive(raw: &[S]) -> Self {
+        use CurrentSensorParameter as P;
+        let g = |p: P| raw[p as usize];
+        let bits = g(P::Bits).lane(0);
+        let levels = if bits > 0.0 { libm::exp2(bits) } else { 0.0 };
+        let resolution = if levels > 0.0 { S::splat(2.0) * g(P::FullScale) / S::splat(levels) } else { S::zero() };
+        let quantised = S::zero().lt(resolution);
+        Self {
+            gain: std::array::from_fn(|j| raw[P::GainA as usize + j]),
+            offset: std::array::from_fn(|j| raw[P::OffsetA as usize + j]),
+            noise_deviation: g(P::NoiseDeviation),
+            resolution,
+            per_resolution: S::select(quantised, S::one() / S::select(quantised, resolution, S::one()), S::zero()),
+            full_scale: g(P::FullScale),
+        }
+    }
+
+    /// What the three sensors show; `noise` has unit deviation.
+    #[inline(always)]
+    pub fn measure(&self, current: [S; 3], noise: [S; 3]) -> [S; 3] {
+        let quantised = S::zero().lt(self.resolution);
+        std::array::from_fn(|j| {
+            let raw = self.gain[j] * current[j] + (self.offset[j] + self.noise_deviation * noise[j]);
+            let steps = (raw.clamp_abs(self.full_scale) * self.per_resolution).round();
+            S::select(quantised, steps * self.resolution, raw)
+        })
+    }
+
+    /// Does the measured current differ from the true one at all? Then it must be fed back.
+    pub fn ideal(raw: &[f64]) -> bool {
+        use CurrentSensorParameter as P;
+        let at = |p: P, healthy: f64| raw[p as usize] == healthy;
+        [P::GainA, P::GainB, P::GainC].into_iter().all(|p| at(p, 1.0))
+            && [P::OffsetA, P::OffsetB, P::OffsetC, P::NoiseDeviation, P::Bits].into_iter().all(|p| at(p, 0.0))
+    }
+}

@@ -1,0 +1,207 @@
+//! Many runs: sorted into lane blocks of one structure, blocks shared between threads.
+
+use super::block::{structure, Block, Lift, Plain};
+use super::spec::{Clock, RunOutput, RunSpec};
+use super::width::Width;
+use crate::actuator::{Tick, Wiring};
+use crate::scalar::{Dual, Portable, Scalar};
+use crate::time::Steps;
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+
+#[cfg(target_arch = "x86_64")]
+use crate::scalar::{Avx2x4, Avx512x8};
+
+/// Chunks of lanes that one thread runs side by side.
+const CHUNKS: usize = 4;
+
+/// Progress out, interruption in; shared between threads.
+#[derive(Debug, Default)]
+pub struct Monitor {
+    done: AtomicU64,
+    cancelled: AtomicBool,
+}
+
+impl Monitor {
+    pub fn done(&self) -> u64 {
+        self.done.load(Relaxed)
+    }
+    pub fn cancel(&self) {
+        self.cancelled.store(true, Relaxed);
+    }
+    /// Counts steps; false once the caller wants to stop.
+    pub(super) fn advance(&self, steps: u64) -> bool {
+        self.done.fetch_add(steps, Relaxed);
+        !self.cancelled.load(Relaxed)
+    }
+}
+
+/// What the runs of a block must have in common.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+struct Shape<T> {
+    structure: T,
+    dt: u64,
+    steps: Steps,
+    grid: u64,
+    ticks: Vec<Tick>,
+    oscillators: Vec<usize>,
+    choices: Vec<u8>,
+}
+
+fn shape<W: Wiring>(run: &RunSpec, recorded: &[usize]) -> Shape<W::Structure> {
+    let structure = structure::<W>(run, recorded);
+    let dt = W::step(&run.parameters);
+    let choices = W::groups()
+        .iter()
+        .flat_map(|g| g.variables)
+        .zip(&run.parameters)
+        .filter(|(v, _)| matches!(v.range, crate::variable::Range::Choice(_)))
+        .map(|(_, &x)| x as u8)
+        .collect();
+    Shape {
+        ticks: W::ticks(&run.parameters, &structure),
+        structure,
+        dt: dt.to_bits(),
+        steps: (run.duration / dt).round() as Steps,
+        grid: W::fault_grid(&run.parameters).to_bits(),
+        oscillators: run.ports.iter().map(|p| p.oscillators()).collect(),
+        choices,
+    }
+}
+
+fn run_block<W: Wiring, S: Scalar>(runs: &[&RunSpec], clocks: &[Clock], recorded: &[usize], monitor: &Monitor) -> Vec<RunOutput> {
+    let mut padded = runs.to_vec();
+    while padded.len() % S::LANES != 0 {
+        padded.push(runs[runs.len() - 1]);
+    }
+    Block::<W, S, Plain>::new(&padded, runs.len(), Plain(&padded), clocks, recorded).run(monitor)
+}
+
+fn run_width<W: Wiring>(width: Width, runs: &[&RunSpec], clocks: &[Clock], recorded: &[usize], monitor: &Monitor) -> Vec<RunOutput> {
+    match width {
+        Width::Single => run_block::<W, f64>(runs, clocks, recorded, monitor),
+        #[cfg(target_arch = "x86_64")]
+        Width::Avx2 => run_block::<W, Avx2x4>(runs, clocks, recorded, monitor),
+        #[cfg(target_arch = "x86_64")]
+        Width::Avx512 => run_block::<W, Avx512x8>(runs, clocks, recorded, monitor),
+        _ => run_block::<W, Portable<4>>(runs, clocks, recorded, monitor),
+    }
+}
+
+/// The signals any clock keeps.
+fn recorded(clocks: &[Clock]) -> Vec<usize> {
+    let mut all: Vec<usize> = clocks.iter().flat_map(|c| c.signals.iter().copied()).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+/// Runs everything; the outputs stand in the order of the runs. `threads` 0 means all cores.
+pub fn run_all<W: Wiring>(runs: &[RunSpec], clocks: &[Clock], threads: usize, width: Width, monitor: &Monitor) -> Vec<RunOutput> {
+    let recorded = recorded(clocks);
+    if let [run] = runs {
+        return run_width::<W>(Width::Single, &[run], clocks, &recorded, monitor);
+    }
+    let blocks = blocks::<W>(runs, &recorded, width, threads);
+    let work = || -> Vec<(Vec<usize>, Vec<RunOutput>)> {
+        blocks
+            .into_par_iter()
+            .map(|indices| {
+                let members: Vec<&RunSpec> = indices.iter().map(|&i| &runs[i]).collect();
+                // A lone run gains nothing from lanes.
+                let width = if members.len() == 1 { Width::Single } else { width };
+                let outputs = run_width::<W>(width, &members, clocks, &recorded, monitor);
+                (indices, outputs)
+            })
+            .collect()
+    };
+    let finished = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
+        Ok(pool) => pool.install(work),
+        Err(_) => work(),
+    };
+    let mut ordered: Vec<Option<RunOutput>> = runs.iter().map(|_| None).collect();
+    for (indices, outputs) in finished {
+        for (i, output) in indices.into_iter().zip(outputs) {
+            ordered[i] = Some(output);
+        }
+    }
+    ordered.into_iter().flatten().collect()
+}
+
+/// Groups runs by shape and cuts the groups into blocks: large enough to hide latencies, enough of them for
+/// the threads.
+fn blocks<W: Wiring>(runs: &[RunSpec], recorded: &[usize], width: Width, threads: usize) -> Vec<Vec<usize>> {
+    let mut order: Vec<Shape<W::Structure>> = Vec::new();
+    let mut groups: HashMap<Shape<W::Structure>, Vec<usize>> = HashMap::new();
+    for (i, run) in runs.iter().enumerate() {
+        let key = shape::<W>(run, recorded);
+        if !groups.contains_key(&key) {
+            order.push(key.clone());
+        }
+        groups.entry(key).or_default().push(i);
+    }
+    let threads = if threads == 0 { rayon::current_num_threads() } else { threads };
+    let lanes = width.lanes();
+    let mut all = Vec::new();
+    for key in order {
+        let members = groups.remove(&key).unwrap_or_default();
+        let fair = members.len().div_ceil(threads).div_ceil(lanes).max(1);
+        let size = lanes * fair.min(CHUNKS);
+        all.extend(members.chunks(size).map(<[usize]>::to_vec));
+    }
+    all
+}
+
+/// Seeds of a dual run: parameters and faults whose derivatives are wanted.
+struct Seeds<'a, const N: usize> {
+    run: &'a RunSpec,
+    parameters: &'a [usize],
+    faults: &'a [usize],
+}
+
+impl<const N: usize> Lift<Dual<N>> for Seeds<'_, N> {
+    fn parameter(&self, _first: usize, index: usize) -> Dual<N> {
+        let value = self.run.parameters[index];
+        match self.parameters.iter().position(|&p| p == index) {
+            Some(slot) => Dual::variable(value, slot),
+            None => Dual::splat(value),
+        }
+    }
+    fn severity(&self, _lane: usize, fault: usize) -> Dual<N> {
+        let value = self.run.faults[fault].severity;
+        match self.faults.iter().position(|&f| f == fault) {
+            Some(slot) => Dual::variable(value, self.parameters.len() + slot),
+            None => Dual::splat(value),
+        }
+    }
+    fn emit(&self, x: Dual<N>, _lane: usize, out: &mut Vec<f64>) {
+        out.push(x.value);
+        out.extend_from_slice(&x.slope[..self.parameters.len() + self.faults.len()]);
+    }
+    fn width(&self) -> usize {
+        1 + self.parameters.len() + self.faults.len()
+    }
+}
+
+/// Slots of one dual pass.
+const SLOTS: usize = 8;
+
+/// One run with exact derivatives: each value is followed by its derivatives with respect to the chosen
+/// parameters, then to the severities of the chosen faults.
+pub fn sensitivities<W: Wiring>(run: &RunSpec, parameters: &[usize], faults: &[usize], clocks: &[Clock], monitor: &Monitor) -> Vec<RunOutput> {
+    let recorded = recorded(clocks);
+    let mut chosen: Vec<(bool, usize)> = parameters.iter().map(|&p| (true, p)).collect();
+    chosen.extend(faults.iter().map(|&f| (false, f)));
+    chosen
+        .chunks(SLOTS)
+        .map(|pass| {
+            let parameters: Vec<usize> = pass.iter().filter(|x| x.0).map(|x| x.1).collect();
+            let faults: Vec<usize> = pass.iter().filter(|x| !x.0).map(|x| x.1).collect();
+            let seeds = Seeds::<SLOTS> { run, parameters: &parameters, faults: &faults };
+            let runs = [run];
+            let mut outputs = Block::<W, Dual<SLOTS>, Seeds<SLOTS>>::new(&runs, 1, seeds, clocks, &recorded).run(monitor);
+            outputs.remove(0)
+        })
+        .collect()
+}

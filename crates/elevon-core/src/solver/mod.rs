@@ -1,0 +1,10 @@
+//! Fixed-step solver: one run, lanes of runs, threads of lane blocks, dual numbers; all the same source.
+
+mod batch;
+mod block;
+mod spec;
+mod width;
+
+pub use batch::{run_all, sensitivities, Monitor};
+pub use spec::{Clock, RunOutput, RunSpec, Status};
+pub use width::Width;

@@ -1,0 +1,55 @@
+//! What a run is asked and what it answers.
+
+use crate::command::SourcePlan;
+use crate::fault::FaultSpec;
+use crate::time::Steps;
+
+/// One run, all in SI.
+#[derive(Clone, Debug)]
+pub struct RunSpec {
+    /// In the order of the wiring's groups.
+    pub parameters: Vec<f64>,
+    /// One per port of the wiring.
+    pub ports: Vec<SourcePlan>,
+    /// Ports that waveforms drive.
+    pub driven: Vec<bool>,
+    pub faults: Vec<FaultSpec>,
+    /// In the order of the wiring's `INITIAL`; NaN where not given.
+    pub initial: Vec<f64>,
+    pub duration: f64,
+    pub seed: u64,
+    /// Number of the run, part of the key of its random numbers.
+    pub run: u64,
+}
+
+/// Signals kept every `period` steps, from the start on.
+#[derive(Clone, Debug)]
+pub struct Clock {
+    pub period: Steps,
+    pub signals: Vec<usize>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub enum Status {
+    Ok,
+    /// The drive tripped at this time; the run went on without it.
+    Tripped { time: f64 },
+    /// A signal left all bounds at this time.
+    Diverged { time: f64, signal: &'static str },
+    Interrupted,
+}
+
+/// What is left of a run.
+#[derive(Clone, Debug)]
+pub struct RunOutput {
+    pub status: Status,
+    pub steps: Steps,
+    pub time: f64,
+    /// Seconds the block of this run spent integrating, divided by its runs.
+    pub wall: f64,
+    /// One per clock, row-major: the clock's signals, then the fault labels.
+    pub clocks: Vec<Vec<f64>>,
+    pub columns: Vec<usize>,
+    /// All signals at the end.
+    pub last: Vec<f64>,
+}

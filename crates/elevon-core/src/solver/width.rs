@@ -1,0 +1,55 @@
+//! The vector width of batches, chosen at run time.
+
+/// Lane types that this processor can run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Width {
+    Single,
+    Portable,
+    Avx2,
+    Avx512,
+}
+
+impl Width {
+    /// The widest of this processor.
+    pub fn detect() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        {
+            let wide = is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") && is_x86_feature_detected!("avx512vl");
+            if wide {
+                return Self::Avx512;
+            }
+            if is_x86_feature_detected!("avx2") {
+                return Self::Avx2;
+            }
+        }
+        Self::Portable
+    }
+
+    pub const NAMES: [&'static str; 4] = ["single", "portable", "avx2", "avx512"];
+
+    pub fn name(self) -> &'static str {
+        Self::NAMES[self as usize]
+    }
+
+    /// By name, if this processor can run it; `auto` is the widest.
+    pub fn by_name(name: &str) -> Option<Self> {
+        let widest = Self::detect();
+        let width = match name {
+            "auto" => return Some(widest),
+            "single" => Self::Single,
+            "portable" => Self::Portable,
+            "avx2" => Self::Avx2,
+            "avx512" => Self::Avx512,
+            _ => return None,
+        };
+        (width as usize <= widest as usize).then_some(width)
+    }
+
+    pub fn lanes(self) -> usize {
+        match self {
+            Self::Single => 1,
+            Self::Portable | Self::Avx2 => 4,
+            Self::Avx512 => 8,
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! Borello's dry friction with exact stick (T2; reference sheet 1.6) and viscous friction.
+
+use crate::scalar::Scalar;
+use crate::variables;
+
+variables! {
+    /// Friction, referred to the fast shaft.
+    FrictionParameter, FRICTION {
+        Static => "static", "FSJ", "N m", NonNegative, Plant, None, "static friction limit";
+        Dynamic => "dynamic", "FDJ", "N m", NonNegative, Plant, None, "dynamic dry friction";
+        DryScale => "dry_scale", "-", "1", NonNegative, Plant, Some(1.0), "healthy 1; growth of the dry friction";
+        Viscous => "viscous", "C", "N m s/rad", NonNegative, Plant, None, "viscous coefficient at rest";
+        ViscousSlope => "viscous_slope", "-", "s/rad", Any, Plant, Some(0.0), "relative change of the viscous coefficient per rad/s: C(w) = C (1 + slope |w|), not below zero";
+        ViscousScale => "viscous_scale", "-", "1", NonNegative, Plant, Some(1.0), "healthy 1; change of the lubricant";
+        JamTorque => "jam_torque", "T_jam", "N m", NonNegative, Plant, Some(0.0), "resistive torque once the mechanism has seized; 0: none";
+        JamPosition => "jam_position", "-", "rad", Any, Plant, Some(0.0), "user position at which it seizes when first reached";
+        JamAnywhere => "jam_anywhere", "-", "1", Unit, Plant, Some(1.0), "1: seized wherever it is, 0: only from jam_position on";
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Friction<S> {
+    pub static_limit: S,
+    pub dynamic: S,
+    pub viscous: S,
+    viscous_slope: S,
+    pub jam_torque: S,
+    pub jam_position: S,
+    pub jam_anywhere: S,
+}
+
+impl<S: Scalar> Friction<S> {
+    pub fn derive(raw: &[S]) -> Self {
+        use FrictionParameter as P;
+        let g = |p: P| raw[p as usize];
+        Self {
+            static_limit: g(P::Static) * g(P::DryScale),
+            dynamic: g(P::Dynamic) * g(P::DryScale),
+            viscous: g(P::Viscous) * g(P::ViscousScale),
+            viscous_slope: g(P::ViscousSlope),
+            jam_torque: g(P::JamTorque),
+            jam_position: g(P::JamPosition),
+            jam_anywhere: g(P::JamAnywhere),
+        }
+    }
+
+    /// C(w) w.
+    #[inline(always)]
+    pub fn viscous_torque(&self, speed: S) -> S {
+        let factor = (S::one() + self.viscous_slope * speed.abs()).maximum(S::zero());
+        self.viscous * factor * speed
+    }
+
+    /// Dry friction at `speed` under the `active` torque: at rest it holds what it can.
+    #[inline(always)]
+    pub fn dry_torque(active: S, speed: S, static_limit: S, dynamic: S) -> S {
+        let held = active.clamp_abs(static_limit);
+        S::select(speed.equals(S::zero()), held, speed.signed(dynamic))
+    }
+
+    /// The new speed, stopped for one step where it would change sign.
+    #[inline(always)]
+    pub fn stop_at_reversal(old: S, new: S) -> S {
+        S::select((old * new).lt(S::zero()), S::zero(), new)
+    }
+}

@@ -1,0 +1,77 @@
+//! Gear ratio, inertia and load-dependent friction, end stops, user inertia and spring.
+
+use crate::scalar::Scalar;
+use crate::variables;
+
+variables! {
+    /// The gearbox.
+    GearParameter, GEAR {
+        Ratio => "ratio", "i", "1", Positive, Plant, None, "fast-shaft speed over user speed";
+        Inertia => "inertia", "J_g", "kg m2", NonNegative, Plant, Some(0.0), "inertia of the gearbox on the fast shaft";
+        Efficiency => "efficiency", "eta", "1", Fraction, Plant, Some(1.0), "efficiency under a load that opposes motion";
+        EfficiencyAiding => "efficiency_aiding", "eta_prime", "1", Between(-1e3, 1.0), Plant, Some(1.0), "efficiency under a load that aids motion; 0 or less: the load cannot back-drive";
+    }
+}
+
+variables! {
+    /// End stops, at the user.
+    StopParameter, STOP {
+        Upper => "upper", "-", "rad", Any, Plant, None, "upper end stop";
+        Lower => "lower", "-", "rad", Any, Plant, None, "lower end stop";
+    }
+}
+
+variables! {
+    /// What hangs on the user side.
+    LoadParameter, LOAD {
+        Inertia => "inertia", "J_u", "kg m2", NonNegative, Load, Some(0.0), "inertia on the user side";
+        Stiffness => "stiffness", "K_s", "N m/rad", NonNegative, Load, Some(0.0), "spring on the user side, torque proportional to the user position";
+        SpringZero => "spring_zero", "-", "rad", Any, Load, Some(0.0), "user position at which the spring is relaxed";
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Gear<S> {
+    pub ratio: S,
+    pub per_ratio: S,
+    /// 1/eta - 1 and 1 - eta'.
+    opposing: S,
+    aiding: S,
+    pub upper: S,
+    pub lower: S,
+    pub stiffness: S,
+    pub spring_zero: S,
+}
+
+impl<S: Scalar> Gear<S> {
+    pub fn derive(gear: &[S], stop: &[S], load: &[S]) -> Self {
+        let ratio = gear[GearParameter::Ratio as usize];
+        Self {
+            ratio,
+            per_ratio: S::one() / ratio,
+            opposing: S::one() / gear[GearParameter::Efficiency as usize] - S::one(),
+            aiding: S::one() - gear[GearParameter::EfficiencyAiding as usize],
+            upper: stop[StopParameter::Upper as usize] * ratio,
+            lower: stop[StopParameter::Lower as usize] * ratio,
+            stiffness: load[LoadParameter::Stiffness as usize],
+            spring_zero: load[LoadParameter::SpringZero as usize],
+        }
+    }
+
+    /// Friction that a user torque adds on the fast shaft (Borello and Dalla Vedova 2006). `direction` is the
+    /// sign of the motion, or of the torque that would start it.
+    #[inline(always)]
+    pub fn load_friction(&self, user_torque: S, direction: S) -> S {
+        let magnitude = user_torque.abs() * self.per_ratio;
+        let opposes = S::zero().lt(user_torque * direction);
+        magnitude * S::select(opposes, self.opposing, self.aiding)
+    }
+
+    /// Motor angle and speed after the stops: at one the speed is zero and its reaction cancels what pushes outwards.
+    #[inline(always)]
+    pub fn stop(&self, angle: S, speed: S) -> (S, S) {
+        let (above, below) = (self.upper.lt(angle), angle.lt(self.lower));
+        let held = S::select(above, self.upper, S::select(below, self.lower, angle));
+        (held, S::select(above | below, S::zero(), speed))
+    }
+}

@@ -1,0 +1,165 @@
+//! What the core knows of its actuators, as plain dictionaries.
+
+use crate::spec::{model, vector};
+use elevon_core::command;
+use elevon_core::fault::{profiles as fault_profiles, Attribute};
+use elevon_core::registry::KINDS;
+use elevon_core::solver::Width;
+use elevon_core::variable::Range;
+use numpy::PyReadonlyArray1;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+type Dicts<'py> = PyResult<Bound<'py, PyList>>;
+
+/// A list of dictionaries, one per item.
+fn dicts<'py, T>(py: Python<'py>, items: impl IntoIterator<Item = T>, fill: impl Fn(&Bound<'py, PyDict>, T) -> PyResult<()>) -> Dicts<'py> {
+    let list = PyList::empty(py);
+    for item in items {
+        let dict = PyDict::new(py);
+        fill(&dict, item)?;
+        list.append(dict)?;
+    }
+    Ok(list)
+}
+
+#[pyfunction]
+pub fn version() -> &'static str {
+    env!("CARGO_PKG_VERSION")
+}
+
+#[pyfunction]
+pub fn widths(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let dict = PyDict::new(py);
+    let widest = Width::detect();
+    for name in Width::NAMES {
+        if let Some(width) = Width::by_name(name) {
+            dict.set_item(name, width.lanes())?;
+        }
+    }
+    dict.set_item("auto", widest.lanes())?;
+    dict.set_item("widest", widest.name())?;
+    Ok(dict)
+}
+
+#[pyfunction]
+pub fn wirings(py: Python<'_>) -> Dicts<'_> {
+    dicts(py, KINDS, |d, kind| {
+        d.set_item("name", kind.name)?;
+        d.set_item("text", kind.text)?;
+        d.set_item("fidelities", kind.fidelities.iter().map(|f| f.0).collect::<Vec<_>>())
+    })
+}
+
+#[pyfunction]
+pub fn parameters<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
+    let groups = model(wiring, "high")?.groups();
+    let all = groups.iter().flat_map(|g| g.variables.iter().enumerate().map(move |(i, v)| (g.path(i), v)));
+    dicts(py, all, |d, (path, v)| {
+        let (minimum, maximum, open) = v.range.bounds();
+        d.set_item("path", path)?;
+        d.set_item("symbol", v.symbol)?;
+        d.set_item("unit", v.unit)?;
+        d.set_item("minimum", minimum)?;
+        d.set_item("maximum", maximum)?;
+        d.set_item("minimum_open", open)?;
+        d.set_item("maximum_open", false)?;
+        d.set_item("text", v.text)?;
+        d.set_item("register", v.register.name())?;
+        d.set_item("default", v.default)?;
+        let choices = if let Range::Choice(names) = v.range { Some(names.to_vec()) } else { None };
+        d.set_item("choices", choices)
+    })
+}
+
+#[pyfunction]
+pub fn signals<'py>(py: Python<'py>, wiring: &str, fidelity: &str) -> Dicts<'py> {
+    dicts(py, model(wiring, fidelity)?.signals(), |d, s| {
+        d.set_item("name", s.name)?;
+        d.set_item("symbol", s.symbol)?;
+        d.set_item("unit", s.unit)?;
+        d.set_item("text", s.text)
+    })
+}
+
+#[pyfunction]
+pub fn ports<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
+    dicts(py, model(wiring, "high")?.ports(), |d, p| {
+        d.set_item("name", p.name)?;
+        d.set_item("unit", p.unit)?;
+        d.set_item("text", p.text)?;
+        d.set_item("parameter", p.parameter)
+    })
+}
+
+#[pyfunction]
+pub fn initial(wiring: &str, fidelity: &str) -> PyResult<Vec<&'static str>> {
+    Ok(model(wiring, fidelity)?.initial().to_vec())
+}
+
+fn attribute<'py>(d: &Bound<'py, PyDict>, a: &Attribute) -> PyResult<()> {
+    d.set_item("name", a.name)?;
+    d.set_item("unit", a.unit)?;
+    d.set_item("default", a.default)?;
+    d.set_item("text", a.text)
+}
+
+#[pyfunction]
+pub fn faults<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
+    let low: Vec<(&str, &str)> = model(wiring, "low").map(|m| m.faults().iter().map(|f| (f.kind, f.places[0].name)).collect()).unwrap_or_default();
+    dicts(py, model(wiring, "high")?.faults(), |d, f| {
+        let (minimum, maximum, open) = f.range.bounds();
+        d.set_item("kind", f.kind)?;
+        d.set_item("places", f.places.iter().map(|p| p.name).collect::<Vec<_>>())?;
+        d.set_item("unit", f.unit)?;
+        d.set_item("minimum", minimum)?;
+        d.set_item("maximum", maximum)?;
+        d.set_item("minimum_open", open)?;
+        d.set_item("effect", f.effect)?;
+        d.set_item("source", f.source)?;
+        d.set_item("attributes", dicts(py, f.attributes, attribute)?)?;
+        let seen = low.contains(&(f.kind, f.places[0].name));
+        d.set_item("fidelities", if seen { vec!["high", "low"] } else { vec!["high"] })
+    })
+}
+
+type ParameterRow = (&'static str, &'static str, Option<f64>, &'static str);
+
+fn rows<'py>(py: Python<'py>, parameters: impl IntoIterator<Item = ParameterRow>) -> Dicts<'py> {
+    dicts(py, parameters, |d, (name, unit, default, text)| {
+        d.set_item("name", name)?;
+        d.set_item("unit", unit)?;
+        d.set_item("default", default)?;
+        d.set_item("text", text)
+    })
+}
+
+#[pyfunction]
+pub fn waveforms(py: Python<'_>) -> Dicts<'_> {
+    dicts(py, command::catalogue(), |d, w| {
+        d.set_item("kind", w.kind)?;
+        d.set_item("text", w.text)?;
+        d.set_item("parameters", rows(py, w.parameters.iter().map(|p| (p.name, p.unit, p.default, p.text)))?)
+    })
+}
+
+#[pyfunction]
+pub fn profiles(py: Python<'_>) -> Dicts<'_> {
+    dicts(py, fault_profiles(), |d, p| {
+        d.set_item("kind", p.kind)?;
+        d.set_item("text", p.text)?;
+        d.set_item("parameters", rows(py, p.parameters.iter().copied())?)
+    })
+}
+
+#[pyfunction]
+pub fn check<'py>(py: Python<'py>, wiring: &str, fidelity: &str, parameters: PyReadonlyArray1<'py, f64>) -> Dicts<'py> {
+    let model = model(wiring, fidelity)?;
+    let raw = vector(model, &parameters)?;
+    dicts(py, model.check(&raw), |d, f| {
+        d.set_item("path", f.path)?;
+        d.set_item("value", f.value)?;
+        d.set_item("limit", f.limit)?;
+        d.set_item("message", f.message)
+    })
+}

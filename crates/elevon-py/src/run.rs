@@ -1,0 +1,160 @@
+//! Runs without the GIL; the calling thread polls for progress and interruption.
+
+use crate::spec::{bad, Resolver};
+use elevon_core::solver::{Clock, Monitor, RunOutput, RunSpec, Status, Width};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use std::sync::mpsc::{sync_channel, RecvTimeoutError};
+use std::time::Duration;
+
+const POLL: Duration = Duration::from_millis(100);
+
+/// Runs `work` on a thread of its own and reports its progress about ten times a second. A callback that returns
+/// False, or raises (Ctrl-C), stops the work; an exception goes on to the caller.
+fn polled<T: Send>(py: Python<'_>, total: u64, progress: Option<&Bound<'_, PyAny>>, work: impl FnOnce(&Monitor) -> T + Send) -> PyResult<T> {
+    let monitor = Monitor::default();
+    let callback = progress.map(|p| p.clone().unbind());
+    let (result, raised) = py.detach(|| {
+        std::thread::scope(|scope| {
+            let (sender, receiver) = sync_channel(1);
+            let watched = &monitor;
+            scope.spawn(move || {
+                let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(watched)));
+                // The receiver lives until the result has come: a failed send cannot happen.
+                let _ = sender.send(outcome);
+            });
+            let mut raised = None;
+            loop {
+                match receiver.recv_timeout(POLL) {
+                    Ok(outcome) => return (Some(outcome), raised),
+                    Err(RecvTimeoutError::Disconnected) => return (None, raised),
+                    Err(RecvTimeoutError::Timeout) if raised.is_none() => {
+                        let fraction = monitor.done() as f64 / total.max(1) as f64;
+                        match Python::attach(|py| report(py, callback.as_ref(), fraction)) {
+                            Ok(true) => {}
+                            Ok(false) => monitor.cancel(),
+                            Err(error) => {
+                                monitor.cancel();
+                                raised = Some(error);
+                            }
+                        }
+                    }
+                    Err(RecvTimeoutError::Timeout) => {}
+                }
+            }
+        })
+    });
+    if let Some(error) = raised {
+        return Err(error);
+    }
+    match result {
+        Some(Ok(value)) => Ok(value),
+        _ => Err(PyRuntimeError::new_err("the core panicked; this is a defect of elevon")),
+    }
+}
+
+fn report(py: Python<'_>, callback: Option<&Py<PyAny>>, fraction: f64) -> PyResult<bool> {
+    py.check_signals()?;
+    match callback {
+        Some(callback) => {
+            let answer = callback.call1(py, (fraction.min(1.0),))?;
+            Ok(!answer.bind(py).is_instance_of::<pyo3::types::PyBool>() || answer.extract::<bool>(py)?)
+        }
+        None => Ok(true),
+    }
+}
+
+fn status(d: &Bound<'_, PyDict>, output: &RunOutput) -> PyResult<()> {
+    let (name, message) = match &output.status {
+        Status::Ok => ("ok", String::new()),
+        Status::Tripped { time } => ("tripped", format!("the drive tripped at {time} s")),
+        Status::Diverged { time, signal } => {
+            d.set_item("diverged_signal", *signal)?;
+            ("diverged", format!("{signal} diverged at {time} s"))
+        }
+        Status::Interrupted => ("interrupted", format!("interrupted at {} s", output.time)),
+    };
+    d.set_item("status", name)?;
+    d.set_item("message", message)
+}
+
+/// A result as a dictionary. `width` numbers stand for each value (1, or 1 + derivatives).
+fn result<'py>(py: Python<'py>, dt: f64, clocks: &[Clock], names: &[String], signals: &[&'static str], width: usize, output: RunOutput) -> PyResult<Bound<'py, PyDict>> {
+    let d = PyDict::new(py);
+    status(&d, &output)?;
+    d.set_item("time", output.time)?;
+    d.set_item("steps", output.steps)?;
+    d.set_item("wall_s", output.wall)?;
+    let last = PyDict::new(py);
+    for (i, name) in signals.iter().enumerate() {
+        last.set_item(name, output.last[i * width])?;
+    }
+    d.set_item("final", last)?;
+    let kept = PyDict::new(py);
+    for (((clock, name), values), columns) in clocks.iter().zip(names).zip(output.clocks).zip(output.columns) {
+        let rows = if columns == 0 { 0 } else { values.len() / columns };
+        let time: Vec<f64> = (0..rows).map(|i| (i as u64 * clock.period) as f64 * dt).collect();
+        let entry = PyDict::new(py);
+        entry.set_item("time", PyArray1::from_vec(py, time))?;
+        entry.set_item("values", PyArray1::from_vec(py, values).reshape([rows, columns])? as Bound<'py, PyArray2<f64>>)?;
+        kept.set_item(name, entry)?;
+    }
+    d.set_item("clocks", kept)?;
+    Ok(d)
+}
+
+fn read_runs(resolver: &Resolver, runs: &Bound<'_, PyList>) -> PyResult<Vec<RunSpec>> {
+    runs.iter().map(|r| resolver.run(&r.cast_into::<PyDict>()?)).collect()
+}
+
+/// Runs everything; the results stand in the order of the runs.
+#[pyfunction]
+#[pyo3(signature = (wiring, fidelity, runs, record, threads=0, lanes="auto", progress=None))]
+#[allow(clippy::too_many_arguments)]
+pub fn simulate<'py>(py: Python<'py>, wiring: &str, fidelity: &str, runs: &Bound<'py, PyList>, record: &Bound<'py, PyList>, threads: usize, lanes: &str, progress: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyList>> {
+    let resolver = Resolver::new(wiring, fidelity)?;
+    let specs = read_runs(&resolver, runs)?;
+    let (clocks, names) = resolver.clocks(record)?;
+    let width = Width::by_name(lanes).ok_or_else(|| bad(format!("lanes {lanes:?} are not known here, or this processor cannot run them")))?;
+    let model = resolver.model;
+    let steps: Vec<f64> = specs.iter().map(|r| model.step(&r.parameters)).collect();
+    let total = specs.iter().zip(&steps).map(|(r, dt)| (r.duration / dt).round() as u64).sum();
+    let outputs = polled(py, total, progress, |monitor| model.run_all(&specs, &clocks, threads, width, monitor))?;
+    let signals: Vec<&'static str> = model.signals().iter().map(|s| s.name).collect();
+    let list = PyList::empty(py);
+    for (output, dt) in outputs.into_iter().zip(steps) {
+        list.append(result(py, dt, &clocks, &names, &signals, 1, output)?)?;
+    }
+    Ok(list)
+}
+
+/// One run with exact derivatives. A list of results, one a pass of at most eight derivatives; in each, every
+/// value is followed by its derivatives.
+#[pyfunction]
+#[pyo3(signature = (wiring, fidelity, run, record, parameters, faults, progress=None))]
+#[allow(clippy::too_many_arguments)]
+pub fn sensitivities<'py>(py: Python<'py>, wiring: &str, fidelity: &str, run: &Bound<'py, PyDict>, record: &Bound<'py, PyList>, parameters: Vec<String>, faults: Vec<usize>, progress: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyList>> {
+    let resolver = Resolver::new(wiring, fidelity)?;
+    let spec = resolver.run(run)?;
+    let (clocks, names) = resolver.clocks(record)?;
+    let wanted = parameters.iter().map(|p| resolver.parameter(p)).collect::<PyResult<Vec<_>>>()?;
+    if let Some(missing) = faults.iter().find(|&&f| f >= spec.faults.len()) {
+        return Err(bad(format!("fault {missing} of {}", spec.faults.len())));
+    }
+    let model = resolver.model;
+    let dt = model.step(&spec.parameters);
+    let chosen = wanted.len() + faults.len();
+    let passes = chosen.div_ceil(8) as u64;
+    let total = (spec.duration / dt).round() as u64 * passes;
+    let outputs = polled(py, total, progress, |monitor| model.sensitivities(&spec, &wanted, &faults, &clocks, monitor))?;
+    let outputs = outputs.ok_or_else(|| bad("sensitivities need the low fidelity: relays have no useful derivative"))?;
+    let signals: Vec<&'static str> = model.signals().iter().map(|s| s.name).collect();
+    let list = PyList::empty(py);
+    for (i, output) in outputs.into_iter().enumerate() {
+        let width = 1 + (chosen - 8 * i).min(8);
+        list.append(result(py, dt, &clocks, &names, &signals, width, output)?)?;
+    }
+    Ok(list)
+}

@@ -1,0 +1,194 @@
+//! Runs as the caller describes them, resolved to the core's indices. Everything is checked here, so that the
+//! core never sees a name or a length it does not expect.
+
+use elevon_core::command::{catalogue, SourcePlan, Term, Wave};
+use elevon_core::fault::{FaultKind, FaultSpec, Profile, Write};
+use elevon_core::registry::Model;
+use elevon_core::solver::{Clock, RunSpec};
+use numpy::PyReadonlyArray1;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+pub fn bad(message: impl Into<String>) -> PyErr {
+    PyValueError::new_err(message.into())
+}
+
+pub fn model(wiring: &str, fidelity: &str) -> PyResult<Model> {
+    Model::find(wiring, fidelity).ok_or_else(|| bad(format!("no wiring {wiring:?} of fidelity {fidelity:?}")))
+}
+
+/// Paths of all parameters of a model and their places.
+pub fn paths(model: Model) -> HashMap<String, usize> {
+    let groups = model.groups();
+    let all = groups.iter().flat_map(|g| (0..g.variables.len()).map(|i| g.path(i)));
+    all.enumerate().map(|(i, p)| (p, i)).collect()
+}
+
+pub fn vector(model: Model, given: &PyReadonlyArray1<'_, f64>) -> PyResult<Vec<f64>> {
+    let raw = given.as_slice()?.to_vec();
+    let variables: Vec<_> = model.groups().iter().flat_map(|g| (0..g.variables.len()).map(move |i| (g.path(i), g.variables[i].range))).collect();
+    if raw.len() != variables.len() {
+        return Err(bad(format!("{} parameters given, {} expected", raw.len(), variables.len())));
+    }
+    for (&x, (path, range)) in raw.iter().zip(&variables) {
+        if !range.contains(x) {
+            let (low, high, _) = range.bounds();
+            return Err(bad(format!("{path}: {x} is outside {low} to {high}")));
+        }
+    }
+    Ok(raw)
+}
+
+/// A required entry of a dictionary.
+fn need<'py>(d: &Bound<'py, PyDict>, key: &str) -> PyResult<Bound<'py, PyAny>> {
+    d.get_item(key)?.ok_or_else(|| bad(format!("missing {key:?}")))
+}
+
+fn points(d: &Bound<'_, PyDict>, key: &str) -> PyResult<Arc<[f64]>> {
+    match d.get_item(key)? {
+        Some(x) if !x.is_none() => Ok(x.extract::<Vec<f64>>()?.into()),
+        _ => Ok(Arc::from([])),
+    }
+}
+
+fn term(d: &Bound<'_, PyDict>) -> PyResult<Term> {
+    let kind: String = need(d, "kind")?.extract()?;
+    let record = catalogue().iter().find(|w| w.kind == kind).ok_or_else(|| bad(format!("no waveform {kind:?}")))?;
+    let parameters: Vec<f64> = need(d, "parameters")?.extract()?;
+    if parameters.len() != record.parameters.len() {
+        return Err(bad(format!("{kind}: {} parameters given, {} expected", parameters.len(), record.parameters.len())));
+    }
+    let (times, values) = (points(d, "times")?, points(d, "values")?);
+    let rising = times.windows(2).all(|w| w[0] < w[1]);
+    if record.wave == Wave::Table && (times.is_empty() || times.len() != values.len() || !rising) {
+        return Err(bad("table: times and values must be of one length and times rising"));
+    }
+    Ok(Term { wave: record.wave, enabled: need(d, "enabled")?.extract()?, parameters, times, values })
+}
+
+fn fault(model: &[FaultKind], places: &HashMap<String, usize>, d: &Bound<'_, PyDict>) -> PyResult<FaultSpec> {
+    let kind: String = need(d, "kind")?.extract()?;
+    let name: String = need(d, "place")?.extract()?;
+    let found = model.iter().filter(|f| f.kind == kind).find_map(|f| f.places.iter().find(|p| p.name == name).map(|p| (f, p)));
+    let (record, place) = found.ok_or_else(|| bad(format!("no fault {kind}@{name} at this fidelity")))?;
+    let index = |path: &str| places.get(path).copied().ok_or_else(|| bad(format!("fault {kind}@{name} needs {path:?}, which the actuator lacks")));
+    let writes = place.targets.iter().map(|t| Ok(Write { index: index(t.path)?, op: t.op })).collect::<PyResult<Vec<_>>>()?;
+    let given: HashMap<String, f64> = need(d, "attributes")?.extract()?;
+    let mut settings = Vec::new();
+    let mut period = 0.0;
+    for attribute in record.attributes {
+        let Some(value) = given.get(attribute.name).copied().or(attribute.default) else { continue };
+        if attribute.path.is_empty() {
+            period = value;
+            continue;
+        }
+        settings.push((index(attribute.path)?, value));
+        if !attribute.flag.is_empty() {
+            settings.push((index(attribute.flag)?, 0.0));
+        }
+    }
+    let severity: f64 = need(d, "severity")?.extract()?;
+    if !record.range.contains(severity) {
+        return Err(bad(format!("{kind}@{name}: severity {severity} is out of range")));
+    }
+    let profile = need(d, "profile")?.cast_into::<PyDict>()?;
+    let shape: String = need(&profile, "kind")?.extract()?;
+    let numbers: Vec<f64> = need(&profile, "parameters")?.extract()?;
+    let profile = Profile::new(&shape, &numbers, points(&profile, "times")?, points(&profile, "values")?).ok_or_else(|| bad(format!("profile {shape:?} with {} parameters", numbers.len())))?;
+    Ok(FaultSpec { severity, profile, writes, settings, period })
+}
+
+/// What a caller's runs are resolved against; made once a call.
+pub struct Resolver {
+    pub model: Model,
+    faults: Vec<FaultKind>,
+    places: HashMap<String, usize>,
+    signals: HashMap<&'static str, usize>,
+}
+
+impl Resolver {
+    pub fn new(wiring: &str, fidelity: &str) -> PyResult<Self> {
+        let model = model(wiring, fidelity)?;
+        let signals = model.signals().iter().enumerate().map(|(i, s)| (s.name, i)).collect();
+        Ok(Self { model, faults: model.faults(), places: paths(model), signals })
+    }
+
+    pub fn parameter(&self, path: &str) -> PyResult<usize> {
+        self.places.get(path).copied().ok_or_else(|| bad(format!("no parameter {path:?}")))
+    }
+
+    pub fn run(&self, d: &Bound<'_, PyDict>) -> PyResult<RunSpec> {
+        let array = need(d, "parameters")?.extract::<PyReadonlyArray1<'_, f64>>()?;
+        let mut parameters = vector(self.model, &array)?;
+        if let Some(mode) = d.get_item("command_mode")? {
+            let mode: String = mode.extract()?;
+            let choice = ["position", "speed", "torque"].iter().position(|&m| m == mode).ok_or_else(|| bad(format!("command mode {mode:?}")))?;
+            parameters[self.parameter("control.mode")?] = choice as f64;
+        }
+        let inputs = need(d, "inputs")?.cast_into::<PyDict>()?;
+        let (ports, driven) = self.ports(&parameters, &inputs)?;
+        let given: HashMap<String, f64> = need(d, "initial")?.extract()?;
+        let names = self.model.initial();
+        if let Some(unknown) = given.keys().find(|k| !names.contains(&k.as_str())) {
+            return Err(bad(format!("no initial value {unknown:?}")));
+        }
+        let faults = need(d, "faults")?.cast_into::<PyList>()?;
+        let faults = faults.iter().map(|f| fault(&self.faults, &self.places, &f.cast_into::<PyDict>()?)).collect::<PyResult<Vec<_>>>()?;
+        let duration: f64 = need(d, "duration")?.extract()?;
+        if !(duration > 0.0 && duration.is_finite()) {
+            return Err(bad(format!("duration: {duration} s")));
+        }
+        Ok(RunSpec {
+            parameters,
+            ports,
+            driven,
+            faults,
+            initial: names.iter().map(|n| given.get(*n).copied().unwrap_or(f64::NAN)).collect(),
+            duration,
+            seed: need(d, "seed")?.extract()?,
+            run: need(d, "run")?.extract()?,
+        })
+    }
+
+    fn ports(&self, parameters: &[f64], inputs: &Bound<'_, PyDict>) -> PyResult<(Vec<SourcePlan>, Vec<bool>)> {
+        let (mut ports, mut driven) = (Vec::new(), Vec::new());
+        for port in self.model.ports() {
+            let mut terms = Vec::new();
+            if let Some(list) = inputs.get_item(port.name)? {
+                for d in list.cast_into::<PyList>()?.iter() {
+                    terms.push(term(&d.cast_into::<PyDict>()?)?);
+                }
+            }
+            driven.push(!terms.is_empty());
+            let rest = terms.is_empty() && !port.parameter.is_empty();
+            ports.push(if rest { SourcePlan::constant(parameters[self.parameter(port.parameter)?]) } else { SourcePlan { terms } });
+        }
+        for name in inputs.keys() {
+            let name: String = name.extract()?;
+            if !self.model.ports().iter().any(|p| p.name == name) {
+                return Err(bad(format!("no input {name:?}")));
+            }
+        }
+        Ok((ports, driven))
+    }
+
+    /// Clocks and their names.
+    pub fn clocks(&self, record: &Bound<'_, PyList>) -> PyResult<(Vec<Clock>, Vec<String>)> {
+        let (mut clocks, mut names) = (Vec::new(), Vec::new());
+        for item in record.iter() {
+            let d = item.cast_into::<PyDict>()?;
+            let period: u64 = need(&d, "period_steps")?.extract()?;
+            if period == 0 {
+                return Err(bad("period_steps: 0"));
+            }
+            let wanted: Vec<String> = need(&d, "signals")?.extract()?;
+            let signals = wanted.iter().map(|n| self.signals.get(n.as_str()).copied().ok_or_else(|| bad(format!("no signal {n:?}")))).collect::<PyResult<Vec<_>>>()?;
+            clocks.push(Clock { period, signals });
+            names.push(need(&d, "clock")?.extract()?);
+        }
+        Ok((clocks, names))
+    }
+}
