@@ -22,6 +22,17 @@ def test_writes_whole_and_leaves_nothing_else(tmp_path):
     assert _names(path.parent) == ["a.txt"]
 
 
+def test_the_content_reaches_the_disk_before_the_name_and_the_name_after(tmp_path, monkeypatch):
+    calls = []
+    monkeypatch.setattr(os, "fsync", lambda handle: calls.append(os.fstat(handle)))
+    present = []
+    link = os.link
+    monkeypatch.setattr(os, "link", lambda *paths: (present.append(len(calls)), link(*paths)))
+    path = write_text(tmp_path / "a.txt", "x")
+    assert present == [1]
+    assert [call.st_ino for call in calls] == [path.stat().st_ino, tmp_path.stat().st_ino]
+
+
 def test_the_mode_is_that_of_any_new_file(tmp_path):
     (tmp_path / "plain").touch()
     path = write_bytes(tmp_path / "a", b"x")

@@ -12,6 +12,8 @@ from elevon.units import parse_unit, to_display
 
 __all__ = ["Channel"]
 
+_LONGEST_TEXT = 1000
+
 
 @dataclass(frozen=True, eq=False)
 class Channel:
@@ -28,12 +30,12 @@ class Channel:
     clock : Clock
         The time base.
     text : str
-        What the quantity is, for labels and documentation.
+        What the quantity is, for labels and documentation; printable, at most 1000 characters.
 
     Raises
     ------
     InputError
-        Bad name, not one value an instant, values that are not numbers.
+        Bad name or text, not one value an instant, values that are not numbers.
     UnitError
         Unknown unit, or one that is not of the SI.
     """
@@ -56,6 +58,10 @@ class Channel:
             raise InputError(
                 f"channel {name!r}: {vector.size} values for the {len(clock)} instants "
                 f"of clock {clock.name!r}"
+            )
+        if len(text) > _LONGEST_TEXT or not text.isprintable():
+            raise InputError(
+                f"channel {name!r}: its text has control characters or more than {_LONGEST_TEXT}"
             )
         pairs = {"name": name, "unit": unit, "values": vector, "clock": clock, "text": text}
         for key, value in pairs.items():

@@ -1,7 +1,8 @@
 """Recordings as comma-separated text, for eyes, spreadsheets and other programs.
 
 The first line is ``# elevon {...}``, the description (`Header`); the second names the columns with
-their units: ``time [s],user_position [rad]``. Numbers have the digits that give back every bit.
+their units: ``time [s],user_position [rad]``. Numbers have the digits that give back every
+bit (a NaN comes back as the plain one).
 A file holds ONE clock; a recording of several is refused (Parquet, NetCDF and MAT hold them).
 
 A table without the first line is read as well, in any units, as a recording without meta.
@@ -18,7 +19,7 @@ from elevon.errors import FormatError, InputError
 from elevon.recording.assemble import check_size, header_bytes, rebuild
 from elevon.recording.header import Header
 from elevon.recording.recording import Recording
-from elevon.units import to_si
+from elevon.units import check_kind, to_si
 
 __all__ = ["check", "read", "write"]
 
@@ -127,6 +128,7 @@ def _without_header(
     try:
         values = {name: arrays[name] for name in columns if name != "time"}
         units = {name: unit for name, unit in columns.items() if name != "time"}
+        check_kind(columns["time"], "s", "time")
         time = arrays["time"]
         if columns["time"] != "s":
             time = to_si(time, columns["time"])

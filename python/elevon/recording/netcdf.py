@@ -8,6 +8,7 @@ A file is read through h5py with every link, layout and type checked first: HDF5
 other files on the disk, and those of strangers may.
 """
 
+import io
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +30,15 @@ def check(recording: Recording) -> None:
 
 
 def write(recording: Recording, path: Path) -> None:
-    """Write the description, the times and the channels."""
+    """Write the description, the times and the channels.
+
+    The file is built in memory: the HDF5 library crashes the process when the disk is full.
+    """
     import h5netcdf
 
+    memory = io.BytesIO()
     text = np.frombuffer(Header.of(recording).to_json().encode("ascii"), dtype="S1")
-    with h5netcdf.File(path, "w") as file:
+    with h5netcdf.File(memory, "w") as file:
         file.dimensions = {"elevon_length": text.size}
         file.create_variable("elevon", ("elevon_length",), "S1", data=text)
         for clock in recording.clocks.values():
@@ -47,6 +52,7 @@ def write(recording: Recording, path: Path) -> None:
             for channel in recording.on_clock(clock.name):
                 notes = {"units": channel.unit, "long_name": channel.text or channel.name}
                 _variable(file, channel.name, dimension, channel.values, notes)
+    path.write_bytes(memory.getbuffer())
 
 
 def read(path: Path, max_bytes: int) -> Recording:

@@ -204,7 +204,8 @@ def _extremes(line: Floats, starts: npt.NDArray[np.intp]) -> Floats:
     finite = np.isfinite(line)
     low = np.minimum.reduceat(np.where(finite, line, np.inf), starts)
     high = np.maximum.reduceat(np.where(finite, line, -np.inf), starts)
-    rising = line[starts] <= (low + high) / 2
+    with np.errstate(invalid="ignore"):  # a slice without any value has no middle
+        rising = line[starts] <= (low + high) / 2
     pair = np.empty(2 * starts.size)
     pair[0::2], pair[1::2] = np.where(rising, low, high), np.where(rising, high, low)
     pair[~np.isfinite(pair)] = np.nan
