@@ -21,7 +21,7 @@ ROWS = [
     ["record_plan"],
     ["simulate"],
     ["bench", "campaign"],
-    ["calibrate"],
+    ["calibrate", "compare"],
     ["reproduce"],
     ["cli"],
 ]

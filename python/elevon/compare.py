@@ -1,0 +1,229 @@
+"""The low fidelity model beside the high one: how far apart, and how much faster."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.errors import InputError, SimulationError
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.progress import Progress
+    from elevon.recording import Recording
+    from elevon.scenario import Scenario
+
+__all__ = ["Comparison", "compare", "default_scenario", "filtered", "run_pair"]
+
+Array = npt.NDArray[np.float64]
+
+SIGNALS = ("user_position", "motor_speed", "current_q")
+RATE_HZ = 10_000.0
+"""Both models are recorded at this rate: the relays' ripple (1 to 5 kHz) does not alias."""
+GRID_HZ = 400.0
+"""Rate at which the filtered signals are compared: that of the bench's log."""
+START_S = 10.0
+CUTOFF_HZ = 10.0
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two runs of one scenario, filtered alike, on one time base.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n,)
+        Common time after `start` [s].
+    high, low : mapping of str to ndarray, shape (n,)
+        Filtered user position [rad], motor speed [rad/s] and quadrature current [A].
+    amplitude : float
+        Half the range of the high model's position, its normaliser [rad].
+    recordings : (Recording, Recording)
+        High and low, as recorded.
+    start, cutoff : float
+        What came before is left out [s]; cut-off of the filter [Hz].
+    """
+
+    time: Array
+    high: Mapping[str, Array]
+    low: Mapping[str, Array]
+    amplitude: float
+    recordings: tuple[Recording, Recording]
+    start: float
+    cutoff: float
+
+    def rms_error(self, signal: str) -> float:
+        """Return the RMS of low less high, in the signal's own unit."""
+        return _rms(self.low[signal] - self.high[signal])
+
+    @property
+    def position_nrmse(self) -> float:
+        """RMS position error over the amplitude of the motion."""
+        return self.rms_error("user_position") / self.amplitude
+
+    @property
+    def speed_nrmse(self) -> float:
+        """RMS speed error over the RMS speed."""
+        return self.rms_error("motor_speed") / _rms(self.high["motor_speed"])
+
+    @property
+    def q_current_nrmse(self) -> float:
+        """RMS current error over the RMS current."""
+        return self.rms_error("current_q") / _rms(self.high["current_q"])
+
+    @property
+    def speed_up(self) -> float:
+        """Wall time of the high model over that of the low one, integration alone."""
+        high, low = (float(recording.meta["wall_s"]) for recording in self.recordings)
+        return high / low if low > 0.0 else float("inf")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object of the command."""
+        high, low = self.recordings
+        return {
+            "status": "ok",
+            "actuator": high.meta["actuator"],
+            "position_nrmse": self.position_nrmse,
+            "speed_nrmse": self.speed_nrmse,
+            "q_current_nrmse": self.q_current_nrmse,
+            "speed_up": self.speed_up,
+            "position_rms_error_rad": self.rms_error("user_position"),
+            "speed_rms_error_rad_per_s": self.rms_error("motor_speed"),
+            "q_current_rms_error_a": self.rms_error("current_q"),
+            "q_current_rms_a": _rms(self.high["current_q"]),
+            "amplitude_rad": self.amplitude,
+            "start_s": self.start,
+            "filter": f"Butterworth, 2nd order, {self.cutoff:g} Hz, forwards and backwards",
+            "high_wall_s": float(high.meta["wall_s"]),
+            "low_wall_s": float(low.meta["wall_s"]),
+            "high_realtime_factor": _realtime(high),
+            "low_realtime_factor": _realtime(low),
+            "faults": list(high.meta["faults"]),
+            "parameter_hash": high.meta["parameter_hash"],
+            "seed": high.meta["seed"],
+        }
+
+
+def default_scenario() -> Scenario:
+    """Return the loaded campaign's motion under 1 N m of brake: 45 deg about 60 deg, 0.05 Hz."""
+    from elevon.scenario import Scenario
+
+    sine = {"kind": "sine", "amplitude": "45 deg", "bias": "60 deg", "frequency": "0.05 Hz"}
+    brake = {"kind": "constant", "value": "1 N m"}
+    return Scenario.from_dict(
+        {
+            "text": "loaded campaign, 1 N m of brake",
+            "duration": "30 s",
+            "command": {"mode": "position", "terms": [sine]},
+            "load": {"brake": {"terms": [brake]}},
+        }
+    )
+
+
+def compare(
+    actuator: Actuator,
+    scenario: Scenario | None = None,
+    *,
+    seed: int = 0,
+    start: float = START_S,
+    cutoff: float = CUTOFF_HZ,
+    progress: Progress | None = None,
+) -> Comparison:
+    """Run one scenario at high and at low fidelity and compare what came out.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        What moves.
+    scenario : Scenario, optional
+        By default `default_scenario`.
+    seed : int
+        Of the random numbers of both.
+    start : float
+        What came before is left out [s].
+    cutoff : float
+        Cut-off of the one filter through which both go [Hz].
+    progress : callable, optional
+        As for `simulate`.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    InputError
+        The scenario ends before `start` or does not move after it; or as `simulate`.
+    SimulationError
+        One of the runs did not reach its end.
+    """
+    scenario = default_scenario() if scenario is None else scenario
+    if scenario.seconds <= start + 1.0 / cutoff:
+        raise InputError(
+            f"compare: the scenario lasts {scenario.seconds:g} s; what is compared begins at "
+            f"{start:g} s (--after) and needs {1.0 / cutoff:g} s at least"
+        )
+    high, low = run_pair(actuator, scenario, seed=seed, progress=progress)
+    grid = np.arange(start, scenario.seconds, 1.0 / GRID_HZ)
+    signals = [{n: filtered(run, n, grid, cutoff) for n in SIGNALS} for run in (high, low)]
+    amplitude = float(np.ptp(signals[0]["user_position"])) / 2.0
+    if amplitude == 0.0:
+        raise InputError(f"compare: nothing moves after {start:g} s, there is no amplitude")
+    return Comparison(grid, signals[0], signals[1], amplitude, (high, low), start, cutoff)
+
+
+def run_pair(
+    actuator: Actuator, scenario: Scenario, *, seed: int = 0, progress: Progress | None = None
+) -> tuple[Recording, Recording]:
+    """Return the recordings of one scenario at high and at low fidelity; errors as `compare`."""
+    from elevon.progress import part
+    from elevon.simulate import simulate
+
+    record = ",".join(SIGNALS) + f"@{RATE_HZ:g} Hz"
+    spans = {"high": part(progress, 0.0, 0.95), "low": part(progress, 0.95, 1.0)}
+    high, low = (
+        simulate(actuator, scenario, fidelity=name, record=record, seed=seed, progress=span)
+        for name, span in spans.items()
+    )
+    for name, run in zip(spans, (high, low), strict=True):
+        if run.status != "ok":
+            raise SimulationError(
+                f"compare: the {name} model ended as {run.status} after "
+                f"{run.meta['sim_s']:g} s: {run.meta['message']}",
+                run.status,
+            )
+    return high, low
+
+
+def filtered(recording: Recording, name: str, grid: Array, cutoff: float) -> Array:
+    """Return one signal through the comparison's filter, at the times of `grid`.
+
+    A second-order Butterworth low-pass runs forwards and backwards, so that it delays nothing.
+
+    Raises
+    ------
+    InputError
+        The cut-off is not below half the recording's rate.
+    """
+    from scipy.signal import butter, sosfiltfilt
+
+    channel = recording[name]
+    rate = 1.0 / float(np.median(np.diff(channel.time)))
+    if not 0.0 < cutoff < rate / 2.0:
+        raise InputError(f"cut-off {cutoff:g} Hz is not between 0 and {rate / 2.0:g} Hz")
+    sections = butter(2, cutoff, fs=rate, output="sos")
+    smooth = np.asarray(sosfiltfilt(sections, channel.values), dtype=np.float64)
+    return np.interp(grid, channel.time, smooth)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _realtime(recording: Recording) -> float:
+    wall = float(recording.meta["wall_s"])
+    return float(recording.meta["sim_s"]) / wall if wall > 0.0 else float("inf")
