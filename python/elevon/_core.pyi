@@ -1,24 +1,55 @@
 """The Rust core: all physics. Every number crossing this seam is an SI float."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = [
+    "version",
+    "wirings",
+    "parameters",
+    "signals",
+    "ports",
+    "initial",
+    "faults",
+    "waveforms",
+    "profiles",
+    "check",
+    "widths",
+    "simulate",
+    "sensitivities",
+]
 
 def version() -> str: ...
 def wirings() -> list[dict[str, Any]]: ...
 def parameters(wiring: str) -> list[dict[str, Any]]: ...
 def signals(wiring: str, fidelity: str) -> list[dict[str, Any]]: ...
+def ports(wiring: str) -> list[dict[str, Any]]: ...
+def initial(wiring: str, fidelity: str) -> list[str]: ...
 def faults(wiring: str) -> list[dict[str, Any]]: ...
 def waveforms() -> list[dict[str, Any]]: ...
 def profiles() -> list[dict[str, Any]]: ...
 def check(
-    wiring: str, fidelity: str, parameters: Sequence[float] | Any
+    wiring: str, fidelity: str, parameters: npt.NDArray[np.float64]
 ) -> list[dict[str, Any]]: ...
+def widths() -> dict[str, Any]: ...
 def simulate(
     wiring: str,
     fidelity: str,
-    runs: Sequence[Mapping[str, Any]],
-    record: Sequence[Mapping[str, Any]],
-    threads: int | None = ...,
-    lanes: int | None = ...,
-    progress: Callable[[float], bool] | None = ...,
+    runs: list[dict[str, Any]],
+    record: list[dict[str, Any]],
+    threads: int = 0,
+    lanes: str = "auto",
+    progress: Callable[[float], bool] | None = None,
+) -> list[dict[str, Any]]: ...
+def sensitivities(
+    wiring: str,
+    fidelity: str,
+    run: dict[str, Any],
+    record: list[dict[str, Any]],
+    parameters: list[str],
+    faults: list[int],
+    progress: Callable[[float], bool] | None = None,
 ) -> list[dict[str, Any]]: ...
