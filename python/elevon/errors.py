@@ -9,6 +9,7 @@ from difflib import get_close_matches
 from typing import ClassVar
 
 __all__ = [
+    "DivergedError",
     "ElevonError",
     "FormatError",
     "InputError",
@@ -92,6 +93,23 @@ class SimulationError(ElevonError):
     def __init__(self, message: str, status: str = "diverged") -> None:
         super().__init__(message)
         self.status = status
+
+
+class DivergedError(SimulationError):
+    """A run that left the finite numbers.
+
+    Attributes
+    ----------
+    time : float
+        When, in simulated s.
+    signal : str
+        Which signal.
+    """
+
+    def __init__(self, message: str, time: float = float("nan"), signal: str = "") -> None:
+        super().__init__(message, "diverged")
+        self.time = time
+        self.signal = signal
 
 
 class Interrupted(ElevonError):  # noqa: N818 - an interruption is asked for, it is no error

@@ -13,7 +13,7 @@ from elevon.scenario.scenario import Scenario, Term
 from elevon.scenario.waveforms import TABLE, check_values, unit_of, wave_records
 from elevon.units import check_kind, parse_quantity, to_si
 
-__all__ = ["CompiledScenario", "compile_scenario", "signal_units"]
+__all__ = ["CompiledScenario", "compile_scenario", "signal_records", "signal_units"]
 
 
 @dataclass(frozen=True)
@@ -24,8 +24,8 @@ class CompiledScenario:
     ----------
     inputs : mapping
         Port to list of terms.
-    command_mode : str
-        position, speed or torque.
+    command_mode, command_unit : str
+        position, speed or torque, and the SI unit of the command.
     faults : list of dict
         Resolved faults, SI.
     initial : mapping
@@ -36,17 +36,23 @@ class CompiledScenario:
 
     inputs: Mapping[str, list[dict[str, Any]]]
     command_mode: str
+    command_unit: str
     faults: list[dict[str, Any]]
     initial: Mapping[str, float]
     duration: float
 
 
 @lru_cache(maxsize=32)
-def signal_units(wiring: str, fidelity: str) -> Mapping[str, str]:
-    """Return the unit of every recordable signal, by name, in the core's order."""
+def signal_records(wiring: str, fidelity: str) -> Mapping[str, Mapping[str, str]]:
+    """Return the core's records of every recordable signal, by name, in the core's order."""
     from elevon import _core
 
-    return {item["name"]: item["unit"] for item in _core.signals(wiring, fidelity)}
+    return {item["name"]: item for item in _core.signals(wiring, fidelity)}
+
+
+def signal_units(wiring: str, fidelity: str) -> Mapping[str, str]:
+    """Return the unit of every recordable signal, by name, in the core's order."""
+    return {name: item["unit"] for name, item in signal_records(wiring, fidelity).items()}
 
 
 def compile_scenario(scenario: Scenario, wiring: str, fidelity: str) -> CompiledScenario:
@@ -70,7 +76,7 @@ def compile_scenario(scenario: Scenario, wiring: str, fidelity: str) -> Compiled
         A unit of the wrong kind, an unknown signal, a fault the actuator cannot have, ...; the
         message names the place in the scenario.
     """
-    units = _port_units(scenario, wiring, fidelity)
+    units = _port_units(scenario, wiring)
     inputs = {
         port: [
             _term(term, units[port], f"{place}.terms[{index}]") for index, term in enumerate(terms)
@@ -85,6 +91,7 @@ def compile_scenario(scenario: Scenario, wiring: str, fidelity: str) -> Compiled
     return CompiledScenario(
         inputs=inputs,
         command_mode=scenario.command.mode,
+        command_unit=units["command"],
         faults=faults,
         initial=_initial(scenario, wiring, fidelity),
         duration=scenario.seconds,
@@ -99,16 +106,13 @@ def _ports(scenario: Scenario) -> Iterator[tuple[str, str, tuple[Term, ...]]]:
     yield "supply", "supply", scenario.supply.terms
 
 
-def _port_units(scenario: Scenario, wiring: str, fidelity: str) -> dict[str, str]:
-    position = signal_units(wiring, fidelity)["user_position"]
-    command = {"position": position, "speed": "rad/s", "torque": "N m"}
-    return {
-        "command": command[scenario.command.mode],
-        "brake": "N m",
-        "shaft": "N m",
-        "user": "N m" if position == "rad" else "N",
-        "supply": "V",
-    }
+def _port_units(scenario: Scenario, wiring: str) -> dict[str, str]:
+    """Return the unit of every port; that of the command goes with its mode."""
+    from elevon import _core
+
+    units = {port["name"]: port["unit"] for port in _core.ports(wiring)}
+    command = {"position": units["command"], "speed": "rad/s", "torque": "N m"}
+    return {**units, "command": command[scenario.command.mode]}
 
 
 def _term(term: Term, own: str, place: str) -> dict[str, Any]:
@@ -149,10 +153,18 @@ def _table(term: Term, own: str, place: str) -> dict[str, Any]:
 
 
 def _initial(scenario: Scenario, wiring: str, fidelity: str) -> dict[str, float]:
+    from elevon import _core
+
     units = signal_units(wiring, fidelity)
+    settable = _core.initial(wiring, fidelity)
     read = {}
     for name, given in scenario.initial.items():
-        if name not in units:
-            raise unknown("signal", name, units, "initial")
+        if name in units and name not in settable:
+            raise InputError(
+                f"initial: {name!r} follows from the others and cannot be set; "
+                f"can be set: {', '.join(settable)}"
+            )
+        if name not in settable:
+            raise unknown("signal", name, settable, "initial")
         read[name] = parse_quantity(given, units[name] or "1", f"initial.{name}")
     return read

@@ -1,0 +1,31 @@
+"""Pieces of the fault grammar that faults and their profiles share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from elevon.errors import InputError
+
+__all__ = ["numbers", "pairs"]
+
+
+def pairs(text: str, place: str) -> dict[str, str]:
+    """Read ``name=value,name=value``; raise `InputError` naming the part that is not so."""
+    found: dict[str, str] = {}
+    for part in filter(None, (part.strip() for part in text.split(","))):
+        name, equals, value = part.partition("=")
+        if not equals or not name.strip() or not value.strip():
+            raise InputError(f"{place}: {part!r} is not of the form name=value")
+        if name.strip() in found:
+            raise InputError(f"{place}: {name.strip()!r} is given twice")
+        found[name.strip()] = value.strip()
+    return found
+
+
+def numbers(given: Any, place: str) -> tuple[float, ...]:
+    """Read a sequence of numbers, or a text of numbers separated by semicolons."""
+    items = [part.strip() for part in given.split(";")] if isinstance(given, str) else list(given)
+    try:
+        return tuple(float(item) for item in items)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{place}: {given!r} is not a list of numbers") from error

@@ -1,0 +1,143 @@
+"""How the severity of a fault goes over time."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+from elevon.errors import InputError, unknown
+from elevon.faults.grammar import numbers, pairs
+from elevon.series import check_series, read_series
+from elevon.units import parse_quantity
+
+__all__ = ["Profile", "profile_records"]
+
+_FORM = re.compile(r"([A-Za-z_]+)\s*(?:\((.*)\))?", re.S)
+
+
+@dataclass(frozen=True)
+class Profile:
+    """How the severity goes over time.
+
+    Attributes
+    ----------
+    kind : str
+        One of the core's profiles: constant, step, ramp, ...
+    arguments : mapping
+        Its arguments, SI numbers or text with units.
+    times, values : tuple of float
+        Points of a `table` profile, s and the profile's own values.
+    """
+
+    kind: str = "constant"
+    arguments: Mapping[str, float | str] = field(default_factory=dict)
+    times: tuple[float, ...] = ()
+    values: tuple[float, ...] = ()
+
+    @classmethod
+    def parse(cls, text: str) -> Profile:
+        """Read ``step(time=5 s)``; a table is ``table(times=0;5;10,values=0;0.5;1)``."""
+        match = _FORM.fullmatch(text.strip())
+        if match is None:
+            raise InputError(f"fault profile {text!r} is not of the form name(argument=value,...)")
+        return cls.from_dict({"kind": match[1], **pairs(match[2] or "", f"profile {text!r}")})
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], place: str = "profile") -> Profile:
+        """Read a mapping with ``kind`` and the arguments as keys."""
+        rest = dict(data)
+        kind = rest.pop("kind", None)
+        if not isinstance(kind, str):
+            raise InputError(f"{place}: 'kind' is missing")
+        if (file := rest.pop("file", None)) is not None:
+            if "times" in rest or "values" in rest:
+                raise InputError(f"{place}: give either a file or times and values, not both")
+            rest["times"], rest["values"] = read_series(file, place)
+        times = numbers(rest.pop("times", ()), f"{place}: times")
+        values = numbers(rest.pop("values", ()), f"{place}: values")
+        return cls(kind, rest, times, values)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the mapping `from_dict` reads."""
+        points = {"times": list(self.times), "values": list(self.values)} if self.times else {}
+        return {"kind": self.kind, **self.arguments, **points}
+
+    def __str__(self) -> str:
+        """The profile in the fault grammar."""
+        given_points = {
+            name: ";".join(f"{number!r}" for number in points)
+            for name, points in (("times", self.times), ("values", self.values))
+            if points
+        }
+        given = ",".join(f"{name}={value}" for name, value in {**self.arguments, **given_points}.items())
+        return f"{self.kind}({given})" if given else self.kind
+
+    def resolved(self, place: str) -> dict[str, Any]:
+        """Check the profile against the core's records; return what crosses the seam, in SI.
+
+        Raises
+        ------
+        UnknownNameError
+            A profile or an argument that does not exist.
+        InputError
+            A missing argument, one out of its range, an end before the start, a malformed table.
+        """
+        known = profile_records()
+        if self.kind not in known:
+            raise unknown("profile", self.kind, known, place)
+        at = f"{place}: profile {self.kind}"
+        values = _values(self.arguments, known[self.kind]["parameters"], at)
+        _check(values, at)
+        return {"kind": self.kind, "parameters": list(values.values()), **_points(self, at)}
+
+
+@lru_cache(maxsize=1)
+def profile_records() -> Mapping[str, Mapping[str, Any]]:
+    """Return the core's records of fault profiles, by kind."""
+    from elevon import _core
+
+    return {item["kind"]: item for item in _core.profiles()}
+
+
+def _values(
+    arguments: Mapping[str, float | str], parameters: list[Mapping[str, Any]], at: str
+) -> dict[str, float]:
+    for name in arguments:
+        if name not in {item["name"] for item in parameters}:
+            raise unknown("argument", name, [item["name"] for item in parameters], at)
+    values = {}
+    for item in parameters:
+        name = item["name"]
+        if name in arguments:
+            values[name] = parse_quantity(arguments[name], item["unit"] or "1", f"{at}: {name}")
+        elif item["default"] is None:
+            raise InputError(f"{at}: {name!r} is missing ({item['text']})")
+        else:
+            values[name] = float(item["default"])
+    return values
+
+
+def _check(values: Mapping[str, float], at: str) -> None:
+    if "end" in values and values["end"] <= values["start"]:
+        raise InputError(
+            f"{at} ends before it starts: end = {values['end']:g} s, start = {values['start']:g} s"
+        )
+    for name in ("period", "time_constant"):
+        if values.get(name, 1.0) <= 0.0:
+            raise InputError(f"{at}: {name} = {values[name]:g} s must be positive")
+    if not 0.0 <= values.get("duty", 0.0) <= 1.0:
+        raise InputError(f"{at}: duty = {values['duty']:g} must be from 0 to 1")
+
+
+def _points(profile: Profile, at: str) -> dict[str, Any]:
+    if profile.kind != "table":
+        if profile.times or profile.values:
+            raise InputError(f"{at}: only a table takes times and values")
+        return {"times": (), "values": ()}
+    times, values = check_series(profile.times, profile.values, at)
+    if values.min() < 0.0 or values.max() > 1.0:
+        raise InputError(f"{at}: the values are fractions of the severity, from 0 to 1")
+    return {"times": times, "values": values}

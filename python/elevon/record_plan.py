@@ -1,0 +1,175 @@
+"""What is kept of a run: texts such as ``"user_position,motor_speed@400 Hz"`` become clocks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from elevon.errors import InputError, unknown
+from elevon.units import parse_quantity
+
+__all__ = ["DEFAULT_RECORD", "GROUPS", "ClockPlan", "clock_name", "record_plan"]
+
+#: Named groups of signals; a model without one of them leaves it out of the group.
+GROUPS: Mapping[str, tuple[str, ...]] = {
+    "drive_log": (
+        "encoder_position",
+        "motor_position",
+        "speed_ref",
+        "motor_speed",
+        "current_ref",
+        "current_q_meas",
+        "current_d_meas",
+        "voltage_q_ref",
+    ),
+    "essential": (
+        "command",
+        "user_position",
+        "motor_torque",
+        "friction_torque",
+        "current_q",
+        "current_d",
+    ),
+    "currents": ("current_a", "current_b", "current_c"),
+    "voltages": ("voltage_a", "voltage_b", "voltage_c"),
+}
+
+#: What is kept when nothing is said: the rate of the Torino drive's log (T1).
+DEFAULT_RECORD = "drive_log,essential@400 Hz"
+
+_EVERY = "every"
+_ALL = "all"
+
+
+@dataclass(frozen=True)
+class ClockPlan:
+    """Signals kept on one clock.
+
+    Attributes
+    ----------
+    name : str
+        The clock's name in the recording: ``at_400_hz``, ``every_step``.
+    period_steps : int
+        Solver steps between two samples.
+    signals : tuple of str
+        Names.
+    rate : float
+        Hz.
+    """
+
+    name: str
+    period_steps: int
+    signals: tuple[str, ...]
+    rate: float
+
+    def to_core(self) -> dict[str, object]:
+        """Return the form that crosses the seam."""
+        return {
+            "clock": self.name,
+            "period_steps": self.period_steps,
+            "signals": list(self.signals),
+        }
+
+    def samples(self, duration: float, step: float) -> int:
+        """Return how many instants a run of some duration (s) keeps, the first one included."""
+        return round(duration / step) // self.period_steps + 1
+
+
+def record_plan(
+    record: str | Sequence[str] | None,
+    units: Mapping[str, str],
+    step: float,
+) -> list[ClockPlan]:
+    """Resolve what to record.
+
+    Parameters
+    ----------
+    record : str, sequence of str or None
+        Texts ``SIGNALS@RATE``: names or groups (``drive_log``, ``essential``, ``currents``,
+        ``voltages``, ``all``) separated by commas, and a rate with unit, or ``every`` for every
+        solver step. None: drive log and essentials at 400 Hz.
+    units : mapping
+        The model's signals.
+    step : float
+        Solver step in s.
+
+    Returns
+    -------
+    list of ClockPlan
+        One a rate.
+
+    Raises
+    ------
+    UnknownNameError
+        A signal the model does not have.
+    InputError
+        The rate is no whole number of steps (the nearest possible rates are named), or a signal
+        is asked for at two rates.
+    """
+    texts = [DEFAULT_RECORD] if record is None else [record] if isinstance(record, str) else record
+    if not texts:
+        raise InputError("record: nothing is recorded; leave it out for the default")
+    chosen: dict[int, list[str]] = {}
+    owner: dict[str, str] = {}
+    for text in texts:
+        names, period = _read(text, units, step)
+        for name in names:
+            if owner.setdefault(name, text) != text:
+                raise InputError(f"record: {name!r} is asked for twice: {owner[name]!r}, {text!r}")
+        kept = chosen.setdefault(period, [])
+        kept.extend(name for name in names if name not in kept)
+    return [
+        ClockPlan(clock_name(period, step), period, tuple(names), 1.0 / (period * step))
+        for period, names in chosen.items()
+    ]
+
+
+def clock_name(period_steps: int, step: float) -> str:
+    """Return the name of a clock: an identifier that tells its rate."""
+    if period_steps == 1:
+        return "every_step"
+    rate = f"{1.0 / (period_steps * step):.6g}".replace(".", "p").replace("+", "")
+    return f"at_{rate.replace('-', 'm')}_hz"
+
+
+def _read(text: str, units: Mapping[str, str], step: float) -> tuple[list[str], int]:
+    names, at, rate = text.partition("@")
+    if not at or not names.strip() and rate.strip() != _EVERY or not rate.strip():
+        raise InputError(
+            f"record: {text!r} is not of the form SIGNALS@RATE, such as "
+            "'user_position,motor_speed@400 Hz' or 'current_a@every'"
+        )
+    wanted = names if names.strip() else _ALL
+    chosen: list[str] = []
+    for name in (part.strip() for part in wanted.split(",")):
+        chosen.extend(item for item in _expand(name, units) if item not in chosen)
+    return chosen, _period(rate.strip(), step)
+
+
+def _expand(name: str, units: Mapping[str, str]) -> list[str]:
+    if name == _ALL:
+        return list(units)
+    if name in units:
+        return [name]
+    if name in GROUPS:
+        return [item for item in GROUPS[name] if item in units]
+    raise unknown("signal", name, [*units, *GROUPS, _ALL], "record")
+
+
+def _period(rate: str, step: float) -> int:
+    if rate == _EVERY:
+        return 1
+    hertz = parse_quantity(rate, "Hz", "record")
+    if hertz <= 0.0:
+        raise InputError(f"record: the rate {rate} must be positive")
+    exact = 1.0 / (hertz * step)
+    period = max(round(exact), 1)
+    if abs(exact - period) <= 1e-9 * exact:
+        return period
+    low, high = max(math.floor(exact), 1), max(math.ceil(exact), 1)
+    near = " or ".join(f"{1.0 / (n * step):.9g} Hz" for n in dict.fromkeys((high, low)))
+    raise InputError(
+        f"record: {rate} is no whole number of solver steps of {step:g} s "
+        f"({exact:.6g} of them); nearest: {near}"
+    )
