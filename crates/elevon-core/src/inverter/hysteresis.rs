@@ -1,11 +1,11 @@
 //! Three hysteresis relays on the phase current errors (T2; reference sheet 1.4).
 
-use crate::scalar::Scalar;
+use crate::scalar::{three, Scalar};
 
 /// New leg commands (+1 high, -1 low): beyond the half band they follow the error's sign, inside it they stay.
 #[inline(always)]
 pub fn relays<S: Scalar>(half_band: S, legs: [S; 3], error: [S; 3]) -> [S; 3] {
-    std::array::from_fn(|j| {
+    three(|j| {
         let lowered = S::select(error[j].lt(-half_band), -S::one(), legs[j]);
         S::select(half_band.lt(error[j]), S::one(), lowered)
     })

@@ -1,7 +1,7 @@
 //! Three-phase star with floating neutral, faults in the winding and the air gap included in
 //! their healthy form (T2; reference sheet 1.5).
 
-use crate::scalar::Scalar;
+use crate::scalar::{three, Scalar};
 use crate::variables;
 
 variables! {
@@ -78,7 +78,7 @@ pub struct StarState<S> {
 }
 
 fn phases<S: Scalar>(raw: &[S], first: MotorParameter) -> [S; 3] {
-    std::array::from_fn(|j| raw[first as usize + j])
+    three(|j| raw[first as usize + j])
 }
 
 impl<S: Scalar> Star<S> {
@@ -89,11 +89,11 @@ impl<S: Scalar> Star<S> {
         let turns = phases(raw, P::TurnsA);
         let k = g(P::EmfConstant) * g(P::FluxFraction);
         let coupling = if structure.shorted_loop { g(P::ShortCoupling) } else { zero };
-        let shorted = turns.map(|n| if structure.shorted_loop { one - n } else { zero });
-        let has_loop = shorted.map(|mu| zero.lt(mu));
-        let guarded: [S; 3] = std::array::from_fn(|j| S::select(has_loop[j], shorted[j], one));
-        let factor: [S; 3] = std::array::from_fn(|j| S::select(has_loop[j], one - coupling * coupling, one));
-        let per_inductance: [S; 3] = std::array::from_fn(|j| one / (turns[j] * turns[j] * g(P::Inductance) * factor[j]));
+        let shorted = three(|j| if structure.shorted_loop { one - turns[j] } else { zero });
+        let has_loop = three(|j| zero.lt(shorted[j]));
+        let guarded: [S; 3] = three(|j| S::select(has_loop[j], shorted[j], one));
+        let factor: [S; 3] = three(|j| S::select(has_loop[j], one - coupling * coupling, one));
+        let per_inductance: [S; 3] = three(|j| one / (turns[j] * turns[j] * g(P::Inductance) * factor[j]));
         let total = per_inductance[0] + per_inductance[1] + per_inductance[2];
         let (sin_s, cos_s) = g(P::EccentricityStaticPhase).sin_cos();
         let (sin_d, cos_d) = g(P::EccentricityDynamicPhase).sin_cos();
@@ -101,10 +101,10 @@ impl<S: Scalar> Star<S> {
         Self {
             pole_pairs: g(P::PolePairs),
             offset: g(P::ElectricalOffset),
-            emf_constant: turns.map(|n| n * k),
-            resistance: turns.map(|n| n * g(P::Resistance)),
+            emf_constant: three(|j| turns[j] * k),
+            resistance: three(|j| turns[j] * g(P::Resistance)),
             per_inductance,
-            neutral_weight: per_inductance.map(|x| x / total),
+            neutral_weight: three(|j| per_inductance[j] / total),
             torque_limit: g(P::TorqueLimit),
             eccentric_cos: g(P::EccentricityStatic) * cos_s,
             eccentric_sin: g(P::EccentricityStatic) * sin_s,
@@ -112,10 +112,10 @@ impl<S: Scalar> Star<S> {
             dynamic_sin: g(P::EccentricityDynamic) * sin_d,
             flat_slope: pi / (pi - g(P::EmfFlatWidth)),
             open: phases(raw, P::OpenA),
-            loop_ratio: std::array::from_fn(|j| S::select(has_loop[j], coupling * turns[j] / guarded[j], zero)),
-            loop_resistance: std::array::from_fn(|j| shorted[j] * g(P::Resistance) + g(P::ShortContact)),
-            loop_per_inductance: std::array::from_fn(|j| S::select(has_loop[j], one / (guarded[j] * guarded[j] * g(P::Inductance)), zero)),
-            loop_turns: std::array::from_fn(|j| shorted[j] * k),
+            loop_ratio: three(|j| S::select(has_loop[j], coupling * turns[j] / guarded[j], zero)),
+            loop_resistance: three(|j| shorted[j] * g(P::Resistance) + g(P::ShortContact)),
+            loop_per_inductance: three(|j| S::select(has_loop[j], one / (guarded[j] * guarded[j] * g(P::Inductance)), zero)),
+            loop_turns: three(|j| shorted[j] * k),
         }
     }
 
@@ -127,7 +127,7 @@ impl<S: Scalar> Star<S> {
     /// k_j of the three phases (sheet 1.5), sinusoidal: `shape` is sin of the three phase angles.
     #[inline(always)]
     pub fn coefficients(&self, shape: [S; 3], gap: [S; 3]) -> [S; 3] {
-        std::array::from_fn(|j| self.emf_constant[j] * shape[j] * gap[j])
+        three(|j| self.emf_constant[j] * shape[j] * gap[j])
     }
 
     /// 1 + zeta cos(theta_e - phi + 2 pi (j-1)/3), the static eccentricity's modulation of phase j.
@@ -154,7 +154,7 @@ impl<S: Scalar> Star<S> {
     /// Trapezoid of the three phase angles theta_e - 2 pi (j-1)/3: a triangle cut at +-1.
     #[inline(always)]
     pub fn trapezoid(&self, angle: S) -> [S; 3] {
-        std::array::from_fn(|j| {
+        three(|j| {
             let turns = angle * S::splat(1.0 / std::f64::consts::TAU) - S::splat(j as f64 / 3.0) + S::splat(0.25);
             let triangle = S::one() - S::splat(4.0) * (turns - turns.floor() - S::splat(0.5)).abs();
             (triangle * self.flat_slope).clamp_abs(S::one())
@@ -181,19 +181,19 @@ impl<S: Scalar> Star<S> {
     /// EMF that the loops' currents add to their phases: -(M / L_f)(R_f i_f + mu k_j' omega).
     #[inline(always)]
     pub fn loop_emf(&self, s: &StarState<S>, loop_k: [S; 3], speed: S) -> [S; 3] {
-        std::array::from_fn(|j| -self.loop_ratio[j] * (self.loop_resistance[j] * s.resistance_factor * s.loop_current[j] + loop_k[j] * speed))
+        three(|j| -self.loop_ratio[j] * (self.loop_resistance[j] * s.resistance_factor * s.loop_current[j] + loop_k[j] * speed))
     }
 
     /// k of the shorted turns alone, from the unit shape and gap of the phase.
     #[inline(always)]
     pub fn loop_coefficients(&self, shape: [S; 3], gap: [S; 3]) -> [S; 3] {
-        std::array::from_fn(|j| self.loop_turns[j] * shape[j] * gap[j])
+        three(|j| self.loop_turns[j] * shape[j] * gap[j])
     }
 
     /// Explicit step of the loop currents, given the phases' di/dt.
     #[inline(always)]
     pub fn step_loops(&self, s: &StarState<S>, loop_k: [S; 3], speed: S, slope: [S; 3], dt: S) -> [S; 3] {
-        std::array::from_fn(|j| {
+        three(|j| {
             let own = self.loop_resistance[j] * s.resistance_factor * s.loop_current[j] + loop_k[j] * speed;
             let change = -own * self.loop_per_inductance[j] - self.loop_ratio[j] * slope[j];
             s.loop_current[j] + dt * change

@@ -131,6 +131,13 @@ pub trait Scalar:
     }
 }
 
+/// `[f(0), f(1), f(2)]`, written out: the standard library's array adapters are not always inlined, and a call in
+/// the inner loop costs more than the step.
+#[inline(always)]
+pub fn three<T>(mut f: impl FnMut(usize) -> T) -> [T; 3] {
+    [f(0), f(1), f(2)]
+}
+
 /// Sine and cosine of three angles 120 degrees apart: `[a, a - 2 pi/3, a + 2 pi/3]`.
 #[inline(always)]
 pub fn three_phase<S: Scalar>(sin: S, cos: S) -> ([S; 3], [S; 3]) {

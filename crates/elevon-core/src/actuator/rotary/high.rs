@@ -14,7 +14,7 @@ use crate::fault::FaultKind;
 use crate::inverter::bridge::{quench, Bridge, BridgeState, InverterParameter, Windings};
 use crate::inverter::hysteresis::{relays, transitions};
 use crate::motor::star::{MotorParameter, MotorStructure, Star, StarState};
-use crate::scalar::{three_phase, Scalar};
+use crate::scalar::{three, three_phase, Scalar};
 use crate::sensor::current::{CurrentSensor, CurrentSensorParameter};
 use crate::sensor::encoder::Encoder;
 use crate::sensor::filter::{closing, low_pass};
@@ -236,9 +236,9 @@ pub(super) fn coupling<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &St
         }
         if structure.motor.dynamic_eccentricity {
             let turning = m.star.dynamic_gap(s.motor_position);
-            gap = std::array::from_fn(|j| gap[j] * turning[j]);
+            gap = three(|j| gap[j] * turning[j]);
         }
-        gap = gap.map(|g| g * s.star.flux_factor);
+        gap = three(|j| gap[j] * s.star.flux_factor);
         if structure.motor.shorted_loop {
             loop_k = m.star.loop_coefficients(shape, gap);
         }
@@ -312,7 +312,7 @@ fn step<S: Scalar, const FULL: bool, const PWM: bool>(m: &Model<S>, structure: &
     if PWM {
         s.legs = m.current_control.compare(&s.current_control, t);
     } else if !FULL || structure.drive == Drive::Hysteresis {
-        let error = std::array::from_fn(|j| s.current_ref * sin_phases[j] - measured[j]);
+        let error = three(|j| s.current_ref * sin_phases[j] - measured[j]);
         s.legs = relays(m.half_band, old_legs, error);
     }
     s.transitions = s.transitions + transitions(old_legs, s.legs);
@@ -339,16 +339,16 @@ fn step<S: Scalar, const FULL: bool, const PWM: bool>(m: &Model<S>, structure: &
 fn electric_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &mut State<S>, c: &Coupling<S>, half_supply: S, old_legs: [S; 3]) -> ([S; 3], [S; 3]) {
     let speed = s.motor_speed;
     let i = s.star.current;
-    let mut emf: [S; 3] = c.k.map(|k| k * speed);
+    let mut emf: [S; 3] = three(|j| c.k[j] * speed);
     let mut resistance = m.star.resistance;
     if FULL {
-        resistance = resistance.map(|r| r * s.star.resistance_factor);
+        resistance = three(|j| resistance[j] * s.star.resistance_factor);
         if structure.motor.shorted_loop {
             let added = m.star.loop_emf(&s.star, c.loop_k, speed);
-            emf = std::array::from_fn(|j| emf[j] + added[j]);
+            emf = three(|j| emf[j] + added[j]);
         }
     }
-    let mut terminal = s.legs.map(|leg| leg * half_supply);
+    let mut terminal = three(|j| s.legs[j] * half_supply);
     let mut rail = terminal;
     let mut legs = None;
     let neutral;
@@ -358,17 +358,17 @@ fn electric_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structur
         let all = connection.connected[0] & connection.connected[1] & connection.connected[2];
         terminal = connection.voltage;
         rail = connection.rail;
-        let plain = m.star.neutral(std::array::from_fn(|j| terminal[j] - emf[j] - resistance[j] * i[j]));
+        let plain = m.star.neutral(three(|j| terminal[j] - emf[j] - resistance[j] * i[j]));
         neutral = S::select(all, plain, v_n);
         // A floating phase shows its EMF over the neutral.
-        terminal = std::array::from_fn(|j| S::select(connection.connected[j], terminal[j], neutral + emf[j]));
+        terminal = three(|j| S::select(connection.connected[j], terminal[j], neutral + emf[j]));
         legs = Some(connection);
     } else {
-        neutral = m.star.neutral(std::array::from_fn(|j| terminal[j] - emf[j] - resistance[j] * i[j]));
+        neutral = m.star.neutral(three(|j| terminal[j] - emf[j] - resistance[j] * i[j]));
     }
-    let voltage: [S; 3] = terminal.map(|v| v - neutral);
-    let slope: [S; 3] = std::array::from_fn(|j| (voltage[j] - emf[j] - resistance[j] * i[j]) * m.star.per_inductance[j]);
-    let mut current: [S; 3] = std::array::from_fn(|j| i[j] + m.dt * slope[j]);
+    let voltage: [S; 3] = three(|j| terminal[j] - neutral);
+    let slope: [S; 3] = three(|j| (voltage[j] - emf[j] - resistance[j] * i[j]) * m.star.per_inductance[j]);
+    let mut current: [S; 3] = three(|j| i[j] + m.dt * slope[j]);
     if FULL {
         s.voltage = voltage;
         if let Some(legs) = &legs {
@@ -389,13 +389,13 @@ fn electric_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structur
 #[allow(clippy::too_many_arguments)]
 fn account_electric<S: Scalar>(m: &Model<S>, s: &mut State<S>, old: [S; 3], new: [S; 3], loops: [S; 3], rail: [S; 3], terminal: [S; 3], resistance: [S; 3]) {
     let half = S::splat(0.5);
-    let middle: [S; 3] = std::array::from_fn(|j| half * (old[j] + new[j]));
+    let middle: [S; 3] = three(|j| half * (old[j] + new[j]));
     for j in 0..3 {
         s.energy[E_SUPPLY] = s.energy[E_SUPPLY] + m.dt * rail[j] * middle[j];
         s.energy[E_INVERTER] = s.energy[E_INVERTER] + m.dt * (rail[j] - terminal[j]) * middle[j];
         s.energy[E_COPPER] = s.energy[E_COPPER] + m.dt * resistance[j] * middle[j] * middle[j];
     }
-    let middle_loops: [S; 3] = std::array::from_fn(|j| half * (s.star.loop_current[j] + loops[j]));
+    let middle_loops: [S; 3] = three(|j| half * (s.star.loop_current[j] + loops[j]));
     s.energy[E_COPPER] = s.energy[E_COPPER] + m.dt * m.star.loop_loss(&s.star, middle_loops);
 }
 
@@ -560,7 +560,7 @@ impl Wiring for High {
         let motor_position = or(0, zero);
         let driver = motor_position * model.gear.per_ratio;
         let mut star = StarState::rest();
-        star.current = std::array::from_fn(|j| or(4 + j, zero));
+        star.current = three(|j| or(4 + j, zero));
         star.heat(Raw(raw).motor(), model.temperature);
         let user_position = model.play.drag(driver, or(2, driver));
         State {
@@ -598,7 +598,7 @@ impl Wiring for High {
     fn tick<S: Scalar>(kind: u8, structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &mut State<S>, t: S, noise: &mut dyn FnMut(u64) -> S) {
         match kind {
             TICK_COMMAND_NOISE => s.command_noise = m.noise_deviation * noise(0),
-            TICK_CURRENT_NOISE => s.current_noise = std::array::from_fn(|j| noise(1 + j as u64)),
+            TICK_CURRENT_NOISE => s.current_noise = three(|j| noise(1 + j as u64)),
             TICK_CONTROL => {
                 let reading = shaft_reading::<S, true>(m, structure, s);
                 control_step::<S, true>(m, structure, &inputs[COMMAND], s, &reading, t);

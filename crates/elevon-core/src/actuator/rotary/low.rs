@@ -10,7 +10,7 @@ use crate::fault::FaultKind;
 use crate::inverter::bridge::InverterParameter;
 use crate::motor::equivalent::{equivalent, imposed_shape, Circuit, LowParameter};
 use crate::motor::star::{MotorParameter, MotorStructure, Star};
-use crate::scalar::{three_phase, Scalar};
+use crate::scalar::{three, three_phase, Scalar};
 use crate::sensor::current::CurrentSensorParameter;
 use crate::sensor::encoder::Encoder;
 use crate::sensor::filter::{closing, low_pass};
@@ -102,7 +102,7 @@ fn coefficients<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, co
     let mut gap = m.star.static_gap(sin, cos);
     if structure.dynamic_eccentricity {
         let turning = m.star.dynamic_gap(s.motor_position);
-        gap = std::array::from_fn(|j| gap[j] * turning[j]);
+        gap = three(|j| gap[j] * turning[j]);
     }
     let k = m.star.coefficients(shape, gap);
     let sines = if structure.resolver {
@@ -281,8 +281,8 @@ impl Wiring for Low {
         Model {
             dt,
             per_dt: one / dt,
-            resistance: star.resistance.map(|r| r * resistance_factor),
-            inductance: star.per_inductance.map(|x| one / x),
+            resistance: three(|j| star.resistance[j] * resistance_factor),
+            inductance: three(|j| one / star.per_inductance[j]),
             healthy_constant: S::splat(1.5) * at(MotorParameter::EmfConstant.at()) * at(MotorParameter::FluxFraction.at()) * flux_factor,
             healthy_resistance: at(MotorParameter::Resistance.at()) * resistance_factor,
             healthy_inductance: at(MotorParameter::Inductance.at()),
