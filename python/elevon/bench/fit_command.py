@@ -38,6 +38,9 @@ _LEAST = 20
 class WaveformFit:
     """A fitted command.
 
+    All standard deviations hold for coloured residuals, and include the unknown instant at which
+    the drive sampled the command (`fit_waveform`, `timing_std`).
+
     Attributes
     ----------
     kind : str
@@ -83,7 +86,7 @@ def fit_waveform(
     *,
     fixed: Mapping[str, float] | None = None,
     window: tuple[float, float] | None = None,
-    timing_std: float = 0.0,
+    timing_std: float | None = None,
 ) -> WaveformFit:
     """Fit a waveform to the valid samples of a command trace.
 
@@ -98,8 +101,10 @@ def fit_waveform(
     window : (float, float), optional
         Seconds used. By default the command's beginning and end are found in the trace: a span at
         rest at either end, and samples that no waveform of this kind explains.
-    timing_std : float
-        Standard deviation [s] of the log's own time offset, added to the phase's.
+    timing_std : float, optional
+        Standard deviation [s] of the instant at which the drive sampled the command, against the
+        time stamp of the row. It is in no residual, so it is added to the phase and to the instants.
+        Default: uniform within one period of the log.
 
     Returns
     -------
@@ -185,7 +190,7 @@ def _without_rest(t: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]
 
 
 def _first_explained(t: FloatArray, residual: FloatArray) -> int:
-    """Index after the last sample of the first half that the second half's spread cannot explain."""
+    """Index after the last sample of the first half beyond the second half's spread."""
     half = len(t) // 2
     spread = 1.4826 * float(np.median(np.abs(residual[half:] - np.median(residual[half:]))))
     off = np.flatnonzero(np.abs(residual[:half]) > max(_OUTLIER * spread, 1e-12))
@@ -262,7 +267,7 @@ def _result(
     t: FloatArray,
     solution: tuple[FloatArray, FloatArray, bool],
     *,
-    timing_std: float,
+    timing_std: float | None,
 ) -> WaveformFit:
     jacobian, residual, converged = solution
     if values.get("amplitude", 1.0) < 0.0 and "phase" in free:
@@ -271,10 +276,10 @@ def _result(
     if "phase" in values:
         values["phase"] = math.remainder(values["phase"], 2.0 * math.pi)
     covariance = _covariance(kind, free, t, jacobian, residual)
-    if timing_std and "phase" in free:
-        place = list(free).index("phase")
-        rate = 2.0 * math.pi * values.get("frequency", values.get("start_frequency", 0.0))
-        covariance[place, place] += (rate * timing_std) ** 2
+    if timing_std is None:
+        timing_std = float(np.median(np.diff(t))) / math.sqrt(12.0)
+    shift = _per_second(values, free)
+    covariance += timing_std**2 * np.outer(shift, shift)
     std = {name: float(math.sqrt(covariance[k, k])) for k, name in enumerate(free)}
     rms = float(np.sqrt(np.mean(residual**2)))
     window = (float(t[0]), float(t[-1]))
@@ -286,13 +291,18 @@ def _covariance(
 ) -> FloatArray:
     """Covariance of the fitted parameters, shape (p, p).
 
-    A step's instant has no derivative: it is uniform between the two samples that enclose it.
+    A step's instant has no derivative: the sampling alone bounds it, which the caller adds.
     """
     smooth = [k for k, name in enumerate(free) if (kind, name) != ("step", "time")]
     covariance = np.zeros((len(free), len(free)))
     if smooth:
         part = robust_covariance(jacobian[:, smooth], residual)
         covariance[np.ix_(smooth, smooth)] = part
-    for k in set(range(len(free))) - set(smooth):
-        covariance[k, k] = float(np.median(np.diff(t))) ** 2 / 12.0
     return covariance
+
+
+def _per_second(values: Mapping[str, float], free: Sequence[str]) -> FloatArray:
+    """Change of each fitted parameter when the whole command comes one second later, shape (p,)."""
+    rate = 2.0 * math.pi * values.get("frequency", values.get("start_frequency", 0.0))
+    moves = {"phase": -rate, "start": 1.0, "end": 1.0, "time": 1.0}
+    return np.array([moves.get(name, 0.0) for name in free])

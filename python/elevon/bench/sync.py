@@ -23,6 +23,8 @@ __all__ = ["ClockFit", "TriggerEdge", "align_clocks", "find_trigger"]
 FloatArray = npt.NDArray[np.float64]
 _MOST_DRIFT = 0.02  # an RC oscillator's worst; a ceramic resonator is within 0.005
 _LEAST_R2 = 0.25  # of the centred load-cell value explained by the drive's signals
+_RIVAL = 1.5  # an offset that leaves less than this times the best one's variance is a rival
+_SMOOTHING = 3.0  # periods of the slower clock
 _LEAST_OVERLAP = 0.5  # of the shorter log
 
 
@@ -136,7 +138,7 @@ def align_clocks(
     InputError
         Too few samples, or neither an edge nor anything the two logs share.
     """
-    t, x, s, y = _arrays(time, signals, second_time, value)
+    t, x, s, y = _smoothed(*_arrays(time, signals, second_time, value))
     guess = _coarse(t, x, s, y, edge)
     fit = None if guess is None else _refine(t, x, s, y, guess=guess, edge=edge)
     if fit is not None and fit.explained >= _LEAST_R2:
@@ -169,6 +171,22 @@ def _arrays(
     return t, (x - x.mean(axis=0)) / np.where(spread > 0.0, spread, 1.0), s, y
 
 
+def _smoothed(
+    t: FloatArray, x: FloatArray, s: FloatArray, y: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Pass both logs through one Gaussian filter of a few of the slower one's periods.
+
+    Interpolated noise would make the misfit jagged in the offset; one filter on both sides leaves
+    their linear relation as it is.
+    """
+    from scipy.ndimage import gaussian_filter1d
+
+    steps = float(np.median(np.diff(t))), float(np.median(np.diff(s)))
+    width = _SMOOTHING * max(steps)
+    smooth_x = gaussian_filter1d(x, width / steps[0], axis=0, mode="nearest")
+    return t, smooth_x, s, gaussian_filter1d(y, width / steps[1], mode="nearest")
+
+
 def _coarse(
     t: FloatArray, x: FloatArray, s: FloatArray, y: FloatArray, edge: TriggerEdge | None
 ) -> float | None:
@@ -182,8 +200,25 @@ def _coarse(
     offsets = np.arange(t[0] - s[-1] + least, t[-1] - s[0] - least, step)
     if not offsets.size:
         return None
-    scores = [_explained(t, x, s + offset, y) for offset in offsets.tolist()]
-    return float(offsets[int(np.argmax(scores))])
+    scores = np.array([_explained(t, x, s + offset, y) for offset in offsets.tolist()])
+    best = int(np.argmax(scores))
+    _refuse_ambiguity(offsets, scores, best)
+    return float(offsets[best])
+
+
+def _refuse_ambiguity(offsets: FloatArray, scores: FloatArray, best: int) -> None:
+    """Refuse a periodic motion, which fits as well when shifted by its period."""
+    if scores[best] < _LEAST_R2:
+        return
+    inner = np.flatnonzero((scores[1:-1] >= scores[:-2]) & (scores[1:-1] >= scores[2:])) + 1
+    rest = [k for k in inner.tolist() if abs(k - best) > 1]
+    rivals = [k for k in rest if 1.0 - scores[k] < _RIVAL * (1.0 - scores[best])]
+    if rivals:
+        other = max(rivals, key=lambda k: float(scores[k]))
+        raise InputError(
+            "synchronisation: the trigger never changes, and the motion repeats: offsets of "
+            f"{offsets[best]:.3f} s and {offsets[other]:.3f} s explain the load cell as well"
+        )
 
 
 def _basis(t: FloatArray, x: FloatArray, at: FloatArray) -> FloatArray:

@@ -75,7 +75,7 @@ def settle_motor(
     fits = [_against(travel_from_speed(time, speed), position) for speed in speeds]
     usable = [fit for fit in fits if fit.usable and fit.travel > _LEAST_TRAVEL]
     if not usable:
-        return _unconfirmed(statement, "motor_position", _why(fits), report), False
+        return _unconfirmed(statement, "resolver_position", _why(fits), report), False
     slope = usable[0].slope
     if statement.per_rad is not None:
         _check_stated(statement, slope, "the integral of the motor's speed")
@@ -153,11 +153,14 @@ def settle_encoder(
     _refuse_shaft(statement, fit, found, ratio, report)
     assert found is not None  # noqa: S101 - _refuse_shaft raises when there is none
     seen = ratio * found.scale / fit.slope
+    follows = f"gear ratio seen {seen:.3f}, expected {ratio:g}"
+    if found.shaft == "fast":  # the drive has multiplied by its own ratio: it cannot be seen
+        follows = f"it moves {fit.slope / found.scale:.4f} of the motor"
     report.note(
         "encoder_position",
         "shaft-confirmed",
-        f"{statement.column} is on the {found.shaft} shaft in {found.unit}: gear ratio seen "
-        f"{seen:.3f}, expected {ratio:g}; play about {play:.3f} deg at the user",
+        f"{statement.column} is on the {found.shaft} shaft in {found.unit}: {follows}; play about "
+        f"{play:.3f} deg at the user",
     )
     return 1.0 / (found.scale * ratio), True
 

@@ -1,0 +1,250 @@
+"""Sizing of the load module's traction springs, with the stress check of the bench's designers.
+
+Transmission thesis (2024), chapter 4: two cables wind on a guide of 160 mm, each pulls a spring.
+Wire under torsion and shear, von Mises: tau_max = 8 F D / (pi d^3) + 4 F / (pi d^2), at most
+sigma / (sqrt 3 c); stiffness K = G d^4 / (8 n D^3); coils touch, so the free length is n d.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from elevon.errors import InputError, RangeError
+
+__all__ = [
+    "INDEX_RANGE",
+    "STANDARD_WIRES",
+    "SpringDesign",
+    "SpringTask",
+    "design_spring",
+    "search_springs",
+]
+
+#: Preferred wire diameters of EN 10270-1 between 2 and 5 mm [m].
+STANDARD_WIRES: tuple[float, ...] = tuple(
+    round(1e-3 * d, 6)
+    for d in (
+        2.0,
+        2.1,
+        2.25,
+        2.4,
+        2.5,
+        2.6,
+        2.8,
+        3.0,
+        3.2,
+        3.4,
+        3.6,
+        3.8,
+        4.0,
+        4.25,
+        4.5,
+        4.75,
+        5.0,
+    )
+)
+INDEX_RANGE = (4.0, 20.0)  # D / d that can be wound cold (EN 13906-2)
+
+
+@dataclass(frozen=True, slots=True)
+class SpringTask:
+    """What the springs must do. SI; the defaults are the bench's.
+
+    Attributes
+    ----------
+    torque : float
+        Greatest torque on the gearbox [N m].
+    guide_diameter : float
+        Diameter of the winding guide [m].
+    force : float
+        Force each spring is designed for [N]: torque / guide diameter (75 N), rounded up to 80.
+    extension : float
+        Extension at that force [m].
+    shear_modulus : float
+        Of the wire [Pa].
+    strength : float
+        Of the wire [Pa]: EN 10270-1 SM/SH/DH, as the designers took it for 3 mm.
+    safety : float
+        Safety factor on it.
+    """
+
+    torque: float = 12.0
+    guide_diameter: float = 0.160
+    force: float = 80.0
+    extension: float = 1.3
+    shear_modulus: float = 81.5e9
+    strength: float = 1730e6
+    safety: float = 2.0
+
+    def __post_init__(self) -> None:
+        for name in self.__slots__:
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise RangeError(f"spring: {name} = {value!r} must be above 0")
+        if self.force < self.cable_force:
+            raise InputError(
+                f"spring: force = {self.force:g} N is less than the {self.cable_force:g} N that "
+                f"{self.torque:g} N m on a guide of {1e3 * self.guide_diameter:g} mm need"
+            )
+
+    @property
+    def cable_force(self) -> float:
+        """Force in each of the two cables at the greatest torque [N]: torque / diameter."""
+        return self.torque / self.guide_diameter
+
+    @property
+    def stiffness(self) -> float:
+        """Stiffness wanted [N/m]."""
+        return self.force / self.extension
+
+    @property
+    def allowed_stress(self) -> float:
+        """Greatest shear stress [Pa]: strength / (sqrt 3 safety)."""
+        return self.strength / (math.sqrt(3.0) * self.safety)
+
+    def largest_coil(self, wire: float) -> float:
+        """Greatest mean coil diameter [m] the stress allows for a wire [m]."""
+        return self.allowed_stress * math.pi * wire**3 / (8.0 * self.force) - 0.5 * wire
+
+
+@dataclass(frozen=True, slots=True)
+class SpringDesign:
+    """A spring and what it does on the bench.
+
+    Attributes
+    ----------
+    task : SpringTask
+        What it was designed for.
+    wire, coil : float
+        Wire diameter and mean coil diameter [m].
+    coils : int
+        Number of coils.
+    """
+
+    task: SpringTask
+    wire: float
+    coil: float
+    coils: int
+
+    @property
+    def stiffness(self) -> float:
+        """Stiffness of one spring [N/m]."""
+        return self.task.shear_modulus * self.wire**4 / (8.0 * self.coils * self.coil**3)
+
+    @property
+    def free_length(self) -> float:
+        """Length with touching coils [m]."""
+        return self.coils * self.wire
+
+    @property
+    def stress(self) -> float:
+        """Greatest shear stress at the design force [Pa]."""
+        force, d = self.task.force, self.wire
+        return 8.0 * force * self.coil / (math.pi * d**3) + 4.0 * force / (math.pi * d**2)
+
+    @property
+    def curved_stress(self) -> float:
+        """Shear stress with Wahl's factor for the curvature of the wire [Pa]; for information."""
+        index = self.coil / self.wire
+        factor = (4.0 * index - 1.0) / (4.0 * index - 4.0) + 0.615 / index
+        return 8.0 * self.task.force * self.coil / (math.pi * self.wire**3) * factor
+
+    @property
+    def safety(self) -> float:
+        """Safety factor reached: strength / (sqrt 3 stress)."""
+        return self.task.strength / (math.sqrt(3.0) * self.stress)
+
+    @property
+    def index(self) -> float:
+        """Coil over wire diameter."""
+        return self.coil / self.wire
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the stress and the spring index hold."""
+        return (
+            self.stress <= self.task.allowed_stress
+            and INDEX_RANGE[0] <= self.index <= INDEX_RANGE[1]
+        )
+
+    @property
+    def wire_volume(self) -> float:
+        """Volume of the wire [m3]: what the spring costs and weighs."""
+        return math.pi * self.coil * self.coils * math.pi * self.wire**2 / 4.0
+
+    @property
+    def torsional_stiffness(self) -> float:
+        """Stiffness of both springs at the user shaft [N m/rad]: 2 K r^2."""
+        return 2.0 * self.stiffness * (0.5 * self.task.guide_diameter) ** 2
+
+    @property
+    def rotation(self) -> float:
+        """Rotation of the guide that extends the springs fully [rad]."""
+        return self.task.extension / (0.5 * self.task.guide_diameter)
+
+    def radial_force(self, mover: float) -> float:
+        """Radial force on the gearbox [N] when the mover goes out by `mover` [m]: K dx."""
+        return self.stiffness * mover
+
+
+def design_spring(
+    task: SpringTask | None = None, *, wire: float = 3e-3, coil: float = 34e-3
+) -> SpringDesign:
+    """Return the spring of a chosen wire and coil: as many coils as make it no stiffer than wanted.
+
+    The defaults are the bench's choice: 3 mm wire, 34 mm coils, 342 of them.
+
+    Raises
+    ------
+    RangeError
+        Diameters that are not positive, or a coil smaller than its wire.
+    """
+    task = task or SpringTask()
+    if not (math.isfinite(wire) and wire > 0.0 and math.isfinite(coil) and coil > wire):
+        raise RangeError(
+            f"spring: wire {1e3 * wire:g} mm, coil {1e3 * coil:g} mm: the coil must be the larger"
+        )
+    exact = task.shear_modulus * wire**4 / (8.0 * task.stiffness * coil**3)
+    return SpringDesign(task, wire, coil, max(1, math.ceil(exact - 1e-9)))
+
+
+def search_springs(
+    task: SpringTask | None = None,
+    *,
+    longest: float = 1.1,
+    wires: tuple[float, ...] = STANDARD_WIRES,
+    coil_step: float = 1e-3,
+) -> list[SpringDesign]:
+    """Return the feasible springs over standard wires, least wire first.
+
+    Parameters
+    ----------
+    task : SpringTask, optional
+        What they must do.
+    longest : float
+        Greatest free length [m]: what the tubes under the bench hold. ASSUMED 1.1: the chosen
+        spring of 1.026 m fits them.
+    wires : tuple of float
+        Wire diameters tried [m].
+    coil_step : float
+        Step of the coil diameters tried [m].
+
+    Returns
+    -------
+    list of SpringDesign
+        May be empty.
+    """
+    task = task or SpringTask()
+    for name, value in (("longest", longest), ("coil_step", coil_step)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise RangeError(f"spring: {name} = {value!r} must be above 0")
+    found = []
+    for wire in wires:
+        top = min(task.largest_coil(wire), INDEX_RANGE[1] * wire)
+        first = math.ceil(INDEX_RANGE[0] * wire / coil_step - 1e-9)
+        for k in range(first, math.floor(top / coil_step + 1e-9) + 1):
+            design = design_spring(task, wire=wire, coil=k * coil_step)
+            if design.feasible and design.free_length <= longest:
+                found.append(design)
+    return sorted(found, key=lambda design: design.wire_volume)

@@ -1,0 +1,191 @@
+"""``elevon import``: bench and drive logs made into recordings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from elevon.cli.output import print_json, print_table, say
+from elevon.errors import InputError
+
+if TYPE_CHECKING:
+    from elevon.bench.logs.importing import ImportedLog
+    from elevon.bench.logs.report import ImportReport
+
+app = typer.Typer(
+    rich_markup_mode=None, help="Read bench and drive logs into recordings; report what was seen."
+)
+
+
+@app.command()
+def import_(
+    *,
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Log files.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="Recording to write (.parquet, .nc, .mat, .csv); a folder for several logs."
+        ),
+    ],
+    log_format: Annotated[
+        str,
+        typer.Option(
+            "--format",
+            help="auto, drive, csv, parquet, netcdf, mat, recording or cranfield.",
+        ),
+    ] = "auto",
+    column_map: Annotated[Path | None, typer.Option("--map", help="Column map (TOML).")] = None,
+    loadcell: Annotated[
+        list[Path] | None, typer.Option(help="Load-cell file; one for each log, in their order.")
+    ] = None,
+    command: Annotated[
+        list[Path] | None,
+        typer.Option(help="Command note (TOML or JSON); one for each log, or one for all."),
+    ] = None,
+    gear_ratio: Annotated[
+        float | None, typer.Option(help="Fast over slow shaft; 124 unless the map says it.")
+    ] = None,
+    sidecars: Annotated[
+        bool, typer.Option(help="Look for NAME_loadcell.csv and NAME_command.json beside a log.")
+    ] = True,
+    json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
+) -> int:
+    """Read logs into recordings, and say everything that was seen on the way."""
+    from elevon.bench.logs.detect import FORMATS
+    from elevon.errors import unknown
+
+    if log_format not in FORMATS:
+        raise unknown("format", log_format, FORMATS, "--format")
+    if log_format == "cranfield":
+        return _cranfield(logs, out, force=force, json=json)
+    cells = _one_each("--loadcell", loadcell, len(logs))
+    notes = _one_each("--command", command, len(logs), shared=True)
+    targets = _targets(logs, out)
+    _check_targets(targets, force=force)
+    imported = _read_all(
+        logs, cells, notes, log_format=log_format, column_map=column_map,
+        gear_ratio=gear_ratio, sidecars=sidecars,
+    )  # fmt: skip
+    for log, target in zip(imported, targets, strict=True):
+        log.recording.save(target, force=force)
+    if json:
+        print_json(_result(imported, targets))
+    else:
+        for log, target in zip(imported, targets, strict=True):
+            _show(log.report, target)
+    return 0
+
+
+def _read_all(
+    logs: list[Path],
+    cells: list[Path | None],
+    notes: list[Path | None],
+    **options: Any,
+) -> list[ImportedLog]:
+    from elevon.bench.logs.importing import import_log, same_rate
+
+    imported = []
+    for path, cell, note in zip(logs, cells, notes, strict=True):
+        log = import_log(path, loadcell=cell, command=note, **options)
+        for finding in log.report.findings:
+            if finding.level == "warning":
+                say(f"{path}: {finding.place}: {finding.text}")
+        imported.append(log)
+    same_rate(imported)
+    return imported
+
+
+def _one_each(
+    option: str, given: list[Path] | None, count: int, *, shared: bool = False
+) -> list[Path | None]:
+    if not given:
+        return [None] * count
+    if shared and len(given) == 1:
+        return [given[0]] * count
+    if len(given) != count:
+        raise InputError(f"{option}: {len(given)} given for {count} logs; one for each, in order")
+    return list(given)
+
+
+def _targets(logs: list[Path], out: Path) -> list[Path]:
+    if len(logs) == 1:
+        return [out / f"{_stem(logs[0])}.parquet" if out.is_dir() else out]
+    if out.suffix.lower() in {".parquet", ".nc", ".mat", ".csv"}:
+        raise InputError(f"--out {out}: {len(logs)} logs need a folder, not one file")
+    targets = [out / f"{_stem(log)}.parquet" for log in logs]
+    for target in targets:
+        if targets.count(target) > 1:
+            raise InputError(f"two logs would be written to {target}; import them apart")
+    return targets
+
+
+def _stem(path: Path) -> str:
+    return path.name.removesuffix(".gz").rpartition(".")[0] or path.name
+
+
+def _check_targets(targets: list[Path], *, force: bool) -> None:
+    from elevon.files import check_output
+    from elevon.recording.formats import check_ending
+
+    for target in targets:
+        check_ending(target)
+        check_output(target, force=force)
+
+
+def _result(imported: list[ImportedLog], targets: list[Path]) -> dict[str, Any]:
+    rows = [
+        {"recording": str(target), **log.report.to_dict()}
+        for log, target in zip(imported, targets, strict=True)
+    ]
+    return {"status": "ok", "logs": rows}
+
+
+def _show(report: ImportReport, target: Path) -> None:
+    title = f"{report.source} ({report.file_format}) -> {target}"
+    rows = [
+        (c["name"], c["column"], c["unit"], _number(c["minimum"]), _number(c["maximum"]),
+         c["missing"])
+        for c in report.channels
+    ]  # fmt: skip
+    print_table(("channel", "column", "unit", "minimum", "maximum", "missing"), rows, title=title)
+    clocks = [
+        (name, c["samples"], f"{c['rate_hz']:.6g}", f"{1e3 * c['jitter_rms_s']:.3g}",
+         len(c["gaps"]), c["duplicates"])
+        for name, c in report.clocks.items()
+    ]  # fmt: skip
+    print_table(("clock", "samples", "rate Hz", "jitter ms", "gaps", "duplicates"), clocks)
+    findings = [(f.level, f.place, f.text) for f in report.findings]
+    print_table(("level", "where", "what"), findings)
+    if report.synchronisation:
+        facts = report.synchronisation
+        rows_ = [(name, _number(value)) for name, value in facts.items()]
+        print_table(("synchronisation", "value"), rows_)
+
+
+def _number(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _cranfield(logs: list[Path], out: Path, *, force: bool, json: bool) -> int:
+    from elevon.bench.logs.cranfield import read_cranfield
+
+    if out.suffix.lower() in {".parquet", ".nc", ".mat", ".csv"}:
+        raise InputError(f"--out {out}: a Cranfield file holds many recordings; give a folder")
+    rows = []
+    for log in logs:
+        for recording in read_cranfield(log):
+            meta = recording.meta
+            name = f"{meta['condition']}_{meta['profile']}_{meta['load_kgf']:g}_{meta['run']}"
+            target = out / f"{name.replace('-', 'm')}.parquet"
+            recording.save(target, force=force)
+            rows.append({"recording": str(target), "samples": len(recording.clock()),
+                         "labels": recording.labels, **meta})  # fmt: skip
+    if json:
+        print_json({"status": "ok", "logs": rows})
+    else:
+        cells = [(r["recording"], r["samples"], r["load_kgf"], r["run"]) for r in rows]
+        print_table(("recording", "samples", "load kgf", "run"), cells)
+    return 0
