@@ -22,6 +22,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
         "current_q_meas",
         "current_d_meas",
         "voltage_q_ref",
+        "voltage_q_meas",
     ),
     "essential": (
         "command",

@@ -309,7 +309,7 @@ def _recording(
         clocks=clocks,
         meta=_meta(run, prepared, fidelity, result),
         labels=_labels(prepared),
-        final=result["final"],
+        final=_final(prepared, result["final"]),
     )
 
 
@@ -334,6 +334,16 @@ def _severities(
     for column, label in enumerate(_labels(prepared)):
         text = f"severity of {label['kind']}@{label['place']}"
         yield Channel(label["channel"], label["unit"], values[:, column], clock, text)
+
+
+def _final(prepared: _Prepared, values: Mapping[str, float]) -> dict[str, float]:
+    """Last values; the core sums energies only where they are recorded, so others are left out."""
+    recorded = {name for plan in prepared.plan for name in plan.signals}
+    return {
+        name: value
+        for name, value in values.items()
+        if name in recorded or not name.startswith("energy_")
+    }
 
 
 def _labels(prepared: _Prepared) -> list[dict[str, Any]]:

@@ -30,6 +30,8 @@ COMMANDS: dict[str, Command] = {
     "design": Command("elevon.cli.design", "Design experiments and parts."),
     "import": Command("elevon.cli.import_log", "Read bench and drive logs into recordings."),
     "calibrate": Command("elevon.cli.calibrate", "Fit an actuator's parameters to logs."),
-    "validate": Command("elevon.cli.validate", "Check an actuator against logs it was not fitted to."),
+    "validate": Command(
+        "elevon.cli.validate", "Check an actuator against logs it was not fitted to."
+    ),
     "reproduce": Command("elevon.cli.reproduce", "Recompute a published table or figure."),
 }

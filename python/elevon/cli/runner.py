@@ -43,7 +43,9 @@ class LazyGroup(typer.core.TyperGroup):
         known = self.list_commands(ctx)
         if args and not args[0].startswith("-") and args[0] not in known:
             near = nearest(args[0], known)
-            hint = f" Did you mean {', '.join(near)}?" if near else f" Commands: {', '.join(known)}."
+            hint = (
+                f" Did you mean {', '.join(near)}?" if near else f" Commands: {', '.join(known)}."
+            )
             raise _UsageError(f"No such command '{args[0]}'.{hint}", ctx)
         return super().resolve_command(ctx, args)
 

@@ -1,0 +1,111 @@
+"""Options that several commands share, and turning them into actuators and scenarios."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from elevon.errors import InputError
+from elevon.files import check_output
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.scenario import Scenario
+
+ActuatorArgument = Annotated[
+    str, typer.Argument(metavar="ACTUATOR", help="Name of a set (elevon list actuators) or a file.")
+]
+ScenarioOption = Annotated[
+    Path | None, typer.Option("--scenario", metavar="FILE", help="Scenario file (TOML).")
+]
+DurationOption = Annotated[
+    str | None, typer.Option(help="Simulated time, such as 5 or '200 ms'; overrides the scenario's.")
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="PATH=VALUE[unit]", help="Change a parameter; repeatable."),
+]
+FaultOption = Annotated[
+    list[str] | None,
+    typer.Option("--fault", metavar="SPEC", help="'KIND@PLACE=VALUE[unit]...'; repeatable."),
+]
+FidelityOption = Annotated[str, typer.Option(help="high or low.")]
+RecordOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--record",
+        metavar="SIGNALS@RATE",
+        help="Such as 'user_position,motor_speed@400 Hz' or 'current_a@every'; repeatable.",
+    ),
+]
+SeedOption = Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")]
+ForceOption = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
+
+
+def read_settings(settings: Sequence[str] | None) -> dict[str, str]:
+    """Read ``PATH=VALUE[unit]`` texts.
+
+    Raises
+    ------
+    InputError
+        Not of that form, or one path given twice.
+    """
+    values: dict[str, str] = {}
+    for text in settings or ():
+        path, equals, value = text.partition("=")
+        if not equals or not path.strip() or not value.strip():
+            raise InputError(f"--set {text!r} is not of the form PATH=VALUE[unit]")
+        if path.strip() in values:
+            raise InputError(f"--set {path.strip()} is given twice")
+        values[path.strip()] = value.strip()
+    return values
+
+
+def read_actuator(reference: str, settings: Sequence[str] | None = None) -> Actuator:
+    """Load an actuator and apply ``--set`` options."""
+    from elevon.actuator import Actuator
+
+    return Actuator.load(reference).with_values(
+        read_settings(settings), source="set on the command line", place="--set"
+    )
+
+
+def read_scenario(
+    actuator: Actuator,
+    path: Path | None,
+    duration: str | None = None,
+    faults: Sequence[str] | None = None,
+) -> Scenario:
+    """Read a scenario file, or the actuator's own, and apply ``--duration`` and ``--fault``."""
+    from elevon.faults import Fault
+    from elevon.scenario import Scenario
+
+    if path is not None:
+        scenario = Scenario.load(path)
+    elif actuator.default_scenario is not None:
+        scenario = Scenario.from_dict(actuator.default_scenario, f"{actuator.name}: scenario")
+    else:
+        raise InputError(f"{actuator.name} has no scenario of its own; give one with --scenario")
+    if duration is not None:
+        scenario = scenario.replaced(duration=_number(duration))
+    if faults:
+        scenario = scenario.with_faults([Fault.parse(text) for text in faults])
+    return scenario
+
+
+def check_outputs(outputs: Sequence[Path | None], *, force: bool) -> None:
+    """Check before any work that every output could be written."""
+    for path in outputs:
+        if path is not None:
+            check_output(path, force=force)
+
+
+def _number(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text

@@ -1,0 +1,138 @@
+"""``elevon list``: what there is."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from elevon.cli.common import ActuatorArgument, FidelityOption, JsonOption
+from elevon.cli.output import print_json, print_table
+
+app = typer.Typer(
+    no_args_is_help=True, rich_markup_mode=None, help="List what there is, with units and sources."
+)
+
+
+@app.command()
+def actuators(*, json: JsonOption = False) -> None:
+    """List the actuators that can be named: the shipped ones and those in ELEVON_SETS."""
+    from elevon.documents import read_toml
+    from elevon.parameters.find import set_paths
+
+    rows = []
+    for name, path in sorted(set_paths().items()):
+        head = read_toml(path).data
+        rows.append({"name": name, "title": head.get("title", ""), "file": str(path)})
+    _print("actuators", rows, json, ("name", "title"))
+
+
+@app.command()
+def signals(
+    actuator: ActuatorArgument, *, fidelity: FidelityOption = "high", json: JsonOption = False
+) -> None:
+    """List the signals of an actuator that can be recorded."""
+    from elevon import _core
+    from elevon.actuator import Actuator
+    from elevon.simulate import check_fidelity
+
+    wiring = Actuator.load(actuator).wiring
+    check_fidelity(wiring, fidelity)
+    rows = [dict(item) for item in _core.signals(wiring, fidelity)]
+    _print("signals", rows, json, ("name", "unit", "text"))
+
+
+@app.command()
+def parameters(actuator: ActuatorArgument, *, json: JsonOption = False) -> None:
+    """List the parameters an actuator's model has: unit, range, default, meaning."""
+    from elevon.actuator import Actuator
+    from elevon.parameters import records
+
+    rows = [
+        {
+            "path": record.path,
+            "symbol": record.symbol,
+            "unit": record.unit,
+            "range": record.range_text,
+            "default": record.default_value(),
+            "register": record.register,
+            "text": record.text,
+        }
+        for record in records(Actuator.load(actuator).wiring).values()
+    ]
+    _print("parameters", rows, json, ("path", "unit", "range", "text"))
+
+
+@app.command()
+def faults(
+    actuator: Annotated[
+        str | None, typer.Argument(metavar="[ACTUATOR]", help="Only the faults of this actuator.")
+    ] = None,
+    *,
+    json: JsonOption = False,
+) -> None:
+    """List the fault catalogue: kind, places, unit, range, effect, source."""
+    from elevon.actuator import Actuator
+    from elevon.faults import catalogue
+    from elevon.parameters.records import wiring_names
+
+    wirings = wiring_names() if actuator is None else [Actuator.load(actuator).wiring]
+    rows = [
+        {
+            "wiring": wiring,
+            "kind": record.kind,
+            "places": list(record.places),
+            "unit": record.unit,
+            "range": record.range_text,
+            "attributes": [dict(item) for item in record.attributes],
+            "fidelities": list(record.fidelities),
+            "effect": record.effect,
+            "source": record.source,
+        }
+        for wiring in wirings
+        for record in catalogue(wiring)
+    ]
+    first = ("wiring",) if len(wirings) > 1 else ()
+    _print("faults", rows, json, (*first, "kind", "places", "unit", "range", "effect", "source"))
+
+
+@app.command()
+def waveforms(*, json: JsonOption = False) -> None:
+    """List the waveforms of commands and loads with their parameters (* = must be given)."""
+    from elevon.scenario.waveforms import wave_records
+
+    rows = [
+        {
+            "kind": record.kind,
+            "text": record.text,
+            "parameters": [
+                {"name": p.name, "unit": p.unit, "default": p.default, "text": p.text}
+                for p in record.parameters
+            ],
+        }
+        for record in wave_records().values()
+    ]
+    if json:
+        print_json({"waveforms": rows})
+        return
+    table = [
+        (row["kind"], ", ".join(_needed(p) for p in row["parameters"]), row["text"]) for row in rows
+    ]
+    print_table(("kind", "parameters", "text"), table)
+
+
+def _needed(parameter: dict[str, Any]) -> str:
+    return f"{parameter['name']}*" if parameter["default"] is None else str(parameter["name"])
+
+
+def _print(
+    what: str, rows: list[dict[str, Any]], json: bool, columns: tuple[str, ...]
+) -> None:
+    if json:
+        print_json({what: rows})
+        return
+    print_table(columns, [[_cell(row[column]) for column in columns] for row in rows])
+
+
+def _cell(value: Any) -> str:
+    return " ".join(value) if isinstance(value, list) else str(value)

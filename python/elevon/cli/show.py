@@ -1,0 +1,109 @@
+"""``elevon show``: one actuator with the source of every number, and its block diagram."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from elevon.cli.common import (
+    ActuatorArgument,
+    ForceOption,
+    JsonOption,
+    SetOption,
+    check_outputs,
+    read_actuator,
+)
+from elevon.cli.output import print_json, print_table, say
+
+app = typer.Typer(rich_markup_mode=None)
+
+
+@app.command()
+def show(
+    actuator: ActuatorArgument,
+    *,
+    settings: SetOption = None,
+    svg: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the block diagram as SVG.")
+    ] = None,
+    schema: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the JSON Schema of its set files.")
+    ] = None,
+    notes: Annotated[bool, typer.Option("--notes", help="Show the notes as well.")] = False,
+    force: ForceOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Show an actuator: block diagram, parameters with units and sources, references."""
+    from elevon.diagram import diagram_svg, diagram_text
+
+    check_outputs([svg, schema], force=force)
+    loaded = read_actuator(actuator, settings)
+    if svg is not None:
+        from elevon.files import write_text
+
+        write_text(svg, diagram_svg(loaded.wiring), force=force)
+        say(f"wrote {svg}")
+    if schema is not None:
+        _write_schema(schema, loaded.wiring, force=force)
+    if json:
+        print_json(_as_json(loaded, svg))
+        return
+    typer.echo(f"{loaded.name}: {loaded.title}\n")
+    typer.echo(diagram_text(loaded.wiring) + "\n")
+    _print_parameters(loaded, notes)
+    if loaded.references:
+        typer.echo("")
+        for key, text in loaded.references.items():
+            typer.echo(f"{key}: {text}")
+
+
+def _print_parameters(loaded: Any, notes: bool) -> None:
+    columns = ["parameter", "value", "confidence", "source", *(["note"] if notes else [])]
+    rows = [
+        [p.path, p.text, p.confidence, p.source, *([p.note] if notes else [])]
+        for p in loaded.parameters.values()
+    ]
+    print_table(columns, rows)
+
+
+def _write_schema(path: Path, wiring: str, *, force: bool) -> None:
+    from json import dumps
+
+    from elevon.cli.output import plain
+    from elevon.files import write_text
+    from elevon.parameters import json_schema
+
+    write_text(path, dumps(plain(json_schema(wiring)), indent=2) + "\n", force=force)
+    say(f"wrote {path}")
+
+
+def _as_json(loaded: Any, svg: Path | None) -> dict[str, Any]:
+    from elevon.parameters import records
+
+    known = records(loaded.wiring)
+    return {
+        "name": loaded.name,
+        "title": loaded.title,
+        "wiring": loaded.wiring,
+        "file": loaded.path,
+        "hash": loaded.hash,
+        "references": loaded.references,
+        "svg": svg,
+        "parameters": [
+            {
+                "path": p.path,
+                "value": p.value,
+                "si_unit": known[p.path].unit,
+                "shown": p.text,
+                "unit": p.unit,
+                "confidence": p.confidence,
+                "source": p.source,
+                "note": p.note,
+                "old": p.old,
+                "text": known[p.path].text,
+            }
+            for p in loaded.parameters.values()
+        ],
+    }

@@ -1,0 +1,123 @@
+"""``elevon simulate``: one run from the command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from elevon.cli.common import (
+    ActuatorArgument,
+    DurationOption,
+    FaultOption,
+    FidelityOption,
+    ForceOption,
+    JsonOption,
+    RecordOption,
+    ScenarioOption,
+    SeedOption,
+    SetOption,
+    check_outputs,
+    read_actuator,
+    read_scenario,
+)
+from elevon.cli.output import print_json, print_table, progress_bar, say
+
+app = typer.Typer(rich_markup_mode=None)
+
+_PLOTS = (".png", ".svg", ".pdf", ".html")
+
+
+@app.command()
+def simulate(
+    actuator: ActuatorArgument,
+    *,
+    scenario: ScenarioOption = None,
+    duration: DurationOption = None,
+    settings: SetOption = None,
+    fault: FaultOption = None,
+    fidelity: FidelityOption = "high",
+    record: RecordOption = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Save the recording: .parquet, .nc, .csv or .mat."),
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Plot it: .png, .svg, .pdf or .html.")
+    ] = None,
+    seed: SeedOption = 0,
+    force: ForceOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Simulate one actuator and keep what it did."""
+    from elevon.simulate import simulate as run
+
+    _check_files(out, plot, force=force)
+    loaded = read_actuator(actuator, settings)
+    asked = read_scenario(loaded, scenario, duration, fault)
+    with progress_bar(f"simulating {loaded.name}") as advance:
+        recording = run(
+            loaded, asked, fidelity=fidelity, record=record, seed=seed, progress=advance
+        )
+    if out is not None:
+        recording.save(out, force=force)
+        say(f"wrote {out}")
+    if plot is not None:
+        recording.plot(path=plot, force=force)
+        say(f"wrote {plot}")
+    if json:
+        print_json(_result(recording, out, plot))
+    else:
+        _print_result(recording)
+
+
+def _check_files(out: Path | None, plot: Path | None, *, force: bool) -> None:
+    from elevon.errors import InputError, unknown
+
+    if out is not None:
+        from elevon.recording.formats import check_ending
+
+        check_ending(out)
+    if plot is not None and plot.suffix.lower() not in _PLOTS:
+        raise unknown("ending of a plot", plot.suffix, _PLOTS, str(plot))
+    if out is not None and plot is not None and out.absolute() == plot.absolute():
+        raise InputError(f"{out}: --out and --plot name the same file")
+    check_outputs([out, plot], force=force)
+
+
+def _result(recording: Any, out: Path | None, plot: Path | None) -> dict[str, Any]:
+    meta = recording.meta
+    keys = ("status", "message", "actuator", "fidelity", "seed", "parameter_hash", "version")
+    return {
+        **{key: meta[key] for key in keys},
+        "sim_s": meta["sim_s"],
+        "wall_s": meta["wall_s"],
+        "ns_per_step": meta["ns_per_step"],
+        "steps": meta["steps"],
+        "final": recording.final,
+        "labels": recording.labels,
+        "out": out,
+        "plot": plot,
+    }
+
+
+def _print_result(recording: Any) -> None:
+    meta = recording.meta
+    speed = meta["sim_s"] / meta["wall_s"] if meta["wall_s"] > 0.0 else float("inf")
+    message = f" ({meta['message']})" if meta["message"] else ""
+    typer.echo(
+        f"{meta['actuator']}, {meta['fidelity']} fidelity: {meta['status']}{message}\n"
+        f"{meta['sim_s']:g} s simulated in {meta['wall_s']:.3g} s "
+        f"({speed:.3g} times real time, {meta['ns_per_step']:.3g} ns a step)\n"
+    )
+    rows = []
+    for channel in recording.channels:
+        low, high = (channel.values.min(), channel.values.max()) if len(channel) else ("", "")
+        final = channel.values[-1] if len(channel) else ""
+        rows.append([channel.name, channel.unit, *(_cell(x) for x in (low, high, final))])
+    print_table(("signal", "unit", "least", "greatest", "last"), rows)
+
+
+def _cell(value: Any) -> str:
+    return value if isinstance(value, str) else f"{value:.6g}"
