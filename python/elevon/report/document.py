@@ -34,6 +34,8 @@ class Table:
         Significant digits of floats.
     marked : collection of int
         Indices of rows that are set apart by colour.
+    formats : sequence of str, optional
+        One format a column (such as ``+.4f``) for its numbers; an empty one means `digits`.
     """
 
     columns: Sequence[str]
@@ -41,9 +43,13 @@ class Table:
     caption: str = ""
     digits: int = 5
     marked: frozenset[int] = frozenset()
+    formats: Sequence[str] = ()
 
-    def cell(self, value: object) -> str:
+    def cell(self, value: object, column: int = 0) -> str:
         """Return the text of one cell."""
+        wanted = self.formats[column] if column < len(self.formats) else ""
+        if wanted and isinstance(value, (int, float)):
+            return f"{value:{wanted}}".replace("-", "\N{MINUS SIGN}")
         if isinstance(value, bool):
             return "yes" if value else "no"
         if isinstance(value, float):

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.compare import filtered
+from elevon.compare import RATES, filtered
 from elevon.errors import InputError, SimulationError
 from elevon.faults import Fault, catalogue
 
@@ -56,8 +56,7 @@ ROTARY_FAULTS = (
 """One severity of each kind, of the size a diagnosis has to see."""
 
 RECORD = (
-    "command,user_position,encoder_position,motor_position,motor_speed,current_q,"
-    "voltage_q_meas@10 kHz"
+    "command,user_position,encoder_position,motor_position,motor_speed,current_q,voltage_q_meas"
 )
 SLOW_HZ, FAST_HZ = 2.0, 50.0
 """A feature's level is below the first cut-off, its ripple between the two."""
@@ -196,7 +195,8 @@ class _Runner:
             Run(self.actuator, item, self.seed, label)
             for item, label in zip(scenarios, labels, strict=True)
         ]
-        recordings = simulate_batch(runs, fidelity=fidelity, record=RECORD, progress=progress)
+        record = f"{RECORD}@{RATES[fidelity]}"
+        recordings = simulate_batch(runs, fidelity=fidelity, record=record, progress=progress)
         ratio = self.actuator.parameters.value("gear.ratio")
         return [features(recording, ratio, self.start) for recording in recordings]
 

@@ -25,7 +25,7 @@ __all__ = ["BacklashResult", "RowResult", "no_load_scenario", "reproduce_backlas
 
 ACTUATOR = "torino-rotary"
 FREQUENCY = 0.2
-DURATION = 25.0
+DURATION = 35.0
 START = 10.0
 """What came before is transient and left out, as on the bench [s]."""
 RECORD = "encoder_position,user_position,motor_position,command@400 Hz"
@@ -92,10 +92,10 @@ class BacklashResult:
         return {
             "status": "pass" if all_passed(self.checks) else "fail",
             "encoder_count_deg": self.encoder_count_deg,
+            "flat_length_rank_correlation": _rank_correlation(self.rows),
             "rows": [row.to_dict() for row in self.rows],
             "checks": [check.to_dict() for check in self.checks],
             "sim_s": sum(float(run.meta["sim_s"]) for run in runs),
-            "wall_s": sum(float(run.meta["wall_s"]) for run in runs),
             "seed": self.blank.meta["seed"],
             "parameter_hash": self.blank.meta["parameter_hash"],
             "version": self.blank.meta["version"],
@@ -213,8 +213,6 @@ def _checks(rows: Sequence[RowResult], count: float) -> list[Check]:
         Check("largest: motor minus encoder less put in", lost, count, "deg"),
         Check("centre distances from the micrometer", max(distance), 0.015, "mm"),
         Check("printed formula column from the geometry", max(printed), PRINT_LIMIT_DEG, "deg"),
-        Check("rank correlation of flat length and play", _rank_correlation(rows), 0.95,
-              at_least=True),
     ]  # fmt: skip
 
 

@@ -36,7 +36,7 @@ def backlash_report(result: BacklashResult, *, date: str | None = None) -> Repor
     report.fact("Encoder count", f"{result.encoder_count_deg:.4f} deg", "at the user side")
     report.fact("Formula less measured", f"{gaps.min():+.2f} deg", "largest, at the widest spacing")
     values = result.to_dict()
-    report.fact("Simulated", f"{values['sim_s']:.0f} s", f"in {values['wall_s']:.1f} s of one core")
+    report.fact("Simulated", f"{values['sim_s']:.0f} s", f"{len(result.rows) + 1} runs, 1 us steps")
     _comparison(report, result)
     _traces(report, result)
     _method(report, result)
@@ -102,18 +102,19 @@ def _comparison(report: Report, result: BacklashResult) -> None:
         [
             row.measured.row,
             row.measured.micrometer_mm,
-            f"{row.measured.measured_total_deg:.4f}",
-            f"{row.formula_deg:.4f}",
-            f"{row.play_in_deg:.4f}",
-            f"{row.play_out_deg:.4f}",
-            f"{row.error_deg:+.4f}",
-            f"{row.limit_deg:.4f}",
-            f"{row.lost_motion_deg:.4f}",
-            f"{row.flat_s:.3f}",
+            row.measured.measured_total_deg,
+            row.formula_deg,
+            row.play_in_deg,
+            row.play_out_deg,
+            row.error_deg,
+            row.limit_deg,
+            row.lost_motion_deg,
+            row.flat_s,
         ]
         for row in result.rows
     ]
-    section.table(Table(columns, rows, "Total play at the user side.", 4))
+    formats = ["d", ".2f", ".4f", ".4f", ".4f", ".4f", "+.4f", ".4f", ".4f", ".3f"]
+    section.table(Table(columns, rows, "Total play at the user side.", formats=formats))
     section.figure(
         _errors(result), "Error of the recovered play; the band is one count and 2 % of the play."
     )
@@ -127,8 +128,8 @@ def _traces(report: Report, result: BacklashResult) -> None:
     )
     section.figure(
         _trace_figure(result),
-        f"One period after {START:g} s at rows 1, 7 and 14: command, motor divided by the gear "
-        "ratio, encoder.",
+        f"Rows 1, 7 and 14: command, motor divided by the gear ratio, encoder. Above one period "
+        f"after {START:g} s, below its top.",
     )
 
 
@@ -168,26 +169,30 @@ def _errors(result: BacklashResult) -> Figure:
 
 
 def _trace_figure(result: BacklashResult) -> Figure:
-    with new_figure(1, 3, width=9.0, height=3.4, sharey=True) as (figure, axes):
-        for axis, number in zip(axes, SHOWN, strict=True):
-            _draw_trace(axis, result, number)
-        axes[0].set_ylabel("Position at the user [deg]")
-        axes[0].legend(loc="lower left")
+    with new_figure(2, 3, width=9.0, height=5.6) as (figure, axes):
+        for column, number in enumerate(SHOWN):
+            whole, top = axes[:, column]
+            period = 1.0 / FREQUENCY
+            _draw_trace(whole, result, number, (START, START + period))
+            _draw_trace(top, result, number, (START + 0.2 * period, START + 0.42 * period))
+            play = result.rows[number - 1].play_in_deg
+            whole.set(title=f"Row {number}: {play:.2f} deg", ylim=(1.0, 19.0))
+            top.set(xlabel="Time [s]", ylim=(14.2, 18.8))
+        for axis in axes[:, 0]:
+            axis.set_ylabel("Position at the user [deg]")
+        axes[0, 0].legend(loc="lower left")
     return figure
 
 
-def _draw_trace(axis: Any, result: BacklashResult, number: int) -> None:
+def _draw_trace(axis: Any, result: BacklashResult, number: int, span: tuple[float, float]) -> None:
     recording = result.recordings[number - 1]
     encoder = recording["encoder_position"]
-    shown = (encoder.time >= START) & (encoder.time < START + 1.0 / FREQUENCY)
-    time = encoder.time[shown]
-    motor = recording["motor_position"].values / result.gear_ratio
+    shown = (encoder.time >= span[0]) & (encoder.time < span[1])
     lines = [
         ("command", recording["command"].values, "grey", 1.0),
-        ("motor / ratio", motor, "blue", 1.2),
+        ("motor / ratio", recording["motor_position"].values / result.gear_ratio, "blue", 1.2),
         ("encoder", encoder.values, "orange", 1.6),
     ]
     for label, values, colour, width in lines:
-        axis.plot(time, np.degrees(values[shown]), color=COLOURS[colour], lw=width, label=label)
-    play = result.rows[number - 1].play_in_deg
-    axis.set(xlabel="Time [s]", title=f"Row {number}: {play:.2f} deg")
+        degrees = np.degrees(values[shown])
+        axis.plot(encoder.time[shown], degrees, color=COLOURS[colour], lw=width, label=label)

@@ -80,7 +80,12 @@ def _estimators(report: Report, result: ComplianceResult) -> None:
     ]
     columns = ["Rows used", "Rows", "Load on loss", "Loss on load", "Theil-Sen", "r squared"]
     section.table(
-        Table(columns, rows, "Stiffness in N/deg, by reading of the table and by estimator.", 4)
+        Table(
+            columns,
+            rows,
+            "Stiffness in N/deg, by reading of the table and by estimator.",
+            formats=["", "d", ".2f", ".2f", ".2f", ".3f"],
+        )
     )
     section.text(
         f"The second line gives {result.variants[1].load_on_loss:.2f}: the published "
