@@ -17,7 +17,7 @@ ROWS = [
     ["recording"],
     ["parameters", "loads"],
     ["actuator", "faults"],
-    ["scenario"],
+    ["scenario", "diagram"],
     ["record_plan"],
     ["simulate"],
     ["bench", "campaign"],

@@ -2,7 +2,7 @@
 
 >>> from elevon.report import Check, Report
 >>> report = Report("A measured play")
->>> report.section("What was checked").checks([Check("play", 0.36, 0.37, "deg")])
+>>> _ = report.section("What was checked").checks([Check("play", 0.36, 0.37, "deg")])
 >>> path = report.save("report.html")  # doctest: +SKIP
 """
 
