@@ -24,6 +24,19 @@ from elevon.recording.recording import Recording
 __all__ = ["check", "read", "write"]
 
 _LIMIT = 2**31 - 1
+_DAMAGE = (
+    ValueError,
+    TypeError,
+    LookupError,
+    ArithmeticError,
+    AttributeError,
+    EOFError,
+    MemoryError,
+    NotImplementedError,
+    SystemError,
+    struct.error,
+    zlib.error,
+)
 _HEADER = 128
 _COMPRESSED = 15
 _PER_CHANNEL = 256
@@ -71,7 +84,7 @@ def read(path: Path, max_bytes: int) -> Recording:
         names = [clock.name for clock in header.clocks]
         content = loadmat(path, variable_names=names)
         return rebuild(header, lambda name: _struct(path, content.get(name), name), str(path))
-    except (ValueError, TypeError, KeyError, OverflowError, EOFError, MatReadError) as error:
+    except (*_DAMAGE, MatReadError) as error:
         if isinstance(error, FormatError):
             raise
         raise FormatError(f"{path}: is not a readable MATLAB file: {error}") from error
