@@ -4,6 +4,7 @@ run over.
 
 from __future__ import annotations
 
+import tomllib
 from importlib import resources
 from typing import Any
 
@@ -11,14 +12,20 @@ import elevon
 from elevon import _core
 
 
-def names() -> list[str]:
-    """Names of the shipped parameter sets, from the package's own folder."""
+def shipped() -> dict[str, str]:
+    """Wiring of every shipped parameter set by its name, from the package's own folder."""
     folder = resources.files("elevon.parameters") / "sets"
-    return sorted(
-        entry.name.removesuffix(".toml")
-        for entry in folder.iterdir()
-        if entry.name.endswith(".toml")
-    )
+    files = [entry for entry in folder.iterdir() if entry.name.endswith(".toml")]
+    return {
+        entry.name.removesuffix(".toml"): tomllib.loads(entry.read_text(encoding="utf-8"))["wiring"]
+        for entry in sorted(files, key=lambda entry: entry.name)
+    }
+
+
+def names() -> list[str]:
+    """Shipped sets whose wiring the core has; `test_every_shipped_set_loads` reports the others."""
+    known = {wiring["name"] for wiring in _core.wirings()}
+    return [name for name, wiring in shipped().items() if wiring in known]
 
 
 def fidelities(name: str) -> list[str]:
@@ -38,13 +45,13 @@ def places(name: str) -> list[tuple[str, str, dict[str, Any]]]:
     return [(record["kind"], place, record) for record in records for place in record["places"]]
 
 
-def scenario(fault: dict[str, Any] | None = None, duration: float = 0.02) -> Any:
-    """A torque command that shakes any actuator both ways, with a fault if given."""
+def scenario(fault: dict[str, Any] | None = None, duration: float = 0.12) -> Any:
+    """A position swing, 0.03 in SI at 4 Hz, that takes up any play, with a fault if given."""
     data: dict[str, Any] = {
-        "duration": f"{duration!r} s",
+        "duration": duration,
         "command": {
-            "mode": "speed",
-            "terms": [{"kind": "sine", "amplitude": 30.0, "frequency": "60 Hz"}],
+            "mode": "position",
+            "terms": [{"kind": "sine", "amplitude": 0.03, "frequency": "4 Hz"}],
         },
     }
     return elevon.Scenario.from_dict({**data, "fault": [fault]} if fault else data)

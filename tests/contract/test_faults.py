@@ -34,7 +34,7 @@ def healthy(name: str, fidelity: str) -> Any:
 
 def simulate(name: str, fidelity: str, fault: dict[str, Any] | None) -> Any:
     """Every signal of a short run."""
-    chosen = ",".join(sets.signals(name, fidelity)) + "@5 kHz"
+    chosen = ",".join(sets.signals(name, fidelity)) + "@1 kHz"
     return elevon.simulate(
         elevon.Actuator.load(name), sets.scenario(fault), fidelity=fidelity, record=[chosen], seed=5
     )

@@ -114,11 +114,16 @@ def oracle(short: float) -> Trace:
 @cache
 def core(short: float) -> Any:
     """The same case through the public API, sampled like the oracle."""
+    return run_core(short, {}, DURATION)
+
+
+def run_core(short: float, settings: dict[str, Any], duration: float) -> Any:
+    """The case with further settings, for some other time."""
     fault = [{"kind": "short", "place": "motor.phase_a", "severity": short}] if short else []
     names = "current_a,current_b,current_c,motor_speed,motor_position,user_position,leg_transitions"
     return run(
-        SETTINGS,
-        duration=DURATION,
+        SETTINGS | settings,
+        duration=duration,
         record=f"{names}@100 kHz",
         command=[term("sine", amplitude=AMPLITUDE, frequency=FREQUENCY)],
         scenario={"load": {"brake": {"terms": [constant(BRAKE)]}}, "fault": fault},
@@ -155,8 +160,8 @@ def test_the_case_is_worth_comparing(short: float) -> None:
 
 @CASES
 def test_positions_agree(short: float) -> None:
-    """RMS 1e-4 rad at the user would pass a wrong model over 50 ms; 1e-4 of the travel at the user
-    does not.
+    """RMS 1e-4 rad at the user would pass a wrong model over 50 ms; 0.2 % of the travel does
+    not.
     """
     for name in ("motor_position", "user_position"):
         ours, theirs = both(name, short)
@@ -183,22 +188,41 @@ def test_rms_and_mean_currents_agree(short: float) -> None:
 
 @CASES
 def test_current_envelopes_agree(short: float) -> None:
-    """Largest and smallest current of each phase in 5 ms windows, to a quarter of the relay
-    band.
+    """Largest and smallest current of each phase in 5 ms windows.
+
+    Each window within the relays' whole band of 1 A, inside which an extreme falls by chance; the
+    windows together, where chance averages out, within a tenth of it.
     """
     for name in ("current_a", "current_b", "current_c"):
         ours, theirs = both(name, short)
-        for window in np.array_split(np.arange(ours.size), 10):
-            assert np.max(ours[window]) == pytest.approx(np.max(theirs[window]), abs=0.125), name
-            assert np.min(ours[window]) == pytest.approx(np.min(theirs[window]), abs=0.125), name
+        windows = np.array_split(np.arange(ours.size), 10)
+        for extreme in (np.max, np.min):
+            gap = np.array([extreme(ours[w]) - extreme(theirs[w]) for w in windows])
+            assert np.max(np.abs(gap)) < 1.0, name
+            assert abs(np.mean(gap)) < 0.1, name
 
 
 @CASES
 def test_switching_rates_agree(short: float) -> None:
-    """Number of leg transitions within 5 %."""
-    assert core(short).final["leg_transitions"] == pytest.approx(
-        oracle(short).transitions, rel=0.05
-    )
+    """Number of leg transitions within a quarter.
+
+    Not less: phases b and c start symmetric, so their relays graze; the core itself counts 215 to
+    261 (healthy) and 338 to 421 (short) at steps from 1e-7 to 1e-6 s. Over whole seconds
+    `tests/physics/test_work_counts.py` asks for 5 %.
+    """
+    ours = core(short).final["leg_transitions"]
+    assert ours == pytest.approx(oracle(short).transitions, rel=0.25)
+
+
+@CASES
+def test_currents_themselves_agree_before_instants_drift_apart(short: float) -> None:
+    """The first 5 ms at a step of 1e-7 s, to a tenth of the relays' band of 1 A."""
+    fine = run_core(short, {"solver.step": 1e-7}, 0.005)
+    trace = oracle(short)
+    for column, name in enumerate(("current_a", "current_b", "current_c")):
+        theirs = np.interp(fine[name].time, trace.time, trace.currents[:, column])
+        assert np.max(np.abs(theirs)) > 1.0
+        assert np.max(np.abs(fine[name].values - theirs)) < 0.1, name
 
 
 def test_the_short_is_seen_by_both_alike() -> None:

@@ -119,7 +119,7 @@ def test_second_order_rotor_converges_at_first_order(method: str) -> None:
     stiff = stiffness / 124**2
     sigma = viscous / (2 * INERTIA)
     omega = math.sqrt(stiff / INERTIA - sigma**2)
-    duration = 0.5
+    duration = 0.3
     exact = (
         theta
         * math.exp(-sigma * duration)
@@ -136,7 +136,7 @@ def test_second_order_rotor_converges_at_first_order(method: str) -> None:
         rec = run(
             settings,
             duration=duration,
-            record="motor_position@1 kHz",
+            record="motor_position@500 Hz",
             scenario={"initial": {"motor_position": theta}},
         )
         errors.append(abs(rec.final["motor_position"] - exact))

@@ -48,7 +48,7 @@ def test_low_steady_torque_balances_the_load() -> None:
     """1.5 k i_q = load at constant speed."""
     rec = run(
         FREE_SHAFT | PWM,
-        duration=1.0,
+        duration=4.0,
         mode="speed",
         command=[constant(30.0)],
         record="current_q,motor_torque@1 kHz",
