@@ -8,7 +8,7 @@ import numpy.typing as npt
 from elevon.errors import InputError, UnitError
 from elevon.recording.clock import Clock, frozen
 from elevon.recording.names import check_name
-from elevon.units import parse_unit, to_display
+from elevon.units import check_kind, parse_unit, si_unit, to_display, to_si
 
 __all__ = ["Channel"]
 
@@ -86,8 +86,6 @@ class Channel:
         UnitError
             Unknown unit, or one of another kind.
         """
-        from elevon.units import check_kind
-
         check_kind(unit, self.unit, f"channel {self.name!r}")
         return to_display(self.values, unit)
 
@@ -99,3 +97,11 @@ class Channel:
             and self.clock.equals(other.clock)
             and self.values.tobytes() == other.values.tobytes()
         )
+
+
+def in_si(name: str, unit: str, values: npt.ArrayLike, clock: Clock) -> Channel:
+    """Make a channel of values in any unit; those already SI keep every bit and their unit."""
+    parsed = parse_unit(unit, f"channel {name!r}")
+    if parsed.factor == 1.0 and not parsed.offset:
+        return Channel(name, unit or "1", values, clock)
+    return Channel(name, si_unit(unit), to_si(values, unit), clock)

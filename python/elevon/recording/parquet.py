@@ -56,7 +56,9 @@ def read(path: Path, max_bytes: int) -> Recording:
             return rebuild(
                 header, lambda name: _columns(path, file, header, name, starts), str(path)
             )
-    except pa.ArrowException as error:
+    except FormatError:
+        raise
+    except (pa.ArrowException, ValueError, OverflowError, MemoryError) as error:
         raise FormatError(f"{path}: is not a readable Parquet file: {error}") from error
 
 

@@ -9,10 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import InputError, unknown
-from elevon.recording.channel import Channel
+from elevon.recording.channel import Channel, in_si
 from elevon.recording.clock import Clock
 from elevon.recording.header import plain
-from elevon.units import parse_unit, si_unit, to_si
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -138,7 +137,7 @@ class Recording:
         if missing:
             raise InputError(f"units: no unit for the channels {', '.join(missing)}")
         base = Clock(clock, time, rate, gaps)
-        channels = [_in_si(name, units[name], values[name], base) for name in values]
+        channels = [in_si(name, units[name], values[name], base) for name in values]
         return cls(channels, clocks=[base], meta=meta, labels=labels)
 
     @property
@@ -396,10 +395,3 @@ class Recording:
         from elevon.recording.formats import load
 
         return load(path, max_bytes=max_bytes)
-
-
-def _in_si(name: str, unit: str, values: npt.ArrayLike, clock: Clock) -> Channel:
-    parsed = parse_unit(unit, f"channel {name!r}")
-    if parsed.factor == 1.0 and not parsed.offset:
-        return Channel(name, unit or "1", values, clock)
-    return Channel(name, si_unit(unit), to_si(values, unit), clock)
