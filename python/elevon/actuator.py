@@ -69,7 +69,11 @@ class Actuator:
         )
 
     def with_values(
-        self, values: Mapping[str, str | float], *, source: str = "set by the caller", place: str = ""
+        self,
+        values: Mapping[str, str | float],
+        *,
+        source: str = "set by the caller",
+        place: str = "",
     ) -> Actuator:
         """Return an actuator with some values changed.
 
@@ -89,7 +93,9 @@ class Actuator:
         """
         if not values:
             return self
-        return replace(self, parameters=self.parameters.replaced(values, source=source, place=place))
+        return replace(
+            self, parameters=self.parameters.replaced(values, source=source, place=place)
+        )
 
     @property
     def hash(self) -> str:

@@ -194,8 +194,7 @@ def _feedback(row: int, source: int, target: int, signal: str) -> list[str]:
 
 def _arrow(x1: float, y1: float, x2: float, y2: float) -> str:
     return (
-        f'<path d="M{x1} {y1}L{x2} {y2}" stroke="#234" stroke-width="1.4" '
-        'marker-end="url(#tip)"/>'
+        f'<path d="M{x1} {y1}L{x2} {y2}" stroke="#234" stroke-width="1.4" marker-end="url(#tip)"/>'
     )
 
 

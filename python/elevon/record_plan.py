@@ -135,8 +135,8 @@ def clock_name(period_steps: int, step: float) -> str:
 
 
 def _read(text: str, units: Mapping[str, str], step: float) -> tuple[list[str], int]:
-    names, at, rate = text.partition("@")
-    if not at or not names.strip() and rate.strip() != _EVERY or not rate.strip():
+    names, _, rate = text.partition("@")
+    if not rate.strip() or not (names.strip() or rate.strip() == _EVERY):
         raise InputError(
             f"record: {text!r} is not of the form SIGNALS@RATE, such as "
             "'user_position,motor_speed@400 Hz' or 'current_a@every'"

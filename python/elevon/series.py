@@ -47,7 +47,8 @@ def check_series(
     if falls.size:
         row = int(falls[0]) + 1
         raise InputError(
-            f"{place}: the times must increase, but times[{row}] = {t[row]:g} follows {t[row - 1]:g}"
+            f"{place}: the times must increase, but times[{row}] = {t[row]:g} "
+            f"follows {t[row - 1]:g}"
         )
     return t, v
 
@@ -71,7 +72,7 @@ def read_series(path: str | os.PathLike[str], place: str) -> Points:
 
 
 @lru_cache(maxsize=16)
-def _read(file: Path, stamp: int, place: str) -> Points:
+def _read(file: Path, stamp: int, place: str) -> Points:  # noqa: ARG001 - a changed file is read anew
     with file.open(newline="", encoding="utf-8-sig") as stream:
         return _points(csv.reader(stream), file, place)
 
@@ -88,7 +89,8 @@ def _points(rows: Iterable[Sequence[str]], file: Path, place: str) -> Points:
             continue
         if len(cells) != 2 or numbers[0] is None or numbers[1] is None:
             raise FormatError(
-                f"{place}: {file}:{line}: expected two numbers (time, value), found {','.join(row)!r}"
+                f"{place}: {file}:{line}: expected two numbers (time, value), "
+                f"found {','.join(row)!r}"
             )
         times.append(numbers[0])
         values.append(numbers[1])

@@ -161,8 +161,10 @@ def run_campaign(
     for index, (first, last) in enumerate(need.blocks):
         if index in done:
             continue
-        _run_block(plan, planned[first:last], folder, manifest, index, threads,
-                   _part(progress, first, last, len(planned)))
+        share = _part(progress, first, last, len(planned))
+        part = planned[first:last]
+        recordings = _simulate(plan, part, threads, share)
+        _keep(folder, manifest, index, part, recordings)
     manifest.runs.sort(key=lambda run: run["run"])
     failed = any(run["status"] == "diverged" for run in manifest.runs)
     manifest.status = "failed" if failed else "ok"
@@ -171,22 +173,29 @@ def run_campaign(
     return CampaignResult(manifest, skipped, time.perf_counter() - begin)
 
 
-def _run_block(
+def _simulate(
     plan: Plan,
     part: Sequence[PlannedRun],
-    folder: Path,
-    manifest: Manifest,
-    index: int,
     threads: int | None,
     progress: Callable[[float], bool],
-) -> None:
-    recordings = simulate_batch(
+) -> list[Recording]:
+    return simulate_batch(
         [item.run for item in part],
         fidelity=plan.fidelity,
         record=_record(plan),
         threads=threads,
         progress=progress,
     )
+
+
+def _keep(
+    folder: Path,
+    manifest: Manifest,
+    index: int,
+    part: Sequence[PlannedRun],
+    recordings: Sequence[Recording],
+) -> None:
+    """Write a block's data first, then the manifest that tells of it."""
     numbers = [item.run.number for item in part]
     files = write_block(folder, index, numbers, recordings)
     manifest.blocks.append(

@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,8 @@ __all__ = ["SCHEMA", "Manifest", "load_run", "read_manifest", "write_block"]
 #: Version of the folder's form, apart from the package's.
 SCHEMA = 1
 MANIFEST = "manifest.json"
+
+_SEVERITY = re.compile(r"fault_\d+")
 
 
 @dataclass
@@ -128,16 +131,25 @@ def _write_parquet(
     fields = [pa.field("run", pa.int64()), pa.field("time", pa.float64(), metadata={"unit": "s"})]
     columns = [np.concatenate(runs), np.concatenate([r.clocks[clock].time for _, r in parts])]
     for name, channel in known.items():
+        unit, text = _described(channel)
         values = [
             r[name].values if name in r else np.full(len(r.clocks[clock]), np.nan) for _, r in parts
         ]
         columns.append(np.concatenate(values))
-        metadata = {"unit": channel.unit, "text": channel.text}
+        metadata = {"unit": unit, "text": text}
         fields.append(pa.field(name, pa.float64(), metadata=metadata))
     rates = {str(n): r.clocks[clock].rate for n, r in parts}
     schema = pa.schema(fields, metadata={"elevon": json.dumps({"schema": SCHEMA, "rates": rates})})
     table = pa.Table.from_arrays([pa.array(column) for column in columns], schema=schema)
     pq.write_table(table, path, compression="snappy")
+
+
+def _described(channel: Channel) -> tuple[str, str]:
+    """Unit and text of a column; a fault's number means another fault in another run."""
+    if _SEVERITY.fullmatch(channel.name):
+        number = channel.name.removeprefix("fault_")
+        return "", f"severity of the run's fault {number}, in the SI unit of its label"
+    return channel.unit, channel.text
 
 
 def load_run(folder: str | os.PathLike[str], number: int) -> Recording:
@@ -163,8 +175,9 @@ def load_run(folder: str | os.PathLike[str], number: int) -> Recording:
     block = next(item for item in manifest.blocks if item["block"] == entry["block"])
     channels: list[Channel] = []
     clocks: list[Clock] = []
+    labels = {label["channel"]: label for label in entry["labels"]}
     for file in block["files"]:
-        found = _read_clock(root / file["file"], file["clock"], number)
+        found = _read_clock(root / file["file"], file["clock"], number, labels)
         clocks.append(found[0])
         channels.extend(found[1])
     meta = {key: value for key, value in entry.items() if key not in ("labels", "final")}
@@ -173,7 +186,9 @@ def load_run(folder: str | os.PathLike[str], number: int) -> Recording:
     )
 
 
-def _read_clock(path: Path, name: str, number: int) -> tuple[Clock, list[Channel]]:
+def _read_clock(
+    path: Path, name: str, number: int, labels: Mapping[str, Mapping[str, Any]]
+) -> tuple[Clock, list[Channel]]:
     import pyarrow.parquet as pq
 
     table = pq.read_table(path, filters=[("run", "==", number)])
@@ -184,8 +199,11 @@ def _read_clock(path: Path, name: str, number: int) -> tuple[Clock, list[Channel
         if item.name in ("run", "time"):
             continue
         values = table[item.name].to_numpy()
-        if len(values) and np.isnan(values).all():
-            continue
         unit, text = item.metadata[b"unit"].decode(), item.metadata[b"text"].decode()
+        if item.name in labels:
+            label = labels[item.name]
+            unit, text = label["unit"], f"severity of {label['kind']}@{label['place']}"
+        elif _SEVERITY.fullmatch(item.name):
+            continue
         channels.append(Channel(item.name, unit, values, clock, text))
     return clock, channels

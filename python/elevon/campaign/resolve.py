@@ -78,7 +78,7 @@ def resolve_plan(plan: Plan, document: Document) -> list[PlannedRun]:
     if not variants or not plan.seeds:
         raise InputError(f"{document.place()}: the plan is empty: it holds no run")
     splits = _splits(plan, len(variants))
-    planned = []
+    planned: list[PlannedRun] = []
     for index, variant in enumerate(variants):
         scenario, changed = _apply(variant, base, actuator, f"{document.place()}: run {index}")
         for seed in plan.seeds:
@@ -94,7 +94,9 @@ def _actuator(plan: Plan, document: Document) -> Actuator:
         near = document.folder / reference
         reference = str(near) if near.is_file() else reference
     actuator = Actuator.load(reference)
-    return actuator.with_values(plan.parameters, source="plan", place=document.place(("parameters",)))
+    return actuator.with_values(
+        plan.parameters, source="plan", place=document.place(("parameters",))
+    )
 
 
 def _base_scenario(plan: Plan, actuator: Actuator, document: Document) -> dict[str, Any]:
@@ -150,7 +152,9 @@ def _change(variant: _Variant, target: Target, value: Any) -> None:
     elif value is not ABSENT:
         kind, place = str(target.fault).split("@")
         fault = {"kind": kind, "place": place, "severity": value, **target.attributes}
-        variant.faults.append(fault if target.profile is None else fault | {"profile": target.profile})
+        variant.faults.append(
+            fault if target.profile is None else fault | {"profile": target.profile}
+        )
 
 
 def _apply(
@@ -173,7 +177,9 @@ def _set(data: Any, path: str, value: Any, place: str) -> None:
     steps: list[Any] = [m[1] if m[1] else int(m[2]) for m in _STEP.finditer(path)]
     written = "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in steps).lstrip(".")
     if not steps or written != path:
-        raise InputError(f"{place}: scenario = {path!r} is not a place such as command.terms[0].phase")
+        raise InputError(
+            f"{place}: scenario = {path!r} is not a place such as command.terms[0].phase"
+        )
     for step, following in itertools.pairwise(steps):
         if isinstance(step, int):
             if not isinstance(data, list) or step >= len(data):

@@ -20,9 +20,7 @@ def batch(
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Folder of the results; resumed if begun.")
     ],
-    threads: Annotated[
-        int | None, typer.Option(min=1, help="Threads; default one a core.")
-    ] = None,
+    threads: Annotated[int | None, typer.Option(min=1, help="Threads; default one a core.")] = None,
     json: JsonOption = False,
 ) -> int:
     """Run a plan of many simulations into a folder; an interrupted one goes on where it was."""

@@ -22,7 +22,8 @@ ScenarioOption = Annotated[
     Path | None, typer.Option("--scenario", metavar="FILE", help="Scenario file (TOML).")
 ]
 DurationOption = Annotated[
-    str | None, typer.Option(help="Simulated time, such as 5 or '200 ms'; overrides the scenario's.")
+    str | None,
+    typer.Option(help="Simulated time, such as 5 or '200 ms'; overrides the scenario's."),
 ]
 SetOption = Annotated[
     list[str] | None,

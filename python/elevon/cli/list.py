@@ -101,7 +101,7 @@ def waveforms(*, json: JsonOption = False) -> None:
     """List the waveforms of commands and loads with their parameters (* = must be given)."""
     from elevon.scenario.waveforms import wave_records
 
-    rows = [
+    rows: list[dict[str, Any]] = [
         {
             "kind": record.kind,
             "text": record.text,
@@ -125,9 +125,7 @@ def _needed(parameter: dict[str, Any]) -> str:
     return f"{parameter['name']}*" if parameter["default"] is None else str(parameter["name"])
 
 
-def _print(
-    what: str, rows: list[dict[str, Any]], json: bool, columns: tuple[str, ...]
-) -> None:
+def _print(what: str, rows: list[dict[str, Any]], json: bool, columns: tuple[str, ...]) -> None:
     if json:
         print_json({what: rows})
         return

@@ -64,7 +64,9 @@ def say(message: str) -> None:
 class Advance(Protocol):
     """Told how far the work is; returns False when the work should stop."""
 
-    def __call__(self, fraction: float, /) -> bool: ...
+    def __call__(self, fraction: float, /) -> bool:
+        """Take the done fraction, 0 to 1."""
+        ...
 
 
 @contextmanager

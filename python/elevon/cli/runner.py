@@ -24,11 +24,11 @@ _UsageError: Any = typer.BadParameter.__mro__[1]
 class LazyGroup(typer.core.TyperGroup):
     """A group that imports a command's module only when that command is run."""
 
-    def list_commands(self, ctx: Any) -> list[str]:
+    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002 - click's signature
         """Names of the commands of this installation, in the registry's order."""
         return [name for name, command in COMMANDS.items() if command.available]
 
-    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002 - click's signature
         """Load one command, or None when there is no such command."""
         command = COMMANDS.get(cmd_name)
         if command is None or not command.available:
@@ -76,7 +76,7 @@ def _print_version(value: bool) -> None:
 @app.callback(invoke_without_command=True)
 def _root(
     context: typer.Context,
-    version: bool = typer.Option(
+    version: bool = typer.Option(  # noqa: ARG001 - its callback does the work
         False, "--version", callback=_print_version, is_eager=True, help="Print the version."
     ),
 ) -> None:

@@ -78,7 +78,7 @@ class Fault:
     def from_dict(cls, data: Mapping[str, Any], place: str = "fault") -> Fault:
         """Read a ``[[fault]]`` table: kind, place, severity, profile; other keys are attributes."""
         rest = dict(data)
-        needed = {}
+        needed: dict[str, Any] = {}
         for key in ("kind", "place", "severity"):
             if key not in rest:
                 raise InputError(f"{place}: {key!r} is missing")
@@ -149,5 +149,3 @@ def check_together(faults: Sequence[Fault], place: str = "") -> None:
                 raise InputError(
                     f"{start}{other.kind} and {fault.kind} of {fault.place} contradict each other"
                 )
-
-

@@ -72,7 +72,9 @@ class Profile:
             for name, points in (("times", self.times), ("values", self.values))
             if points
         }
-        given = ",".join(f"{name}={value}" for name, value in {**self.arguments, **given_points}.items())
+        given = ",".join(
+            f"{name}={value}" for name, value in {**self.arguments, **given_points}.items()
+        )
         return f"{self.kind}({given})" if given else self.kind
 
     def resolved(self, place: str) -> dict[str, Any]:

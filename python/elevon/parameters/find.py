@@ -62,7 +62,9 @@ def _file(text: str, folder: Path | None) -> Path:
 
 
 def _user_folders() -> list[Path]:
-    folders = [Path(part).expanduser() for part in os.environ.get(VARIABLE, "").split(os.pathsep) if part]
+    folders = [
+        Path(part).expanduser() for part in os.environ.get(VARIABLE, "").split(os.pathsep) if part
+    ]
     for folder in folders:
         if not folder.is_dir():
             raise InputError(f"{VARIABLE}: {folder} is not a folder")

@@ -83,7 +83,9 @@ def load_set(reference: str | os.PathLike[str]) -> SetFile:
     if wiring is None:
         raise InputError(f"{top.document.place()}: 'wiring' is missing; {_wirings()}")
     if wiring not in wiring_names():
-        raise InputError(f"{top.document.place(('wiring',))}: unknown wiring {wiring!r}; {_wirings()}")
+        raise InputError(
+            f"{top.document.place(('wiring',))}: unknown wiring {wiring!r}; {_wirings()}"
+        )
     entries: dict[str, Parameter] = {}
     references: dict[str, str] = {}
     for layer in reversed(layers):
@@ -161,7 +163,9 @@ def _parameter(path: str, entry: Any, record: Record, place: str) -> Parameter:
         return parse_quantity(f"{number!r} {entry.unit}".strip(), record.unit or "1", place)
 
     if isinstance(entry.value, str) and record.choices is None:
-        raise InputError(f"{place}: value = {entry.value!r} is text; write value = 1.5 and unit = 'm'")
+        raise InputError(
+            f"{place}: value = {entry.value!r} is text; write value = 1.5 and unit = 'm'"
+        )
     if not entry.unit and record.choices is None and record.unit not in ("", "1"):
         raise InputError(f"{place}: the unit is missing (such as {record.unit!r})")
     value = si(entry.value)

@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, StrictStr, field_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    StrictFloat,
+    StrictInt,
+    StrictStr,
+    field_validator,
+)
 
 __all__ = ["Entry", "Header", "Reference"]
 
@@ -31,7 +39,9 @@ class Entry(_Strict):
     note: StrictStr = Field("", description="Derivation, or what to know before using it")
     confidence: Literal["published", "derived", "assumed", "calibrated"]
     old: Number | StrictStr | None = Field(None, description="The value before calibration")
-    interval: tuple[Number, Number] | None = Field(None, description="Interval of the calibrated value")
+    interval: tuple[Number, Number] | None = Field(
+        None, description="Interval of the calibrated value"
+    )
 
     @field_validator("source")
     @classmethod
@@ -46,7 +56,9 @@ class Header(_Strict):
 
     name: StrictStr = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
     title: StrictStr = ""
-    wiring: StrictStr | None = Field(None, description="Which wiring of the core; from the base if absent")
+    wiring: StrictStr | None = Field(
+        None, description="Which wiring of the core; from the base if absent"
+    )
     base: StrictStr | None = Field(None, description="Set name or file this one overrides")
     references: tuple[Reference, ...] = ()
     scenario: dict[str, Any] | None = Field(None, description="What runs when none is given")

@@ -12,7 +12,7 @@ from typing import Any
 from elevon.errors import InputError, RangeError, UnknownNameError, did_you_mean, unknown
 from elevon.units import format_quantity, parse_quantity
 
-__all__ = ["Record", "record_of", "records", "wiring_names"]
+__all__ = ["Record", "positions", "record_of", "records", "wiring_names"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +118,12 @@ def records(wiring: str) -> Mapping[str, Record]:
     return MappingProxyType({item["path"]: _record(item) for item in _core.parameters(wiring)})
 
 
+@lru_cache(maxsize=32)
+def positions(wiring: str) -> Mapping[str, int]:
+    """Return where each parameter stands in the core's vector."""
+    return {path: index for index, path in enumerate(records(wiring))}
+
+
 def record_of(wiring: str, path: str, place: str | None = None) -> Record:
     """Return one record, or raise with the nearest paths."""
     known = records(wiring)
@@ -126,9 +132,7 @@ def record_of(wiring: str, path: str, place: str | None = None) -> Record:
     return known[path]
 
 
-def _unknown_path(
-    path: str, known: Mapping[str, Record], place: str | None
-) -> UnknownNameError:
+def _unknown_path(path: str, known: Mapping[str, Record], place: str | None) -> UnknownNameError:
     return unknown("parameter", path, known, place)
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from elevon.errors import InputError, unknown
 from elevon.parameters.parameter import Parameter
-from elevon.parameters.records import record_of, records
+from elevon.parameters.records import positions, record_of, records
 
 if TYPE_CHECKING:
     import numpy as np
@@ -41,7 +41,7 @@ class ParameterSet(Mapping[str, Parameter]):
         A parameter without a default is missing.
     """
 
-    __slots__ = ("_items", "wiring")
+    __slots__ = ("_hash", "_items", "_vector", "wiring")
 
     def __init__(self, wiring: str, entries: Mapping[str, Parameter], place: str = "") -> None:
         known = records(wiring)
@@ -58,6 +58,8 @@ class ParameterSet(Mapping[str, Parameter]):
     def _hold(self, wiring: str, items: dict[str, Parameter]) -> None:
         self.wiring = wiring
         self._items = MappingProxyType(items)
+        self._vector: npt.NDArray[np.float64] | None = None
+        self._hash: str | None = None
 
     def __getitem__(self, path: str) -> Parameter:
         try:
@@ -85,14 +87,22 @@ class ParameterSet(Mapping[str, Parameter]):
         return records(self.wiring)[path].number(self[path].value)
 
     def vector(self) -> npt.NDArray[np.float64]:
-        """Return all values, shape (n,), in the core's order, SI, choices as indices."""
-        import numpy as np
+        """Return all values, shape (n,), in the core's order, SI, choices as indices; read-only."""
+        if self._vector is None:
+            import numpy as np
 
-        known = records(self.wiring)
-        return np.array([known[path].number(item.value) for path, item in self._items.items()])
+            known = records(self.wiring)
+            numbers = [known[path].number(item.value) for path, item in self._items.items()]
+            self._vector = np.array(numbers)
+            self._vector.flags.writeable = False
+        return self._vector
 
     def replaced(
-        self, values: Mapping[str, str | float], *, source: str = "set by the caller", place: str = ""
+        self,
+        values: Mapping[str, str | float],
+        *,
+        source: str = "set by the caller",
+        place: str = "",
     ) -> ParameterSet:
         """Return a set with some values changed; a number alone is SI, text may carry a unit.
 
@@ -119,13 +129,28 @@ class ParameterSet(Mapping[str, Parameter]):
         # Everything else was checked when this set was made.
         result = ParameterSet.__new__(ParameterSet)
         result._hold(self.wiring, items)
+        result._vector = self._changed_vector(items, values)
         return result
+
+    def _changed_vector(
+        self, items: Mapping[str, Parameter], changed: Iterable[str]
+    ) -> npt.NDArray[np.float64]:
+        """Return this set's vector with some entries taken from other items."""
+        vector = self.vector().copy()
+        known = records(self.wiring)
+        place = positions(self.wiring)
+        for path in changed:
+            vector[place[path]] = known[path].number(items[path].value)
+        vector.flags.writeable = False
+        return vector
 
     @property
     def hash(self) -> str:
         """Sixteen hexadecimal digits over the wiring and every value, not over the notes."""
-        lines = [self.wiring, *(f"{path}={item.value!r}" for path, item in self._items.items())]
-        return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:16]
+        if self._hash is None:
+            lines = [self.wiring, *(f"{path}={item.value!r}" for path, item in self._items.items())]
+            self._hash = hashlib.sha256("\n".join(lines).encode()).hexdigest()[:16]
+        return self._hash
 
 
 def _default(wiring: str, path: str) -> Parameter:

@@ -16,7 +16,6 @@ from pydantic import (
     StrictFloat,
     StrictInt,
     StrictStr,
-    ValidationInfo,
     field_validator,
     model_validator,
 )
@@ -63,7 +62,7 @@ class Term(BaseModel):
     time_unit: StrictStr = "s"
 
     @model_validator(mode="after")
-    def _known(self, info: ValidationInfo) -> Self:
+    def _known(self) -> Self:
         known = wave_records()
         if self.kind not in known:
             raise ValueError(f"unknown waveform {self.kind!r}{did_you_mean(self.kind, known)}")
@@ -72,7 +71,9 @@ class Term(BaseModel):
         valid = ["kind", "enabled", *record.names, *points]
         for name in (*self.arguments, *(self.model_fields_set - {"kind", "enabled"})):
             if name not in valid:
-                raise ValueError(f"unknown key {name!r} of a {self.kind}{did_you_mean(name, valid)}")
+                raise ValueError(
+                    f"unknown key {name!r} of a {self.kind}{did_you_mean(name, valid)}"
+                )
         needed = [p.name for p in record.parameters if p.default is None]
         for name in needed:
             if name not in self.arguments:

@@ -1,0 +1,16 @@
+"""Simulate one run, or many of them in lanes and threads, on the Rust core."""
+
+from elevon.simulate.batch import batch_bytes, simulate, simulate_batch
+from elevon.simulate.prepare import Run, check_fidelity, solver_step
+from elevon.simulate.sensitivity import Sensitivities, sensitivities
+
+__all__ = [
+    "Run",
+    "Sensitivities",
+    "batch_bytes",
+    "check_fidelity",
+    "sensitivities",
+    "simulate",
+    "simulate_batch",
+    "solver_step",
+]

@@ -1,0 +1,181 @@
+"""One run, or many in lanes and threads, on the Rust core."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from elevon.actuator import Actuator
+from elevon.errors import DivergedError, InputError, Interrupted
+from elevon.memory import check_memory
+from elevon.recording import Recording
+from elevon.scenario import Scenario
+from elevon.simulate.prepare import Prepared, Record, Run, prepare_named
+from elevon.simulate.result import build_recording
+
+__all__ = ["Progress", "batch_bytes", "simulate", "simulate_batch"]
+
+Progress = Callable[[float], Any]
+
+
+def simulate(
+    actuator: Actuator,
+    scenario: Scenario,
+    *,
+    fidelity: str = "high",
+    record: Record = None,
+    seed: int = 0,
+    number: int = 0,
+    lanes: str = "auto",
+    progress: Progress | None = None,
+) -> Recording:
+    """Simulate one run.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        What moves.
+    scenario : Scenario
+        What it is asked, what acts on it, what breaks, for how long.
+    fidelity : str
+        ``high`` or ``low``.
+    record : str or sequence of str, optional
+        What is kept, such as ``"user_position,motor_speed@400 Hz"``; see `record_plan`.
+    seed, number : int
+        Keys of the random numbers.
+    lanes : str
+        Vector width: ``auto``, ``single``, ``portable``, ``avx2``, ``avx512``, ... as this
+        processor has them; the result does not depend on it.
+    progress : callable, optional
+        Called some ten times a second with the done fraction; returning False interrupts.
+
+    Returns
+    -------
+    Recording
+        Status ``ok`` or ``tripped``, named channels in SI, one or several clocks.
+
+    Raises
+    ------
+    InputError
+        Anything in actuator, scenario or record that cannot be; place, value, limit are named.
+    DivergedError
+        The run left the finite numbers; time and signal are named.
+    Interrupted
+        `progress` returned False.
+    """
+    run = Run(actuator, scenario, seed, number=number)
+    recording = simulate_batch(
+        [run], fidelity=fidelity, record=record, threads=1, lanes=lanes, progress=progress
+    )[0]
+    if recording.status == "diverged":
+        raise DivergedError(
+            f"the run diverged at {recording.meta['sim_s']:.9g} s: {recording.meta['message']}",
+            time=recording.meta["sim_s"],
+            signal=recording.meta.get("signal", ""),
+        )
+    return recording
+
+
+def simulate_batch(
+    runs: Sequence[Run],
+    *,
+    fidelity: str = "high",
+    record: Record = None,
+    threads: int | None = None,
+    lanes: str = "auto",
+    progress: Progress | None = None,
+) -> list[Recording]:
+    """Simulate many runs, one a lane, on several threads.
+
+    The results are bit-identical to those of single runs, whatever the lanes and threads.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Any mix of actuators and scenarios.
+    fidelity, record, lanes, progress
+        As for `simulate`.
+    threads : int, optional
+        Default: one a core.
+
+    Returns
+    -------
+    list of Recording
+        In the order of `runs`. A run that diverged is marked in its status and keeps what was
+        recorded until then.
+
+    Raises
+    ------
+    InputError
+        No runs; or wrong input, with the run named; or more memory needed than there is.
+    Interrupted
+        `progress` returned False.
+    """
+    if not runs:
+        raise InputError("a batch needs at least one run")
+    prepared = [prepare_named(run, fidelity, record, len(runs) > 1) for run in runs]
+    check_memory(sum(item.bytes for item in prepared), f"the recordings of {len(runs)} run(s)")
+    results: list[Recording | None] = [None] * len(runs)
+    done = 0
+    for group in _groups(prepared):
+        part = [prepared[index] for index in group]
+        share = _share(progress, done, len(group), len(runs))
+        for index, result in zip(
+            group, _run_core(part, fidelity, threads, lanes, share), strict=True
+        ):
+            results[index] = build_recording(runs[index], prepared[index], fidelity, result)
+        done += len(group)
+    return [item for item in results if item is not None]
+
+
+def batch_bytes(runs: Sequence[Run], *, fidelity: str = "high", record: Record = None) -> int:
+    """Return the memory the recordings of a batch will take, in bytes; errors as for the batch."""
+    return sum(prepare_named(run, fidelity, record, len(runs) > 1).bytes for run in runs)
+
+
+def _groups(prepared: Sequence[Prepared]) -> list[list[int]]:
+    """Indices of the runs that can go to the core together: one wiring, one recording plan."""
+    groups: dict[Any, list[int]] = {}
+    for index, item in enumerate(prepared):
+        key = (item.actuator.wiring, item.step, tuple(item.plan))
+        groups.setdefault(key, []).append(index)
+    return list(groups.values())
+
+
+def _share(progress: Progress | None, done: int, part: int, total: int) -> Callable[[float], bool]:
+    """Return the callback of one part of a batch. There always is one: it lets Ctrl-C through."""
+
+    def report(fraction: float) -> bool:
+        if progress is None:
+            return True
+        return progress((done + part * fraction) / total) is not False
+
+    return report
+
+
+def _run_core(
+    part: Sequence[Prepared],
+    fidelity: str,
+    threads: int | None,
+    lanes: str,
+    progress: Callable[[float], bool],
+) -> list[dict[str, Any]]:
+    from elevon import _core
+
+    first = part[0]
+    try:
+        results = _core.simulate(
+            first.actuator.wiring,
+            fidelity,
+            [item.core for item in part],
+            [clock.to_core() for clock in first.plan],
+            threads or 0,
+            lanes,
+            progress,
+        )
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    stopped = next((item for item in results if item["status"] == "interrupted"), None)
+    if stopped is not None:
+        raise Interrupted(f"interrupted at {stopped['time']:.6g} s of simulated time")
+    return results
