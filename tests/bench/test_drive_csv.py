@@ -30,10 +30,8 @@ def test_what_is_written_is_read_back(tmp_path, truth, dialect):
     path = write_drive_csv(tmp_path / "log.csv", truth.signals, layout=DriveFormat(**dialect))
     log = import_log(path)
     for name, values in truth.signals.items():
-        if name == "time":
-            got = log.recording.clocks["drive"].time
-        else:
-            got = log.recording[name].values
+        clock = log.recording.clocks["drive"]
+        got = clock.time if name == "time" else log.recording[name].values
         np.testing.assert_allclose(got, values, rtol=1e-7, atol=1e-7 * np.ptp(values))
     assert log.recording.clocks["drive"].rate == pytest.approx(400.0, rel=1e-9)
     assert log.report.has("unit-confirmed")
@@ -95,11 +93,12 @@ HEADER = "Xms,C0Drive_axis_1r4821,C1Drive_axis_1r4820,Drive_axis_1.r62,Drive_axi
 
 
 def rows(count=40, start=0.0):
-    return [
-        f"{start + 2.5 * k},{100 * math.sin(k / 8)},{100 * math.sin(k / 8)},"
-        f"{100 * math.cos(k / 8) / 8 / 360 / 0.0025 * 60},{100 * math.cos(k / 8) / 8 / 360 / 0.0025 * 60}"
-        for k in range(count)
-    ]
+    """A sine in degrees on both shafts, with the speed that belongs to it."""
+    lines = []
+    for k in range(count):
+        angle, speed = 100 * math.sin(k / 8), 100 * math.cos(k / 8) / 8 / 360 / 0.0025 * 60
+        lines.append(f"{start + 2.5 * k},{angle},{angle},{speed},{speed}")
+    return lines
 
 
 BAD = {

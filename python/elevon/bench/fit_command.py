@@ -103,7 +103,7 @@ def fit_waveform(
         rest at either end, and samples that no waveform of this kind explains.
     timing_std : float, optional
         Standard deviation [s] of the instant at which the drive sampled the command, against the
-        time stamp of the row. It is in no residual, so it is added to the phase and to the instants.
+        time stamp of the row. It is in no residual, so it is added to the phase and the instants.
         Default: uniform within one period of the log.
 
     Returns
@@ -275,7 +275,7 @@ def _result(
         jacobian = jacobian * np.where(np.array(free) == "amplitude", -1.0, 1.0)
     if "phase" in values:
         values["phase"] = math.remainder(values["phase"], 2.0 * math.pi)
-    covariance = _covariance(kind, free, t, jacobian, residual)
+    covariance = _covariance(kind, free, jacobian, residual)
     if timing_std is None:
         timing_std = float(np.median(np.diff(t))) / math.sqrt(12.0)
     shift = _per_second(values, free)
@@ -287,7 +287,7 @@ def _result(
 
 
 def _covariance(
-    kind: str, free: Sequence[str], t: FloatArray, jacobian: FloatArray, residual: FloatArray
+    kind: str, free: Sequence[str], jacobian: FloatArray, residual: FloatArray
 ) -> FloatArray:
     """Covariance of the fitted parameters, shape (p, p).
 

@@ -32,6 +32,7 @@ _DAMAGE = (
     AttributeError,
     EOFError,
     MemoryError,
+    NameError,
     NotImplementedError,
     SystemError,
     struct.error,

@@ -16,6 +16,7 @@ from elevon.bench.logs.column_map import ColumnMap, read_column_map
 from elevon.bench.logs.detect import read_table
 from elevon.bench.logs.limits import DEFAULT_LIMITS, Limits
 from elevon.bench.logs.loadcell_join import join_loadcell
+from elevon.bench.logs.mat5 import has_variable
 from elevon.bench.logs.quality import ClockQuality, clock_quality
 from elevon.bench.logs.report import ImportReport
 from elevon.bench.logs.sidecar import CommandNote, read_command_note
@@ -161,6 +162,8 @@ def _is_saved(file: Path) -> bool:
         with file.open("rb") as stream:
             if stream.read(9) == b"# elevon ":
                 return True
+        if file.suffix.lower() == ".mat" and not has_variable(file, "elevon", DEFAULT_LIMITS):
+            return False
         if file.suffix.lower() in {".parquet", ".nc", ".mat"}:
             Recording.load(file)
             return True

@@ -1,32 +1,50 @@
-"""A bounded look into a MATLAB v5 file before a library loads it.
+"""MATLAB v5 files, read within bounds: plain numeric vectors, at the top or in one structure.
 
 A v5 file is a chain of elements, each a tag (type, length) and its bytes; most are compressed with
-zlib. Every element is expanded here piece by piece, against the limit, and its structure walked:
-only variables that are plain numbers, or one structure of plain numbers, are let through.
+zlib. Every element is expanded here piece by piece, against the limit. The numbers are then decoded
+here too, and not by scipy's reader, which a damaged file can bring to read outside its memory.
 """
 
 from __future__ import annotations
 
 import struct
 import zlib
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from elevon.bench.logs.limits import Limits, quoted
+from elevon.bench.logs.opening import head
+from elevon.bench.logs.table import FloatArray
 from elevon.errors import FormatError
 
-__all__ = ["plain_variables"]
+__all__ = ["has_variable", "read_vectors"]
 
 _COMPRESSED, _MATRIX = 15, 14
 _STRUCT, _NUMERIC = 2, range(6, 16)
 _OTHER = {1: "cell", 3: "object", 4: "text", 5: "sparse", 16: "function", 17: "opaque object"}
+_STORED = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8",
+           13: "u8"}  # fmt: skip
 _COMPLEX = 0x08
 _MOST_VARIABLES = 512
 _PIECE = 1 << 16
 
 
-def plain_variables(path: Path, limits: Limits, notes: list[str]) -> list[str]:
-    """Return the names of the variables that are safe and useful to load.
+@dataclass(frozen=True, slots=True)
+class _Matrix:
+    """A variable's heading, and the bytes that follow it."""
+
+    name: str
+    kind: int
+    complex_: bool
+    shape: tuple[int, ...]
+    rest: bytes
+
+
+def read_vectors(path: Path, limits: Limits, notes: list[str]) -> dict[str, FloatArray]:
+    """Return the numeric vectors of a file; those inside a structure as ``name/field``.
 
     Parameters
     ----------
@@ -35,17 +53,45 @@ def plain_variables(path: Path, limits: Limits, notes: list[str]) -> list[str]:
     limits : Limits
         Bound on the expanded size, of all variables together.
     notes : list of str
-        What is passed over is added here.
+        What is passed over is added here: matrices, cells, objects, text, complex numbers.
 
     Raises
     ------
     FormatError
-        Not a v5 file, a damaged chain of elements, or an expansion over the limit.
+        Not a v5 file, damaged, or an expansion over the limit.
     """
-    names: list[str] = []
-    expanded = numbers = 0
+    found: dict[str, FloatArray] = {}
+    numbers = 0
+    order = _byte_order(head(path, 128), path)
+    for body in _variables(path, order, limits):
+        for matrix in _unpacked(_matrix(body, order, path), order, path):
+            vector = _vector(matrix, order, path, notes)
+            if vector is None:
+                continue
+            if matrix.name in found:
+                raise FormatError(f"{path}: two variables are named {quoted(matrix.name)}")
+            numbers += len(vector)
+            limits.check_shape(str(path), numbers, 1)
+            found[matrix.name] = vector
+    return found
+
+
+def has_variable(path: Path, name: str, limits: Limits) -> bool:
+    """Whether a v5 file holds a variable of a name at its top; False for any other file."""
+    try:
+        order = _byte_order(head(path, 128), path)
+        return any(
+            _matrix(body, order, path).name == name for body in _variables(path, order, limits)
+        )
+    except FormatError:
+        return False
+
+
+def _variables(path: Path, order: str, limits: Limits) -> Iterator[bytes]:
+    """Yield the expanded bytes of each variable."""
+    expanded = count = 0
     with path.open("rb") as stream:
-        order = _byte_order(stream.read(128), path)
+        stream.seek(128)
         while tag := stream.read(8):
             kind, length = _tag(tag, order, path)
             body = stream.read(length)
@@ -59,32 +105,10 @@ def plain_variables(path: Path, limits: Limits, notes: list[str]) -> list[str]:
             limits.check_bytes(str(path), expanded)
             if kind != _MATRIX or length > len(body):
                 raise FormatError(f"{path}: damaged: an element of type {kind} at the top")
-            matrix = _matrix(body[:length], order, path)
-            numbers += matrix.count
-            limits.check_shape(str(path), numbers, 1)
-            _sort(matrix, names, notes)
-            if len(names) + len(notes) > _MOST_VARIABLES:
+            count += 1
+            if count > _MOST_VARIABLES:
                 raise FormatError(f"{path}: more than {_MOST_VARIABLES} variables")
-    return names
-
-
-@dataclass(frozen=True, slots=True)
-class _Matrix:
-    name: str
-    kind: int
-    complex_: bool
-    count: int
-    rest: bytes
-
-
-def _sort(matrix: _Matrix, names: list[str], notes: list[str]) -> None:
-    if matrix.kind in _OTHER or matrix.complex_:
-        what = "complex numbers" if matrix.complex_ else _OTHER[matrix.kind]
-        notes.append(f"{quoted(matrix.name)} passed over: {what}")
-    elif matrix.name in names:
-        raise FormatError(f"two variables are named {quoted(matrix.name)}")
-    else:
-        names.append(matrix.name)
+            yield body[:length]
 
 
 def _byte_order(header: bytes, path: Path) -> str:
@@ -142,55 +166,38 @@ def _element(data: bytes, at: int, order: str, path: Path) -> tuple[int, bytes, 
     return kind, data[at + 8 : end], end + (-length) % 8
 
 
-def _matrix(data: bytes, order: str, path: Path, depth: int = 0) -> _Matrix:
-    """Read a matrix's heading, and walk inside a structure."""
+def _matrix(data: bytes, order: str, path: Path) -> _Matrix:
     _, flags, at = _element(data, 0, order, path)
     if len(flags) < 4:
         raise FormatError(f"{path}: damaged: array flags of {len(flags)} bytes")
     (word,) = struct.unpack_from(order + "I", flags)
     kind, complex_ = word & 0xFF, bool((word >> 8) & _COMPLEX)
     if kind == 17:  # an opaque object has no size
-        return _Matrix("", kind, complex_, 0, b"")
+        return _Matrix("", kind, complex_, (0,), b"")
+    if kind not in _NUMERIC and kind not in _OTHER and kind != _STRUCT:
+        raise FormatError(f"{path}: damaged: array class {kind}")
     _, size, at = _element(data, at, order, path)
     _, name, at = _element(data, at, order, path)
-    matrix = _Matrix(name.decode("latin-1"), kind, complex_, _count(size, order, path), data[at:])
-    if kind == _STRUCT:
-        return replace(matrix, count=_walk_structure(matrix, order, path, depth))
-    if kind not in _NUMERIC and kind not in _OTHER:
-        raise FormatError(f"{path}: damaged: array class {kind}")
-    if kind in _NUMERIC:
-        _check_numbers(matrix, order, path)
-    return matrix
+    shape = _shape(size, order, path)
+    return _Matrix(name.decode("latin-1"), kind, complex_, shape, data[at:])
 
 
-def _count(size: bytes, order: str, path: Path) -> int:
+def _shape(size: bytes, order: str, path: Path) -> tuple[int, ...]:
     if len(size) % 4 or not 8 <= len(size) <= 32:
         raise FormatError(f"{path}: damaged: sizes of {len(size)} bytes")
-    count = 1
-    for length in struct.unpack(f"{order}{len(size) // 4}i", size):
-        if length < 0:
-            raise FormatError(f"{path}: damaged: a negative size")
-        count *= length
-    return count
+    shape: tuple[int, ...] = struct.unpack(f"{order}{len(size) // 4}i", size)
+    if min(shape) < 0:
+        raise FormatError(f"{path}: damaged: a negative size")
+    return shape
 
 
-def _check_numbers(matrix: _Matrix, order: str, path: Path) -> None:
-    """Refuse a declared size with fewer bytes behind it: the library would allocate it blindly."""
-    _, stored, _ = _element(matrix.rest, 0, order, path) if matrix.count else (0, b"", 0)
-    if matrix.count > len(stored):
-        raise FormatError(
-            f"{path}, {quoted(matrix.name)}: {matrix.count} numbers declared, "
-            f"{len(stored)} bytes stored"
-        )
-
-
-def _walk_structure(matrix: _Matrix, order: str, path: Path, depth: int) -> int:
-    """Check each field of a structure; return how many numbers they declare together."""
-    if matrix.count != 1 or depth > 0:
-        raise FormatError(
-            f"{path}, {quoted(matrix.name)}: only one structure of vectors can be read, "
-            "not an array of structures or structures within one"
-        )
+def _unpacked(matrix: _Matrix, order: str, path: Path) -> Iterator[_Matrix]:
+    """Yield the variable itself, or the fields of a structure."""
+    if matrix.kind != _STRUCT:
+        yield matrix
+        return
+    if any(length != 1 for length in matrix.shape):
+        raise FormatError(f"{path}, {quoted(matrix.name)}: arrays of structures cannot be read")
     _, width, at = _element(matrix.rest, 0, order, path)
     _, names, at = _element(matrix.rest, at, order, path)
     if len(width) != 4:
@@ -198,16 +205,39 @@ def _walk_structure(matrix: _Matrix, order: str, path: Path, depth: int) -> int:
     (step,) = struct.unpack(order + "i", width)
     if not 0 < step <= 64 or len(names) % step:
         raise FormatError(f"{path}: damaged: field names of width {step}")
-    numbers = 0
-    for _ in range(len(names) // step):
+    for place in range(0, len(names), step):
         kind, body, at = _element(matrix.rest, at, order, path)
         if kind != _MATRIX:
             raise FormatError(f"{path}: damaged: a field of type {kind}")
-        field = _matrix(body, order, path, depth + 1) if body else None
-        if field is not None and field.kind not in _NUMERIC and field.kind != 4:
+        if not body:
+            continue
+        field = _matrix(body, order, path)
+        if field.kind == _STRUCT:
             raise FormatError(
-                f"{path}, {quoted(matrix.name)}: holds a "
-                f"{_OTHER.get(field.kind, 'value')}; only numbers and text can be read"
+                f"{path}, {quoted(matrix.name)}: a structure within a structure cannot be read"
             )
-        numbers += field.count if field is not None else 0
-    return numbers
+        label = names[place : place + step].split(b"\0")[0].decode("latin-1")
+        full = f"{matrix.name}/{label}"
+        yield _Matrix(full, field.kind, field.complex_, field.shape, field.rest)
+
+
+def _vector(matrix: _Matrix, order: str, path: Path, notes: list[str]) -> FloatArray | None:
+    """Decode a vector; None, with a note, for anything else."""
+    reason = _OTHER.get(matrix.kind, "complex numbers" if matrix.complex_ else "")
+    if not reason and sum(length != 1 for length in matrix.shape) > 1:
+        reason = f"not a vector, shape {matrix.shape}"
+    if reason:
+        notes.append(f"{quoted(matrix.name)} passed over: {reason}")
+        return None
+    count = max(matrix.shape) if min(matrix.shape) else 0
+    if not count:
+        return np.empty(0)
+    kind, stored, _ = _element(matrix.rest, 0, order, path)
+    if kind not in _STORED:
+        raise FormatError(f"{path}, {quoted(matrix.name)}: damaged: numbers of type {kind}")
+    dtype = np.dtype(order + _STORED[kind])
+    if len(stored) != count * dtype.itemsize:
+        raise FormatError(
+            f"{path}, {quoted(matrix.name)}: {count} numbers declared, {len(stored)} bytes stored"
+        )
+    return np.frombuffer(stored, dtype=dtype).astype(np.float64)

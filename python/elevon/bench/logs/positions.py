@@ -151,7 +151,7 @@ def settle_encoder(
         )
     found = match(fit.slope, encoder_candidates(ratio))
     _refuse_shaft(statement, fit, found, ratio, report)
-    assert found is not None  # noqa: S101 - _refuse_shaft raises when there is none
+    assert found is not None
     seen = ratio * found.scale / fit.slope
     follows = f"gear ratio seen {seen:.3f}, expected {ratio:g}"
     if found.shaft == "fast":  # the drive has multiplied by its own ratio: it cannot be seen

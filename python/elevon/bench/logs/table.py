@@ -13,6 +13,7 @@ from elevon.errors import FormatError
 
 __all__ = ["FloatArray", "RawTable", "split_unit", "unique_names"]
 
+_LARGEST = 1e100  # beyond it squares overflow; nothing measured comes near
 FloatArray = npt.NDArray[np.float64]
 
 
@@ -49,6 +50,14 @@ class RawTable:
             raise FormatError(f"{self.source}: columns of different lengths {sorted(lengths)}")
         if not self.columns:
             raise FormatError(f"{self.source}: no column of numbers")
+        for name, values in self.columns.items():
+            bad = ~np.isnan(values) & ~(np.abs(values) < _LARGEST)
+            if bad.any():
+                row = int(np.argmax(bad))
+                raise FormatError(
+                    f"{self.source}, row {row + 1}, column {quoted(name)}: {values[row]:g} is no "
+                    "finite number that anything could measure"
+                )
 
     @property
     def rows(self) -> int:

@@ -251,12 +251,6 @@ class _Reader:
         if not self.values:
             raise FormatError(f"{self.source}: a header alone, no row of numbers")
         data = np.frombuffer(self.values, dtype=np.float64).reshape(-1, len(names))
-        infinite = np.argwhere(np.isinf(data))
-        if infinite.size:
-            row, column = infinite[0]
-            raise FormatError(
-                f"{self.source}, row {row + 1}, column {quoted(names[column])}: not a finite number"
-            )
         if not self.ended:
             self.notes.append("the last line has no line end: its last number may be cut short")
         pairs = [split_unit(name) for name in names]
