@@ -16,6 +16,8 @@ pub struct Source<S> {
     at: S,
     value: S,
     slope: S,
+    /// No slope and no oscillator in any lane: the value is all there is.
+    flat: bool,
     oscillators: Vec<[S; 5]>,
 }
 
@@ -98,18 +100,22 @@ impl SourceLanes {
                 [get(&|o| o.at), get(&|o| o.amplitude), get(&|o| o.phase), get(&|o| o.rate), get(&|o| o.sweep)]
             })
             .collect();
-        Source { at: lane(&|i| self.lines[i][0]), value: lane(&|i| self.lines[i][1]), slope: lane(&|i| self.lines[i][2]), oscillators }
+        let flat = count == 0 && (0..S::LANES).all(|i| self.lines[first + i][2] == 0.0);
+        Source { flat, at: lane(&|i| self.lines[i][0]), value: lane(&|i| self.lines[i][1]), slope: lane(&|i| self.lines[i][2]), oscillators }
     }
 }
 
 impl<S: Scalar> Source<S> {
     #[inline(always)]
     pub fn at(&self, t: S) -> S {
-        let mut sum = self.value + self.slope * (t - self.at);
+        if self.flat {
+            return self.value;
+        }
+        let mut sum = self.slope.fma(t - self.at, self.value);
         for [at, amplitude, phase, rate, sweep] in &self.oscillators {
             let tau = t - *at;
-            let (sin, _) = (*phase + (*rate + *sweep * tau) * tau).sin_cos();
-            sum = sum + *amplitude * sin;
+            let (sin, _) = sweep.fma(tau, *rate).fma(tau, *phase).sin_cos();
+            sum = amplitude.fma(sin, sum);
         }
         sum
     }

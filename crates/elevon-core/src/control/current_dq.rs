@@ -2,8 +2,9 @@
 //! (reference sheet 1.1: 4 kHz pulses). Sign convention of sheet 1.4:
 //! v_q = R i_q + L di_q/dt + p omega L i_d + k omega, v_d = R i_d + L di_d/dt - p omega L i_q.
 
-use crate::scalar::{three, three_phase, Scalar};
+use crate::scalar::{three_phase, Scalar};
 use crate::variables;
+use crate::three;
 
 variables! {
     /// The current controller and its carrier.
@@ -90,11 +91,11 @@ impl<S: Scalar> CurrentControl<S> {
         let (sin, cos) = (x.angle + self.lead * x.speed).sin_cos();
         let (sa, ca) = three_phase(sin, cos);
         let per_half = S::splat(2.0) / x.supply;
-        let phase: [S; 3] = three(|j| (s.voltage_q * sa[j] - s.voltage_d * ca[j]) * per_half);
+        let phase: [S; 3] = three!(|j| (s.voltage_q * sa[j] - s.voltage_d * ca[j]) * per_half);
         let high = phase[0].maximum(phase[1]).maximum(phase[2]);
         let low = phase[0].minimum(phase[1]).minimum(phase[2]);
         let shift = S::splat(0.5) * (high + low);
-        s.modulation = three(|j| phase[j] - shift);
+        s.modulation = three!(|j| phase[j] - shift);
     }
 
     /// Gate signals: +1 while the reference stands above the triangular carrier, else -1.
@@ -103,7 +104,7 @@ impl<S: Scalar> CurrentControl<S> {
         let x = t * self.frequency;
         let cycle = x - x.floor();
         let carrier = S::splat(4.0) * (cycle - S::splat(0.5)).abs() - S::one();
-        three(|j| S::select(carrier.le(s.modulation[j]), S::one(), -S::one()))
+        three!(|j| S::select(carrier.le(s.modulation[j]), S::one(), -S::one()))
     }
 }
 

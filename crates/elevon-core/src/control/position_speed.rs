@@ -132,11 +132,11 @@ impl<S: Scalar> PositionSpeed<S> {
         };
         s.speed_ref = demanded.clamp_abs(self.speed_limit);
         let error = s.speed_ref - speed;
-        let mut torque = self.speed_gain * error + s.integral;
+        let mut torque = self.speed_gain.fma(error, s.integral);
         if structure.derivative {
             let difference = error - s.filtered_error;
-            torque = torque + self.derivative_gain * difference;
-            s.filtered_error = s.filtered_error + self.derivative_decay * difference;
+            torque = self.derivative_gain.fma(difference, torque);
+            s.filtered_error = self.derivative_decay.fma(difference, s.filtered_error);
         }
         s.torque_ref = torque.clamp_abs(self.torque_limit);
         self.integrate(structure, s, error, torque, position_error, speed);

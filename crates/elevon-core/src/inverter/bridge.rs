@@ -4,8 +4,9 @@
 //! phase floats until its terminal voltage v_n + e_j leaves the rails. The neutral voltage sums the
 //! connected phases only. A shorted switch whose partner is gated shoots through: the drive trips.
 
-use crate::scalar::{three, Scalar};
+use crate::scalar::Scalar;
 use crate::variables;
+use crate::three;
 
 variables! {
     /// The bridge and its supply.
@@ -86,7 +87,7 @@ impl<S: Scalar> Bridge<S> {
     pub fn derive(raw: &[S], dt: f64) -> Self {
         use InverterParameter as P;
         let g = |p: P| raw[p as usize];
-        let pairs = |first: P| -> [[S; 2]; 3] { three(|j| std::array::from_fn(|i| raw[first as usize + 2 * j + i])) };
+        let pairs = |first: P| -> [[S; 2]; 3] { three!(|j| std::array::from_fn(|i| raw[first as usize + 2 * j + i])) };
         Self {
             on_resistance: g(P::OnResistance),
             diode_drop: g(P::DiodeDrop),
@@ -200,5 +201,5 @@ pub fn quench<S: Scalar>(legs: &Legs<S>, old: [S; 3], new: [S; 3]) -> [S; 3] {
     let count = carrying[0] + carrying[1] + carrying[2];
     let residue = current[0] + current[1] + current[2];
     let share = S::select(count.equals(zero), zero, residue / count.maximum(S::one()));
-    three(|j| current[j] - carrying[j] * share)
+    three!(|j| current[j] - carrying[j] * share)
 }

@@ -1,19 +1,24 @@
 //! Three hysteresis relays on the phase current errors (T2; reference sheet 1.4).
 
-use crate::scalar::{three, Scalar};
+use crate::scalar::Scalar;
+use crate::three;
 
 /// New leg commands (+1 high, -1 low): beyond the half band they follow the error's sign, inside it they stay.
 #[inline(always)]
 pub fn relays<S: Scalar>(half_band: S, legs: [S; 3], error: [S; 3]) -> [S; 3] {
-    three(|j| {
+    three!(|j| {
         let lowered = S::select(error[j].lt(-half_band), -S::one(), legs[j]);
         S::select(half_band.lt(error[j]), S::one(), lowered)
     })
 }
 
-/// Leg transitions between two sets of commands.
+/// Leg transitions between two sets of commands added to `count`; most steps have none.
 #[inline(always)]
-pub fn transitions<S: Scalar>(old: [S; 3], new: [S; 3]) -> S {
+pub fn count_transitions<S: Scalar>(count: S, old: [S; 3], new: [S; 3]) -> S {
+    let same = old[0].equals(new[0]) & old[1].equals(new[1]) & old[2].equals(new[2]);
+    if !S::any(!same) {
+        return count;
+    }
     let sum = (new[0] - old[0]).abs() + (new[1] - old[1]).abs() + (new[2] - old[2]).abs();
-    S::splat(0.5) * sum
+    count + S::splat(0.5) * sum
 }

@@ -4,8 +4,9 @@
 //! whose coefficients depend on the rotor angle (derivation: docs/theory/low-fidelity.md):
 //! k_T = sum k_j sin a_j, R_q = 2/3 sum R_j sin^2 a_j, L_q likewise, v_q = R_q i + L_q di/dt + 2/3 k_T omega.
 
-use crate::scalar::{three, Scalar};
+use crate::scalar::Scalar;
 use crate::variables;
+use crate::three;
 
 variables! {
     /// The few numbers that only the low fidelity has.
@@ -29,7 +30,7 @@ pub struct Equivalent<S> {
 #[inline(always)]
 pub fn equivalent<S: Scalar>(k: [S; 3], resistance: [S; 3], inductance: [S; 3], imposed: [S; 3]) -> Equivalent<S> {
     let two_thirds = S::splat(2.0 / 3.0);
-    let weight: [S; 3] = three(|j| two_thirds * imposed[j] * imposed[j]);
+    let weight: [S; 3] = three!(|j| two_thirds * imposed[j] * imposed[j]);
     let dot = |a: [S; 3], b: [S; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     Equivalent { torque_constant: dot(k, imposed), resistance: dot(resistance, weight), inductance: dot(inductance, weight) }
 }

@@ -1,8 +1,9 @@
 //! Three-phase star with floating neutral, faults in the winding and the air gap included in
 //! their healthy form (T2; reference sheet 1.5).
 
-use crate::scalar::{three, Scalar};
+use crate::scalar::Scalar;
 use crate::variables;
+use crate::three;
 
 variables! {
     /// The motor.
@@ -42,6 +43,7 @@ variables! {
 pub struct MotorStructure {
     pub trapezoidal: bool,
     pub shorted_loop: bool,
+    pub static_eccentricity: bool,
     pub dynamic_eccentricity: bool,
 }
 
@@ -61,6 +63,8 @@ pub struct Star<S> {
     dynamic_sin: S,
     flat_slope: S,
     pub open: [S; 3],
+    /// Solver step over the inductance.
+    dt_per_inductance: [S; 3],
     /// Shorted loops: coupling ratio M / L_f, resistance, 1 / L_f and turns of the loop.
     loop_ratio: [S; 3],
     loop_resistance: [S; 3],
@@ -78,22 +82,22 @@ pub struct StarState<S> {
 }
 
 fn phases<S: Scalar>(raw: &[S], first: MotorParameter) -> [S; 3] {
-    three(|j| raw[first as usize + j])
+    three!(|j| raw[first as usize + j])
 }
 
 impl<S: Scalar> Star<S> {
-    pub fn derive(raw: &[S], structure: &MotorStructure) -> Self {
+    pub fn derive(raw: &[S], structure: &MotorStructure, dt: S) -> Self {
         use MotorParameter as P;
         let g = |p: P| raw[p as usize];
         let (one, zero) = (S::one(), S::zero());
         let turns = phases(raw, P::TurnsA);
         let k = g(P::EmfConstant) * g(P::FluxFraction);
         let coupling = if structure.shorted_loop { g(P::ShortCoupling) } else { zero };
-        let shorted = three(|j| if structure.shorted_loop { one - turns[j] } else { zero });
-        let has_loop = three(|j| zero.lt(shorted[j]));
-        let guarded: [S; 3] = three(|j| S::select(has_loop[j], shorted[j], one));
-        let factor: [S; 3] = three(|j| S::select(has_loop[j], one - coupling * coupling, one));
-        let per_inductance: [S; 3] = three(|j| one / (turns[j] * turns[j] * g(P::Inductance) * factor[j]));
+        let shorted = three!(|j| if structure.shorted_loop { one - turns[j] } else { zero });
+        let has_loop = three!(|j| zero.lt(shorted[j]));
+        let guarded: [S; 3] = three!(|j| S::select(has_loop[j], shorted[j], one));
+        let factor: [S; 3] = three!(|j| S::select(has_loop[j], one - coupling * coupling, one));
+        let per_inductance: [S; 3] = three!(|j| one / (turns[j] * turns[j] * g(P::Inductance) * factor[j]));
         let total = per_inductance[0] + per_inductance[1] + per_inductance[2];
         let (sin_s, cos_s) = g(P::EccentricityStaticPhase).sin_cos();
         let (sin_d, cos_d) = g(P::EccentricityDynamicPhase).sin_cos();
@@ -101,10 +105,11 @@ impl<S: Scalar> Star<S> {
         Self {
             pole_pairs: g(P::PolePairs),
             offset: g(P::ElectricalOffset),
-            emf_constant: three(|j| turns[j] * k),
-            resistance: three(|j| turns[j] * g(P::Resistance)),
+            emf_constant: three!(|j| turns[j] * k),
+            resistance: three!(|j| turns[j] * g(P::Resistance)),
             per_inductance,
-            neutral_weight: three(|j| per_inductance[j] / total),
+            dt_per_inductance: three!(|j| dt * per_inductance[j]),
+            neutral_weight: three!(|j| per_inductance[j] / total),
             torque_limit: g(P::TorqueLimit),
             eccentric_cos: g(P::EccentricityStatic) * cos_s,
             eccentric_sin: g(P::EccentricityStatic) * sin_s,
@@ -112,29 +117,29 @@ impl<S: Scalar> Star<S> {
             dynamic_sin: g(P::EccentricityDynamic) * sin_d,
             flat_slope: pi / (pi - g(P::EmfFlatWidth)),
             open: phases(raw, P::OpenA),
-            loop_ratio: three(|j| S::select(has_loop[j], coupling * turns[j] / guarded[j], zero)),
-            loop_resistance: three(|j| shorted[j] * g(P::Resistance) + g(P::ShortContact)),
-            loop_per_inductance: three(|j| S::select(has_loop[j], one / (guarded[j] * guarded[j] * g(P::Inductance)), zero)),
-            loop_turns: three(|j| shorted[j] * k),
+            loop_ratio: three!(|j| S::select(has_loop[j], coupling * turns[j] / guarded[j], zero)),
+            loop_resistance: three!(|j| shorted[j] * g(P::Resistance) + g(P::ShortContact)),
+            loop_per_inductance: three!(|j| S::select(has_loop[j], one / (guarded[j] * guarded[j] * g(P::Inductance)), zero)),
+            loop_turns: three!(|j| shorted[j] * k),
         }
     }
 
     #[inline(always)]
     pub fn electrical_angle(&self, theta: S) -> S {
-        self.pole_pairs * theta + self.offset
+        self.pole_pairs.fma(theta, self.offset)
     }
 
-    /// k_j of the three phases (sheet 1.5), sinusoidal: `shape` is sin of the three phase angles.
+    /// k_j of the three phases (sheet 1.5): `shape` is f of the three phase angles.
     #[inline(always)]
     pub fn coefficients(&self, shape: [S; 3], gap: [S; 3]) -> [S; 3] {
-        three(|j| self.emf_constant[j] * shape[j] * gap[j])
+        three!(|j| self.emf_constant[j] * shape[j] * gap[j])
     }
 
     /// 1 + zeta cos(theta_e - phi + 2 pi (j-1)/3), the static eccentricity's modulation of phase j.
     #[inline(always)]
     pub fn static_gap(&self, sin: S, cos: S) -> [S; 3] {
-        let x = self.eccentric_cos * cos + self.eccentric_sin * sin;
-        let y = self.eccentric_cos * sin - self.eccentric_sin * cos;
+        let x = self.eccentric_cos.fma(cos, self.eccentric_sin * sin);
+        let y = self.eccentric_cos.fma(sin, -(self.eccentric_sin * cos));
         let half = S::splat(-0.5) * x;
         let root = S::splat(0.866_025_403_784_438_6) * y;
         [S::one() + x, S::one() + (half - root), S::one() + (half + root)]
@@ -154,7 +159,7 @@ impl<S: Scalar> Star<S> {
     /// Trapezoid of the three phase angles theta_e - 2 pi (j-1)/3: a triangle cut at +-1.
     #[inline(always)]
     pub fn trapezoid(&self, angle: S) -> [S; 3] {
-        three(|j| {
+        three!(|j| {
             let turns = angle * S::splat(1.0 / std::f64::consts::TAU) - S::splat(j as f64 / 3.0) + S::splat(0.25);
             let triangle = S::one() - S::splat(4.0) * (turns - turns.floor() - S::splat(0.5)).abs();
             (triangle * self.flat_slope).clamp_abs(S::one())
@@ -164,13 +169,20 @@ impl<S: Scalar> Star<S> {
     /// v_n of three connected phases.
     #[inline(always)]
     pub fn neutral(&self, drop: [S; 3]) -> S {
-        self.neutral_weight[0] * drop[0] + self.neutral_weight[1] * drop[1] + self.neutral_weight[2] * drop[2]
+        let w = &self.neutral_weight;
+        w[0].fma(drop[0], w[1].fma(drop[1], w[2] * drop[2]))
+    }
+
+    /// Phase currents after a step of explicit Euler; `drop` is terminal voltage less EMF and R i.
+    #[inline(always)]
+    pub fn currents_after(&self, current: [S; 3], drop: [S; 3], neutral: S) -> [S; 3] {
+        three!(|j| self.dt_per_inductance[j].fma(drop[j] - neutral, current[j]))
     }
 
     /// Torque of phase and loop currents before saturation.
     #[inline(always)]
     pub fn torque(&self, k: [S; 3], current: [S; 3]) -> S {
-        k[0] * current[0] + k[1] * current[1] + k[2] * current[2]
+        k[0].fma(current[0], k[1].fma(current[1], k[2] * current[2]))
     }
 
     #[inline(always)]
@@ -181,19 +193,19 @@ impl<S: Scalar> Star<S> {
     /// EMF that the loops' currents add to their phases: -(M / L_f)(R_f i_f + mu k_j' omega).
     #[inline(always)]
     pub fn loop_emf(&self, s: &StarState<S>, loop_k: [S; 3], speed: S) -> [S; 3] {
-        three(|j| -self.loop_ratio[j] * (self.loop_resistance[j] * s.resistance_factor * s.loop_current[j] + loop_k[j] * speed))
+        three!(|j| -self.loop_ratio[j] * (self.loop_resistance[j] * s.resistance_factor * s.loop_current[j] + loop_k[j] * speed))
     }
 
     /// k of the shorted turns alone, from the unit shape and gap of the phase.
     #[inline(always)]
     pub fn loop_coefficients(&self, shape: [S; 3], gap: [S; 3]) -> [S; 3] {
-        three(|j| self.loop_turns[j] * shape[j] * gap[j])
+        three!(|j| self.loop_turns[j] * shape[j] * gap[j])
     }
 
     /// Explicit step of the loop currents, given the phases' di/dt.
     #[inline(always)]
     pub fn step_loops(&self, s: &StarState<S>, loop_k: [S; 3], speed: S, slope: [S; 3], dt: S) -> [S; 3] {
-        three(|j| {
+        three!(|j| {
             let own = self.loop_resistance[j] * s.resistance_factor * s.loop_current[j] + loop_k[j] * speed;
             let change = -own * self.loop_per_inductance[j] - self.loop_ratio[j] * slope[j];
             s.loop_current[j] + dt * change

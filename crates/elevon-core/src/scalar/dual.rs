@@ -106,6 +106,11 @@ impl<const N: usize> Scalar for Dual<N> {
         value
     }
     #[inline(always)]
+    fn fma(self, factor: Self, addend: Self) -> Self {
+        let product = self * factor + addend;
+        Self { value: f64::mul_add(self.value, factor.value, addend.value), slope: product.slope }
+    }
+    #[inline(always)]
     fn abs(self) -> Self {
         if self.value < 0.0 {
             -self

@@ -2,7 +2,8 @@
 //! `f64`, as a vector of lanes (one run a lane) or as a dual number.
 //!
 //! Every operation of a lane type is the IEEE operation of its lanes, in the same order: that is
-//! what makes batch and single runs equal to the last bit. No fused multiply-add anywhere.
+//! what makes batch and single runs equal to the last bit. A multiply-add is fused only where `fma` is written,
+//! and then on every type and processor (without the instruction the library's exact one is called: slow, equal).
 
 mod dual;
 mod portable;
@@ -53,6 +54,8 @@ pub trait Scalar:
     fn any(mask: Self::Mask) -> bool;
     fn mask(value: bool) -> Self::Mask;
 
+    /// `self * factor + addend` with one rounding.
+    fn fma(self, factor: Self, addend: Self) -> Self;
     fn abs(self) -> Self;
     fn sqrt(self) -> Self;
     /// Nearest integer, ties to even.
@@ -131,11 +134,37 @@ pub trait Scalar:
     }
 }
 
-/// `[f(0), f(1), f(2)]`, written out: the standard library's array adapters are not always inlined, and a call in
-/// the inner loop costs more than the step.
+/// Runs code without vector types with AVX2 and FMA where the processor has them: faster, the same results.
 #[inline(always)]
-pub fn three<T>(mut f: impl FnMut(usize) -> T) -> [T; 3] {
-    [f(0), f(1), f(2)]
+fn best<K: Kernel>(kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
+        // SAFETY: the features were just detected.
+        return unsafe { x86::with_avx2(kernel) };
+    }
+    kernel.run()
+}
+
+/// `three!(|j| f(j))` is `[f(0), f(1), f(2)]`, written out: closures and the standard library's array adapters are
+/// not always inlined, and a call in the inner loop costs more than the step.
+#[macro_export]
+macro_rules! three {
+    (|$j:ident| $body:expr) => {
+        [
+            {
+                let $j = 0_usize;
+                $body
+            },
+            {
+                let $j = 1_usize;
+                $body
+            },
+            {
+                let $j = 2_usize;
+                $body
+            },
+        ]
+    };
 }
 
 /// Sine and cosine of three angles 120 degrees apart: `[a, a - 2 pi/3, a + 2 pi/3]`.

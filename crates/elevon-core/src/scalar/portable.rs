@@ -93,6 +93,10 @@ impl<const N: usize> Scalar for Portable<N> {
         PortableMask([value; N])
     }
     #[inline(always)]
+    fn fma(self, factor: Self, addend: Self) -> Self {
+        Self(std::array::from_fn(|i| f64::mul_add(self.0[i], factor.0[i], addend.0[i])))
+    }
+    #[inline(always)]
     fn abs(self) -> Self {
         Self(self.0.map(f64::abs))
     }
@@ -120,6 +124,6 @@ impl<const N: usize> Scalar for Portable<N> {
     }
     #[inline(always)]
     fn vectorize<K: Kernel>(kernel: K) -> K::Output {
-        kernel.run()
+        super::best(kernel)
     }
 }

@@ -47,6 +47,10 @@ impl Scalar for f64 {
         value
     }
     #[inline(always)]
+    fn fma(self, factor: Self, addend: Self) -> Self {
+        f64::mul_add(self, factor, addend)
+    }
+    #[inline(always)]
     fn abs(self) -> Self {
         f64::abs(self)
     }
@@ -72,14 +76,8 @@ impl Scalar for f64 {
     fn sin_cos(self) -> (Self, Self) {
         trig::sin_cos(self)
     }
-    /// AVX2 where the processor has it: three-operand code and `roundsd`, the same results.
     #[inline(always)]
     fn vectorize<K: Kernel>(kernel: K) -> K::Output {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the feature was just detected.
-            return unsafe { super::x86::with_avx2(kernel) };
-        }
-        kernel.run()
+        super::best(kernel)
     }
 }

@@ -1,15 +1,12 @@
-//! Sine, cosine and arctangent over any scalar: Cody-Waite reduction by pi/2 in three parts, then
+//! Sine, cosine and arctangent over any scalar: Cody-Waite reduction by pi/2 in two parts, then
 //! minimax polynomials on [-pi/4, pi/4] (coefficients as published with fdlibm's kernel functions).
 
 use super::Scalar;
 
 const TWO_OVER_PI: f64 = std::f64::consts::FRAC_2_PI;
-// pi/2 split into parts of 33 bits: their products with a quotient below 2^20 are exact, so the
-// reduction needs no fused multiply-add. Valid for |x| < 1.6e6 rad (9 hours at 500 rpm and four pole pairs
-// before the error leaves the last places; it grows only as the quotient's rounding beyond).
-const HALF_PI_1: f64 = 1.570_796_326_734_125_6;
-const HALF_PI_2: f64 = 6.077_100_506_303_966e-11;
-const HALF_PI_3: f64 = 2.022_266_248_795_950_6e-21;
+// pi/2 as a sum of two doubles: with a fused multiply-add the reduction is exact to 1e-32 |q|.
+const HALF_PI_HIGH: f64 = std::f64::consts::FRAC_PI_2;
+const HALF_PI_LOW: f64 = 6.123_233_995_736_766e-17;
 
 const SIN: [f64; 6] = [
     -1.666_666_666_666_663_2e-1,
@@ -32,22 +29,22 @@ const COS: [f64; 6] = [
 #[inline(always)]
 fn six<S: Scalar>(c: &[f64; 6], z: S) -> S {
     let z2 = z * z;
-    let low = S::splat(c[0]) + z * S::splat(c[1]);
-    let mid = S::splat(c[2]) + z * S::splat(c[3]);
-    let high = S::splat(c[4]) + z * S::splat(c[5]);
-    low + z2 * (mid + z2 * high)
+    let low = z.fma(S::splat(c[1]), S::splat(c[0]));
+    let mid = z.fma(S::splat(c[3]), S::splat(c[2]));
+    let high = z.fma(S::splat(c[5]), S::splat(c[4]));
+    z2.fma(z2.fma(high, mid), low)
 }
 
 #[inline(always)]
 pub fn sin_cos<S: Scalar>(x: S) -> (S, S) {
     let q = (x * S::splat(TWO_OVER_PI)).round();
-    let r = ((x - q * S::splat(HALF_PI_1)) - q * S::splat(HALF_PI_2)) - q * S::splat(HALF_PI_3);
+    let r = q.fma(S::splat(-HALF_PI_LOW), q.fma(S::splat(-HALF_PI_HIGH), x));
     let z = r * r;
-    let s = r + r * (z * six(&SIN, z));
-    let c = (S::one() - S::splat(0.5) * z) + z * (z * six(&COS, z));
+    let s = (r * z).fma(six(&SIN, z), r);
+    let c = (z * z).fma(six(&COS, z), z.fma(S::splat(-0.5), S::one()));
     // Quadrant from the quotient modulo 4, in floating point so that lanes need no integers.
     let quarter = q * S::splat(0.25);
-    let m = q - S::splat(4.0) * quarter.floor();
+    let m = S::splat(-4.0).fma(quarter.floor(), q);
     let one = S::one();
     let odd = m.equals(one) | m.equals(S::splat(3.0));
     let (sin, cos) = (S::select(odd, c, s), S::select(odd, s, c));

@@ -9,15 +9,15 @@ use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 /// # Safety
-/// The processor must have AVX2.
-#[target_feature(enable = "avx2")]
+/// The processor must have AVX2 and FMA.
+#[target_feature(enable = "avx2,fma")]
 pub unsafe fn with_avx2<K: Kernel>(kernel: K) -> K::Output {
     kernel.run()
 }
 
 /// # Safety
 /// The processor must have AVX-512 F, DQ and VL.
-#[target_feature(enable = "avx2,avx512f,avx512dq,avx512vl")]
+#[target_feature(enable = "avx2,fma,avx512f,avx512dq,avx512vl")]
 unsafe fn with_avx512<K: Kernel>(kernel: K) -> K::Output {
     kernel.run()
 }
@@ -25,7 +25,7 @@ unsafe fn with_avx512<K: Kernel>(kernel: K) -> K::Output {
 macro_rules! vector_type {
     ($name:ident, $mask:ident, $lanes:literal, $align:literal, $register:ty,
      $add:ident, $sub:ident, $mul:ident, $div:ident, $splat:ident, $load:ident, $store:ident,
-     $sqrt:ident, $with:ident) => {
+     $sqrt:ident, $fma:ident, $with:ident) => {
         #[derive(Clone, Copy, Debug)]
         pub struct $name($register);
 
@@ -113,6 +113,10 @@ macro_rules! vector_type {
                 $mask::uniform(value)
             }
             #[inline(always)]
+            fn fma(self, factor: Self, addend: Self) -> Self {
+                Self(unsafe { $fma(self.0, factor.0, addend.0) })
+            }
+            #[inline(always)]
             fn abs(self) -> Self {
                 self.absolute()
             }
@@ -148,11 +152,11 @@ macro_rules! vector_type {
 
 vector_type!(
     Avx2x4, Avx2Mask, 4, 32, __m256d, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd,
-    _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd, _mm256_sqrt_pd, with_avx2
+    _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd, _mm256_sqrt_pd, _mm256_fmadd_pd, with_avx2
 );
 vector_type!(
     Avx512x8, Avx512Mask, 8, 64, __m512d, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd,
-    _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd, _mm512_sqrt_pd, with_avx512
+    _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd, _mm512_sqrt_pd, _mm512_fmadd_pd, with_avx512
 );
 
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,8 @@
 //! Phase current sensors: gain, offset, noise, quantisation.
 
-use crate::scalar::{three, Scalar};
+use crate::scalar::Scalar;
 use crate::variables;
+use crate::three;
 
 variables! {
     /// The three phase current sensors and the acquisition filter.
@@ -39,8 +40,8 @@ impl<S: Scalar> CurrentSensor<S> {
         let resolution = if levels > 0.0 { S::splat(2.0) * g(P::FullScale) / S::splat(levels) } else { S::zero() };
         let quantised = S::zero().lt(resolution);
         Self {
-            gain: three(|j| raw[P::GainA as usize + j]),
-            offset: three(|j| raw[P::OffsetA as usize + j]),
+            gain: three!(|j| raw[P::GainA as usize + j]),
+            offset: three!(|j| raw[P::OffsetA as usize + j]),
             noise_deviation: g(P::NoiseDeviation),
             resolution,
             per_resolution: S::select(quantised, S::one() / S::select(quantised, resolution, S::one()), S::zero()),
@@ -52,7 +53,7 @@ impl<S: Scalar> CurrentSensor<S> {
     #[inline(always)]
     pub fn measure(&self, current: [S; 3], noise: [S; 3]) -> [S; 3] {
         let quantised = S::zero().lt(self.resolution);
-        three(|j| {
+        three!(|j| {
             let raw = self.gain[j] * current[j] + (self.offset[j] + self.noise_deviation * noise[j]);
             let steps = (raw.clamp_abs(self.full_scale) * self.per_resolution).round();
             S::select(quantised, steps * self.resolution, raw)

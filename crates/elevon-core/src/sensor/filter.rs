@@ -9,5 +9,5 @@ pub fn closing<S: Scalar>(cutoff_hz: S, dt: f64) -> S {
 
 #[inline(always)]
 pub fn low_pass<S: Scalar>(closing: S, filtered: S, input: S) -> S {
-    filtered + closing * (input - filtered)
+    closing.fma(input - filtered, filtered)
 }

@@ -139,6 +139,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
 
     /// Runs to the end or until interrupted.
     pub fn run(mut self, monitor: &Monitor) -> Vec<RunOutput> {
+        let began = Instant::now();
         let mut k: Steps = 0;
         let mut out = vec![S::zero(); W::signals().len()];
         loop {
@@ -157,13 +158,12 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
                 break;
             }
         }
+        self.wall = began.elapsed().as_secs_f64();
         self.finish(k, out)
     }
 
     fn advance(&mut self, from: Steps, count: Steps) {
-        let began = Instant::now();
         S::vectorize(Advance::<W, S> { structure: &self.structure, models: &self.models, inputs: &self.inputs, states: &mut self.states, from, count });
-        self.wall += began.elapsed().as_secs_f64();
     }
 
     /// Inputs and parameters that change at step `k`.

@@ -15,10 +15,11 @@ impl Width {
         #[cfg(target_arch = "x86_64")]
         {
             let wide = is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") && is_x86_feature_detected!("avx512vl");
-            if wide {
+            let fused = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
+            if wide && fused {
                 return Self::Avx512;
             }
-            if is_x86_feature_detected!("avx2") {
+            if fused {
                 return Self::Avx2;
             }
         }

@@ -58,6 +58,15 @@ impl<S: Scalar> Friction<S> {
         S::select(speed.equals(S::zero()), held, speed.signed(dynamic))
     }
 
+    /// Torque left to accelerate. `active` is what would move the shaft from rest, `resist` what opposes it when it moves
+    /// (loads, dynamic dry and viscous friction): two early sums, so that the motor torque enters last.
+    #[inline(always)]
+    pub fn net_torque(torque: S, load: S, resist: S, speed: S, static_limit: S) -> S {
+        let active = torque - load;
+        let from_rest = active - active.clamp_abs(static_limit);
+        S::select(speed.equals(S::zero()), from_rest, torque - resist)
+    }
+
     /// The new speed, stopped for one step where it would change sign.
     #[inline(always)]
     pub fn stop_at_reversal(old: S, new: S) -> S {

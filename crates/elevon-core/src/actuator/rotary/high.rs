@@ -12,9 +12,9 @@ use crate::control::current_dq::{CurrentControl, CurrentControlState, CurrentSam
 use crate::control::position_speed::{ControlParameter, ControlStructure, PositionSpeed, PositionSpeedState};
 use crate::fault::FaultKind;
 use crate::inverter::bridge::{quench, Bridge, BridgeState, InverterParameter, Windings};
-use crate::inverter::hysteresis::{relays, transitions};
+use crate::inverter::hysteresis::{count_transitions, relays};
 use crate::motor::star::{MotorParameter, MotorStructure, Star, StarState};
-use crate::scalar::{three, three_phase, Scalar};
+use crate::scalar::{three_phase, Scalar};
 use crate::sensor::current::{CurrentSensor, CurrentSensorParameter};
 use crate::sensor::encoder::Encoder;
 use crate::sensor::filter::{closing, low_pass};
@@ -24,6 +24,7 @@ use crate::transmission::friction::{Friction, FrictionParameter};
 use crate::transmission::gear::{Gear, GearParameter, LoadParameter};
 use crate::transmission::play::{Play, PlayParameter};
 use crate::variable::{Group, Signal};
+use crate::three;
 
 /// The rotary actuator at high fidelity.
 pub struct High;
@@ -70,7 +71,7 @@ pub struct Model<S> {
     pub(super) resolver: Resolver<S>,
     pub(super) filter: S,
     pub(super) inertia: S,
-    pub(super) per_inertia: S,
+    pub(super) dt_per_inertia: S,
     pub(super) user_inertia: S,
     pub(super) per_user_inertia: S,
     pub(super) noise_deviation: S,
@@ -141,6 +142,7 @@ impl Structure {
         let motor = MotorStructure {
             trapezoidal: choice(MotorParameter::EmfShape.at()) == 1,
             shorted_loop: choice(MotorParameter::ShortModel.at()) == 1,
+            static_eccentricity: departs(MotorParameter::EccentricityStatic.at(), 0.0),
             dynamic_eccentricity: departs(MotorParameter::EccentricityDynamic.at(), 0.0),
         };
         let open_phase = (MotorParameter::OpenA.at()..=MotorParameter::OpenC.at()).any(|i| departs(i, 0.0));
@@ -194,10 +196,10 @@ fn sample_steps(raw: &[f64], index: usize) -> Steps {
 pub(super) fn shaft_loads<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &State<S>, torque: S, t: S) -> ShaftLoads<S> {
     let brake = inputs[BRAKE].at(t).maximum(S::zero());
     let shaft = inputs[SHAFT].at(t);
-    let user_torque = inputs[USER].at(t) + m.gear.stiffness * (s.user_position - m.gear.spring_zero);
+    let user_torque = m.gear.stiffness.fma(s.user_position - m.gear.spring_zero, inputs[USER].at(t));
     let elastic = FULL && structure.elastic;
     let through = if elastic { contact_torque(m, s) } else { user_torque };
-    let load = shaft + through * m.gear.per_ratio;
+    let load = through.fma(m.gear.per_ratio, shaft);
     let own = if elastic { shaft } else { load };
     let mut added = brake;
     if FULL {
@@ -228,7 +230,10 @@ pub(super) struct Coupling<S> {
 #[inline(always)]
 pub(super) fn coupling<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &State<S>, sin: S, cos: S) -> Coupling<S> {
     let (mut shape, _) = three_phase(sin, cos);
-    let mut gap = m.star.static_gap(sin, cos);
+    let mut gap = [S::one(); 3];
+    if structure.motor.static_eccentricity {
+        gap = m.star.static_gap(sin, cos);
+    }
     let mut loop_k = [S::zero(); 3];
     if FULL {
         if structure.motor.trapezoidal {
@@ -236,9 +241,9 @@ pub(super) fn coupling<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &St
         }
         if structure.motor.dynamic_eccentricity {
             let turning = m.star.dynamic_gap(s.motor_position);
-            gap = three(|j| gap[j] * turning[j]);
+            gap = three!(|j| gap[j] * turning[j]);
         }
-        gap = three(|j| gap[j] * s.star.flux_factor);
+        gap = three!(|j| gap[j] * s.star.flux_factor);
         if structure.motor.shorted_loop {
             loop_k = m.star.loop_coefficients(shape, gap);
         }
@@ -312,10 +317,10 @@ fn step<S: Scalar, const FULL: bool, const PWM: bool>(m: &Model<S>, structure: &
     if PWM {
         s.legs = m.current_control.compare(&s.current_control, t);
     } else if !FULL || structure.drive == Drive::Hysteresis {
-        let error = three(|j| s.current_ref * sin_phases[j] - measured[j]);
+        let error = three!(|j| s.current_ref * sin_phases[j] - measured[j]);
         s.legs = relays(m.half_band, old_legs, error);
     }
-    s.transitions = s.transitions + transitions(old_legs, s.legs);
+    s.transitions = count_transitions(s.transitions, old_legs, s.legs);
 
     // Motor electromagnetics.
     let c = coupling::<S, FULL>(m, structure, s, sin, cos);
@@ -339,18 +344,19 @@ fn step<S: Scalar, const FULL: bool, const PWM: bool>(m: &Model<S>, structure: &
 fn electric_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &mut State<S>, c: &Coupling<S>, half_supply: S, old_legs: [S; 3]) -> ([S; 3], [S; 3]) {
     let speed = s.motor_speed;
     let i = s.star.current;
-    let mut emf: [S; 3] = three(|j| c.k[j] * speed);
+    let mut emf: [S; 3] = three!(|j| c.k[j] * speed);
     let mut resistance = m.star.resistance;
     if FULL {
-        resistance = three(|j| resistance[j] * s.star.resistance_factor);
+        resistance = three!(|j| resistance[j] * s.star.resistance_factor);
         if structure.motor.shorted_loop {
             let added = m.star.loop_emf(&s.star, c.loop_k, speed);
-            emf = three(|j| emf[j] + added[j]);
+            emf = three!(|j| emf[j] + added[j]);
         }
     }
-    let mut terminal = three(|j| s.legs[j] * half_supply);
+    let mut terminal = three!(|j| s.legs[j] * half_supply);
     let mut rail = terminal;
     let mut legs = None;
+    let drops = |terminal: &[S; 3]| three!(|j| (-resistance[j]).fma(i[j], terminal[j] - emf[j]));
     let neutral;
     if FULL && structure.bridge {
         let windings = Windings { current: i, emf, per_inductance: m.star.per_inductance, resistance, open: m.star.open };
@@ -358,23 +364,28 @@ fn electric_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structur
         let all = connection.connected[0] & connection.connected[1] & connection.connected[2];
         terminal = connection.voltage;
         rail = connection.rail;
-        let plain = m.star.neutral(three(|j| terminal[j] - emf[j] - resistance[j] * i[j]));
+        let plain = m.star.neutral(drops(&terminal));
         neutral = S::select(all, plain, v_n);
         // A floating phase shows its EMF over the neutral.
-        terminal = three(|j| S::select(connection.connected[j], terminal[j], neutral + emf[j]));
+        terminal = three!(|j| S::select(connection.connected[j], terminal[j], neutral + emf[j]));
         legs = Some(connection);
     } else {
-        neutral = m.star.neutral(three(|j| terminal[j] - emf[j] - resistance[j] * i[j]));
+        neutral = m.star.neutral(drops(&terminal));
     }
-    let voltage: [S; 3] = three(|j| terminal[j] - neutral);
-    let slope: [S; 3] = three(|j| (voltage[j] - emf[j] - resistance[j] * i[j]) * m.star.per_inductance[j]);
-    let mut current: [S; 3] = three(|j| i[j] + m.dt * slope[j]);
+    let voltage: [S; 3] = three!(|j| terminal[j] - neutral);
+    let drop = drops(&terminal);
+    let mut current = m.star.currents_after(i, drop, neutral);
     if FULL {
         s.voltage = voltage;
         if let Some(legs) = &legs {
             current = quench(legs, i, current);
         }
-        let loops = if structure.motor.shorted_loop { m.star.step_loops(&s.star, c.loop_k, speed, slope, m.dt) } else { s.star.loop_current };
+        let loops = if structure.motor.shorted_loop {
+            let slope = three!(|j| (drop[j] - neutral) * m.star.per_inductance[j]);
+            m.star.step_loops(&s.star, c.loop_k, speed, slope, m.dt)
+        } else {
+            s.star.loop_current
+        };
         if structure.accounts {
             account_electric(m, s, i, current, loops, rail, terminal, resistance);
         }
@@ -389,13 +400,13 @@ fn electric_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structur
 #[allow(clippy::too_many_arguments)]
 fn account_electric<S: Scalar>(m: &Model<S>, s: &mut State<S>, old: [S; 3], new: [S; 3], loops: [S; 3], rail: [S; 3], terminal: [S; 3], resistance: [S; 3]) {
     let half = S::splat(0.5);
-    let middle: [S; 3] = three(|j| half * (old[j] + new[j]));
+    let middle: [S; 3] = three!(|j| half * (old[j] + new[j]));
     for j in 0..3 {
         s.energy[E_SUPPLY] = s.energy[E_SUPPLY] + m.dt * rail[j] * middle[j];
         s.energy[E_INVERTER] = s.energy[E_INVERTER] + m.dt * (rail[j] - terminal[j]) * middle[j];
         s.energy[E_COPPER] = s.energy[E_COPPER] + m.dt * resistance[j] * middle[j] * middle[j];
     }
-    let middle_loops: [S; 3] = three(|j| half * (s.star.loop_current[j] + loops[j]));
+    let middle_loops: [S; 3] = three!(|j| half * (s.star.loop_current[j] + loops[j]));
     s.energy[E_COPPER] = s.energy[E_COPPER] + m.dt * m.star.loop_loss(&s.star, middle_loops);
 }
 
@@ -404,13 +415,14 @@ fn mechanical_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Struct
     let loads = shaft_loads::<S, FULL>(m, structure, inputs, s, torque, t);
     let speed = s.motor_speed;
     let viscous = if FULL { m.friction.viscous_torque(speed) } else { m.friction.viscous * speed };
-    let active = torque - loads.load;
-    let dry = Friction::dry_torque(active, speed, loads.static_limit, loads.dynamic);
-    let free = speed + m.dt * (m.per_inertia * (active - dry - viscous));
+    let resist = loads.load + speed.signed(loads.dynamic) + viscous;
+    let net = Friction::net_torque(torque, loads.load, resist, speed, loads.static_limit);
+    let free = m.dt_per_inertia.fma(net, speed);
     let new_speed = Friction::stop_at_reversal(speed, free);
-    let moved = s.motor_position + m.dt * if structure.semi_implicit { new_speed } else { speed };
+    let moved = m.dt.fma(if structure.semi_implicit { new_speed } else { speed }, s.motor_position);
     let (position, held_speed) = m.gear.stop(moved, new_speed);
     if FULL && structure.accounts {
+        let dry = Friction::dry_torque(torque - loads.load, speed, loads.static_limit, loads.dynamic);
         account_mechanical(m, s, &loads, speed, new_speed, held_speed, dry, viscous);
     }
     if FULL && structure.elastic {
@@ -458,15 +470,6 @@ fn account_mechanical<S: Scalar>(m: &Model<S>, s: &mut State<S>, loads: &ShaftLo
 
 #[inline(always)]
 fn steps<S: Scalar, const FULL: bool, const PWM: bool>(structure: &Structure, models: &[Model<S>], inputs: &[Inputs<S>], states: &mut [State<S>], from: Steps, count: Steps) {
-    if let ([model], [inputs], [state]) = (models, inputs, &mut *states) {
-        // One chunk: its state stays in registers as far as they go.
-        let mut s = *state;
-        for k in from..from + count {
-            step::<S, FULL, PWM>(model, structure, inputs, &mut s, S::splat(k as f64) * model.dt);
-        }
-        *state = s;
-        return;
-    }
     // Several chunks side by side hide each other's latencies.
     for k in from..from + count {
         for ((model, inputs), state) in models.iter().zip(inputs).zip(states.iter_mut()) {
@@ -532,7 +535,7 @@ impl Wiring for High {
         let inertia = if structure.elastic { rotor } else { rotor + user_inertia * gear.per_ratio * gear.per_ratio };
         Model {
             dt,
-            star: Star::derive(view.motor(), &structure.motor),
+            star: Star::derive(view.motor(), &structure.motor, dt),
             bridge: Bridge::derive(view.inverter(), dt0),
             half_band: at(InverterParameter::HysteresisBand.at()),
             supply_scale: at(InverterParameter::SupplyScale.at()),
@@ -546,7 +549,7 @@ impl Wiring for High {
             resolver: Resolver::derive(view.resolver()),
             filter: closing(at(CurrentSensorParameter::FilterCutoff.at()), dt0),
             inertia,
-            per_inertia: S::one() / inertia,
+            dt_per_inertia: dt / inertia,
             user_inertia: if structure.elastic { user_inertia } else { S::zero() },
             per_user_inertia: S::one() / S::select(S::zero().lt(user_inertia), user_inertia, S::one()),
             noise_deviation: at(ControlParameter::NoiseDeviation.at()),
@@ -560,7 +563,7 @@ impl Wiring for High {
         let motor_position = or(0, zero);
         let driver = motor_position * model.gear.per_ratio;
         let mut star = StarState::rest();
-        star.current = three(|j| or(4 + j, zero));
+        star.current = three!(|j| or(4 + j, zero));
         star.heat(Raw(raw).motor(), model.temperature);
         let user_position = model.play.drag(driver, or(2, driver));
         State {
@@ -598,7 +601,7 @@ impl Wiring for High {
     fn tick<S: Scalar>(kind: u8, structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &mut State<S>, t: S, noise: &mut dyn FnMut(u64) -> S) {
         match kind {
             TICK_COMMAND_NOISE => s.command_noise = m.noise_deviation * noise(0),
-            TICK_CURRENT_NOISE => s.current_noise = three(|j| noise(1 + j as u64)),
+            TICK_CURRENT_NOISE => s.current_noise = three!(|j| noise(1 + j as u64)),
             TICK_CONTROL => {
                 let reading = shaft_reading::<S, true>(m, structure, s);
                 control_step::<S, true>(m, structure, &inputs[COMMAND], s, &reading, t);

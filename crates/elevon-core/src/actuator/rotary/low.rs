@@ -10,7 +10,7 @@ use crate::fault::FaultKind;
 use crate::inverter::bridge::InverterParameter;
 use crate::motor::equivalent::{equivalent, imposed_shape, Circuit, LowParameter};
 use crate::motor::star::{MotorParameter, MotorStructure, Star};
-use crate::scalar::{three, three_phase, Scalar};
+use crate::scalar::{three_phase, Scalar};
 use crate::sensor::current::CurrentSensorParameter;
 use crate::sensor::encoder::Encoder;
 use crate::sensor::filter::{closing, low_pass};
@@ -20,6 +20,7 @@ use crate::transmission::friction::{Friction, FrictionParameter};
 use crate::transmission::gear::{Gear, GearParameter, LoadParameter};
 use crate::transmission::play::Play;
 use crate::variable::{Group, Signal};
+use crate::three;
 
 /// The rotary actuator at low fidelity.
 pub struct Low;
@@ -102,7 +103,7 @@ fn coefficients<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, co
     let mut gap = m.star.static_gap(sin, cos);
     if structure.dynamic_eccentricity {
         let turning = m.star.dynamic_gap(s.motor_position);
-        gap = three(|j| gap[j] * turning[j]);
+        gap = three!(|j| gap[j] * turning[j]);
     }
     let k = m.star.coefficients(shape, gap);
     let sines = if structure.resolver {
@@ -267,8 +268,8 @@ impl Wiring for Low {
         let gear = Gear::derive(view.gear(), view.stop(), view.load());
         let inertia = at(MotorParameter::Inertia.at()) + at(GearParameter::Inertia.at()) + at(LoadParameter::Inertia.at()) * gear.per_ratio * gear.per_ratio;
         // The reduced short: missing turns only; loop currents do not show in one phase.
-        let reduced = MotorStructure { trapezoidal: false, shorted_loop: false, dynamic_eccentricity: false };
-        let star = Star::derive(view.motor(), &reduced);
+        let reduced = MotorStructure { trapezoidal: false, shorted_loop: false, static_eccentricity: false, dynamic_eccentricity: false };
+        let star = Star::derive(view.motor(), &reduced, dt);
         let rise = at(MotorParameter::WindingTemperature.at()) - at(MotorParameter::ReferenceTemperature.at());
         let resistance_factor = one + at(MotorParameter::TemperatureCoefficient.at()) * rise;
         let flux_factor = one + at(MotorParameter::FluxTemperatureCoefficient.at()) * rise;
@@ -281,8 +282,8 @@ impl Wiring for Low {
         Model {
             dt,
             per_dt: one / dt,
-            resistance: three(|j| star.resistance[j] * resistance_factor),
-            inductance: three(|j| one / star.per_inductance[j]),
+            resistance: three!(|j| star.resistance[j] * resistance_factor),
+            inductance: three!(|j| one / star.per_inductance[j]),
             healthy_constant: S::splat(1.5) * at(MotorParameter::EmfConstant.at()) * at(MotorParameter::FluxFraction.at()) * flux_factor,
             healthy_resistance: at(MotorParameter::Resistance.at()) * resistance_factor,
             healthy_inductance: at(MotorParameter::Inductance.at()),

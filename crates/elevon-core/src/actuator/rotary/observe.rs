@@ -4,8 +4,9 @@ use super::high::*;
 use super::layout::*;
 use super::signals::HighSignal as Q;
 use crate::actuator::Inputs;
-use crate::scalar::{three, three_phase, Scalar};
+use crate::scalar::{three_phase, Scalar};
 use crate::transmission::friction::Friction;
+use crate::three;
 
 pub(super) fn high<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
     let mut set = |q: Q, x: S| out[q as usize] = x;
@@ -65,10 +66,10 @@ fn electrical<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>
 /// Phase-to-neutral voltages of an ideal bridge in its present switching state.
 fn ideal_voltage<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, supply: S, sin: S, cos: S) -> [S; 3] {
     let c = coupling::<S, true>(m, structure, s, sin, cos);
-    let terminal = three(|j| s.legs[j] * S::splat(0.5) * supply);
-    let drop: [S; 3] = three(|j| terminal[j] - c.k[j] * s.motor_speed - m.star.resistance[j] * s.star.resistance_factor * s.star.current[j]);
+    let terminal = three!(|j| s.legs[j] * S::splat(0.5) * supply);
+    let drop: [S; 3] = three!(|j| terminal[j] - c.k[j] * s.motor_speed - m.star.resistance[j] * s.star.resistance_factor * s.star.current[j]);
     let neutral = m.star.neutral(drop);
-    three(|j| terminal[j] - neutral)
+    three!(|j| terminal[j] - neutral)
 }
 
 fn mechanical<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
