@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import elevon
-from elevon.campaign import load_plan, load_run, read_manifest, resolve_plan
 from elevon.campaign import execute as execute_module
+from elevon.campaign import load_plan, load_run, read_manifest, resolve_plan
 from elevon.cli import main
 from elevon.errors import FormatError, InputError
 
@@ -199,7 +199,7 @@ def test_a_killed_batch_goes_on(write, tmp_path):
     command = [sys.executable, "-m", "elevon.cli", "batch", str(path), "--out", str(out)]
     for number, code in ((signal.SIGKILL, -9), (signal.SIGINT, 130)):
         before = len(list(out.glob("runs/*.parquet")))
-        process = subprocess.Popen(  # noqa: S603 - our own program
+        process = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=os.environ
         )
         for _ in range(400):

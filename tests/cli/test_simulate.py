@@ -178,7 +178,7 @@ def test_a_diverging_run_names_time_and_signal(elevon_cli, tmp_path):
 
 def start(*arguments, cwd):
     command = [sys.executable, "-m", "elevon.cli", *map(str, arguments)]
-    return subprocess.Popen(  # noqa: S603 - our own program
+    return subprocess.Popen(
         command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
 

@@ -20,7 +20,7 @@ SAYS = {
 
 @pytest.mark.parametrize("name", SAYS)
 def test_script(name, tmp_path):
-    done = subprocess.run(  # noqa: S603 - our own program
+    done = subprocess.run(
         [sys.executable, "-W", "error", EXAMPLES / name],
         cwd=tmp_path,
         env=os.environ,

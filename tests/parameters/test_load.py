@@ -121,7 +121,7 @@ def test_bad_headers(write, text, message):
 
 
 def test_bad_files(write, tmp_path):
-    with pytest.raises(FormatError, match="not valid TOML.*line 1"):
+    with pytest.raises(FormatError, match=r"not valid TOML.*line 1"):
         elevon.Actuator.load(write("name = \n"))
     binary = tmp_path / "binary.toml"
     binary.write_bytes(b"\xff\xfe")

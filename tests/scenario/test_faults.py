@@ -3,6 +3,7 @@
 import math
 import re
 import shlex
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -65,10 +66,8 @@ def test_text_and_object_are_the_same(severity, phase, profile):
 
 @given(st.text(max_size=40))
 def test_no_text_does_anything_but_read_or_refuse(text):
-    try:
+    with suppress(InputError):
         resolved(text)
-    except InputError as error:
-        assert str(error)
 
 
 REFUSED = {
@@ -133,7 +132,7 @@ def test_one_kind_may_have_two_units():
     ],
 )
 def test_contradictions(texts):
-    with pytest.raises(InputError, match="contradict|given twice"):
+    with pytest.raises(InputError, match=r"contradict|given twice"):
         check_together([Fault.parse(text) for text in texts])
 
 
