@@ -93,8 +93,9 @@ def torque_balance(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
     Returns
     -------
     Regression or None
-        Coefficients ``inertia``, ``viscous``, ``dry``, ``brake`` (with a load cell), ``offset``
-        (of the current), ``lag`` [s]; None without enough motion both ways.
+        Coefficients ``inertia``, ``viscous``, ``dry``, ``brake`` (with a load cell), ``cell`` (its
+        offset, where another log shows the friction alone), ``offset`` (of the current), ``lag``
+        [s]; None without enough motion both ways.
     """
     from scipy.optimize import minimize_scalar
 
@@ -106,8 +107,10 @@ def torque_balance(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
     masks = [_moving(logs[k], m, keeps[k]) for k, m in zip(chosen, motions, strict=True)]
     if sum(int(m.sum()) for m in masks) < 200 or not _both_ways(motions, masks):
         return None
-    raw = [_balance_columns(log, m, cell) for log, m in zip(used, motions, strict=True)]
-    names = ("inertia", "viscous", "dry", *(("brake",) if cell else ()), "offset")
+    both = cell and any(log.brake.known == "off" for log in used)
+    raw = [_balance_columns(log, m, cell, both) for log, m in zip(used, motions, strict=True)]
+    names = ("inertia", "viscous", "dry", *(("brake",) if cell else ()),
+             *(("cell",) if both else ()), "offset")  # fmt: skip
 
     def solve(lag: float) -> tuple[Floats, Floats, Floats, Floats]:
         rows = [_lagged(x, lag, log.period)[m] for x, log, m in zip(raw, used, masks, strict=True)]
@@ -282,12 +285,14 @@ def _both_ways(motions: Sequence[_Motion], masks: Sequence[Bools]) -> bool:
     return bool(min(np.mean(speed > 0.0), np.mean(speed < 0.0)) > 0.02)
 
 
-def _balance_columns(log: BenchLog, motion: _Motion, cell: bool) -> Floats:
+def _balance_columns(log: BenchLog, motion: _Motion, cell: bool, both: bool) -> Floats:
     sign = np.sign(motion.speed)
     columns = [motion.acceleration, motion.speed, sign]
     if cell:
         level = np.interp(log.time, log.brake.time, log.brake.level) if log.brake.measured else 0.0
         columns.append(sign * level)
+    if both:
+        columns.append(-sign * float(log.brake.measured))
     return np.column_stack((*columns, np.ones_like(sign)))
 
 

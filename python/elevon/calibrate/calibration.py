@@ -140,6 +140,7 @@ def calibrate(
     fidelity: str = "low",
     transient: float | None = None,
     hold_out: bool = True,
+    model_runs: bool = True,
     progress: Progress | None = None,
 ) -> Calibration:
     """Estimate what the logs determine.
@@ -159,6 +160,9 @@ def calibrate(
         limit for the first time.
     hold_out : bool
         Whether to refit without each log in turn (without the end of a single log).
+    model_runs : bool
+        Whether to rank and fit on model runs too: for what the regressions cannot see, and to name
+        what absorbs the model's misfit.
     progress : callable, optional
         Told the done fraction; returns False to stop.
 
@@ -194,9 +198,12 @@ def calibrate(
     commands = _commands(logs, actuator, found)
     _go(progress, 0.35)
     found = _asked(found, free, actuator)
-    dynamic = dynamic_stage(
-        logs, keeps, actuator, found, free, fidelity=fidelity, progress=part(progress, 0.35, 0.8)
-    )
+    dynamic = None
+    if model_runs or plant is None or law is None:
+        dynamic = dynamic_stage(
+            logs, keeps, actuator, found, free, fidelity=fidelity,
+            progress=part(progress, 0.35, 0.8),
+        )  # fmt: skip
     if dynamic is not None:
         found += dynamic.estimates(actuator, [item.path for item in found], free)
     _missing(free, found, torque)

@@ -143,7 +143,10 @@ def dynamic_stage(
         if not check():
             raise Interrupted("calibration stopped")
 
-    fit = fit_dynamic(problem, [chosen[k] for k in kept], x[kept], most=_MOST, advance=advance)
+    fit = fit_dynamic(
+        problem, [chosen[k] for k in kept], x[kept], most=_MOST,
+        finite=[part[:, :, kept] for part in jac], advance=advance,
+    )  # fmt: skip
     return Dynamic(
         ranking=ranking, fit=fit, drive=str(problem.actuator.parameters["drive.kind"].value),
         absorbed=_absorbed(fit, known), rms=_rms(problem, fit), runs=problem.runs,

@@ -101,6 +101,7 @@ def fit_dynamic(
     x0: Floats,
     *,
     most: int = 25,
+    finite: Sequence[Floats] | None = None,
     advance: Callable[[float], object] = lambda _f: None,
 ) -> DynamicFit:
     """Fit the free candidates from a start.
@@ -115,6 +116,8 @@ def fit_dynamic(
         Start.
     most : int
         Evaluations of the optimiser at most.
+    finite : sequence of ndarray, optional
+        Central differences at the start, one (n, 2, p) a log, where the caller has them.
     advance : callable
         Told the done fraction.
 
@@ -128,8 +131,9 @@ def fit_dynamic(
     low = np.array([_bound(item, item.low) for item in free])
     high = np.array([_bound(item, item.high) for item in free])
     start = np.clip(x0, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
-    start = _global_start(problem, free, start, low, high)
-    exact = _exact_columns(problem, free, start)
+    moved = _global_start(problem, free, start, low, high)
+    exact = _exact_columns(problem, free, moved, finite if moved is start else None)
+    start = moved
     calls = 0
 
     def residual(x: Floats) -> Floats:
@@ -200,14 +204,17 @@ def _global_start(
     return np.asarray(points[int(np.argmin(costs))], dtype=np.float64)
 
 
-def _exact_columns(problem: Problem, free: Sequence[Candidate], x: Floats) -> tuple[int, ...]:
+def _exact_columns(
+    problem: Problem, free: Sequence[Candidate], x: Floats, finite: Sequence[Floats] | None
+) -> tuple[int, ...]:
     """Candidates whose exact derivatives agree with differences over the switching instants."""
     if problem.fidelity != "low":
         return ()
     chosen = [k for k, item in enumerate(free) if item.kind == "parameter"]
     if not chosen:
         return ()
-    finite = problem.jacobian(free, x, step_sizes(free))
+    if finite is None:
+        finite = problem.jacobian(free, x, step_sizes(free))
     dual = _exact(problem, free, x, chosen)
     held = []
     for j, k in enumerate(chosen):

@@ -108,6 +108,10 @@ def plant_estimates(
     add("sensor.current_offset", "A", lambda b: float(b[offset]),
         "or a constant load: the current alone cannot tell them apart", given=(),
         register="sensor", in_set=False)  # fmt: skip
+    if "cell" in plant.names:
+        cell = plant.names.index("cell")
+        add("sensor.load_cell_offset", "N m", lambda b: scale(b) * float(b[cell]),
+            "of the brake torque the load cell shows", register="sensor", in_set=False)  # fmt: skip
     lag = len(plant.names) - 1
     add("sensor.current_lag", "s", lambda b: float(b[lag]),
         "of the logged current behind the motion", given=(), register="sensor", in_set=False)  # fmt: skip
