@@ -109,8 +109,14 @@ def torque_balance(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
         return None
     both = cell and any(log.brake.known == "off" for log in used)
     raw = [_balance_columns(log, m, cell, both) for log, m in zip(used, motions, strict=True)]
-    names = ("inertia", "viscous", "dry", *(("brake",) if cell else ()),
-             *(("cell",) if both else ()), "offset")  # fmt: skip
+    names = (
+        "inertia",
+        "viscous",
+        "dry",
+        *(("brake",) if cell else ()),
+        *(("cell",) if both else ()),
+        "offset",
+    )
 
     def solve(lag: float) -> tuple[Floats, Floats, Floats, Floats]:
         rows = [_lagged(x, lag, log.period)[m] for x, log, m in zip(raw, used, masks, strict=True)]
@@ -118,16 +124,18 @@ def torque_balance(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
         return _huber(np.vstack(rows), data)
 
     found = minimize_scalar(
-        lambda lag: _robust_cost(solve(lag)[1]), bounds=_LAGS, method="bounded",
+        lambda lag: _robust_cost(solve(lag)[1]),
+        bounds=_LAGS,
+        method="bounded",
         options={"xatol": 1e-5},
-    )  # fmt: skip
+    )
     lag = float(found.x)
     beta, rest, weight, design = solve(lag)
     slope = (solve(lag + 2e-4)[3] - solve(lag - 2e-4)[3]) @ beta / 4e-4
     times = [(log.time[m], log.period) for log, m in zip(used, masks, strict=True)]
     full = np.column_stack((design, slope))
     value = np.append(beta, lag)
-    return _answer((*names, "lag"), value, full, rest, weight, times)
+    return _answer((*names, "lag"), value, full, rest, weight, times=times)
 
 
 def controller_law(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regression | None:
@@ -157,14 +165,19 @@ def controller_law(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
     if sum(inside) < 200:
         return None
     present = [k for k, count in enumerate(inside) if count]
-    names = ("proportional", "integral", "derivative", "smoothing",
-             *(f"start[{k}]" for k in present))  # fmt: skip
+    names = (
+        "proportional",
+        "integral",
+        "derivative",
+        "smoothing",
+        *(f"start[{k}]" for k in present),
+    )
     design = np.vstack(rows)[:, [0, 1, 2, 3, *(4 + k for k in present)]]
     size = np.linalg.norm(design, axis=0)
     if not np.all(size > 0.0) or np.linalg.matrix_rank(design / size) < design.shape[1]:
         return None
     target = np.concatenate(data)
-    full = _answer(names, *_in_order(_huber(design, target)), times)
+    full = _answer(names, *_in_order(_huber(design, target)), times=times)
     rest = [0, 1, 2, *range(4, design.shape[1])]
     plain = _huber(design[:, rest], target)[0]
     gap = np.zeros(len(names))
@@ -195,6 +208,7 @@ def _answer(
     design: Floats,
     rest: Floats,
     weight: Floats,
+    *,
     times: Sequence[tuple[Floats, float]],
 ) -> Regression:
     scores, blocks, at = [], [], 0

@@ -28,8 +28,8 @@ class Brake:
     Attributes
     ----------
     known : str
-        ``torque``: level on the fast shaft [N m]; ``force``: level [N], arm unknown; ``on``: nothing
-        but that it acted; ``off``.
+        ``torque``: level on the fast shaft [N m]; ``force``: level [N], arm unknown; ``on``:
+        nothing but that it acted; ``off``.
     time, level : ndarray, shape (m,)
         Seconds from the log's first sample, and the size of the resistive torque or force.
     """
@@ -80,9 +80,7 @@ def brake_of(
     return off
 
 
-def _level(
-    at: Floats, value: Floats, time: Floats, speed: Floats
-) -> tuple[Floats, Floats] | None:
+def _level(at: Floats, value: Floats, time: Floats, speed: Floats) -> tuple[Floats, Floats] | None:
     """Size of a resistive torque, from samples where the shaft moves; (time, level)."""
     from scipy.ndimage import uniform_filter1d
 

@@ -106,16 +106,23 @@ class Calibration:
             "status": "ok",
             "actuator": self.before.name,
             "logs": [
-                {"name": log.name, "samples": len(log.time), "rate_hz": 1.0 / log.period,
-                 "brake": log.brake.known, "skipped_s": self.skipped[log.name],
-                 "warnings": list(log.warnings)}
+                {
+                    "name": log.name,
+                    "samples": len(log.time),
+                    "rate_hz": 1.0 / log.period,
+                    "brake": log.brake.known,
+                    "skipped_s": self.skipped[log.name],
+                    "warnings": list(log.warnings),
+                }
                 for log in self.logs
             ],
             "parameters": {i.path: i.to_dict() for i in self.estimates},
             "registers": {name: [i["path"] for i in items] for name, items in groups.items()},
             "torque_constant": {
-                "value": self.torque.constant, "from_load_cell": self.torque.measured,
-                "determined": "torque constant and inertia apart" if self.torque.measured
+                "value": self.torque.constant,
+                "from_load_cell": self.torque.measured,
+                "determined": "torque constant and inertia apart"
+                if self.torque.measured
                 else "only ratios to the torque constant",
             },
             "followed": dict(self.followed),
@@ -129,7 +136,7 @@ class Calibration:
             "held_out": [item.to_dict() for item in self.held_out],
             "findings": list(self.findings),
             "wall_s": self.wall_s,
-        }  # fmt: skip
+        }
 
 
 def calibrate(
@@ -189,7 +196,8 @@ def calibrate(
     plant, law = torque_balance(logs, keeps), controller_law(logs, keeps)
     _go(progress, 0.25)
     torque = torque_scale(actuator, plant)
-    found, followed = list(positions), {}
+    found = list(positions)
+    followed: dict[str, float] = {}
     if plant is not None:
         estimates, followed = plant_estimates(actuator, plant, torque)
         found += estimates
@@ -201,25 +209,40 @@ def calibrate(
     dynamic = None
     if model_runs or plant is None or law is None:
         dynamic = dynamic_stage(
-            logs, keeps, actuator, found, free, fidelity=fidelity,
+            logs,
+            keeps,
+            actuator,
+            found,
+            free,
+            fidelity=fidelity,
             progress=part(progress, 0.35, 0.8),
-        )  # fmt: skip
+        )
     if dynamic is not None:
         found += dynamic.estimates(actuator, [item.path for item in found], free)
     _missing(free, found, torque)
     fitted = _with_values(actuator, found, followed, torque, dynamic)
     kept = held_out(logs, keeps, actuator, fitted, part(progress, 0.8, 1.0)) if hold_out else ()
     findings = (
-        *plant_findings(logs, plant, torque, found, dynamic, actuator),
+        *plant_findings(logs, plant, torque, dynamic, actuator),
         *amplitude_findings(commands, found),
     )
     _go(progress, 1.0)
     return Calibration(
-        actuator=fitted, before=actuator, logs=tuple(logs), skipped=skipped,
-        estimates=tuple(found), followed=followed, torque=torque, plant=plant, law=law,
-        commands=tuple(commands), dynamic=dynamic, held_out=tuple(kept), findings=findings,
+        actuator=fitted,
+        before=actuator,
+        logs=tuple(logs),
+        skipped=skipped,
+        estimates=tuple(found),
+        followed=followed,
+        torque=torque,
+        plant=plant,
+        law=law,
+        commands=tuple(commands),
+        dynamic=dynamic,
+        held_out=tuple(kept),
+        findings=findings,
         wall_s=clock.perf_counter() - begin,
-    )  # fmt: skip
+    )
 
 
 def _check(
@@ -245,9 +268,7 @@ def _run_in(log: BenchLog, transient: float | None) -> float:
     """Seconds left out: until the set point has left its limit for the first time, 1 s at least."""
     if transient is not None:
         if not 0.0 <= transient < log.duration:
-            raise InputError(
-                f"transient of {transient:g} s: {log.name} lasts {log.duration:g} s"
-            )
+            raise InputError(f"transient of {transient:g} s: {log.name} lasts {log.duration:g} s")
         return transient
     limit = 0.999 * saturated_speed(log)
     held = np.abs(log.speed_ref) >= limit
@@ -271,8 +292,9 @@ def _commands(
     from elevon.calibrate.positions import gain_estimate
 
     value = actuator.parameters.value
-    limit = next((i.value for i in found if i.path == "control.speed_limit"),
-                 value("control.speed_limit"))  # fmt: skip
+    limit = next(
+        (i.value for i in found if i.path == "control.speed_limit"), value("control.speed_limit")
+    )
     gain = value("control.position_gain")
     fits = [fit for log in logs if (fit := command_fit(log, gain, limit)) is not None]
     pooled = gain_estimate(fits, gain)
@@ -281,9 +303,7 @@ def _commands(
     return fits
 
 
-def _asked(
-    found: list[Estimate], free: Sequence[str] | None, actuator: Actuator
-) -> list[Estimate]:
+def _asked(found: list[Estimate], free: Sequence[str] | None, actuator: Actuator) -> list[Estimate]:
     """Keep what was asked for, what no set holds, and only what a set can take."""
     kept = []
     for item in found:
@@ -291,7 +311,9 @@ def _asked(
             continue
         if item.in_set:
             record = record_of(actuator.wiring, item.path)
-            low = item.value < record.minimum or (record.minimum_open and item.value == record.minimum)
+            low = item.value < record.minimum or (
+                record.minimum_open and item.value == record.minimum
+            )
             if low or item.value > record.maximum or not np.isfinite(item.std):
                 continue
         kept.append(item)
@@ -315,9 +337,12 @@ def _missing(free: Sequence[str] | None, found: Sequence[Estimate], torque: Torq
 
 
 def _with_values(
-    actuator: Actuator, found: Sequence[Estimate], followed: Mapping[str, float], torque: Torque,
+    actuator: Actuator,
+    found: Sequence[Estimate],
+    followed: Mapping[str, float],
+    torque: Torque,
     dynamic: Dynamic | None,
-) -> Actuator:  # fmt: skip
+) -> Actuator:
     values: dict[str, str | float] = dict(followed)
     values |= {item.path: item.value for item in found if item.in_set}
     if torque.measured and torque.tied and "motor.emf_constant" in values:

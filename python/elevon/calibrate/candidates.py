@@ -100,12 +100,21 @@ def candidates(
     if not current > 0.0 or not speed > 0.0:
         raise InputError("the logs hold no motion and no current: nothing can be calibrated")
     found += [
-        Candidate("sensor.current_offset", "output", "sensor", "A", False, -current, current,
-                  0.01 * current),
-        Candidate("sensor.speed_offset", "output", "sensor", "rad/s", False, -speed, speed,
-                  0.01 * speed),
+        Candidate(
+            "sensor.current_offset",
+            "output",
+            "sensor",
+            "A",
+            False,
+            -current,
+            current,
+            0.01 * current,
+        ),
+        Candidate(
+            "sensor.speed_offset", "output", "sensor", "rad/s", False, -speed, speed, 0.01 * speed
+        ),
         Candidate("sensor.speed_delay", "output", "sensor", "s", False, -_DELAY, _DELAY, 1e-3),
-    ]  # fmt: skip
+    ]
     return found + _brakes(logs)
 
 
@@ -116,16 +125,26 @@ def _brakes(logs: Sequence[BenchLog]) -> list[Candidate]:
     if measured and any(log.brake.known == "off" for log in logs):
         top = max(float(log.brake.level.max()) for log in measured)
         found.append(
-            Candidate("sensor.load_cell_offset", "input", "sensor", "N m", False,
-                      -top, top, 0.01 * top)
-        )  # fmt: skip
+            Candidate(
+                "sensor.load_cell_offset", "input", "sensor", "N m", False, -top, top, 0.01 * top
+            )
+        )
     for k, log in enumerate(logs):
         if log.brake.known in {"on", "force"}:
             found += [
-                Candidate(f"load.brake[{log.name}][{j}]", "input", "load", "N m", False,
-                          0.0, 100.0, 0.1, (k, j))
+                Candidate(
+                    f"load.brake[{log.name}][{j}]",
+                    "input",
+                    "load",
+                    "N m",
+                    False,
+                    0.0,
+                    100.0,
+                    0.1,
+                    (k, j),
+                )
                 for j in range(_KNOTS)
-            ]  # fmt: skip
+            ]
     return found
 
 

@@ -123,7 +123,9 @@ def choose(
         if worst is None or not loose[worst] > _LOOSEST:
             break
         index = kept[worst]
-        dropped[free[index].path] = _reason([free[k] for k in kept], covariance, worst, loose[worst])
+        dropped[free[index].path] = _reason(
+            [free[k] for k in kept], covariance, worst, loose[worst]
+        )
         kept.remove(index)
     _refuse(free, kept, jac, residual, blocks)
     chosen = [free[k] for k in kept]

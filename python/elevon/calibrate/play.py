@@ -97,17 +97,27 @@ def fit_play(logs: Sequence[BenchLog], ratio: float, count: float) -> PlayFit | 
             parts.append(((p[2] * dragged + p[1] - p[3] * follows) - y)[keep])
         return np.concatenate(parts) / count
 
+    def jacobian(p: Floats) -> Floats:
+        return _jacobian(residual, p, scale)
+
     best = least_squares(
-        residual, [width, centre, 1.0, 0.0], x_scale=scale, diff_step=1e-3, loss="soft_l1",
-        f_scale=3.0, max_nfev=30, jac=lambda p: _jacobian(residual, p, scale),
-    )  # fmt: skip
+        residual,
+        [width, centre, 1.0, 0.0],
+        x_scale=scale,
+        loss="soft_l1",
+        f_scale=3.0,
+        max_nfev=30,
+        jac=jacobian,
+    )
     covariance, degrees = _covariance(best, used, keeps)
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     value = np.array(best.x)
     value[0] = abs(value[0])
     rms = count * float(np.sqrt(np.mean(residual(best.x) ** 2)))
     pairs = [(float(v), float(s)) for v, s in zip(value, std, strict=True)]
-    return PlayFit(pairs[0], pairs[1], pairs[2], pairs[3], degrees, rms, tuple(x.name for x in used))
+    return PlayFit(
+        pairs[0], pairs[1], pairs[2], pairs[3], degrees, rms, tuple(x.name for x in used)
+    )
 
 
 def _jacobian(residual: object, p: Floats, scale: Floats) -> Floats:

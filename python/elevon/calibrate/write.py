@@ -37,7 +37,9 @@ def calibrated_parameters(result: Calibration) -> list[Parameter]:
         unit = old.unit or _unit(wiring, path)
         if item is None:
             note = _followed(path)
-            changes.append(Parameter(path, entry.value, unit, source, note, "calibrated", old.value))
+            changes.append(
+                Parameter(path, entry.value, unit, source, note, "calibrated", old.value)
+            )
             continue
         given = f"; holds for {', '.join(item.given)} as given" if item.given else ""
         note = f"{item.note}{'; ' if item.note else ''}{100 * LEVEL:.0f} % interval{given}"
@@ -75,9 +77,7 @@ def _up(value: float) -> float:
     return float(f"{math.ceil(value / unit) * unit:.6g}")
 
 
-def set_text(
-    result: Calibration, *, name: str, base: str, validation: Validation | None
-) -> str:
+def set_text(result: Calibration, *, name: str, base: str, validation: Validation | None) -> str:
     """Return the TOML text of the calibrated set."""
     import tomlkit
 

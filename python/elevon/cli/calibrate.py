@@ -64,7 +64,10 @@ def one_each(
 
 
 def read(
-    logs: list[Path], loadcell: list[Path] | None, command: list[Path] | None, column_map: Path | None
+    logs: list[Path],
+    loadcell: list[Path] | None,
+    command: list[Path] | None,
+    column_map: Path | None,
 ) -> list[BenchLog]:
     """Import logs with their companions; warnings of the import go to stderr."""
     from elevon.calibrate.log import read_logs
@@ -113,9 +116,13 @@ def calibrate(
     data = read(logs, loadcell, command, column_map)
     with progress_bar("calibrating") as advance:
         result = run(
-            data, model, free=_paths(free), fidelity=fidelity, transient=transient,
+            data,
+            model,
+            free=_paths(free),
+            fidelity=fidelity,
+            transient=transient,
             progress=lambda f: advance(0.9 * f),
-        )  # fmt: skip
+        )
         before, after = _agreement(data, result, transient)
         advance(1.0)
     if out is not None:
@@ -175,9 +182,13 @@ def _provenance() -> dict[str, object]:
 
 
 def _print(
-    result: Calibration, before: Validation | None, after: Validation | None, out: Path | None,
-    *, as_json: bool,
-) -> None:  # fmt: skip
+    result: Calibration,
+    before: Validation | None,
+    after: Validation | None,
+    out: Path | None,
+    *,
+    as_json: bool,
+) -> None:
     if as_json:
         values = result.to_dict() | {
             "out": None if out is None else str(out),
@@ -189,10 +200,20 @@ def _print(
         print_json(values)
         return
     rows = [
-        (i.path, "" if i.old is None else f"{i.old:.5g}", f"{i.value:.5g}",
-         f"{i.interval[0]:.5g}", f"{i.interval[1]:.5g}", i.unit, i.register, ", ".join(i.given))
+        (
+            i.path,
+            "" if i.old is None else f"{i.old:.5g}",
+            f"{i.value:.5g}",
+            f"{i.interval[0]:.5g}",
+            f"{i.interval[1]:.5g}",
+            i.unit,
+            i.register,
+            ", ".join(i.given),
+        )
         for i in result.estimates
-    ]  # fmt: skip
-    print_table(("parameter", "before", "after", "low", "high", "unit", "register", "holds for"), rows)
+    ]
+    print_table(
+        ("parameter", "before", "after", "low", "high", "unit", "register", "holds for"), rows
+    )
     for text in result.findings:
         say(text)
