@@ -58,7 +58,10 @@ impl Range {
     pub fn contains(self, value: f64) -> bool {
         let (low, high, open) = self.bounds();
         let integral = !matches!(self, Self::Choice(_)) || value.fract() == 0.0;
-        value.is_finite() && integral && value <= high && if open { value > low } else { value >= low }
+        value.is_finite()
+            && integral
+            && value <= high
+            && if open { value > low } else { value >= low }
     }
 }
 
@@ -113,6 +116,77 @@ pub struct Signal {
     pub symbol: &'static str,
     pub unit: &'static str,
     pub text: &'static str,
+}
+
+/// What a form of a component changes in one of its records. Empty texts leave the record's.
+#[derive(Clone, Copy, Debug)]
+pub struct Relabel {
+    pub index: usize,
+    pub name: &'static str,
+    pub unit: &'static str,
+    pub text: &'static str,
+}
+
+/// A copy of a table of parameters with other names, units or texts.
+pub const fn relabelled<const N: usize>(table: &[Variable], changes: &[Relabel]) -> [Variable; N] {
+    let mut all = [table[0]; N];
+    let mut i = 0;
+    while i < N {
+        all[i] = table[i];
+        i += 1;
+    }
+    let mut i = 0;
+    while i < changes.len() {
+        let change = changes[i];
+        let old = all[change.index];
+        all[change.index] = Variable {
+            path: or(change.name, old.path),
+            unit: or(change.unit, old.unit),
+            text: or(change.text, old.text),
+            ..old
+        };
+        i += 1;
+    }
+    all
+}
+
+/// A copy of a table of signals with other names, units or texts, and further signals behind them.
+pub const fn extended<const N: usize>(
+    table: &[Signal],
+    changes: &[Relabel],
+    further: &[Signal],
+) -> [Signal; N] {
+    let mut all = [table[0]; N];
+    let mut i = 0;
+    while i < N {
+        all[i] = if i < table.len() {
+            table[i]
+        } else {
+            further[i - table.len()]
+        };
+        i += 1;
+    }
+    let mut i = 0;
+    while i < changes.len() {
+        let change = changes[i];
+        let old = all[change.index];
+        all[change.index] = Signal {
+            name: or(change.name, old.name),
+            unit: or(change.unit, old.unit),
+            text: or(change.text, old.text),
+            ..old
+        };
+        i += 1;
+    }
+    all
+}
+
+const fn or(given: &'static str, other: &'static str) -> &'static str {
+    if given.is_empty() {
+        other
+    } else {
+        given
+    }
 }
 
 /// Declares an enum of parameters and the table of their records, in one place.

@@ -13,7 +13,12 @@ const POLL: Duration = Duration::from_millis(100);
 
 /// Runs `work` on a thread of its own and reports its progress about ten times a second. A callback that returns
 /// False, or raises (Ctrl-C), stops the work; an exception goes on to the caller.
-fn polled<T: Send>(py: Python<'_>, total: u64, progress: Option<&Bound<'_, PyAny>>, work: impl FnOnce(&Monitor) -> T + Send) -> PyResult<T> {
+fn polled<T: Send>(
+    py: Python<'_>,
+    total: u64,
+    progress: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(&Monitor) -> T + Send,
+) -> PyResult<T> {
     let monitor = Monitor::default();
     let callback = progress.map(|p| p.clone().unbind());
     let (result, raised) = py.detach(|| {
@@ -21,7 +26,8 @@ fn polled<T: Send>(py: Python<'_>, total: u64, progress: Option<&Bound<'_, PyAny
             let (sender, receiver) = sync_channel(1);
             let watched = &monitor;
             scope.spawn(move || {
-                let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(watched)));
+                let outcome =
+                    std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(watched)));
                 // The receiver lives until the result has come: a failed send cannot happen.
                 let _ = sender.send(outcome);
             });
@@ -51,7 +57,9 @@ fn polled<T: Send>(py: Python<'_>, total: u64, progress: Option<&Bound<'_, PyAny
     }
     match result {
         Some(Ok(value)) => Ok(value),
-        _ => Err(PyRuntimeError::new_err("the core panicked; this is a defect of elevon")),
+        _ => Err(PyRuntimeError::new_err(
+            "the core panicked; this is a defect of elevon",
+        )),
     }
 }
 
@@ -60,7 +68,8 @@ fn report(py: Python<'_>, callback: Option<&Py<PyAny>>, fraction: f64) -> PyResu
     match callback {
         Some(callback) => {
             let answer = callback.call1(py, (fraction.min(1.0),))?;
-            Ok(!answer.bind(py).is_instance_of::<pyo3::types::PyBool>() || answer.extract::<bool>(py)?)
+            Ok(!answer.bind(py).is_instance_of::<pyo3::types::PyBool>()
+                || answer.extract::<bool>(py)?)
         }
         None => Ok(true),
     }
@@ -70,6 +79,9 @@ fn status(d: &Bound<'_, PyDict>, output: &RunOutput) -> PyResult<()> {
     let (name, message) = match &output.status {
         Status::Ok => ("ok", String::new()),
         Status::Tripped { time } => ("tripped", format!("the drive tripped at {time} s")),
+        Status::Overheated { time, temperature } => {
+            ("tripped", format!("the winding passed thermal.trip at {time} s, {temperature:.2} K: the drive opened its bridge"))
+        }
         Status::Diverged { time, signal } => {
             d.set_item("diverged_signal", *signal)?;
             ("diverged", format!("{signal} diverged at {time} s"))
@@ -81,7 +93,15 @@ fn status(d: &Bound<'_, PyDict>, output: &RunOutput) -> PyResult<()> {
 }
 
 /// A result as a dictionary. `width` numbers stand for each value (1, or 1 + derivatives).
-fn result<'py>(py: Python<'py>, dt: f64, clocks: &[Clock], names: &[String], signals: &[&'static str], width: usize, output: RunOutput) -> PyResult<Bound<'py, PyDict>> {
+fn result<'py>(
+    py: Python<'py>,
+    dt: f64,
+    clocks: &[Clock],
+    names: &[String],
+    signals: &[&'static str],
+    width: usize,
+    output: RunOutput,
+) -> PyResult<Bound<'py, PyDict>> {
     let d = PyDict::new(py);
     status(&d, &output)?;
     d.set_item("time", output.time)?;
@@ -93,12 +113,26 @@ fn result<'py>(py: Python<'py>, dt: f64, clocks: &[Clock], names: &[String], sig
     }
     d.set_item("final", last)?;
     let kept = PyDict::new(py);
-    for (((clock, name), values), columns) in clocks.iter().zip(names).zip(output.clocks).zip(output.columns) {
-        let rows = if columns == 0 { 0 } else { values.len() / columns };
-        let time: Vec<f64> = (0..rows).map(|i| (i as u64 * clock.period) as f64 * dt).collect();
+    for (((clock, name), values), columns) in clocks
+        .iter()
+        .zip(names)
+        .zip(output.clocks)
+        .zip(output.columns)
+    {
+        let rows = if columns == 0 {
+            0
+        } else {
+            values.len() / columns
+        };
+        let time: Vec<f64> = (0..rows)
+            .map(|i| (i as u64 * clock.period) as f64 * dt)
+            .collect();
         let entry = PyDict::new(py);
         entry.set_item("time", PyArray1::from_vec(py, time))?;
-        entry.set_item("values", PyArray1::from_vec(py, values).reshape([rows, columns])? as Bound<'py, PyArray2<f64>>)?;
+        entry.set_item(
+            "values",
+            PyArray1::from_vec(py, values).reshape([rows, columns])? as Bound<'py, PyArray2<f64>>,
+        )?;
         kept.set_item(name, entry)?;
     }
     d.set_item("clocks", kept)?;
@@ -106,22 +140,43 @@ fn result<'py>(py: Python<'py>, dt: f64, clocks: &[Clock], names: &[String], sig
 }
 
 fn read_runs(resolver: &Resolver, runs: &Bound<'_, PyList>) -> PyResult<Vec<RunSpec>> {
-    runs.iter().map(|r| resolver.run(&r.cast_into::<PyDict>()?)).collect()
+    runs.iter()
+        .map(|r| resolver.run(&r.cast_into::<PyDict>()?))
+        .collect()
 }
 
 /// Runs everything; the results stand in the order of the runs.
 #[pyfunction]
 #[pyo3(signature = (wiring, fidelity, runs, record, threads=0, lanes="auto", progress=None))]
 #[allow(clippy::too_many_arguments)]
-pub fn simulate<'py>(py: Python<'py>, wiring: &str, fidelity: &str, runs: &Bound<'py, PyList>, record: &Bound<'py, PyList>, threads: usize, lanes: &str, progress: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyList>> {
+pub fn simulate<'py>(
+    py: Python<'py>,
+    wiring: &str,
+    fidelity: &str,
+    runs: &Bound<'py, PyList>,
+    record: &Bound<'py, PyList>,
+    threads: usize,
+    lanes: &str,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyList>> {
     let resolver = Resolver::new(wiring, fidelity)?;
     let specs = read_runs(&resolver, runs)?;
     let (clocks, names) = resolver.clocks(record)?;
-    let width = Width::by_name(lanes).ok_or_else(|| bad(format!("lanes {lanes:?} are not known here, or this processor cannot run them")))?;
+    let width = Width::by_name(lanes).ok_or_else(|| {
+        bad(format!(
+            "lanes {lanes:?} are not known here, or this processor cannot run them"
+        ))
+    })?;
     let model = resolver.model;
     let steps: Vec<f64> = specs.iter().map(|r| model.step(&r.parameters)).collect();
-    let total = specs.iter().zip(&steps).map(|(r, dt)| (r.duration / dt).round() as u64).sum();
-    let outputs = polled(py, total, progress, |monitor| model.run_all(&specs, &clocks, threads, width, monitor))?;
+    let total = specs
+        .iter()
+        .zip(&steps)
+        .map(|(r, dt)| (r.duration / dt).round() as u64)
+        .sum();
+    let outputs = polled(py, total, progress, |monitor| {
+        model.run_all(&specs, &clocks, threads, width, monitor)
+    })?;
     let signals: Vec<&'static str> = model.signals().iter().map(|s| s.name).collect();
     let list = PyList::empty(py);
     for (output, dt) in outputs.into_iter().zip(steps) {
@@ -135,11 +190,23 @@ pub fn simulate<'py>(py: Python<'py>, wiring: &str, fidelity: &str, runs: &Bound
 #[pyfunction]
 #[pyo3(signature = (wiring, fidelity, run, record, parameters, faults, progress=None))]
 #[allow(clippy::too_many_arguments)]
-pub fn sensitivities<'py>(py: Python<'py>, wiring: &str, fidelity: &str, run: &Bound<'py, PyDict>, record: &Bound<'py, PyList>, parameters: Vec<String>, faults: Vec<usize>, progress: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyList>> {
+pub fn sensitivities<'py>(
+    py: Python<'py>,
+    wiring: &str,
+    fidelity: &str,
+    run: &Bound<'py, PyDict>,
+    record: &Bound<'py, PyList>,
+    parameters: Vec<String>,
+    faults: Vec<usize>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyList>> {
     let resolver = Resolver::new(wiring, fidelity)?;
     let spec = resolver.run(run)?;
     let (clocks, names) = resolver.clocks(record)?;
-    let wanted = parameters.iter().map(|p| resolver.parameter(p)).collect::<PyResult<Vec<_>>>()?;
+    let wanted = parameters
+        .iter()
+        .map(|p| resolver.parameter(p))
+        .collect::<PyResult<Vec<_>>>()?;
     if let Some(missing) = faults.iter().find(|&&f| f >= spec.faults.len()) {
         return Err(bad(format!("fault {missing} of {}", spec.faults.len())));
     }
@@ -148,8 +215,12 @@ pub fn sensitivities<'py>(py: Python<'py>, wiring: &str, fidelity: &str, run: &B
     let chosen = wanted.len() + faults.len();
     let passes = chosen.div_ceil(8) as u64;
     let total = (spec.duration / dt).round() as u64 * passes;
-    let outputs = polled(py, total, progress, |monitor| model.sensitivities(&spec, &wanted, &faults, &clocks, monitor))?;
-    let outputs = outputs.ok_or_else(|| bad("sensitivities need the low fidelity: relays have no useful derivative"))?;
+    let outputs = polled(py, total, progress, |monitor| {
+        model.sensitivities(&spec, &wanted, &faults, &clocks, monitor)
+    })?;
+    let outputs = outputs.ok_or_else(|| {
+        bad("sensitivities need the low fidelity: relays have no useful derivative")
+    })?;
     let signals: Vec<&'static str> = model.signals().iter().map(|s| s.name).collect();
     let list = PyList::empty(py);
     for (i, output) in outputs.into_iter().enumerate() {

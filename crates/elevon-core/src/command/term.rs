@@ -35,24 +35,75 @@ pub struct Oscillation {
     pub until: f64,
 }
 
+/// One cycle of a period sweep: a linear chirp from 1/T_k to 1/T_(k+1). Requiring the period at a cycle's start to be
+/// T_k = T_0 + q t_k gives T_k = T_0 rho^k in closed form (docs/theory/ballscrew.md, "Profiles").
+struct Cycle {
+    begin: f64,
+    period: f64,
+    length: f64,
+    sweep: f64,
+}
+
+impl Cycle {
+    /// The cycle at time `t` of a sweep with the parameters `p`.
+    fn find(p: &[f64], t: f64) -> Self {
+        let (first, slope) = (p[1], (p[2] - p[1]) / p[3]);
+        if slope == 0.0 {
+            let k = (t / first).floor();
+            return Self {
+                begin: k * first,
+                period: first,
+                length: first,
+                sweep: 0.0,
+            };
+        }
+        let rho = slope + (1.0 + slope * slope).sqrt();
+        let k = (libm::log(1.0 + slope * t / first) / libm::log(rho)).floor();
+        let power = libm::pow(rho, k);
+        let (period, length) = (first * power, (rho - 1.0) / slope * first * power);
+        let begin = first * (power - 1.0) / slope;
+        let sweep = std::f64::consts::PI * (1.0 / (rho * period) - 1.0 / period) / length;
+        Self {
+            begin,
+            period,
+            length,
+            sweep,
+        }
+    }
+}
+
 const NEVER: f64 = f64::INFINITY;
 
 impl Line {
     fn constant(value: f64, until: f64) -> Self {
-        Self { at: 0.0, value, slope: 0.0, until }
+        Self {
+            at: 0.0,
+            value,
+            slope: 0.0,
+            until,
+        }
     }
     /// Through two points, exact at the first.
     fn through(t0: f64, v0: f64, t1: f64, v1: f64) -> Self {
-        Self { at: t0, value: v0, slope: (v1 - v0) / (t1 - t0), until: t1 }
+        Self {
+            at: t0,
+            value: v0,
+            slope: (v1 - v0) / (t1 - t0),
+            until: t1,
+        }
     }
     fn shifted(self, offset: f64) -> Self {
-        Self { at: self.at + offset, until: self.until + offset, ..self }
+        Self {
+            at: self.at + offset,
+            until: self.until + offset,
+            ..self
+        }
     }
 }
 
 impl Term {
     pub fn oscillates(&self) -> bool {
-        self.enabled && matches!(self.wave, Wave::Sine | Wave::Chirp)
+        self.enabled && matches!(self.wave, Wave::Sine | Wave::Chirp | Wave::PeriodSweep)
     }
 
     /// The straight-line part at time `t` (for oscillating terms: the bias and the held values).
@@ -64,10 +115,16 @@ impl Term {
             Wave::Step if t < p[2] => Line::constant(p[0], p[2]),
             Wave::Step => Line::constant(p[1], NEVER),
             Wave::Ramp if t < p[2] => Line::constant(p[0], p[2]),
-            Wave::Ramp if t < p[3] => Line { at: p[2], value: p[0], slope: p[1], until: p[3] },
+            Wave::Ramp if t < p[3] => Line {
+                at: p[2],
+                value: p[0],
+                slope: p[1],
+                until: p[3],
+            },
             Wave::Ramp => Line::constant(p[0] + p[1] * (p[3] - p[2]), NEVER),
             Wave::Sine => self.sine_line(t),
             Wave::Chirp => self.chirp_line(t),
+            Wave::PeriodSweep => self.period_sweep_line(t),
             Wave::Triangle => self.triangle(t),
             Wave::Trapezoid => self.trapezoid(t),
             Wave::Rectangle => self.rectangle(t),
@@ -78,10 +135,24 @@ impl Term {
     /// The oscillating part at time `t`; zero amplitude while the term is held.
     pub fn oscillation(&self, t: f64) -> Oscillation {
         let p = &self.parameters;
-        let silent = |until| Oscillation { at: 0.0, amplitude: 0.0, phase: 0.0, rate: 0.0, sweep: 0.0, until };
+        let silent = |until| Oscillation {
+            at: 0.0,
+            amplitude: 0.0,
+            phase: 0.0,
+            rate: 0.0,
+            sweep: 0.0,
+            until,
+        };
         match self.wave {
             Wave::Sine if t < p[4] => silent(p[4]),
-            Wave::Sine if t < p[5] => Oscillation { at: p[4], amplitude: p[0], phase: p[2], rate: TAU * p[1], sweep: 0.0, until: p[5] },
+            Wave::Sine if t < p[5] => Oscillation {
+                at: p[4],
+                amplitude: p[0],
+                phase: p[2],
+                rate: TAU * p[1],
+                sweep: 0.0,
+                until: p[5],
+            },
             Wave::Chirp if t < p[6] => silent(p[6]),
             Wave::Chirp => {
                 let (cycle, repeat) = (((t - p[6]) / p[3]).floor(), p[7] != 0.0);
@@ -90,9 +161,50 @@ impl Term {
                 }
                 let at = p[6] + cycle * p[3];
                 let sweep = std::f64::consts::PI * (p[2] - p[1]) / p[3];
-                Oscillation { at, amplitude: p[0], phase: p[4], rate: TAU * p[1], sweep, until: at + p[3] }
+                Oscillation {
+                    at,
+                    amplitude: p[0],
+                    phase: p[4],
+                    rate: TAU * p[1],
+                    sweep,
+                    until: at + p[3],
+                }
+            }
+            Wave::PeriodSweep if t < p[5] => silent(p[5]),
+            Wave::PeriodSweep => {
+                let sweep = ((t - p[5]) / p[3]).floor();
+                if sweep >= 1.0 && p[6] == 0.0 {
+                    return silent(NEVER);
+                }
+                let origin = p[5] + sweep * p[3];
+                let cycle = Cycle::find(p, t - origin);
+                let until = (origin + cycle.begin + cycle.length).min(origin + p[3]);
+                Oscillation {
+                    at: origin + cycle.begin,
+                    amplitude: p[0],
+                    phase: 0.0,
+                    rate: TAU / cycle.period,
+                    sweep: cycle.sweep,
+                    until,
+                }
             }
             _ => silent(NEVER),
+        }
+    }
+
+    fn period_sweep_line(&self, t: f64) -> Line {
+        let p = &self.parameters;
+        if t < p[5] {
+            Line::constant(p[4], p[5])
+        } else if p[6] == 0.0 && t >= p[5] + p[3] {
+            let cycle = Cycle::find(p, p[3]);
+            let tau = p[3] - cycle.begin;
+            Line::constant(
+                p[4] + p[0] * libm::sin((cycle.sweep * tau + TAU / cycle.period) * tau),
+                NEVER,
+            )
+        } else {
+            Line::constant(p[4], self.oscillation(t).until)
         }
     }
 
@@ -135,7 +247,12 @@ impl Term {
             let until = if t < start { start } else { NEVER };
             return Line::constant(bias + slope * (time - at), until);
         }
-        Line { at, value: bias, slope, until: (at + 0.25 / frequency).min(end) }
+        Line {
+            at,
+            value: bias,
+            slope,
+            until: (at + 0.25 / frequency).min(end),
+        }
     }
 
     fn trapezoid(&self, t: f64) -> Line {
@@ -145,7 +262,11 @@ impl Term {
             return Line::constant(low, start);
         }
         let period = p[2] + p[3] + p[4] + p[5];
-        let cycle = if repeat { ((t - start) / period).floor() } else { 0.0 };
+        let cycle = if repeat {
+            ((t - start) / period).floor()
+        } else {
+            0.0
+        };
         let origin = start + cycle * period;
         let (t1, t2) = (p[2], p[2] + p[3]);
         let (t3, t4) = (t2 + p[4], period);
@@ -173,14 +294,29 @@ impl Term {
     }
 
     fn table(&self, t: f64) -> Line {
-        let (start, repeat, gain) = (self.parameters[0], self.parameters[1] != 0.0, self.parameters[2]);
+        let (start, repeat, gain) = (
+            self.parameters[0],
+            self.parameters[1] != 0.0,
+            self.parameters[2],
+        );
         let (times, values) = (&self.times, &self.values);
         let last = times.len() - 1;
         let period = times[last] - times[0];
-        let cycle = if repeat && period > 0.0 { ((t - start - times[0]) / period).floor().max(0.0) } else { 0.0 };
+        let cycle = if repeat && period > 0.0 {
+            ((t - start - times[0]) / period).floor().max(0.0)
+        } else {
+            0.0
+        };
         let origin = start + cycle * period;
         let tau = t - origin;
-        let scaled = |line: Line| Line { value: gain * line.value, slope: gain * line.slope, ..line }.shifted(origin);
+        let scaled = |line: Line| {
+            Line {
+                value: gain * line.value,
+                slope: gain * line.slope,
+                ..line
+            }
+            .shifted(origin)
+        };
         if tau < times[0] {
             return scaled(Line::constant(values[0], times[0]));
         }
@@ -188,6 +324,11 @@ impl Term {
         if next > last {
             return scaled(Line::constant(values[last], NEVER));
         }
-        scaled(Line::through(times[next - 1], values[next - 1], times[next], values[next]))
+        scaled(Line::through(
+            times[next - 1],
+            values[next - 1],
+            times[next],
+            values[next],
+        ))
     }
 }

@@ -25,20 +25,46 @@ pub enum Wave {
     Ramp,
     Sine,
     Chirp,
+    PeriodSweep,
     Triangle,
     Trapezoid,
     Rectangle,
     Table,
 }
 
-const fn p(name: &'static str, unit: &'static str, default: Option<f64>, text: &'static str) -> WaveParameter {
-    WaveParameter { name, unit, default, text }
+const fn p(
+    name: &'static str,
+    unit: &'static str,
+    default: Option<f64>,
+    text: &'static str,
+) -> WaveParameter {
+    WaveParameter {
+        name,
+        unit,
+        default,
+        text,
+    }
 }
 
-const START: WaveParameter = p("start", "s", Some(0.0), "before it the term holds its starting value");
-const END: WaveParameter = p("end", "s", Some(f64::INFINITY), "after it the term holds the value it had then");
+const START: WaveParameter = p(
+    "start",
+    "s",
+    Some(0.0),
+    "before it the term holds its starting value",
+);
+const END: WaveParameter = p(
+    "end",
+    "s",
+    Some(f64::INFINITY),
+    "after it the term holds the value it had then",
+);
 const BIAS: WaveParameter = p("bias", "", Some(0.0), "mean value");
-const REPEAT: WaveParameter = p("repeat", "1", Some(1.0), "1: starts again after its last point, 0: holds its last value");
+const REPEAT: WaveParameter = p(
+    "repeat",
+    "1",
+    Some(1.0),
+    "1: starts again after its last point, 0: holds its last value",
+);
 
 /// Every waveform.
 pub fn catalogue() -> &'static [WaveRecord] {
@@ -72,6 +98,20 @@ pub fn catalogue() -> &'static [WaveRecord] {
                 p("end_frequency", "Hz", None, "frequency at the end of the sweep"),
                 p("sweep_time", "s", None, "duration of the sweep"),
                 p("phase", "rad", Some(0.0), "phase at the start of the sweep"),
+                BIAS,
+                START,
+                p("repeat", "1", Some(0.0), "1: sweeps again from the start, 0: holds its last value"),
+            ],
+        },
+        WaveRecord {
+            wave: Wave::PeriodSweep,
+            kind: "period_sweep",
+            text: "one sine cycle after another whose period runs linearly from the first to the last one during the sweep; position and speed are continuous",
+            parameters: &[
+                p("amplitude", "", None, "peak value"),
+                p("start_period", "s", None, "period at the start of the sweep"),
+                p("end_period", "s", None, "period at the end of the sweep"),
+                p("sweep_time", "s", None, "duration of the sweep"),
                 BIAS,
                 START,
                 p("repeat", "1", Some(0.0), "1: sweeps again from the start, 0: holds its last value"),

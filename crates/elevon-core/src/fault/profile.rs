@@ -6,12 +6,28 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub enum Profile {
     Constant,
-    Step { time: f64 },
-    Ramp { start: f64, end: f64 },
+    Step {
+        time: f64,
+    },
+    Ramp {
+        start: f64,
+        end: f64,
+    },
     /// Grows as exp(t / tau) from nothing at `start` to the whole severity at `end`.
-    Exponential { start: f64, end: f64, time_constant: f64 },
-    Intermittent { start: f64, period: f64, duty: f64 },
-    Table { times: Arc<[f64]>, values: Arc<[f64]> },
+    Exponential {
+        start: f64,
+        end: f64,
+        time_constant: f64,
+    },
+    Intermittent {
+        start: f64,
+        period: f64,
+        duty: f64,
+    },
+    Table {
+        times: Arc<[f64]>,
+        values: Arc<[f64]>,
+    },
 }
 
 /// A kind of profile and its parameters (name, unit, default, text).
@@ -25,20 +41,57 @@ pub struct ProfileRecord {
 /// Every profile.
 pub fn profiles() -> &'static [ProfileRecord] {
     &[
-        ProfileRecord { kind: "constant", text: "the severity, always", parameters: &[] },
-        ProfileRecord { kind: "step", text: "nothing, then the severity from a time on", parameters: &[("time", "s", None, "time of the step")] },
-        ProfileRecord { kind: "ramp", text: "grows linearly from nothing to the severity", parameters: &[("start", "s", Some(0.0), "begin of the growth"), ("end", "s", None, "end of the growth")] },
+        ProfileRecord {
+            kind: "constant",
+            text: "the severity, always",
+            parameters: &[],
+        },
+        ProfileRecord {
+            kind: "step",
+            text: "nothing, then the severity from a time on",
+            parameters: &[("time", "s", None, "time of the step")],
+        },
+        ProfileRecord {
+            kind: "ramp",
+            text: "grows linearly from nothing to the severity",
+            parameters: &[
+                ("start", "s", Some(0.0), "begin of the growth"),
+                ("end", "s", None, "end of the growth"),
+            ],
+        },
         ProfileRecord {
             kind: "exponential",
             text: "grows exponentially from nothing to the severity",
-            parameters: &[("start", "s", Some(0.0), "begin of the growth"), ("end", "s", None, "time at which the severity is reached"), ("time_constant", "s", None, "time in which the growth rate becomes e-fold")],
+            parameters: &[
+                ("start", "s", Some(0.0), "begin of the growth"),
+                ("end", "s", None, "time at which the severity is reached"),
+                (
+                    "time_constant",
+                    "s",
+                    None,
+                    "time in which the growth rate becomes e-fold",
+                ),
+            ],
         },
         ProfileRecord {
             kind: "intermittent",
             text: "the severity during the duty part of each period",
-            parameters: &[("start", "s", Some(0.0), "begin of the first period"), ("period", "s", None, "period"), ("duty", "1", Some(0.5), "part of the period with the fault present")],
+            parameters: &[
+                ("start", "s", Some(0.0), "begin of the first period"),
+                ("period", "s", None, "period"),
+                (
+                    "duty",
+                    "1",
+                    Some(0.5),
+                    "part of the period with the fault present",
+                ),
+            ],
         },
-        ProfileRecord { kind: "table", text: "fractions of the severity at times, linear between; needs times and values", parameters: &[] },
+        ProfileRecord {
+            kind: "table",
+            text: "fractions of the severity at times, linear between; needs times and values",
+            parameters: &[],
+        },
     ]
 }
 
@@ -49,9 +102,19 @@ impl Profile {
             ("constant", []) => Self::Constant,
             ("step", &[time]) => Self::Step { time },
             ("ramp", &[start, end]) => Self::Ramp { start, end },
-            ("exponential", &[start, end, time_constant]) => Self::Exponential { start, end, time_constant },
-            ("intermittent", &[start, period, duty]) => Self::Intermittent { start, period, duty },
-            ("table", []) if times.len() == values.len() && !times.is_empty() => Self::Table { times, values },
+            ("exponential", &[start, end, time_constant]) => Self::Exponential {
+                start,
+                end,
+                time_constant,
+            },
+            ("intermittent", &[start, period, duty]) => Self::Intermittent {
+                start,
+                period,
+                duty,
+            },
+            ("table", []) if times.len() == values.len() && !times.is_empty() => {
+                Self::Table { times, values }
+            }
             _ => return None,
         })
     }
@@ -63,14 +126,26 @@ impl Profile {
             Self::Constant => (1.0, never),
             &Self::Step { time } if t < time => (0.0, time),
             Self::Step { .. } => (1.0, never),
-            &Self::Ramp { start, .. } | &Self::Exponential { start, .. } if t < start => (0.0, start),
+            &Self::Ramp { start, .. } | &Self::Exponential { start, .. } if t < start => {
+                (0.0, start)
+            }
             &Self::Ramp { end, .. } | &Self::Exponential { end, .. } if t >= end => (1.0, never),
             &Self::Ramp { start, end } => ((t - start) / (end - start), t),
-            &Self::Exponential { start, end, time_constant } => {
-                (libm::expm1((t - start) / time_constant) / libm::expm1((end - start) / time_constant), t)
-            }
+            &Self::Exponential {
+                start,
+                end,
+                time_constant,
+            } => (
+                libm::expm1((t - start) / time_constant)
+                    / libm::expm1((end - start) / time_constant),
+                t,
+            ),
             &Self::Intermittent { start, .. } if t < start => (0.0, start),
-            &Self::Intermittent { start, period, duty } => {
+            &Self::Intermittent {
+                start,
+                period,
+                duty,
+            } => {
                 let origin = start + ((t - start) / period).floor() * period;
                 let off = origin + duty * period;
                 if t < off {
@@ -80,9 +155,18 @@ impl Profile {
                 }
             }
             Self::Table { times, values } => {
-                let term = Term { wave: crate::command::Wave::Table, enabled: true, parameters: vec![0.0, 0.0, 1.0], times: times.clone(), values: values.clone() };
+                let term = Term {
+                    wave: crate::command::Wave::Table,
+                    enabled: true,
+                    parameters: vec![0.0, 0.0, 1.0],
+                    times: times.clone(),
+                    values: values.clone(),
+                };
                 let line = term.line(t);
-                (line.value + line.slope * (t - line.at), if line.slope == 0.0 { line.until } else { t })
+                (
+                    line.value + line.slope * (t - line.at),
+                    if line.slope == 0.0 { line.until } else { t },
+                )
             }
         }
     }

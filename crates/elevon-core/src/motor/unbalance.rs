@@ -29,7 +29,12 @@ impl<S: Scalar> Unbalance<S> {
         use UnbalanceParameter as P;
         let g = |p: P| raw[p as usize];
         let (_, level) = g(P::Tilt).sin_cos();
-        Self { inertia: g(P::Inertia), weight: g(P::Inertia) * g(P::Radius) * S::splat(GRAVITY) * level, phase: g(P::Phase), gap_share: g(P::GapShare) }
+        Self {
+            inertia: g(P::Inertia),
+            weight: g(P::Inertia) * g(P::Radius) * S::splat(GRAVITY) * level,
+            phase: g(P::Phase),
+            gap_share: g(P::GapShare),
+        }
     }
 
     /// Gravity torque on the shaft.

@@ -33,7 +33,11 @@ unsafe fn signs_avx2(quarters: __m256i) -> (Avx2Mask, __m256d, __m256d) {
     let sin_sign = _mm256_and_si256(_mm256_slli_epi64::<62>(quarters), sign);
     // cos changes sign with quarters + 1: the second bit of the sum is the exclusive or of the two low bits.
     let cos_sign = _mm256_xor_si256(sin_sign, odd);
-    (Avx2Mask(_mm256_castsi256_pd(odd)), _mm256_castsi256_pd(sin_sign), _mm256_castsi256_pd(cos_sign))
+    (
+        Avx2Mask(_mm256_castsi256_pd(odd)),
+        _mm256_castsi256_pd(sin_sign),
+        _mm256_castsi256_pd(cos_sign),
+    )
 }
 
 /// As `signs_avx2`.
@@ -46,7 +50,11 @@ unsafe fn signs_avx512(quarters: __m512i) -> (Avx512Mask, __m512d, __m512d) {
     let odd = _mm512_slli_epi64::<63>(quarters);
     let sin_sign = _mm512_and_si512(_mm512_slli_epi64::<62>(quarters), sign);
     let cos_sign = _mm512_xor_si512(sin_sign, odd);
-    (Avx512Mask(_mm512_movepi64_mask(odd)), _mm512_castsi512_pd(sin_sign), _mm512_castsi512_pd(cos_sign))
+    (
+        Avx512Mask(_mm512_movepi64_mask(odd)),
+        _mm512_castsi512_pd(sin_sign),
+        _mm512_castsi512_pd(cos_sign),
+    )
 }
 
 macro_rules! vector_type {
@@ -170,7 +178,9 @@ macro_rules! vector_type {
             #[inline(always)]
             fn quarters(self) -> (Self, $integers) {
                 let shifted = self + Self::splat(ROUNDER);
-                (shifted - Self::splat(ROUNDER), unsafe { $to_bits(shifted.0) })
+                (shifted - Self::splat(ROUNDER), unsafe {
+                    $to_bits(shifted.0)
+                })
             }
             #[inline(always)]
             fn turn(sin: Self, cos: Self, quarters: $integers) -> (Self, Self) {
@@ -187,14 +197,46 @@ macro_rules! vector_type {
 }
 
 vector_type!(
-    Avx2x4, Avx2Mask, 4, 32, __m256d, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd,
-    _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd, _mm256_sqrt_pd, _mm256_fmadd_pd, with_avx2,
-    __m256i, _mm256_castpd_si256, signs_avx2, _mm256_xor_pd
+    Avx2x4,
+    Avx2Mask,
+    4,
+    32,
+    __m256d,
+    _mm256_add_pd,
+    _mm256_sub_pd,
+    _mm256_mul_pd,
+    _mm256_div_pd,
+    _mm256_set1_pd,
+    _mm256_loadu_pd,
+    _mm256_storeu_pd,
+    _mm256_sqrt_pd,
+    _mm256_fmadd_pd,
+    with_avx2,
+    __m256i,
+    _mm256_castpd_si256,
+    signs_avx2,
+    _mm256_xor_pd
 );
 vector_type!(
-    Avx512x8, Avx512Mask, 8, 64, __m512d, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd,
-    _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd, _mm512_sqrt_pd, _mm512_fmadd_pd, with_avx512,
-    __m512i, _mm512_castpd_si512, signs_avx512, _mm512_xor_pd
+    Avx512x8,
+    Avx512Mask,
+    8,
+    64,
+    __m512d,
+    _mm512_add_pd,
+    _mm512_sub_pd,
+    _mm512_mul_pd,
+    _mm512_div_pd,
+    _mm512_set1_pd,
+    _mm512_loadu_pd,
+    _mm512_storeu_pd,
+    _mm512_sqrt_pd,
+    _mm512_fmadd_pd,
+    with_avx512,
+    __m512i,
+    _mm512_castpd_si512,
+    signs_avx512,
+    _mm512_xor_pd
 );
 
 #[derive(Clone, Copy, Debug)]

@@ -1,0 +1,707 @@
+//! Low fidelity: one equivalent phase (reference sheet 1.9). Same blocks, same parameters where shared; PID
+//! without anti-windup and derivative filter, linear viscous friction; Borello friction and play kept.
+
+use super::form::Form;
+use super::layout::*;
+use super::model::network;
+use super::observe::low_screw;
+use super::signals::{LowSignal as Q, LOW};
+use crate::actuator::{Finding, Inputs, Overheat, Port, Setup, Tick, Watch, Wiring};
+use crate::control::current_dq::PwmParameter;
+use crate::control::position_speed::{ControlParameter, Mode};
+use crate::fault::FaultKind;
+use crate::inverter::bridge::InverterParameter;
+use crate::motor::equivalent::{equivalent, imposed_shape, Circuit, LowParameter};
+use crate::motor::star::{MotorParameter, MotorStructure, Star, StarState};
+use crate::motor::thermal::{Network, NetworkState, ThermalParameter};
+use crate::motor::unbalance::{Unbalance, UnbalanceParameter};
+use crate::scalar::{three_phase, Scalar};
+use crate::sensor::current::CurrentSensorParameter;
+use crate::sensor::encoder::Encoder;
+use crate::sensor::filter::{closing, low_pass};
+use crate::sensor::resolver::{Resolver, ResolverParameter};
+use crate::three;
+use crate::time::Steps;
+use crate::transmission::friction::{Friction, FrictionParameter};
+use crate::transmission::gear::{Gear, GearParameter, LoadParameter};
+use crate::transmission::play::Play;
+use crate::transmission::screw::Screw;
+use crate::variable::{Group, Signal};
+use std::marker::PhantomData;
+
+/// A servo at low fidelity.
+pub struct Low<F>(PhantomData<F>);
+
+const TICK_THERMAL: u8 = 0;
+const TICK_DEBRIS: u8 = 1;
+
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Structure {
+    mode: Mode,
+    feedback: u8,
+    /// 0 hysteresis, 1 PWM, 2 off.
+    drive: u8,
+    integral: bool,
+    resolver: bool,
+    /// The resolver commutates, too.
+    commutated: bool,
+    /// Coefficients vary with the rotor angle.
+    angle: bool,
+    feedforward: bool,
+    linear: bool,
+    load_side: bool,
+    heat: bool,
+    unbalance: bool,
+    spall: bool,
+    debris: bool,
+    dynamic_eccentricity: bool,
+    loaded: bool,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Model<S> {
+    dt: S,
+    per_dt: S,
+    star: Star<S>,
+    resistance: [S; 3],
+    inductance: [S; 3],
+    healthy_constant: S,
+    healthy_resistance: S,
+    healthy_inductance: S,
+    voltage_ratio: S,
+    band: S,
+    tracking: S,
+    supply_scale: S,
+    tripped: S,
+    position_gain: S,
+    feedforward: S,
+    speed_gain: S,
+    integral_step: S,
+    derivative_inertia: S,
+    speed_limit: S,
+    torque_limit: S,
+    per_torque_constant: S,
+    friction: Friction<S>,
+    gear: Gear<S>,
+    play: Play<S>,
+    encoder: Encoder<S>,
+    resolver: Resolver<S>,
+    filter: S,
+    inertia: S,
+    per_inertia: S,
+    temperature: S,
+    screw: Screw<S>,
+    unbalance: Unbalance<S>,
+    network: Network<S>,
+    load_friction: S,
+    load_viscous: S,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct State<S> {
+    resistance_factor: S,
+    flux_factor: S,
+    network: NetworkState<S>,
+    scatter: S,
+    /// Command of the last step; NaN before the first.
+    command: S,
+    copper: S,
+    current: S,
+    voltage: S,
+    integral: S,
+    speed_ref: S,
+    torque_ref: S,
+    motor_torque: S,
+    friction_torque: S,
+    motor_position: S,
+    motor_speed: S,
+    user_position: S,
+    held_angle: S,
+    jam_side: S,
+    jammed: S,
+    filtered: [S; 2],
+    tripped: S,
+}
+
+/// Torque constant, resistance and inductance of the equivalent phase at the present angle.
+#[inline(always)]
+fn coefficients<S: Scalar>(
+    m: &Model<S>,
+    structure: &Structure,
+    s: &State<S>,
+    commutation: S,
+) -> (S, S, S) {
+    if !structure.angle {
+        return (
+            m.healthy_constant * s.flux_factor,
+            m.healthy_resistance * s.resistance_factor,
+            m.healthy_inductance,
+        );
+    }
+    let (sin, cos) = m.star.electrical_angle(s.motor_position).sin_cos();
+    let (shape, _) = three_phase(sin, cos);
+    let mut gap = m.star.static_gap(sin, cos);
+    if structure.dynamic_eccentricity {
+        let turning = m.star.dynamic_gap(s.motor_position);
+        gap = three!(|j| gap[j] * turning[j]);
+    }
+    let k = m.star.coefficients(shape, gap);
+    let sines = if structure.resolver && structure.commutated {
+        let (sin, cos) = m.star.electrical_angle(commutation).sin_cos();
+        three_phase(sin, cos).0
+    } else {
+        shape
+    };
+    let resistance = three!(|j| m.resistance[j] * s.resistance_factor);
+    let e = equivalent(
+        k,
+        resistance,
+        m.inductance,
+        imposed_shape(sines, m.star.open),
+    );
+    (
+        e.torque_constant * s.flux_factor,
+        e.resistance,
+        e.inductance,
+    )
+}
+
+#[inline(always)]
+fn step<S: Scalar>(
+    m: &Model<S>,
+    structure: &Structure,
+    inputs: &Inputs<S>,
+    s: &mut State<S>,
+    t: S,
+) {
+    let zero = S::zero();
+    let speed = s.motor_speed;
+    // Sensors.
+    let (mut angle, mut shown_speed, mut shown_position) =
+        (s.motor_position, speed, s.motor_position);
+    if structure.resolver {
+        let reading = m.resolver.read(s.motor_position, speed, &mut s.held_angle);
+        (angle, shown_speed, shown_position) = (reading.angle, reading.speed, reading.position);
+    }
+    let position = match structure.feedback {
+        0 => s.user_position,
+        1 => m.encoder.read(s.user_position),
+        _ => shown_position * m.gear.per_ratio,
+    };
+
+    // Control electronics: P and PID; the derivative of the measured speed is solved with the acceleration.
+    let command = inputs[COMMAND].at(t);
+    let demanded = match structure.mode {
+        Mode::Position if structure.feedforward => {
+            let moved = command - s.command;
+            s.command = command;
+            let ahead = S::select(moved.equals(moved), m.feedforward * moved, zero);
+            m.position_gain * (command - position) + ahead
+        }
+        Mode::Position => m.position_gain * (command - position),
+        _ => command,
+    };
+    let speed_ref = demanded.clamp_abs(m.speed_limit);
+    let error = speed_ref - shown_speed;
+    let slope = (speed_ref - s.speed_ref) * m.per_dt;
+    let torque_mode = structure.mode == Mode::Torque;
+    let derivative_inertia = if torque_mode {
+        zero
+    } else {
+        m.derivative_inertia
+    };
+    let demand = if torque_mode {
+        command
+    } else {
+        m.speed_gain * error + s.integral + derivative_inertia * slope
+    };
+
+    // Loads.
+    let brake = inputs[BRAKE].at(t).maximum(zero);
+    let user_torque =
+        inputs[USER].at(t) + m.gear.stiffness * (s.user_position - m.gear.spring_zero);
+    let mut load = inputs[SHAFT].at(t) + user_torque * m.gear.per_ratio;
+    let (k_t, resistance, inductance) = coefficients(m, structure, s, angle);
+    let efficacy = k_t * m.per_torque_constant;
+    let resistive = if structure.linear {
+        (brake + m.load_friction) * m.gear.per_ratio
+    } else {
+        brake
+    };
+    let mut added = resistive + s.jammed * m.friction.jam_torque;
+    let mut viscous = m.friction.viscous * speed;
+    if structure.load_side {
+        viscous = viscous + m.load_viscous * speed;
+        if !structure.linear {
+            added = added + m.load_friction * m.gear.per_ratio;
+        }
+    }
+    if structure.spall {
+        let (torque, friction) = m.screw.spall(
+            s.motor_position,
+            user_torque,
+            s.motor_position * m.gear.per_ratio,
+        );
+        load = load - torque;
+        added = added + friction;
+    }
+    if structure.unbalance {
+        load = load - m.unbalance.torque(s.motor_position);
+    }
+    if structure.loaded {
+        let start = (efficacy * demand - load).sign();
+        let direction = S::select(speed.equals(zero), start, speed.sign());
+        added = added + m.gear.load_friction(user_torque, direction);
+    }
+    let (mut static_limit, mut dynamic) =
+        (m.friction.static_limit + added, m.friction.dynamic + added);
+    if structure.debris {
+        (static_limit, dynamic) = (static_limit * s.scatter, dynamic * s.scatter);
+    }
+    let wanted = efficacy * demand - load;
+    let acceleration =
+        (wanted - Friction::dry_torque(wanted, speed, static_limit, dynamic) - viscous)
+            / (m.inertia + efficacy * derivative_inertia);
+    s.torque_ref = (demand - derivative_inertia * acceleration).clamp_abs(m.torque_limit);
+    s.speed_ref = speed_ref;
+    if structure.integral {
+        s.integral = s.integral + m.integral_step * error;
+    }
+
+    // Equivalent phase.
+    let emf = S::splat(2.0 / 3.0) * k_t * speed;
+    let current_ref = s.torque_ref * m.per_torque_constant;
+    let circuit = Circuit::new(resistance, inductance, m.dt);
+    let target = match structure.drive {
+        // The relays act only at the edges of their band; inside it the EMF drives the current.
+        0 => circuit
+            .current(s.current, -emf)
+            .clamp(current_ref - m.band, current_ref + m.band),
+        1 => s.current + m.tracking * (current_ref - s.current),
+        _ => zero,
+    };
+    let driving = circuit.voltage(s.current, target);
+    let supply = inputs[SUPPLY].at(t) * m.supply_scale;
+    let cross = m.star.pole_pairs * speed * m.healthy_inductance * s.current;
+    let largest = m.voltage_ratio * supply;
+    let limit = (largest * largest - cross * cross).maximum(zero).sqrt();
+    s.voltage = (driving + emf).clamp_abs(limit);
+    s.tripped = s.tripped.maximum(m.tripped);
+    let live = S::one() - s.tripped;
+    let reached = circuit.current(s.current, s.voltage - emf) * live;
+    let before = s.current;
+    s.current = if structure.drive == 2 { zero } else { reached };
+    if structure.heat {
+        // Sum of R_j i_j^2 of the three phases, at the step's middle.
+        let middle = S::splat(0.5) * (before + s.current);
+        let heat = S::splat(1.5) * resistance * middle * middle * m.dt;
+        s.network.collected[0] = s.network.collected[0] + heat;
+        s.copper = s.copper + heat;
+    }
+
+    // Motor and transmission dynamics.
+    s.motor_torque = m.star.saturate(k_t * s.current);
+    let active = s.motor_torque - load;
+    let dry = Friction::dry_torque(active, speed, static_limit, dynamic);
+    s.friction_torque = dry + viscous;
+    let free = speed + m.dt * (m.per_inertia * (active - dry - viscous));
+    let new_speed = Friction::stop_at_reversal(speed, free);
+    let (position, held) = m.gear.stop(s.motor_position + m.dt * new_speed, new_speed);
+    s.motor_position = position;
+    s.motor_speed = held;
+    s.user_position = m.play.drag(position * m.gear.per_ratio, s.user_position);
+    let passed = ((s.user_position - m.friction.jam_position) * s.jam_side).le(zero);
+    s.jammed = S::select(
+        passed | S::splat(0.5).lt(m.friction.jam_anywhere),
+        S::one(),
+        s.jammed,
+    );
+
+    // Acquisition.
+    s.filtered[0] = low_pass(m.filter, s.filtered[0], s.current);
+    s.filtered[1] = low_pass(m.filter, s.filtered[1], s.voltage);
+}
+
+impl<F: Form> Wiring for Low<F> {
+    type Structure = Structure;
+    type Model<S: Scalar> = Model<S>;
+    type State<S: Scalar> = State<S>;
+
+    const PORTS: &'static [Port] = F::PORTS;
+    const INITIAL: &'static [&'static str] = &["motor_position", "motor_speed", "user_position"];
+
+    fn groups() -> &'static [Group] {
+        F::GROUPS
+    }
+    fn signals() -> &'static [Signal] {
+        F::LOW
+    }
+    fn faults() -> Vec<FaultKind> {
+        F::faults().into_iter().filter(|f| f.low).collect()
+    }
+    fn step(raw: &[f64]) -> f64 {
+        raw[LowParameter::Step.at()]
+    }
+    fn fault_grid(raw: &[f64]) -> f64 {
+        raw[SolverParameter::FaultGrid.at()].max(raw[LowParameter::Step.at()])
+    }
+
+    fn structure(setup: &Setup) -> Structure {
+        let raw = setup.raw;
+        let departs = |i: usize, healthy: f64| setup.departs(i, healthy);
+        let feedback = raw[ControlParameter::PositionFeedback.at()] as u8;
+        let first = ResolverParameter::Mismatch.at();
+        let resolver = !Resolver::<f64>::ideal(Raw(raw).resolver())
+            || (0..5).any(|i| setup.touched[first + i]);
+        let phases = MotorParameter::TurnsA.at()..=MotorParameter::TurnsC.at();
+        let opens = MotorParameter::OpenA.at()..=MotorParameter::OpenC.at();
+        let unbalance = departs(UnbalanceParameter::Inertia.at(), 0.0);
+        let dynamic_eccentricity =
+            unbalance || departs(MotorParameter::EccentricityDynamic.at(), 0.0);
+        let commutated = raw[DriveParameter::CommutationSource.at()] == 0.0;
+        let (spall, debris) = F::worn(&departs);
+        let mut turns = phases.map(|i| departs(i, 1.0));
+        Structure {
+            mode: crate::control::position_speed::ControlStructure::read(Raw(raw).control()).mode,
+            feedback,
+            drive: raw[DriveParameter::Kind.at()] as u8,
+            integral: raw[ControlParameter::IntegralTime.at()] > 0.0,
+            resolver,
+            commutated,
+            feedforward: raw[ControlParameter::SpeedFeedforward.at()] != 0.0,
+            linear: F::LINEAR,
+            load_side: F::LINEAR
+                || departs(LoadParameter::Damping.at(), 0.0)
+                || departs(LoadParameter::Friction.at(), 0.0),
+            heat: raw[ThermalParameter::Model.at()] != 0.0,
+            unbalance,
+            spall,
+            debris,
+            angle: (resolver && commutated)
+                || dynamic_eccentricity
+                || turns.any(|x| x)
+                || opens.clone().any(|i| departs(i, 0.0))
+                || departs(MotorParameter::EccentricityStatic.at(), 0.0),
+            dynamic_eccentricity,
+            loaded: F::LINEAR
+                || departs(GearParameter::Efficiency.at(), 1.0)
+                || departs(GearParameter::EfficiencyAiding.at(), 1.0),
+        }
+    }
+
+    fn ticks(raw: &[f64], structure: &Structure) -> Vec<Tick> {
+        let period =
+            |seconds: f64| ((seconds / raw[LowParameter::Step.at()]).round() as Steps).max(1);
+        let mut ticks = Vec::new();
+        if structure.heat {
+            ticks.push(Tick {
+                period: period(raw[ThermalParameter::SampleTime.at()]),
+                kind: TICK_THERMAL,
+            });
+        }
+        if structure.debris {
+            ticks.push(Tick {
+                period: period(raw[ControlParameter::SampleTime.at()]),
+                kind: TICK_DEBRIS,
+            });
+        }
+        ticks
+    }
+    fn check(raw: &[f64]) -> Vec<Finding> {
+        super::checks::low::<F>(raw)
+    }
+
+    fn check_faulted(raw: &[f64]) -> Vec<Finding> {
+        super::checks::faulted::<F>(raw)
+    }
+
+    fn derive<S: Scalar>(raw: &[S], _structure: &Structure) -> Model<S> {
+        let view = Raw(raw);
+        let at = |i: usize| raw[i];
+        let one = S::one();
+        let dt = at(LowParameter::Step.at());
+        let (screw, ratio) = (F::screw(raw), F::ratio(raw));
+        let gear = Gear::derive(
+            ratio,
+            view.gear(),
+            view.stop(),
+            view.load(),
+            [screw.efficiency, screw.efficiency_aiding],
+        );
+        let unbalance = Unbalance::derive(view.unbalance());
+        let rotor = at(MotorParameter::Inertia.at())
+            + at(GearParameter::Inertia.at())
+            + (F::screw_inertia(raw) + unbalance.inertia);
+        let inertia = rotor + at(LoadParameter::Inertia.at()) * gear.per_ratio * gear.per_ratio;
+        let mut friction = Friction::derive(view.friction());
+        friction.preloaded(
+            screw.preload_torque,
+            screw.viscous,
+            at(FrictionParameter::Static.at()),
+            at(FrictionParameter::Dynamic.at()),
+        );
+        // The reduced short: missing turns only; loop currents do not show in one phase.
+        let reduced = MotorStructure {
+            trapezoidal: false,
+            shorted_loop: false,
+            static_eccentricity: false,
+            dynamic_eccentricity: false,
+        };
+        let mut star = Star::derive(view.motor(), &reduced, dt);
+        star.lean(unbalance.eccentricity(inertia));
+        let gain = at(ControlParameter::SpeedGain.at()) * at(ControlParameter::SpeedGainScale.at());
+        let ti = at(ControlParameter::IntegralTime.at());
+        let has_integral = S::zero().lt(ti);
+        let drive = at(DriveParameter::Kind.at()).lane(0);
+        let first_shorted = InverterParameter::ShortedAHigh.at();
+        let shorted = (0..6).fold(S::zero(), |sum, i| sum + at(first_shorted + i));
+        Model {
+            dt,
+            per_dt: one / dt,
+            resistance: star.resistance,
+            inductance: three!(|j| one / star.per_inductance[j]),
+            healthy_constant: S::splat(1.5)
+                * at(MotorParameter::EmfConstant.at())
+                * at(MotorParameter::FluxFraction.at()),
+            healthy_resistance: at(MotorParameter::Resistance.at()),
+            healthy_inductance: at(MotorParameter::Inductance.at()),
+            star,
+            voltage_ratio: at(LowParameter::VoltageRatio.at()),
+            band: at(LowParameter::BandRatio.at()) * at(InverterParameter::HysteresisBand.at()),
+            tracking: if drive == 1.0 {
+                one - (-(at(PwmParameter::ProportionalGain.at())
+                    / at(MotorParameter::Inductance.at())
+                    * dt))
+                    .exp()
+            } else {
+                one
+            },
+            supply_scale: at(InverterParameter::SupplyScale.at()),
+            tripped: S::indicator(S::splat(0.5).lt(shorted)),
+            position_gain: at(ControlParameter::PositionGain.at())
+                * at(ControlParameter::PositionGainScale.at()),
+            feedforward: at(ControlParameter::SpeedFeedforward.at()) * ratio / dt,
+            speed_gain: gain,
+            integral_step: S::select(
+                has_integral,
+                gain / S::select(has_integral, ti, one) * dt,
+                S::zero(),
+            ),
+            derivative_inertia: gain * at(ControlParameter::DerivativeTime.at()),
+            speed_limit: at(ControlParameter::SpeedLimit.at()),
+            torque_limit: at(ControlParameter::TorqueConstant.at())
+                * at(ControlParameter::CurrentLimit.at()),
+            per_torque_constant: one / at(ControlParameter::TorqueConstant.at()),
+            friction,
+            load_friction: at(LoadParameter::Friction.at()),
+            load_viscous: at(LoadParameter::Damping.at()) * gear.per_ratio * gear.per_ratio,
+            gear,
+            play: Play::derive(view.play()),
+            encoder: Encoder::derive(
+                view.encoder(),
+                if F::LINEAR {
+                    1.0
+                } else {
+                    std::f64::consts::TAU
+                },
+            ),
+            resolver: Resolver::derive(view.resolver()),
+            filter: closing(at(CurrentSensorParameter::FilterCutoff.at()), dt.lane(0)),
+            inertia,
+            per_inertia: one / inertia,
+            temperature: at(MotorParameter::WindingTemperature.at()),
+            screw,
+            unbalance,
+            network: network(raw, dt.lane(0)),
+        }
+    }
+
+    fn start<S: Scalar>(m: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
+        let or = |i: usize, other: S| S::select(initial[i].equals(initial[i]), initial[i], other);
+        let zero = S::zero();
+        let motor_position = or(0, zero);
+        let driver = motor_position * m.gear.per_ratio;
+        let user_position = m.play.drag(driver, or(2, driver));
+        let warm = m.network.start(m.temperature, m.temperature);
+        let (resistance_factor, flux_factor) = heat(raw, &warm);
+        State {
+            resistance_factor,
+            flux_factor,
+            network: warm,
+            scatter: S::one(),
+            command: S::splat(f64::NAN),
+            copper: zero,
+            current: zero,
+            voltage: zero,
+            integral: zero,
+            speed_ref: zero,
+            torque_ref: zero,
+            motor_torque: zero,
+            friction_torque: zero,
+            motor_position,
+            motor_speed: or(1, zero),
+            user_position,
+            held_angle: motor_position,
+            jam_side: (user_position - m.friction.jam_position).sign(),
+            jammed: S::indicator(S::splat(0.5).lt(m.friction.jam_anywhere)),
+            filtered: [zero; 2],
+            tripped: zero,
+        }
+    }
+
+    fn refresh<S: Scalar>(raw: &[S], s: &mut State<S>) {
+        (s.resistance_factor, s.flux_factor) = heat(raw, &s.network);
+        let side = (s.user_position - raw[FrictionParameter::JamPosition.at()]).sign();
+        let unset = s.jam_side.equals(S::zero()) & s.jammed.equals(S::zero());
+        s.jam_side = S::select(unset, side, s.jam_side);
+    }
+
+    fn tick<S: Scalar>(
+        kind: u8,
+        _structure: &Structure,
+        m: &Model<S>,
+        _inputs: &Inputs<S>,
+        s: &mut State<S>,
+        _t: S,
+        noise: &mut dyn FnMut(u64) -> S,
+    ) {
+        if kind == TICK_THERMAL {
+            m.network.tick(&mut s.network);
+            (s.resistance_factor, s.flux_factor) = m.network.factors(&s.network);
+        } else {
+            s.scatter = m.screw.scatter.fma(noise(4), S::one()).maximum(S::zero());
+        }
+    }
+
+    #[inline(always)]
+    fn advance<S: Scalar>(
+        structure: &Structure,
+        models: &[Model<S>],
+        inputs: &[Inputs<S>],
+        states: &mut [State<S>],
+        from: Steps,
+        count: Steps,
+    ) {
+        for k in from..from + count {
+            for ((m, inputs), s) in models.iter().zip(inputs).zip(states.iter_mut()) {
+                step(m, structure, inputs, s, S::splat(k as f64) * m.dt);
+            }
+        }
+    }
+
+    fn observe<S: Scalar>(
+        structure: &Structure,
+        m: &Model<S>,
+        inputs: &Inputs<S>,
+        s: &State<S>,
+        t: S,
+        out: &mut [S],
+    ) {
+        let lag = s.motor_position * m.gear.per_ratio - s.user_position;
+        let pushing =
+            (m.play.half * S::splat(1.0 - 1e-9)).le(lag.abs()) & S::zero().le(lag * s.motor_speed);
+        let mut held = s.held_angle;
+        let reading = m.resolver.read(s.motor_position, s.motor_speed, &mut held);
+        let user_torque =
+            inputs[USER].at(t) + m.gear.stiffness * (s.user_position - m.gear.spring_zero);
+        let mut set = |q: Q, x: S| out[q as usize] = x;
+        set(Q::Command, inputs[COMMAND].at(t));
+        set(Q::UserPosition, s.user_position);
+        set(
+            Q::UserSpeed,
+            S::select(pushing, s.motor_speed * m.gear.per_ratio, S::zero()),
+        );
+        set(Q::MotorPosition, s.motor_position);
+        set(Q::MotorSpeed, s.motor_speed);
+        set(Q::SpeedRef, s.speed_ref);
+        set(Q::TorqueRef, s.torque_ref);
+        set(Q::CurrentRef, s.torque_ref * m.per_torque_constant);
+        set(Q::CurrentQ, s.current);
+        set(Q::CurrentQMeas, s.filtered[0]);
+        set(Q::VoltageQRef, s.voltage);
+        set(Q::VoltageQMeas, s.filtered[1]);
+        set(Q::MotorTorque, s.motor_torque);
+        set(Q::FrictionTorque, s.friction_torque);
+        set(Q::BrakeTorque, inputs[BRAKE].at(t).maximum(S::zero()));
+        set(
+            Q::LoadTorque,
+            inputs[SHAFT].at(t) + user_torque * m.gear.per_ratio,
+        );
+        set(Q::SupplyVoltage, inputs[SUPPLY].at(t) * m.supply_scale);
+        set(
+            Q::WindingTemperature,
+            if structure.heat {
+                s.network.winding
+            } else {
+                m.temperature
+            },
+        );
+        set(Q::SurfaceTemperature, s.network.surface);
+        set(Q::HeatCopper, s.network.power[0]);
+        set(Q::HeatAir, s.network.power[2]);
+        set(Q::ThermalWarning, m.network.warns(&s.network));
+        let limited = m.speed_limit.le(s.speed_ref.abs()) | m.torque_limit.le(s.torque_ref.abs());
+        set(Q::Limited, S::indicator(limited));
+        set(Q::EnergyCopper, s.copper);
+        set(Q::EnergyHeatStored, m.network.stored(&s.network));
+        set(Q::EnergyAir, s.network.heat_out);
+        set(Q::EncoderPosition, m.encoder.read(s.user_position));
+        set(Q::ResolverPosition, reading.position);
+        set(Q::ResolverSpeed, reading.speed);
+        set(Q::Tripped, s.tripped);
+        if F::LINEAR {
+            let efficiency = [m.screw.efficiency, m.screw.efficiency_aiding];
+            out[LOW.len()..].copy_from_slice(&low_screw(
+                m.gear.per_ratio,
+                s.motor_position,
+                s.motor_speed,
+                user_torque,
+                efficiency,
+                s.current,
+                s.voltage,
+            ));
+        }
+    }
+
+    fn watch<S: Scalar>(s: &State<S>) -> Vec<Watch<S>> {
+        vec![
+            Watch {
+                name: "motor_speed",
+                value: s.motor_speed,
+                limit: 1e6,
+            },
+            Watch {
+                name: "current_q",
+                value: s.current,
+                limit: 1e7,
+            },
+            Watch {
+                name: "user_position",
+                value: s.user_position,
+                limit: 1e9,
+            },
+        ]
+    }
+    fn tripped<S: Scalar>(s: &State<S>) -> S {
+        s.tripped
+    }
+    fn overheated<S: Scalar>(s: &State<S>) -> Option<Overheat<S>> {
+        Some(Overheat {
+            over: s.network.over,
+            temperature: s.network.winding,
+        })
+    }
+}
+
+/// Factors of the winding's resistance and of the flux.
+fn heat<S: Scalar>(raw: &[S], warm: &NetworkState<S>) -> (S, S) {
+    if raw[ThermalParameter::Model.at()].lane(0) == 0.0 {
+        let mut star = StarState::rest();
+        star.heat(
+            Raw(raw).motor(),
+            raw[MotorParameter::WindingTemperature.at()],
+        );
+        return (star.resistance_factor, star.flux_factor);
+    }
+    network(raw, raw[LowParameter::Step.at()].lane(0)).factors(warm)
+}
