@@ -17,9 +17,7 @@ impl Key {
         let golden = 0x9e37_79b9_7f4a_7c15_u64;
         let a = mix(seed.wrapping_add(golden));
         let b = mix(a ^ run.wrapping_mul(golden).wrapping_add(1));
-        Self(mix(b ^ channel
-            .wrapping_mul(0xd1b5_4a32_d192_ed03)
-            .wrapping_add(2)))
+        Self(mix(b ^ channel.wrapping_mul(0xd1b5_4a32_d192_ed03).wrapping_add(2)))
     }
 
     fn bits(self, counter: u64) -> u64 {
@@ -63,11 +61,9 @@ mod tests {
     #[test]
     fn channels_and_ticks_are_uncorrelated() {
         let n = 100_000_u64;
-        for (a, b) in [
-            (Key::new(1, 0, 0), Key::new(1, 0, 1)),
-            (Key::new(1, 0, 0), Key::new(1, 1, 0)),
-            (Key::new(1, 0, 0), Key::new(2, 0, 0)),
-        ] {
+        for (a, b) in
+            [(Key::new(1, 0, 0), Key::new(1, 0, 1)), (Key::new(1, 0, 0), Key::new(1, 1, 0)), (Key::new(1, 0, 0), Key::new(2, 0, 0))]
+        {
             let cross: f64 = (0..n).map(|t| a.gaussian(t) * b.gaussian(t)).sum();
             let lag: f64 = (0..n).map(|t| a.gaussian(t) * a.gaussian(t + 1)).sum();
             assert!(cross.abs() < 5.0 * (n as f64).sqrt());

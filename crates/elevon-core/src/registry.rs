@@ -62,10 +62,7 @@ macro_rules! dispatch {
 impl Model {
     pub fn find(kind: &str, fidelity: &str) -> Option<Self> {
         let kind = KINDS.iter().find(|k| k.name == kind)?;
-        kind.fidelities
-            .iter()
-            .find(|f| f.0 == fidelity)
-            .map(|f| f.1)
+        kind.fidelities.iter().find(|f| f.0 == fidelity).map(|f| f.1)
     }
     pub fn groups(self) -> &'static [Group] {
         dispatch!(self, W => W::groups())
@@ -92,14 +89,7 @@ impl Model {
     pub fn step(self, raw: &[f64]) -> f64 {
         dispatch!(self, W => W::step(raw))
     }
-    pub fn run_all(
-        self,
-        runs: &[RunSpec],
-        clocks: &[Clock],
-        threads: usize,
-        width: Width,
-        monitor: &Monitor,
-    ) -> Vec<RunOutput> {
+    pub fn run_all(self, runs: &[RunSpec], clocks: &[Clock], threads: usize, width: Width, monitor: &Monitor) -> Vec<RunOutput> {
         dispatch!(self, W => solver::run_all::<W>(runs, clocks, threads, width, monitor))
     }
     /// Low fidelities only: the relays of a switching inverter have no useful derivative.
@@ -112,12 +102,8 @@ impl Model {
         monitor: &Monitor,
     ) -> Option<Vec<RunOutput>> {
         match self {
-            Self::RotaryLow => Some(solver::sensitivities::<rotary::Low>(
-                run, parameters, faults, clocks, monitor,
-            )),
-            Self::BallscrewLow => Some(solver::sensitivities::<ballscrew::Low>(
-                run, parameters, faults, clocks, monitor,
-            )),
+            Self::RotaryLow => Some(solver::sensitivities::<rotary::Low>(run, parameters, faults, clocks, monitor)),
+            Self::BallscrewLow => Some(solver::sensitivities::<ballscrew::Low>(run, parameters, faults, clocks, monitor)),
             Self::RotaryHigh | Self::BallscrewHigh => None,
         }
     }

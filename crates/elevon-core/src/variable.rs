@@ -58,10 +58,7 @@ impl Range {
     pub fn contains(self, value: f64) -> bool {
         let (low, high, open) = self.bounds();
         let integral = !matches!(self, Self::Choice(_)) || value.fract() == 0.0;
-        value.is_finite()
-            && integral
-            && value <= high
-            && if open { value > low } else { value >= low }
+        value.is_finite() && integral && value <= high && if open { value > low } else { value >= low }
     }
 }
 
@@ -139,43 +136,27 @@ pub const fn relabelled<const N: usize>(table: &[Variable], changes: &[Relabel])
     while i < changes.len() {
         let change = changes[i];
         let old = all[change.index];
-        all[change.index] = Variable {
-            path: or(change.name, old.path),
-            unit: or(change.unit, old.unit),
-            text: or(change.text, old.text),
-            ..old
-        };
+        all[change.index] =
+            Variable { path: or(change.name, old.path), unit: or(change.unit, old.unit), text: or(change.text, old.text), ..old };
         i += 1;
     }
     all
 }
 
 /// A copy of a table of signals with other names, units or texts, and further signals behind them.
-pub const fn extended<const N: usize>(
-    table: &[Signal],
-    changes: &[Relabel],
-    further: &[Signal],
-) -> [Signal; N] {
+pub const fn extended<const N: usize>(table: &[Signal], changes: &[Relabel], further: &[Signal]) -> [Signal; N] {
     let mut all = [table[0]; N];
     let mut i = 0;
     while i < N {
-        all[i] = if i < table.len() {
-            table[i]
-        } else {
-            further[i - table.len()]
-        };
+        all[i] = if i < table.len() { table[i] } else { further[i - table.len()] };
         i += 1;
     }
     let mut i = 0;
     while i < changes.len() {
         let change = changes[i];
         let old = all[change.index];
-        all[change.index] = Signal {
-            name: or(change.name, old.name),
-            unit: or(change.unit, old.unit),
-            text: or(change.text, old.text),
-            ..old
-        };
+        all[change.index] =
+            Signal { name: or(change.name, old.name), unit: or(change.unit, old.unit), text: or(change.text, old.text), ..old };
         i += 1;
     }
     all

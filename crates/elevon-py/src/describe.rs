@@ -13,11 +13,7 @@ use pyo3::types::{PyDict, PyList};
 type Dicts<'py> = PyResult<Bound<'py, PyList>>;
 
 /// A list of dictionaries, one per item.
-fn dicts<'py, T>(
-    py: Python<'py>,
-    items: impl IntoIterator<Item = T>,
-    fill: impl Fn(&Bound<'py, PyDict>, T) -> PyResult<()>,
-) -> Dicts<'py> {
+fn dicts<'py, T>(py: Python<'py>, items: impl IntoIterator<Item = T>, fill: impl Fn(&Bound<'py, PyDict>, T) -> PyResult<()>) -> Dicts<'py> {
     let list = PyList::empty(py);
     for item in items {
         let dict = PyDict::new(py);
@@ -51,22 +47,14 @@ pub fn wirings(py: Python<'_>) -> Dicts<'_> {
     dicts(py, KINDS, |d, kind| {
         d.set_item("name", kind.name)?;
         d.set_item("text", kind.text)?;
-        d.set_item(
-            "fidelities",
-            kind.fidelities.iter().map(|f| f.0).collect::<Vec<_>>(),
-        )
+        d.set_item("fidelities", kind.fidelities.iter().map(|f| f.0).collect::<Vec<_>>())
     })
 }
 
 #[pyfunction]
 pub fn parameters<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
     let groups = model(wiring, "high")?.groups();
-    let all = groups.iter().flat_map(|g| {
-        g.variables
-            .iter()
-            .enumerate()
-            .map(move |(i, v)| (g.path(i), v))
-    });
+    let all = groups.iter().flat_map(|g| g.variables.iter().enumerate().map(move |(i, v)| (g.path(i), v)));
     dicts(py, all, |d, (path, v)| {
         let (minimum, maximum, open) = v.range.bounds();
         d.set_item("path", path)?;
@@ -79,11 +67,7 @@ pub fn parameters<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
         d.set_item("text", v.text)?;
         d.set_item("register", v.register.name())?;
         d.set_item("default", v.default)?;
-        let choices = if let Range::Choice(names) = v.range {
-            Some(names.to_vec())
-        } else {
-            None
-        };
+        let choices = if let Range::Choice(names) = v.range { Some(names.to_vec()) } else { None };
         d.set_item("choices", choices)
     })
 }
@@ -122,21 +106,12 @@ fn attribute<'py>(d: &Bound<'py, PyDict>, a: &Attribute) -> PyResult<()> {
 
 #[pyfunction]
 pub fn faults<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
-    let low: Vec<(&str, &str)> = model(wiring, "low")
-        .map(|m| {
-            m.faults()
-                .iter()
-                .map(|f| (f.kind, f.places[0].name))
-                .collect()
-        })
-        .unwrap_or_default();
+    let low: Vec<(&str, &str)> =
+        model(wiring, "low").map(|m| m.faults().iter().map(|f| (f.kind, f.places[0].name)).collect()).unwrap_or_default();
     dicts(py, model(wiring, "high")?.faults(), |d, f| {
         let (minimum, maximum, open) = f.range.bounds();
         d.set_item("kind", f.kind)?;
-        d.set_item(
-            "places",
-            f.places.iter().map(|p| p.name).collect::<Vec<_>>(),
-        )?;
+        d.set_item("places", f.places.iter().map(|p| p.name).collect::<Vec<_>>())?;
         d.set_item("unit", f.unit)?;
         d.set_item("minimum", minimum)?;
         d.set_item("maximum", maximum)?;
@@ -145,14 +120,7 @@ pub fn faults<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
         d.set_item("source", f.source)?;
         d.set_item("attributes", dicts(py, f.attributes, attribute)?)?;
         let seen = low.contains(&(f.kind, f.places[0].name));
-        d.set_item(
-            "fidelities",
-            if seen {
-                vec!["high", "low"]
-            } else {
-                vec!["high"]
-            },
-        )
+        d.set_item("fidelities", if seen { vec!["high", "low"] } else { vec!["high"] })
     })
 }
 
@@ -172,15 +140,7 @@ pub fn waveforms(py: Python<'_>) -> Dicts<'_> {
     dicts(py, command::catalogue(), |d, w| {
         d.set_item("kind", w.kind)?;
         d.set_item("text", w.text)?;
-        d.set_item(
-            "parameters",
-            rows(
-                py,
-                w.parameters
-                    .iter()
-                    .map(|p| (p.name, p.unit, p.default, p.text)),
-            )?,
-        )
+        d.set_item("parameters", rows(py, w.parameters.iter().map(|p| (p.name, p.unit, p.default, p.text)))?)
     })
 }
 
@@ -194,12 +154,7 @@ pub fn profiles(py: Python<'_>) -> Dicts<'_> {
 }
 
 #[pyfunction]
-pub fn check<'py>(
-    py: Python<'py>,
-    wiring: &str,
-    fidelity: &str,
-    parameters: PyReadonlyArray1<'py, f64>,
-) -> Dicts<'py> {
+pub fn check<'py>(py: Python<'py>, wiring: &str, fidelity: &str, parameters: PyReadonlyArray1<'py, f64>) -> Dicts<'py> {
     let model = model(wiring, fidelity)?;
     let raw = vector(model, &parameters)?;
     dicts(py, model.check(&raw), |d, f| {

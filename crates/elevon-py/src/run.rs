@@ -26,8 +26,7 @@ fn polled<T: Send>(
             let (sender, receiver) = sync_channel(1);
             let watched = &monitor;
             scope.spawn(move || {
-                let outcome =
-                    std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(watched)));
+                let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(watched)));
                 // The receiver lives until the result has come: a failed send cannot happen.
                 let _ = sender.send(outcome);
             });
@@ -57,9 +56,7 @@ fn polled<T: Send>(
     }
     match result {
         Some(Ok(value)) => Ok(value),
-        _ => Err(PyRuntimeError::new_err(
-            "the core panicked; this is a defect of elevon",
-        )),
+        _ => Err(PyRuntimeError::new_err("the core panicked; this is a defect of elevon")),
     }
 }
 
@@ -68,8 +65,7 @@ fn report(py: Python<'_>, callback: Option<&Py<PyAny>>, fraction: f64) -> PyResu
     match callback {
         Some(callback) => {
             let answer = callback.call1(py, (fraction.min(1.0),))?;
-            Ok(!answer.bind(py).is_instance_of::<pyo3::types::PyBool>()
-                || answer.extract::<bool>(py)?)
+            Ok(!answer.bind(py).is_instance_of::<pyo3::types::PyBool>() || answer.extract::<bool>(py)?)
         }
         None => Ok(true),
     }
@@ -113,26 +109,12 @@ fn result<'py>(
     }
     d.set_item("final", last)?;
     let kept = PyDict::new(py);
-    for (((clock, name), values), columns) in clocks
-        .iter()
-        .zip(names)
-        .zip(output.clocks)
-        .zip(output.columns)
-    {
-        let rows = if columns == 0 {
-            0
-        } else {
-            values.len() / columns
-        };
-        let time: Vec<f64> = (0..rows)
-            .map(|i| (i as u64 * clock.period) as f64 * dt)
-            .collect();
+    for (((clock, name), values), columns) in clocks.iter().zip(names).zip(output.clocks).zip(output.columns) {
+        let rows = if columns == 0 { 0 } else { values.len() / columns };
+        let time: Vec<f64> = (0..rows).map(|i| (i as u64 * clock.period) as f64 * dt).collect();
         let entry = PyDict::new(py);
         entry.set_item("time", PyArray1::from_vec(py, time))?;
-        entry.set_item(
-            "values",
-            PyArray1::from_vec(py, values).reshape([rows, columns])? as Bound<'py, PyArray2<f64>>,
-        )?;
+        entry.set_item("values", PyArray1::from_vec(py, values).reshape([rows, columns])? as Bound<'py, PyArray2<f64>>)?;
         kept.set_item(name, entry)?;
     }
     d.set_item("clocks", kept)?;
@@ -140,9 +122,7 @@ fn result<'py>(
 }
 
 fn read_runs(resolver: &Resolver, runs: &Bound<'_, PyList>) -> PyResult<Vec<RunSpec>> {
-    runs.iter()
-        .map(|r| resolver.run(&r.cast_into::<PyDict>()?))
-        .collect()
+    runs.iter().map(|r| resolver.run(&r.cast_into::<PyDict>()?)).collect()
 }
 
 /// Runs everything; the results stand in the order of the runs.
@@ -162,21 +142,12 @@ pub fn simulate<'py>(
     let resolver = Resolver::new(wiring, fidelity)?;
     let specs = read_runs(&resolver, runs)?;
     let (clocks, names) = resolver.clocks(record)?;
-    let width = Width::by_name(lanes).ok_or_else(|| {
-        bad(format!(
-            "lanes {lanes:?} are not known here, or this processor cannot run them"
-        ))
-    })?;
+    let width =
+        Width::by_name(lanes).ok_or_else(|| bad(format!("lanes {lanes:?} are not known here, or this processor cannot run them")))?;
     let model = resolver.model;
     let steps: Vec<f64> = specs.iter().map(|r| model.step(&r.parameters)).collect();
-    let total = specs
-        .iter()
-        .zip(&steps)
-        .map(|(r, dt)| (r.duration / dt).round() as u64)
-        .sum();
-    let outputs = polled(py, total, progress, |monitor| {
-        model.run_all(&specs, &clocks, threads, width, monitor)
-    })?;
+    let total = specs.iter().zip(&steps).map(|(r, dt)| (r.duration / dt).round() as u64).sum();
+    let outputs = polled(py, total, progress, |monitor| model.run_all(&specs, &clocks, threads, width, monitor))?;
     let signals: Vec<&'static str> = model.signals().iter().map(|s| s.name).collect();
     let list = PyList::empty(py);
     for (output, dt) in outputs.into_iter().zip(steps) {
@@ -203,10 +174,7 @@ pub fn sensitivities<'py>(
     let resolver = Resolver::new(wiring, fidelity)?;
     let spec = resolver.run(run)?;
     let (clocks, names) = resolver.clocks(record)?;
-    let wanted = parameters
-        .iter()
-        .map(|p| resolver.parameter(p))
-        .collect::<PyResult<Vec<_>>>()?;
+    let wanted = parameters.iter().map(|p| resolver.parameter(p)).collect::<PyResult<Vec<_>>>()?;
     if let Some(missing) = faults.iter().find(|&&f| f >= spec.faults.len()) {
         return Err(bad(format!("fault {missing} of {}", spec.faults.len())));
     }
@@ -215,12 +183,8 @@ pub fn sensitivities<'py>(
     let chosen = wanted.len() + faults.len();
     let passes = chosen.div_ceil(8) as u64;
     let total = (spec.duration / dt).round() as u64 * passes;
-    let outputs = polled(py, total, progress, |monitor| {
-        model.sensitivities(&spec, &wanted, &faults, &clocks, monitor)
-    })?;
-    let outputs = outputs.ok_or_else(|| {
-        bad("sensitivities need the low fidelity: relays have no useful derivative")
-    })?;
+    let outputs = polled(py, total, progress, |monitor| model.sensitivities(&spec, &wanted, &faults, &clocks, monitor))?;
+    let outputs = outputs.ok_or_else(|| bad("sensitivities need the low fidelity: relays have no useful derivative"))?;
     let signals: Vec<&'static str> = model.signals().iter().map(|s| s.name).collect();
     let list = PyList::empty(py);
     for (i, output) in outputs.into_iter().enumerate() {

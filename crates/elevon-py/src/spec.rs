@@ -17,32 +17,22 @@ pub fn bad(message: impl Into<String>) -> PyErr {
 }
 
 pub fn model(wiring: &str, fidelity: &str) -> PyResult<Model> {
-    Model::find(wiring, fidelity)
-        .ok_or_else(|| bad(format!("no wiring {wiring:?} of fidelity {fidelity:?}")))
+    Model::find(wiring, fidelity).ok_or_else(|| bad(format!("no wiring {wiring:?} of fidelity {fidelity:?}")))
 }
 
 /// Paths of all parameters of a model and their places.
 pub fn paths(model: Model) -> HashMap<String, usize> {
     let groups = model.groups();
-    let all = groups
-        .iter()
-        .flat_map(|g| (0..g.variables.len()).map(|i| g.path(i)));
+    let all = groups.iter().flat_map(|g| (0..g.variables.len()).map(|i| g.path(i)));
     all.enumerate().map(|(i, p)| (p, i)).collect()
 }
 
 pub fn vector(model: Model, given: &PyReadonlyArray1<'_, f64>) -> PyResult<Vec<f64>> {
     let raw = given.as_slice()?.to_vec();
-    let variables: Vec<_> = model
-        .groups()
-        .iter()
-        .flat_map(|g| (0..g.variables.len()).map(move |i| (g.path(i), g.variables[i].range)))
-        .collect();
+    let variables: Vec<_> =
+        model.groups().iter().flat_map(|g| (0..g.variables.len()).map(move |i| (g.path(i), g.variables[i].range))).collect();
     if raw.len() != variables.len() {
-        return Err(bad(format!(
-            "{} parameters given, {} expected",
-            raw.len(),
-            variables.len()
-        )));
+        return Err(bad(format!("{} parameters given, {} expected", raw.len(), variables.len())));
     }
     for (&x, (path, range)) in raw.iter().zip(&variables) {
         if !range.contains(x) {
@@ -55,8 +45,7 @@ pub fn vector(model: Model, given: &PyReadonlyArray1<'_, f64>) -> PyResult<Vec<f
 
 /// A required entry of a dictionary.
 fn need<'py>(d: &Bound<'py, PyDict>, key: &str) -> PyResult<Bound<'py, PyAny>> {
-    d.get_item(key)?
-        .ok_or_else(|| bad(format!("missing {key:?}")))
+    d.get_item(key)?.ok_or_else(|| bad(format!("missing {key:?}")))
 }
 
 fn points(d: &Bound<'_, PyDict>, key: &str) -> PyResult<Arc<[f64]>> {
@@ -68,64 +57,27 @@ fn points(d: &Bound<'_, PyDict>, key: &str) -> PyResult<Arc<[f64]>> {
 
 fn term(d: &Bound<'_, PyDict>) -> PyResult<Term> {
     let kind: String = need(d, "kind")?.extract()?;
-    let record = catalogue()
-        .iter()
-        .find(|w| w.kind == kind)
-        .ok_or_else(|| bad(format!("no waveform {kind:?}")))?;
+    let record = catalogue().iter().find(|w| w.kind == kind).ok_or_else(|| bad(format!("no waveform {kind:?}")))?;
     let parameters: Vec<f64> = need(d, "parameters")?.extract()?;
     if parameters.len() != record.parameters.len() {
-        return Err(bad(format!(
-            "{kind}: {} parameters given, {} expected",
-            parameters.len(),
-            record.parameters.len()
-        )));
+        return Err(bad(format!("{kind}: {} parameters given, {} expected", parameters.len(), record.parameters.len())));
     }
     let (times, values) = (points(d, "times")?, points(d, "values")?);
     let rising = times.windows(2).all(|w| w[0] < w[1]);
     if record.wave == Wave::Table && (times.is_empty() || times.len() != values.len() || !rising) {
-        return Err(bad(
-            "table: times and values must be of one length and times rising",
-        ));
+        return Err(bad("table: times and values must be of one length and times rising"));
     }
-    Ok(Term {
-        wave: record.wave,
-        enabled: need(d, "enabled")?.extract()?,
-        parameters,
-        times,
-        values,
-    })
+    Ok(Term { wave: record.wave, enabled: need(d, "enabled")?.extract()?, parameters, times, values })
 }
 
-fn fault(
-    model: &[FaultKind],
-    places: &HashMap<String, usize>,
-    d: &Bound<'_, PyDict>,
-) -> PyResult<FaultSpec> {
+fn fault(model: &[FaultKind], places: &HashMap<String, usize>, d: &Bound<'_, PyDict>) -> PyResult<FaultSpec> {
     let kind: String = need(d, "kind")?.extract()?;
     let name: String = need(d, "place")?.extract()?;
-    let found = model
-        .iter()
-        .filter(|f| f.kind == kind)
-        .find_map(|f| f.places.iter().find(|p| p.name == name).map(|p| (f, p)));
-    let (record, place) =
-        found.ok_or_else(|| bad(format!("no fault {kind}@{name} at this fidelity")))?;
-    let index = |path: &str| {
-        places.get(path).copied().ok_or_else(|| {
-            bad(format!(
-                "fault {kind}@{name} needs {path:?}, which the actuator lacks"
-            ))
-        })
-    };
-    let writes = place
-        .targets
-        .iter()
-        .map(|t| {
-            Ok(Write {
-                index: index(t.path)?,
-                op: t.op,
-            })
-        })
-        .collect::<PyResult<Vec<_>>>()?;
+    let found = model.iter().filter(|f| f.kind == kind).find_map(|f| f.places.iter().find(|p| p.name == name).map(|p| (f, p)));
+    let (record, place) = found.ok_or_else(|| bad(format!("no fault {kind}@{name} at this fidelity")))?;
+    let index =
+        |path: &str| places.get(path).copied().ok_or_else(|| bad(format!("fault {kind}@{name} needs {path:?}, which the actuator lacks")));
+    let writes = place.targets.iter().map(|t| Ok(Write { index: index(t.path)?, op: t.op })).collect::<PyResult<Vec<_>>>()?;
     let given: HashMap<String, f64> = need(d, "attributes")?.extract()?;
     let mut settings = Vec::new();
     let mut period = 0.0;
@@ -144,32 +96,14 @@ fn fault(
     }
     let severity: f64 = need(d, "severity")?.extract()?;
     if !record.range.contains(severity) {
-        return Err(bad(format!(
-            "{kind}@{name}: severity {severity} is out of range"
-        )));
+        return Err(bad(format!("{kind}@{name}: severity {severity} is out of range")));
     }
     let profile = need(d, "profile")?.cast_into::<PyDict>()?;
     let shape: String = need(&profile, "kind")?.extract()?;
     let numbers: Vec<f64> = need(&profile, "parameters")?.extract()?;
-    let profile = Profile::new(
-        &shape,
-        &numbers,
-        points(&profile, "times")?,
-        points(&profile, "values")?,
-    )
-    .ok_or_else(|| {
-        bad(format!(
-            "profile {shape:?} with {} parameters",
-            numbers.len()
-        ))
-    })?;
-    Ok(FaultSpec {
-        severity,
-        profile,
-        writes,
-        settings,
-        period,
-    })
+    let profile = Profile::new(&shape, &numbers, points(&profile, "times")?, points(&profile, "values")?)
+        .ok_or_else(|| bad(format!("profile {shape:?} with {} parameters", numbers.len())))?;
+    Ok(FaultSpec { severity, profile, writes, settings, period })
 }
 
 /// What a caller's runs are resolved against; made once a call.
@@ -183,25 +117,12 @@ pub struct Resolver {
 impl Resolver {
     pub fn new(wiring: &str, fidelity: &str) -> PyResult<Self> {
         let model = model(wiring, fidelity)?;
-        let signals = model
-            .signals()
-            .iter()
-            .enumerate()
-            .map(|(i, s)| (s.name, i))
-            .collect();
-        Ok(Self {
-            model,
-            faults: model.faults(),
-            places: paths(model),
-            signals,
-        })
+        let signals = model.signals().iter().enumerate().map(|(i, s)| (s.name, i)).collect();
+        Ok(Self { model, faults: model.faults(), places: paths(model), signals })
     }
 
     pub fn parameter(&self, path: &str) -> PyResult<usize> {
-        self.places
-            .get(path)
-            .copied()
-            .ok_or_else(|| bad(format!("no parameter {path:?}")))
+        self.places.get(path).copied().ok_or_else(|| bad(format!("no parameter {path:?}")))
     }
 
     pub fn run(&self, d: &Bound<'_, PyDict>) -> PyResult<RunSpec> {
@@ -209,10 +130,8 @@ impl Resolver {
         let mut parameters = vector(self.model, &array)?;
         if let Some(mode) = d.get_item("command_mode")? {
             let mode: String = mode.extract()?;
-            let choice = ["position", "speed", "torque"]
-                .iter()
-                .position(|&m| m == mode)
-                .ok_or_else(|| bad(format!("command mode {mode:?}")))?;
+            let choice =
+                ["position", "speed", "torque"].iter().position(|&m| m == mode).ok_or_else(|| bad(format!("command mode {mode:?}")))?;
             parameters[self.parameter("control.mode")?] = choice as f64;
         }
         let inputs = need(d, "inputs")?.cast_into::<PyDict>()?;
@@ -223,20 +142,9 @@ impl Resolver {
             return Err(bad(format!("no initial value {unknown:?}")));
         }
         let faults = need(d, "faults")?.cast_into::<PyList>()?;
-        let faults = faults
-            .iter()
-            .map(|f| fault(&self.faults, &self.places, &f.cast_into::<PyDict>()?))
-            .collect::<PyResult<Vec<_>>>()?;
-        if let Some(finding) = self
-            .model
-            .check_faulted(&whole(&parameters, &faults))
-            .into_iter()
-            .next()
-        {
-            return Err(bad(format!(
-                "the faults at their whole severity: {}",
-                finding.message
-            )));
+        let faults = faults.iter().map(|f| fault(&self.faults, &self.places, &f.cast_into::<PyDict>()?)).collect::<PyResult<Vec<_>>>()?;
+        if let Some(finding) = self.model.check_faulted(&whole(&parameters, &faults)).into_iter().next() {
+            return Err(bad(format!("the faults at their whole severity: {}", finding.message)));
         }
         let duration: f64 = need(d, "duration")?.extract()?;
         if !(duration > 0.0 && duration.is_finite()) {
@@ -247,21 +155,14 @@ impl Resolver {
             ports,
             driven,
             faults,
-            initial: names
-                .iter()
-                .map(|n| given.get(*n).copied().unwrap_or(f64::NAN))
-                .collect(),
+            initial: names.iter().map(|n| given.get(*n).copied().unwrap_or(f64::NAN)).collect(),
             duration,
             seed: need(d, "seed")?.extract()?,
             run: need(d, "run")?.extract()?,
         })
     }
 
-    fn ports(
-        &self,
-        parameters: &[f64],
-        inputs: &Bound<'_, PyDict>,
-    ) -> PyResult<(Vec<SourcePlan>, Vec<bool>)> {
+    fn ports(&self, parameters: &[f64], inputs: &Bound<'_, PyDict>) -> PyResult<(Vec<SourcePlan>, Vec<bool>)> {
         let (mut ports, mut driven) = (Vec::new(), Vec::new());
         for port in self.model.ports() {
             let mut terms = Vec::new();
@@ -272,11 +173,7 @@ impl Resolver {
             }
             driven.push(!terms.is_empty());
             let rest = terms.is_empty() && !port.parameter.is_empty();
-            ports.push(if rest {
-                SourcePlan::constant(parameters[self.parameter(port.parameter)?])
-            } else {
-                SourcePlan { terms }
-            });
+            ports.push(if rest { SourcePlan::constant(parameters[self.parameter(port.parameter)?]) } else { SourcePlan { terms } });
         }
         for name in inputs.keys() {
             let name: String = name.extract()?;
@@ -299,12 +196,7 @@ impl Resolver {
             let wanted: Vec<String> = need(&d, "signals")?.extract()?;
             let signals = wanted
                 .iter()
-                .map(|n| {
-                    self.signals
-                        .get(n.as_str())
-                        .copied()
-                        .ok_or_else(|| bad(format!("no signal {n:?}")))
-                })
+                .map(|n| self.signals.get(n.as_str()).copied().ok_or_else(|| bad(format!("no signal {n:?}"))))
                 .collect::<PyResult<Vec<_>>>()?;
             clocks.push(Clock { period, signals });
             names.push(need(&d, "clock")?.extract()?);

@@ -23,13 +23,7 @@ pub struct Source<S> {
 
 impl SourcePlan {
     pub fn constant(value: f64) -> Self {
-        let term = Term {
-            wave: super::Wave::Constant,
-            enabled: true,
-            parameters: vec![value],
-            times: [].into(),
-            values: [].into(),
-        };
+        let term = Term { wave: super::Wave::Constant, enabled: true, parameters: vec![value], times: [].into(), values: [].into() };
         Self { terms: vec![term] }
     }
 
@@ -54,10 +48,7 @@ impl SourcePlan {
 
     fn oscillations(&self, k: Steps, dt: f64) -> impl Iterator<Item = Oscillation> + '_ {
         let looked_up = (k as f64 + 0.5) * dt;
-        self.terms
-            .iter()
-            .filter(|t| t.oscillates())
-            .map(move |t| t.oscillation(looked_up))
+        self.terms.iter().filter(|t| t.oscillates()).map(move |t| t.oscillation(looked_up))
     }
 }
 
@@ -73,12 +64,7 @@ pub struct SourceLanes {
 impl SourceLanes {
     pub fn new(plans: Vec<SourcePlan>) -> Self {
         let n = plans.len();
-        Self {
-            plans,
-            lines: vec![[0.0; 3]; n],
-            oscillations: vec![Vec::new(); n],
-            next: vec![0; n],
-        }
+        Self { plans, lines: vec![[0.0; 3]; n], oscillations: vec![Vec::new(); n], next: vec![0; n] }
     }
 
     pub fn next(&self) -> Steps {
@@ -111,13 +97,7 @@ impl SourceLanes {
         let oscillators = (0..count)
             .map(|j| {
                 let get = |f: &dyn Fn(&Oscillation) -> f64| lane(&|i| f(&self.oscillations[i][j]));
-                [
-                    get(&|o| o.at),
-                    get(&|o| o.amplitude),
-                    get(&|o| o.phase),
-                    get(&|o| o.rate),
-                    get(&|o| o.sweep),
-                ]
+                [get(&|o| o.at), get(&|o| o.amplitude), get(&|o| o.phase), get(&|o| o.rate), get(&|o| o.sweep)]
             })
             .collect();
         let flat = count == 0 && (0..S::LANES).all(|i| self.lines[first + i][2] == 0.0);

@@ -50,12 +50,7 @@ impl Cycle {
         let (first, slope) = (p[1], (p[2] - p[1]) / p[3]);
         if slope == 0.0 {
             let k = (t / first).floor();
-            return Self {
-                begin: k * first,
-                period: first,
-                length: first,
-                sweep: 0.0,
-            };
+            return Self { begin: k * first, period: first, length: first, sweep: 0.0 };
         }
         let rho = slope + (1.0 + slope * slope).sqrt();
         let k = (libm::log(1.0 + slope * t / first) / libm::log(rho)).floor();
@@ -63,12 +58,7 @@ impl Cycle {
         let (period, length) = (first * power, (rho - 1.0) / slope * first * power);
         let begin = first * (power - 1.0) / slope;
         let sweep = std::f64::consts::PI * (1.0 / (rho * period) - 1.0 / period) / length;
-        Self {
-            begin,
-            period,
-            length,
-            sweep,
-        }
+        Self { begin, period, length, sweep }
     }
 }
 
@@ -76,28 +66,14 @@ const NEVER: f64 = f64::INFINITY;
 
 impl Line {
     fn constant(value: f64, until: f64) -> Self {
-        Self {
-            at: 0.0,
-            value,
-            slope: 0.0,
-            until,
-        }
+        Self { at: 0.0, value, slope: 0.0, until }
     }
     /// Through two points, exact at the first.
     fn through(t0: f64, v0: f64, t1: f64, v1: f64) -> Self {
-        Self {
-            at: t0,
-            value: v0,
-            slope: (v1 - v0) / (t1 - t0),
-            until: t1,
-        }
+        Self { at: t0, value: v0, slope: (v1 - v0) / (t1 - t0), until: t1 }
     }
     fn shifted(self, offset: f64) -> Self {
-        Self {
-            at: self.at + offset,
-            until: self.until + offset,
-            ..self
-        }
+        Self { at: self.at + offset, until: self.until + offset, ..self }
     }
 }
 
@@ -115,12 +91,7 @@ impl Term {
             Wave::Step if t < p[2] => Line::constant(p[0], p[2]),
             Wave::Step => Line::constant(p[1], NEVER),
             Wave::Ramp if t < p[2] => Line::constant(p[0], p[2]),
-            Wave::Ramp if t < p[3] => Line {
-                at: p[2],
-                value: p[0],
-                slope: p[1],
-                until: p[3],
-            },
+            Wave::Ramp if t < p[3] => Line { at: p[2], value: p[0], slope: p[1], until: p[3] },
             Wave::Ramp => Line::constant(p[0] + p[1] * (p[3] - p[2]), NEVER),
             Wave::Sine => self.sine_line(t),
             Wave::Chirp => self.chirp_line(t),
@@ -135,24 +106,10 @@ impl Term {
     /// The oscillating part at time `t`; zero amplitude while the term is held.
     pub fn oscillation(&self, t: f64) -> Oscillation {
         let p = &self.parameters;
-        let silent = |until| Oscillation {
-            at: 0.0,
-            amplitude: 0.0,
-            phase: 0.0,
-            rate: 0.0,
-            sweep: 0.0,
-            until,
-        };
+        let silent = |until| Oscillation { at: 0.0, amplitude: 0.0, phase: 0.0, rate: 0.0, sweep: 0.0, until };
         match self.wave {
             Wave::Sine if t < p[4] => silent(p[4]),
-            Wave::Sine if t < p[5] => Oscillation {
-                at: p[4],
-                amplitude: p[0],
-                phase: p[2],
-                rate: TAU * p[1],
-                sweep: 0.0,
-                until: p[5],
-            },
+            Wave::Sine if t < p[5] => Oscillation { at: p[4], amplitude: p[0], phase: p[2], rate: TAU * p[1], sweep: 0.0, until: p[5] },
             Wave::Chirp if t < p[6] => silent(p[6]),
             Wave::Chirp => {
                 let (cycle, repeat) = (((t - p[6]) / p[3]).floor(), p[7] != 0.0);
@@ -161,14 +118,7 @@ impl Term {
                 }
                 let at = p[6] + cycle * p[3];
                 let sweep = std::f64::consts::PI * (p[2] - p[1]) / p[3];
-                Oscillation {
-                    at,
-                    amplitude: p[0],
-                    phase: p[4],
-                    rate: TAU * p[1],
-                    sweep,
-                    until: at + p[3],
-                }
+                Oscillation { at, amplitude: p[0], phase: p[4], rate: TAU * p[1], sweep, until: at + p[3] }
             }
             Wave::PeriodSweep if t < p[5] => silent(p[5]),
             Wave::PeriodSweep => {
@@ -179,14 +129,7 @@ impl Term {
                 let origin = p[5] + sweep * p[3];
                 let cycle = Cycle::find(p, t - origin);
                 let until = (origin + cycle.begin + cycle.length).min(origin + p[3]);
-                Oscillation {
-                    at: origin + cycle.begin,
-                    amplitude: p[0],
-                    phase: 0.0,
-                    rate: TAU / cycle.period,
-                    sweep: cycle.sweep,
-                    until,
-                }
+                Oscillation { at: origin + cycle.begin, amplitude: p[0], phase: 0.0, rate: TAU / cycle.period, sweep: cycle.sweep, until }
             }
             _ => silent(NEVER),
         }
@@ -199,10 +142,7 @@ impl Term {
         } else if p[6] == 0.0 && t >= p[5] + p[3] {
             let cycle = Cycle::find(p, p[3]);
             let tau = p[3] - cycle.begin;
-            Line::constant(
-                p[4] + p[0] * libm::sin((cycle.sweep * tau + TAU / cycle.period) * tau),
-                NEVER,
-            )
+            Line::constant(p[4] + p[0] * libm::sin((cycle.sweep * tau + TAU / cycle.period) * tau), NEVER)
         } else {
             Line::constant(p[4], self.oscillation(t).until)
         }
@@ -247,12 +187,7 @@ impl Term {
             let until = if t < start { start } else { NEVER };
             return Line::constant(bias + slope * (time - at), until);
         }
-        Line {
-            at,
-            value: bias,
-            slope,
-            until: (at + 0.25 / frequency).min(end),
-        }
+        Line { at, value: bias, slope, until: (at + 0.25 / frequency).min(end) }
     }
 
     fn trapezoid(&self, t: f64) -> Line {
@@ -262,11 +197,7 @@ impl Term {
             return Line::constant(low, start);
         }
         let period = p[2] + p[3] + p[4] + p[5];
-        let cycle = if repeat {
-            ((t - start) / period).floor()
-        } else {
-            0.0
-        };
+        let cycle = if repeat { ((t - start) / period).floor() } else { 0.0 };
         let origin = start + cycle * period;
         let (t1, t2) = (p[2], p[2] + p[3]);
         let (t3, t4) = (t2 + p[4], period);
@@ -294,29 +225,14 @@ impl Term {
     }
 
     fn table(&self, t: f64) -> Line {
-        let (start, repeat, gain) = (
-            self.parameters[0],
-            self.parameters[1] != 0.0,
-            self.parameters[2],
-        );
+        let (start, repeat, gain) = (self.parameters[0], self.parameters[1] != 0.0, self.parameters[2]);
         let (times, values) = (&self.times, &self.values);
         let last = times.len() - 1;
         let period = times[last] - times[0];
-        let cycle = if repeat && period > 0.0 {
-            ((t - start - times[0]) / period).floor().max(0.0)
-        } else {
-            0.0
-        };
+        let cycle = if repeat && period > 0.0 { ((t - start - times[0]) / period).floor().max(0.0) } else { 0.0 };
         let origin = start + cycle * period;
         let tau = t - origin;
-        let scaled = |line: Line| {
-            Line {
-                value: gain * line.value,
-                slope: gain * line.slope,
-                ..line
-            }
-            .shifted(origin)
-        };
+        let scaled = |line: Line| Line { value: gain * line.value, slope: gain * line.slope, ..line }.shifted(origin);
         if tau < times[0] {
             return scaled(Line::constant(values[0], times[0]));
         }
@@ -324,11 +240,6 @@ impl Term {
         if next > last {
             return scaled(Line::constant(values[last], NEVER));
         }
-        scaled(Line::through(
-            times[next - 1],
-            values[next - 1],
-            times[next],
-            values[next],
-        ))
+        scaled(Line::through(times[next - 1], values[next - 1], times[next], values[next]))
     }
 }

@@ -32,39 +32,14 @@ pub enum Wave {
     Table,
 }
 
-const fn p(
-    name: &'static str,
-    unit: &'static str,
-    default: Option<f64>,
-    text: &'static str,
-) -> WaveParameter {
-    WaveParameter {
-        name,
-        unit,
-        default,
-        text,
-    }
+const fn p(name: &'static str, unit: &'static str, default: Option<f64>, text: &'static str) -> WaveParameter {
+    WaveParameter { name, unit, default, text }
 }
 
-const START: WaveParameter = p(
-    "start",
-    "s",
-    Some(0.0),
-    "before it the term holds its starting value",
-);
-const END: WaveParameter = p(
-    "end",
-    "s",
-    Some(f64::INFINITY),
-    "after it the term holds the value it had then",
-);
+const START: WaveParameter = p("start", "s", Some(0.0), "before it the term holds its starting value");
+const END: WaveParameter = p("end", "s", Some(f64::INFINITY), "after it the term holds the value it had then");
 const BIAS: WaveParameter = p("bias", "", Some(0.0), "mean value");
-const REPEAT: WaveParameter = p(
-    "repeat",
-    "1",
-    Some(1.0),
-    "1: starts again after its last point, 0: holds its last value",
-);
+const REPEAT: WaveParameter = p("repeat", "1", Some(1.0), "1: starts again after its last point, 0: holds its last value");
 
 /// Every waveform.
 pub fn catalogue() -> &'static [WaveRecord] {

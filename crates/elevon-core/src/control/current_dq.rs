@@ -73,28 +73,16 @@ impl<S: Scalar> CurrentControl<S> {
     pub fn step(&self, s: &mut CurrentControlState<S>, x: &CurrentSample<S>) {
         let (error_d, error_q) = (x.reference_d - x.current_d, x.reference_q - x.current_q);
         let electrical = self.pole_pairs * x.speed;
-        let v_d =
-            self.proportional * error_d + s.integral_d - electrical * self.inductance * x.current_q;
-        let v_q = self.proportional * error_q
-            + s.integral_q
-            + electrical * self.inductance * x.current_d
-            + self.emf_constant * x.speed;
+        let v_d = self.proportional * error_d + s.integral_d - electrical * self.inductance * x.current_q;
+        let v_q = self.proportional * error_q + s.integral_q + electrical * self.inductance * x.current_d + self.emf_constant * x.speed;
         let limit = x.supply * S::splat(0.577_350_269_189_625_8);
         let magnitude = (v_d * v_d + v_q * v_q).sqrt();
         let limited = limit.lt(magnitude);
         let scale = S::select(limited, limit / magnitude, S::one());
         s.voltage_d = v_d * scale;
         s.voltage_q = v_q * scale;
-        s.integral_d = S::select(
-            limited,
-            s.integral_d,
-            s.integral_d + self.integral_step * error_d,
-        );
-        s.integral_q = S::select(
-            limited,
-            s.integral_q,
-            s.integral_q + self.integral_step * error_q,
-        );
+        s.integral_d = S::select(limited, s.integral_d, s.integral_d + self.integral_step * error_d);
+        s.integral_q = S::select(limited, s.integral_q, s.integral_q + self.integral_step * error_q);
         self.modulate(s, x);
     }
 
@@ -123,12 +111,6 @@ impl<S: Scalar> CurrentControl<S> {
 impl<S: Scalar> CurrentControlState<S> {
     pub fn rest() -> Self {
         let zero = S::zero();
-        Self {
-            integral_d: zero,
-            integral_q: zero,
-            voltage_d: zero,
-            voltage_q: zero,
-            modulation: [zero; 3],
-        }
+        Self { integral_d: zero, integral_q: zero, voltage_d: zero, voltage_q: zero, modulation: [zero; 3] }
     }
 }

@@ -110,11 +110,7 @@ impl<S: Scalar> PositionSpeed<S> {
         let gain = g(P::SpeedGain) * g(P::SpeedGainScale);
         let guarded = |x: S| S::select(x.equals(S::zero()), S::one(), x);
         let present = |x: S| S::indicator(S::zero().lt(x));
-        let (ti, td, filter) = (
-            g(P::IntegralTime),
-            g(P::DerivativeTime),
-            g(P::DerivativeFilter),
-        );
+        let (ti, td, filter) = (g(P::IntegralTime), g(P::DerivativeTime), g(P::DerivativeFilter));
         let dt = S::splat(ts);
         Self {
             position_gain: g(P::PositionGain) * g(P::PositionGainScale),
@@ -133,24 +129,14 @@ impl<S: Scalar> PositionSpeed<S> {
 
     /// One tick: the quadrature current reference from the command and what the sensors say.
     #[inline(always)]
-    pub fn step(
-        &self,
-        structure: &ControlStructure,
-        s: &mut PositionSpeedState<S>,
-        command: S,
-        position: S,
-        speed: S,
-    ) -> S {
+    pub fn step(&self, structure: &ControlStructure, s: &mut PositionSpeedState<S>, command: S, position: S, speed: S) -> S {
         let position_error = command - position;
         let demanded = match structure.mode {
             Mode::Position if structure.feedforward => {
                 let moved = command - s.command;
                 s.command = command;
                 let known = moved.equals(moved);
-                self.position_gain.fma(
-                    position_error,
-                    S::select(known, self.feedforward * moved, S::zero()),
-                )
+                self.position_gain.fma(position_error, S::select(known, self.feedforward * moved, S::zero()))
             }
             Mode::Position => self.position_gain * position_error,
             Mode::Speed => command,
@@ -174,21 +160,11 @@ impl<S: Scalar> PositionSpeed<S> {
 
     /// 1 while the speed or the torque reference stands at its limit.
     pub fn limited(&self, s: &PositionSpeedState<S>) -> S {
-        S::indicator(
-            self.speed_limit.le(s.speed_ref.abs()) | self.torque_limit.le(s.torque_ref.abs()),
-        )
+        S::indicator(self.speed_limit.le(s.speed_ref.abs()) | self.torque_limit.le(s.torque_ref.abs()))
     }
 
     #[inline(always)]
-    fn integrate(
-        &self,
-        structure: &ControlStructure,
-        s: &mut PositionSpeedState<S>,
-        error: S,
-        torque: S,
-        position_error: S,
-        speed: S,
-    ) {
+    fn integrate(&self, structure: &ControlStructure, s: &mut PositionSpeedState<S>, error: S, torque: S, position_error: S, speed: S) {
         let mut change = self.integral_step * error;
         if structure.conditional {
             change = S::select(s.torque_ref.equals(torque), change, S::zero());
@@ -204,11 +180,7 @@ impl<S: Scalar> PositionSpeed<S> {
         }
         if structure.hold_on_error != 0 {
             let below = position_error.abs().lt(self.threshold);
-            let held = if structure.hold_on_error == 1 {
-                below
-            } else {
-                !below
-            };
+            let held = if structure.hold_on_error == 1 { below } else { !below };
             change = S::select(held, S::zero(), change);
         }
         s.integral = s.integral + change;
@@ -218,13 +190,6 @@ impl<S: Scalar> PositionSpeed<S> {
 impl<S: Scalar> PositionSpeedState<S> {
     pub fn rest() -> Self {
         let zero = S::zero();
-        Self {
-            integral: zero,
-            filtered_error: zero,
-            rested: zero,
-            speed_ref: zero,
-            torque_ref: zero,
-            command: S::splat(f64::NAN),
-        }
+        Self { integral: zero, filtered_error: zero, rested: zero, speed_ref: zero, torque_ref: zero, command: S::splat(f64::NAN) }
     }
 }

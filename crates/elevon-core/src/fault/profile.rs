@@ -41,11 +41,7 @@ pub struct ProfileRecord {
 /// Every profile.
 pub fn profiles() -> &'static [ProfileRecord] {
     &[
-        ProfileRecord {
-            kind: "constant",
-            text: "the severity, always",
-            parameters: &[],
-        },
+        ProfileRecord { kind: "constant", text: "the severity, always", parameters: &[] },
         ProfileRecord {
             kind: "step",
             text: "nothing, then the severity from a time on",
@@ -54,10 +50,7 @@ pub fn profiles() -> &'static [ProfileRecord] {
         ProfileRecord {
             kind: "ramp",
             text: "grows linearly from nothing to the severity",
-            parameters: &[
-                ("start", "s", Some(0.0), "begin of the growth"),
-                ("end", "s", None, "end of the growth"),
-            ],
+            parameters: &[("start", "s", Some(0.0), "begin of the growth"), ("end", "s", None, "end of the growth")],
         },
         ProfileRecord {
             kind: "exponential",
@@ -65,12 +58,7 @@ pub fn profiles() -> &'static [ProfileRecord] {
             parameters: &[
                 ("start", "s", Some(0.0), "begin of the growth"),
                 ("end", "s", None, "time at which the severity is reached"),
-                (
-                    "time_constant",
-                    "s",
-                    None,
-                    "time in which the growth rate becomes e-fold",
-                ),
+                ("time_constant", "s", None, "time in which the growth rate becomes e-fold"),
             ],
         },
         ProfileRecord {
@@ -79,12 +67,7 @@ pub fn profiles() -> &'static [ProfileRecord] {
             parameters: &[
                 ("start", "s", Some(0.0), "begin of the first period"),
                 ("period", "s", None, "period"),
-                (
-                    "duty",
-                    "1",
-                    Some(0.5),
-                    "part of the period with the fault present",
-                ),
+                ("duty", "1", Some(0.5), "part of the period with the fault present"),
             ],
         },
         ProfileRecord {
@@ -102,19 +85,9 @@ impl Profile {
             ("constant", []) => Self::Constant,
             ("step", &[time]) => Self::Step { time },
             ("ramp", &[start, end]) => Self::Ramp { start, end },
-            ("exponential", &[start, end, time_constant]) => Self::Exponential {
-                start,
-                end,
-                time_constant,
-            },
-            ("intermittent", &[start, period, duty]) => Self::Intermittent {
-                start,
-                period,
-                duty,
-            },
-            ("table", []) if times.len() == values.len() && !times.is_empty() => {
-                Self::Table { times, values }
-            }
+            ("exponential", &[start, end, time_constant]) => Self::Exponential { start, end, time_constant },
+            ("intermittent", &[start, period, duty]) => Self::Intermittent { start, period, duty },
+            ("table", []) if times.len() == values.len() && !times.is_empty() => Self::Table { times, values },
             _ => return None,
         })
     }
@@ -126,26 +99,14 @@ impl Profile {
             Self::Constant => (1.0, never),
             &Self::Step { time } if t < time => (0.0, time),
             Self::Step { .. } => (1.0, never),
-            &Self::Ramp { start, .. } | &Self::Exponential { start, .. } if t < start => {
-                (0.0, start)
-            }
+            &Self::Ramp { start, .. } | &Self::Exponential { start, .. } if t < start => (0.0, start),
             &Self::Ramp { end, .. } | &Self::Exponential { end, .. } if t >= end => (1.0, never),
             &Self::Ramp { start, end } => ((t - start) / (end - start), t),
-            &Self::Exponential {
-                start,
-                end,
-                time_constant,
-            } => (
-                libm::expm1((t - start) / time_constant)
-                    / libm::expm1((end - start) / time_constant),
-                t,
-            ),
+            &Self::Exponential { start, end, time_constant } => {
+                (libm::expm1((t - start) / time_constant) / libm::expm1((end - start) / time_constant), t)
+            }
             &Self::Intermittent { start, .. } if t < start => (0.0, start),
-            &Self::Intermittent {
-                start,
-                period,
-                duty,
-            } => {
+            &Self::Intermittent { start, period, duty } => {
                 let origin = start + ((t - start) / period).floor() * period;
                 let off = origin + duty * period;
                 if t < off {
@@ -163,10 +124,7 @@ impl Profile {
                     values: values.clone(),
                 };
                 let line = term.line(t);
-                (
-                    line.value + line.slope * (t - line.at),
-                    if line.slope == 0.0 { line.until } else { t },
-                )
+                (line.value + line.slope * (t - line.at), if line.slope == 0.0 { line.until } else { t })
             }
         }
     }

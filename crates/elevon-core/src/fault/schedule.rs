@@ -36,11 +36,7 @@ impl FaultSpec {
         let t = (k as f64 + 0.5) * dt;
         let (factor, until) = self.profile.factor(t);
         let smooth = until <= t;
-        let mut next = if smooth {
-            (k / grid + 1) * grid
-        } else {
-            step_at(until, dt).max(k + 1)
-        };
+        let mut next = if smooth { (k / grid + 1) * grid } else { step_at(until, dt).max(k + 1) };
         let label = factor * self.severity;
         let mut pulse = false;
         if self.writes.iter().any(|w| w.op == Op::Pulse) && label > 0.0 {
@@ -50,14 +46,7 @@ impl FaultSpec {
             let edge = if pulse { off } else { origin + self.period };
             next = next.min(step_at(edge, dt).max(k + 1));
         }
-        (
-            Held {
-                label,
-                factor,
-                pulse,
-            },
-            next,
-        )
+        (Held { label, factor, pulse }, next)
     }
 }
 
@@ -79,20 +68,9 @@ pub struct FaultLanes {
 
 impl FaultLanes {
     pub fn new(faults: Vec<Vec<FaultSpec>>, grid: Steps) -> Self {
-        let held = faults
-            .iter()
-            .map(|f| vec![Held::default(); f.len()])
-            .collect();
-        let next = faults
-            .iter()
-            .map(|f| if f.is_empty() { Steps::MAX } else { 0 })
-            .collect();
-        Self {
-            faults,
-            held,
-            next,
-            grid: grid.max(1),
-        }
+        let held = faults.iter().map(|f| vec![Held::default(); f.len()]).collect();
+        let next = faults.iter().map(|f| if f.is_empty() { Steps::MAX } else { 0 }).collect();
+        Self { faults, held, next, grid: grid.max(1) }
     }
 
     pub fn next(&self) -> Steps {
@@ -125,12 +103,7 @@ impl FaultLanes {
 
     /// Writes the held severities of lanes `first..` into a copy of the healthy parameters. `severity(lane,
     /// fault)` is the severity as a scalar, so that a dual number can carry its derivative.
-    pub fn apply<S: Scalar>(
-        &self,
-        first: usize,
-        raw: &mut [S],
-        severity: &dyn Fn(usize, usize) -> S,
-    ) {
+    pub fn apply<S: Scalar>(&self, first: usize, raw: &mut [S], severity: &dyn Fn(usize, usize) -> S) {
         let numbers = S::from_fn(|i| i as f64);
         for i in 0..S::LANES {
             let lane = first + i;
@@ -157,11 +130,7 @@ pub fn whole(raw: &[f64], faults: &[FaultSpec]) -> Vec<f64> {
         for &(index, value) in &fault.settings {
             all[index] = value;
         }
-        let held = Held {
-            label: fault.severity,
-            factor: 1.0,
-            pulse: fault.severity > 0.0,
-        };
+        let held = Held { label: fault.severity, factor: 1.0, pulse: fault.severity > 0.0 };
         for write in &fault.writes {
             all[write.index] = changed(all[write.index], fault.severity, write.op, held);
         }

@@ -35,8 +35,7 @@ variables! {
 
 impl InverterParameter {
     /// Any of these away from zero needs the detailed bridge.
-    pub const DETAIL: std::ops::RangeInclusive<usize> =
-        Self::OnResistance as usize..=Self::ShortedCLow as usize;
+    pub const DETAIL: std::ops::RangeInclusive<usize> = Self::OnResistance as usize..=Self::ShortedCLow as usize;
 }
 
 /// Constants of the detailed bridge.
@@ -88,9 +87,7 @@ impl<S: Scalar> Bridge<S> {
     pub fn derive(raw: &[S], dt: f64) -> Self {
         use InverterParameter as P;
         let g = |p: P| raw[p as usize];
-        let pairs = |first: P| -> [[S; 2]; 3] {
-            three!(|j| std::array::from_fn(|i| raw[first as usize + 2 * j + i]))
-        };
+        let pairs = |first: P| -> [[S; 2]; 3] { three!(|j| std::array::from_fn(|i| raw[first as usize + 2 * j + i])) };
         Self {
             on_resistance: g(P::OnResistance),
             diode_drop: g(P::DiodeDrop),
@@ -104,29 +101,13 @@ impl<S: Scalar> Bridge<S> {
 
     /// Legs from the commands (+1 high, -1 low, 0 off) and the windings; `v_n` in the second place.
     #[inline(always)]
-    pub fn connect(
-        &self,
-        s: &mut BridgeState<S>,
-        old: [S; 3],
-        new: [S; 3],
-        half_supply: S,
-        w: &Windings<S>,
-    ) -> (Legs<S>, S) {
+    pub fn connect(&self, s: &mut BridgeState<S>, old: [S; 3], new: [S; 3], half_supply: S, w: &Windings<S>) -> (Legs<S>, S) {
         let zero = S::zero();
         let tiny = S::splat(0.5);
-        let mut legs = Legs {
-            voltage: [zero; 3],
-            rail: [zero; 3],
-            connected: [S::mask(false); 3],
-            passive: [S::mask(false); 3],
-        };
+        let mut legs = Legs { voltage: [zero; 3], rail: [zero; 3], connected: [S::mask(false); 3], passive: [S::mask(false); 3] };
         for j in 0..3 {
             let changed = !old[j].equals(new[j]);
-            s.blanking[j] = S::select(
-                changed,
-                self.dead_time,
-                (s.blanking[j] - self.dt).maximum(zero),
-            );
+            s.blanking[j] = S::select(changed, self.dead_time, (s.blanking[j] - self.dt).maximum(zero));
             let live = s.blanking[j].le(tiny * self.dt) & s.tripped.le(tiny);
             let gate_high = live & zero.lt(new[j]);
             let gate_low = live & new[j].lt(zero);
@@ -140,11 +121,7 @@ impl<S: Scalar> Bridge<S> {
             let off_voltage = S::select(positive, -diode, diode);
             let held = high | low;
             let rail_held = S::select(high, half_supply, -half_supply);
-            legs.rail[j] = S::select(
-                held,
-                rail_held,
-                S::select(positive, -half_supply, half_supply),
-            );
+            legs.rail[j] = S::select(held, rail_held, S::select(positive, -half_supply, half_supply));
             legs.voltage[j] = S::select(held, rail_held - switched, off_voltage);
             let intact = w.open[j].le(tiny);
             legs.connected[j] = carrying | (held & intact);
@@ -204,10 +181,7 @@ impl<S: Scalar> Bridge<S> {
 
 impl<S: Scalar> BridgeState<S> {
     pub fn rest() -> Self {
-        Self {
-            blanking: [S::zero(); 3],
-            tripped: S::zero(),
-        }
+        Self { blanking: [S::zero(); 3], tripped: S::zero() }
     }
 }
 

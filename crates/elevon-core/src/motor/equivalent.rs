@@ -28,20 +28,11 @@ pub struct Equivalent<S> {
 /// Coefficients for currents i_q `imposed[j]` in phases of `k`, `resistance`, `inductance`; `sensed[j]`
 /// projects phase quantities on the quadrature axis.
 #[inline(always)]
-pub fn equivalent<S: Scalar>(
-    k: [S; 3],
-    resistance: [S; 3],
-    inductance: [S; 3],
-    imposed: [S; 3],
-) -> Equivalent<S> {
+pub fn equivalent<S: Scalar>(k: [S; 3], resistance: [S; 3], inductance: [S; 3], imposed: [S; 3]) -> Equivalent<S> {
     let two_thirds = S::splat(2.0 / 3.0);
     let weight: [S; 3] = three!(|j| two_thirds * imposed[j] * imposed[j]);
     let dot = |a: [S; 3], b: [S; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    Equivalent {
-        torque_constant: dot(k, imposed),
-        resistance: dot(resistance, weight),
-        inductance: dot(inductance, weight),
-    }
+    Equivalent { torque_constant: dot(k, imposed), resistance: dot(resistance, weight), inductance: dot(inductance, weight) }
 }
 
 /// Shape of the phase currents per ampere of i_q: sin a_j; with phase j interrupted the other two carry half
@@ -77,11 +68,7 @@ impl<S: Scalar> Circuit<S> {
         let square = x * x;
         let even = S::one() + square * S::splat(0.1);
         let odd = x * (S::splat(0.5) + square * S::splat(1.0 / 120.0));
-        Self {
-            resistance,
-            numerator: even - odd,
-            denominator: even + odd,
-        }
+        Self { resistance, numerator: even - odd, denominator: even + odd }
     }
 
     /// Current after the step under the driving voltage (terminal voltage less EMF).
@@ -94,8 +81,7 @@ impl<S: Scalar> Circuit<S> {
     /// Driving voltage that brings the current from `start` to `end` in the step.
     #[inline(always)]
     pub fn voltage(&self, start: S, end: S) -> S {
-        let settled =
-            (end * self.denominator - start * self.numerator) / (self.denominator - self.numerator);
+        let settled = (end * self.denominator - start * self.numerator) / (self.denominator - self.numerator);
         self.resistance * settled
     }
 }

@@ -92,21 +92,12 @@ impl<S: Scalar> Star<S> {
         let (one, zero) = (S::one(), S::zero());
         let turns = phases(raw, P::TurnsA);
         let k = g(P::EmfConstant) * g(P::FluxFraction);
-        let coupling = if structure.shorted_loop {
-            g(P::ShortCoupling)
-        } else {
-            zero
-        };
-        let shorted = three!(|j| if structure.shorted_loop {
-            one - turns[j]
-        } else {
-            zero
-        });
+        let coupling = if structure.shorted_loop { g(P::ShortCoupling) } else { zero };
+        let shorted = three!(|j| if structure.shorted_loop { one - turns[j] } else { zero });
         let has_loop = three!(|j| zero.lt(shorted[j]));
         let guarded: [S; 3] = three!(|j| S::select(has_loop[j], shorted[j], one));
         let factor: [S; 3] = three!(|j| S::select(has_loop[j], one - coupling * coupling, one));
-        let per_inductance: [S; 3] =
-            three!(|j| one / (turns[j] * turns[j] * g(P::Inductance) * factor[j]));
+        let per_inductance: [S; 3] = three!(|j| one / (turns[j] * turns[j] * g(P::Inductance) * factor[j]));
         let total = per_inductance[0] + per_inductance[1] + per_inductance[2];
         let (sin_s, cos_s) = g(P::EccentricityStaticPhase).sin_cos();
         let (sin_d, cos_d) = g(P::EccentricityDynamicPhase).sin_cos();
@@ -128,11 +119,7 @@ impl<S: Scalar> Star<S> {
             open: phases(raw, P::OpenA),
             loop_ratio: three!(|j| S::select(has_loop[j], coupling * turns[j] / guarded[j], zero)),
             loop_resistance: three!(|j| shorted[j] * g(P::Resistance) + g(P::ShortContact)),
-            loop_per_inductance: three!(|j| S::select(
-                has_loop[j],
-                one / (guarded[j] * guarded[j] * g(P::Inductance)),
-                zero
-            )),
+            loop_per_inductance: three!(|j| S::select(has_loop[j], one / (guarded[j] * guarded[j] * g(P::Inductance)), zero)),
             loop_turns: three!(|j| shorted[j] * k),
         }
     }
@@ -162,11 +149,7 @@ impl<S: Scalar> Star<S> {
         let y = self.eccentric_cos.fma(sin, -(self.eccentric_sin * cos));
         let half = S::splat(-0.5) * x;
         let root = S::splat(0.866_025_403_784_438_6) * y;
-        [
-            S::one() + x,
-            S::one() + (half - root),
-            S::one() + (half + root),
-        ]
+        [S::one() + x, S::one() + (half - root), S::one() + (half + root)]
     }
 
     /// 1 + zeta_d cos(theta_m - phi_d - 2 pi (j-1)/3): the narrow gap sweeps the phases once a turn.
@@ -177,19 +160,14 @@ impl<S: Scalar> Star<S> {
         let y = self.dynamic_cos * sin - self.dynamic_sin * cos;
         let half = S::splat(-0.5) * x;
         let root = S::splat(0.866_025_403_784_438_6) * y;
-        [
-            S::one() + x,
-            S::one() + (half + root),
-            S::one() + (half - root),
-        ]
+        [S::one() + x, S::one() + (half + root), S::one() + (half - root)]
     }
 
     /// Trapezoid of the three phase angles theta_e - 2 pi (j-1)/3: a triangle cut at +-1.
     #[inline(always)]
     pub fn trapezoid(&self, angle: S) -> [S; 3] {
         three!(|j| {
-            let turns = angle * S::splat(1.0 / std::f64::consts::TAU) - S::splat(j as f64 / 3.0)
-                + S::splat(0.25);
+            let turns = angle * S::splat(1.0 / std::f64::consts::TAU) - S::splat(j as f64 / 3.0) + S::splat(0.25);
             let triangle = S::one() - S::splat(4.0) * (turns - turns.floor() - S::splat(0.5)).abs();
             (triangle * self.flat_slope).clamp_abs(S::one())
         })
@@ -222,9 +200,7 @@ impl<S: Scalar> Star<S> {
     /// EMF that the loops' currents add to their phases: -(M / L_f)(R_f i_f + mu k_j' omega).
     #[inline(always)]
     pub fn loop_emf(&self, s: &StarState<S>, loop_k: [S; 3], speed: S) -> [S; 3] {
-        three!(|j| -self.loop_ratio[j]
-            * (self.loop_resistance[j] * s.resistance_factor * s.loop_current[j]
-                + loop_k[j] * speed))
+        three!(|j| -self.loop_ratio[j] * (self.loop_resistance[j] * s.resistance_factor * s.loop_current[j] + loop_k[j] * speed))
     }
 
     /// k of the shorted turns alone, from the unit shape and gap of the phase.
@@ -235,17 +211,9 @@ impl<S: Scalar> Star<S> {
 
     /// Explicit step of the loop currents, given the phases' di/dt.
     #[inline(always)]
-    pub fn step_loops(
-        &self,
-        s: &StarState<S>,
-        loop_k: [S; 3],
-        speed: S,
-        slope: [S; 3],
-        dt: S,
-    ) -> [S; 3] {
+    pub fn step_loops(&self, s: &StarState<S>, loop_k: [S; 3], speed: S, slope: [S; 3], dt: S) -> [S; 3] {
         three!(|j| {
-            let own = self.loop_resistance[j] * s.resistance_factor * s.loop_current[j]
-                + loop_k[j] * speed;
+            let own = self.loop_resistance[j] * s.resistance_factor * s.loop_current[j] + loop_k[j] * speed;
             let change = -own * self.loop_per_inductance[j] - self.loop_ratio[j] * slope[j];
             s.loop_current[j] + dt * change
         })
@@ -254,20 +222,13 @@ impl<S: Scalar> Star<S> {
     /// Copper loss in the loops, W.
     #[inline(always)]
     pub fn loop_loss(&self, s: &StarState<S>, current: [S; 3]) -> S {
-        (0..3).fold(S::zero(), |sum, j| {
-            sum + self.loop_resistance[j] * s.resistance_factor * current[j] * current[j]
-        })
+        (0..3).fold(S::zero(), |sum, j| sum + self.loop_resistance[j] * s.resistance_factor * current[j] * current[j])
     }
 }
 
 impl<S: Scalar> StarState<S> {
     pub fn rest() -> Self {
-        Self {
-            current: [S::zero(); 3],
-            loop_current: [S::zero(); 3],
-            resistance_factor: S::one(),
-            flux_factor: S::one(),
-        }
+        Self { current: [S::zero(); 3], loop_current: [S::zero(); 3], resistance_factor: S::one(), flux_factor: S::one() }
     }
 
     /// Sets the temperature factors for a winding at `temperature` (K).

@@ -32,24 +32,14 @@ impl<S: Scalar> Tap<S> {
             let level = raw[P::LevelA as usize + j];
             level / (reference * (S::one() - level))
         });
-        Self {
-            conductance,
-            per_dt: S::one() / dt,
-        }
+        Self { conductance, per_dt: S::one() / dt }
     }
 
     /// Neutral voltage that closes Kirchhoff's law at the end of the step. `drop` is terminal voltage less EMF and R i.
     #[inline(always)]
-    pub fn neutral(
-        &self,
-        terminal: [S; 3],
-        drop: [S; 3],
-        current: [S; 3],
-        per_inductance: [S; 3],
-    ) -> S {
+    pub fn neutral(&self, terminal: [S; 3], drop: [S; 3], current: [S; 3], per_inductance: [S; 3]) -> S {
         let g = self.conductance;
-        let driven =
-            drop[0] * per_inductance[0] + drop[1] * per_inductance[1] + drop[2] * per_inductance[2];
+        let driven = drop[0] * per_inductance[0] + drop[1] * per_inductance[1] + drop[2] * per_inductance[2];
         let tapped = g[0] * terminal[0] + g[1] * terminal[1] + g[2] * terminal[2];
         let sum = current[0] + current[1] + current[2];
         let weight = per_inductance[0] + per_inductance[1] + per_inductance[2];

@@ -107,8 +107,7 @@ impl<S: Scalar> Network<S> {
     #[inline(always)]
     fn to_air(&self, surface: S) -> S {
         let fourth = |t: S| t.square().square();
-        self.convection * (surface - self.ambient)
-            + self.radiation * (fourth(surface) - fourth(self.ambient))
+        self.convection * (surface - self.ambient) + self.radiation * (fourth(surface) - fourth(self.ambient))
     }
 
     /// Surface temperature at the end of an implicit step: `gain` is its length over the winding's capacity,
@@ -133,24 +132,14 @@ impl<S: Scalar> Network<S> {
         let (copper, loops) = (s.collected[0] / self.period, s.collected[1] / self.period);
         let power = copper + loops;
         let gain = self.period / self.winding_capacity;
-        let surface = self.surface_after(
-            s.winding,
-            s.surface,
-            power,
-            gain,
-            self.housing_capacity / self.period,
-        );
+        let surface = self.surface_after(s.winding, s.surface, power, gain, self.housing_capacity / self.period);
         let through = (s.winding + gain * power - surface) / (self.resistance + gain);
         let out = S::select(quasi, through, self.to_air(surface));
         s.heat_in = s.heat_in + self.period * power;
         s.heat_out = s.heat_out + self.period * out;
         s.winding = s.winding + gain * (power - through);
         let capacity = S::select(quasi, S::one(), self.housing_capacity);
-        s.surface = S::select(
-            quasi,
-            surface,
-            s.surface + self.period / capacity * (through - out),
-        );
+        s.surface = S::select(quasi, surface, s.surface + self.period / capacity * (through - out));
         s.collected = [zero; 2];
         s.power = [copper, loops, out];
         s.over = S::select(self.trip.lt(s.winding), S::one(), s.over);
@@ -159,16 +148,12 @@ impl<S: Scalar> Network<S> {
     /// Factors on the winding's resistance (its own temperature) and on the flux (the surface's).
     pub fn factors(&self, s: &NetworkState<S>) -> (S, S) {
         let one = S::one();
-        (
-            one + self.coefficient * (s.winding - self.reference),
-            one + self.flux_coefficient * (s.surface - self.reference),
-        )
+        (one + self.coefficient * (s.winding - self.reference), one + self.flux_coefficient * (s.surface - self.reference))
     }
 
     /// Heat in both nodes above that of the start, J.
     pub fn stored(&self, s: &NetworkState<S>) -> S {
-        self.winding_capacity * (s.winding - s.begin[0])
-            + self.housing_capacity * (s.surface - s.begin[1])
+        self.winding_capacity * (s.winding - s.begin[0]) + self.housing_capacity * (s.surface - s.begin[1])
     }
 
     /// 1 while the winding is above its warning.

@@ -15,17 +15,11 @@ pub struct Dual<const N: usize> {
 impl<const N: usize> Dual<N> {
     /// The independent variable number `index`.
     pub fn variable(value: f64, index: usize) -> Self {
-        Self {
-            value,
-            slope: std::array::from_fn(|i| if i == index { 1.0 } else { 0.0 }),
-        }
+        Self { value, slope: std::array::from_fn(|i| if i == index { 1.0 } else { 0.0 }) }
     }
     #[inline(always)]
     fn chain(self, value: f64, derivative: f64) -> Self {
-        Self {
-            value,
-            slope: self.slope.map(|d| d * derivative),
-        }
+        Self { value, slope: self.slope.map(|d| d * derivative) }
     }
 }
 
@@ -33,20 +27,14 @@ impl<const N: usize> Add for Dual<N> {
     type Output = Self;
     #[inline(always)]
     fn add(self, o: Self) -> Self {
-        Self {
-            value: self.value + o.value,
-            slope: std::array::from_fn(|i| self.slope[i] + o.slope[i]),
-        }
+        Self { value: self.value + o.value, slope: std::array::from_fn(|i| self.slope[i] + o.slope[i]) }
     }
 }
 impl<const N: usize> Sub for Dual<N> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, o: Self) -> Self {
-        Self {
-            value: self.value - o.value,
-            slope: std::array::from_fn(|i| self.slope[i] - o.slope[i]),
-        }
+        Self { value: self.value - o.value, slope: std::array::from_fn(|i| self.slope[i] - o.slope[i]) }
     }
 }
 impl<const N: usize> Mul for Dual<N> {
@@ -54,10 +42,7 @@ impl<const N: usize> Mul for Dual<N> {
     #[inline(always)]
     fn mul(self, o: Self) -> Self {
         let slope = std::array::from_fn(|i| self.slope[i] * o.value + self.value * o.slope[i]);
-        Self {
-            value: self.value * o.value,
-            slope,
-        }
+        Self { value: self.value * o.value, slope }
     }
 }
 impl<const N: usize> Div for Dual<N> {
@@ -65,20 +50,14 @@ impl<const N: usize> Div for Dual<N> {
     #[inline(always)]
     fn div(self, o: Self) -> Self {
         let value = self.value / o.value;
-        Self {
-            value,
-            slope: std::array::from_fn(|i| (self.slope[i] - value * o.slope[i]) / o.value),
-        }
+        Self { value, slope: std::array::from_fn(|i| (self.slope[i] - value * o.slope[i]) / o.value) }
     }
 }
 impl<const N: usize> Neg for Dual<N> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self {
-            value: -self.value,
-            slope: self.slope.map(|d| -d),
-        }
+        Self { value: -self.value, slope: self.slope.map(|d| -d) }
     }
 }
 
@@ -89,10 +68,7 @@ impl<const N: usize> Scalar for Dual<N> {
 
     #[inline(always)]
     fn splat(value: f64) -> Self {
-        Self {
-            value,
-            slope: [0.0; N],
-        }
+        Self { value, slope: [0.0; N] }
     }
     #[inline(always)]
     fn from_fn(mut f: impl FnMut(usize) -> f64) -> Self {
@@ -133,10 +109,7 @@ impl<const N: usize> Scalar for Dual<N> {
     #[inline(always)]
     fn fma(self, factor: Self, addend: Self) -> Self {
         let product = self * factor + addend;
-        Self {
-            value: f64::mul_add(self.value, factor.value, addend.value),
-            slope: product.slope,
-        }
+        Self { value: f64::mul_add(self.value, factor.value, addend.value), slope: product.slope }
     }
     #[inline(always)]
     fn abs(self) -> Self {
@@ -175,20 +148,9 @@ impl<const N: usize> Scalar for Dual<N> {
     }
     #[inline(always)]
     fn turn(sin: Self, cos: Self, quarters: u64) -> (Self, Self) {
-        let (s, c) = if quarters & 1 != 0 {
-            (cos, sin)
-        } else {
-            (sin, cos)
-        };
+        let (s, c) = if quarters & 1 != 0 { (cos, sin) } else { (sin, cos) };
         let s = if quarters & 2 != 0 { -s } else { s };
-        (
-            s,
-            if quarters.wrapping_add(1) & 2 != 0 {
-                -c
-            } else {
-                c
-            },
-        )
+        (s, if quarters.wrapping_add(1) & 2 != 0 { -c } else { c })
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {

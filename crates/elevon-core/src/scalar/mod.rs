@@ -39,10 +39,7 @@ pub trait Scalar:
     + Neg<Output = Self>
     + 'static
 {
-    type Mask: Copy
-        + BitAnd<Output = Self::Mask>
-        + BitOr<Output = Self::Mask>
-        + Not<Output = Self::Mask>;
+    type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask> + Not<Output = Self::Mask>;
     /// Quarter turns as an integer, low bits valid.
     type Quarters: Copy;
     const LANES: usize;

@@ -83,13 +83,7 @@ impl<const N: usize> Scalar for Portable<N> {
     }
     #[inline(always)]
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
-        Self(std::array::from_fn(|i| {
-            if mask.0[i] {
-                yes.0[i]
-            } else {
-                no.0[i]
-            }
-        }))
+        Self(std::array::from_fn(|i| if mask.0[i] { yes.0[i] } else { no.0[i] }))
     }
     #[inline(always)]
     fn any(mask: Self::Mask) -> bool {
@@ -101,9 +95,7 @@ impl<const N: usize> Scalar for Portable<N> {
     }
     #[inline(always)]
     fn fma(self, factor: Self, addend: Self) -> Self {
-        Self(std::array::from_fn(|i| {
-            f64::mul_add(self.0[i], factor.0[i], addend.0[i])
-        }))
+        Self(std::array::from_fn(|i| f64::mul_add(self.0[i], factor.0[i], addend.0[i])))
     }
     #[inline(always)]
     fn abs(self) -> Self {
@@ -134,8 +126,7 @@ impl<const N: usize> Scalar for Portable<N> {
     }
     #[inline(always)]
     fn turn(sin: Self, cos: Self, quarters: [u64; N]) -> (Self, Self) {
-        let both: [(f64, f64); N] =
-            std::array::from_fn(|i| f64::turn(sin.0[i], cos.0[i], quarters[i]));
+        let both: [(f64, f64); N] = std::array::from_fn(|i| f64::turn(sin.0[i], cos.0[i], quarters[i]));
         (Self(both.map(|b| b.0)), Self(both.map(|b| b.1)))
     }
     #[inline(always)]

@@ -80,17 +80,10 @@ impl Scalar for f64 {
     }
     #[inline(always)]
     fn turn(sin: Self, cos: Self, quarters: u64) -> (Self, Self) {
-        let (s, c) = if quarters & 1 != 0 {
-            (cos, sin)
-        } else {
-            (sin, cos)
-        };
+        let (s, c) = if quarters & 1 != 0 { (cos, sin) } else { (sin, cos) };
         let sin_sign = (quarters & 2) << 62;
         let cos_sign = (quarters.wrapping_add(1) & 2) << 62;
-        (
-            f64::from_bits(s.to_bits() ^ sin_sign),
-            f64::from_bits(c.to_bits() ^ cos_sign),
-        )
+        (f64::from_bits(s.to_bits() ^ sin_sign), f64::from_bits(c.to_bits() ^ cos_sign))
     }
     #[inline(always)]
     fn vectorize<K: Kernel>(kernel: K) -> K::Output {

@@ -33,11 +33,7 @@ unsafe fn signs_avx2(quarters: __m256i) -> (Avx2Mask, __m256d, __m256d) {
     let sin_sign = _mm256_and_si256(_mm256_slli_epi64::<62>(quarters), sign);
     // cos changes sign with quarters + 1: the second bit of the sum is the exclusive or of the two low bits.
     let cos_sign = _mm256_xor_si256(sin_sign, odd);
-    (
-        Avx2Mask(_mm256_castsi256_pd(odd)),
-        _mm256_castsi256_pd(sin_sign),
-        _mm256_castsi256_pd(cos_sign),
-    )
+    (Avx2Mask(_mm256_castsi256_pd(odd)), _mm256_castsi256_pd(sin_sign), _mm256_castsi256_pd(cos_sign))
 }
 
 /// As `signs_avx2`.
@@ -50,11 +46,7 @@ unsafe fn signs_avx512(quarters: __m512i) -> (Avx512Mask, __m512d, __m512d) {
     let odd = _mm512_slli_epi64::<63>(quarters);
     let sin_sign = _mm512_and_si512(_mm512_slli_epi64::<62>(quarters), sign);
     let cos_sign = _mm512_xor_si512(sin_sign, odd);
-    (
-        Avx512Mask(_mm512_movepi64_mask(odd)),
-        _mm512_castsi512_pd(sin_sign),
-        _mm512_castsi512_pd(cos_sign),
-    )
+    (Avx512Mask(_mm512_movepi64_mask(odd)), _mm512_castsi512_pd(sin_sign), _mm512_castsi512_pd(cos_sign))
 }
 
 macro_rules! vector_type {
@@ -178,9 +170,7 @@ macro_rules! vector_type {
             #[inline(always)]
             fn quarters(self) -> (Self, $integers) {
                 let shifted = self + Self::splat(ROUNDER);
-                (shifted - Self::splat(ROUNDER), unsafe {
-                    $to_bits(shifted.0)
-                })
+                (shifted - Self::splat(ROUNDER), unsafe { $to_bits(shifted.0) })
             }
             #[inline(always)]
             fn turn(sin: Self, cos: Self, quarters: $integers) -> (Self, Self) {

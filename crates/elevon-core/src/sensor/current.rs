@@ -38,22 +38,14 @@ impl<S: Scalar> CurrentSensor<S> {
         let g = |p: P| raw[p as usize];
         let bits = g(P::Bits).lane(0);
         let levels = if bits > 0.0 { libm::exp2(bits) } else { 0.0 };
-        let resolution = if levels > 0.0 {
-            S::splat(2.0) * g(P::FullScale) / S::splat(levels)
-        } else {
-            S::zero()
-        };
+        let resolution = if levels > 0.0 { S::splat(2.0) * g(P::FullScale) / S::splat(levels) } else { S::zero() };
         let quantised = S::zero().lt(resolution);
         Self {
             gain: three!(|j| raw[P::GainA as usize + j]),
             offset: three!(|j| raw[P::OffsetA as usize + j]),
             noise_deviation: g(P::NoiseDeviation),
             resolution,
-            per_resolution: S::select(
-                quantised,
-                S::one() / S::select(quantised, resolution, S::one()),
-                S::zero(),
-            ),
+            per_resolution: S::select(quantised, S::one() / S::select(quantised, resolution, S::one()), S::zero()),
             full_scale: g(P::FullScale),
         }
     }
@@ -63,8 +55,7 @@ impl<S: Scalar> CurrentSensor<S> {
     pub fn measure(&self, current: [S; 3], noise: [S; 3]) -> [S; 3] {
         let quantised = S::zero().lt(self.resolution);
         three!(|j| {
-            let raw =
-                self.gain[j] * current[j] + (self.offset[j] + self.noise_deviation * noise[j]);
+            let raw = self.gain[j] * current[j] + (self.offset[j] + self.noise_deviation * noise[j]);
             let steps = (raw.clamp_abs(self.full_scale) * self.per_resolution).round();
             S::select(quantised, steps * self.resolution, raw)
         })
@@ -74,17 +65,7 @@ impl<S: Scalar> CurrentSensor<S> {
     pub fn ideal(raw: &[f64]) -> bool {
         use CurrentSensorParameter as P;
         let at = |p: P, healthy: f64| raw[p as usize] == healthy;
-        [P::GainA, P::GainB, P::GainC]
-            .into_iter()
-            .all(|p| at(p, 1.0))
-            && [
-                P::OffsetA,
-                P::OffsetB,
-                P::OffsetC,
-                P::NoiseDeviation,
-                P::Bits,
-            ]
-            .into_iter()
-            .all(|p| at(p, 0.0))
+        [P::GainA, P::GainB, P::GainC].into_iter().all(|p| at(p, 1.0))
+            && [P::OffsetA, P::OffsetB, P::OffsetC, P::NoiseDeviation, P::Bits].into_iter().all(|p| at(p, 0.0))
     }
 }

@@ -30,11 +30,7 @@ impl<S: Scalar> Encoder<S> {
         let counts = g(P::Pulses) * g(P::Edges) * g(P::WheelRatio);
         let tau = S::splat(turn);
         let kept = S::one() - g(P::MissingCounts);
-        Self {
-            per_count: counts / tau * kept,
-            count: g(P::Gain) * tau / counts,
-            offset: g(P::Offset),
-        }
+        Self { per_count: counts / tau * kept, count: g(P::Gain) * tau / counts, offset: g(P::Offset) }
     }
 
     /// Shown user position: whole counts since the user's zero.

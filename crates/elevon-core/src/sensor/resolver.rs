@@ -52,10 +52,7 @@ impl<S: Scalar> Resolver<S> {
 
     pub fn ideal(raw: &[f64]) -> bool {
         use ResolverParameter as P;
-        raw[P::Gain as usize] == 1.0
-            && [P::Mismatch, P::Offset, P::PowerOff]
-                .into_iter()
-                .all(|p| raw[p as usize] == 0.0)
+        raw[P::Gain as usize] == 1.0 && [P::Mismatch, P::Offset, P::PowerOff].into_iter().all(|p| raw[p as usize] == 0.0)
     }
 
     /// Reading at angle `theta`, speed `omega`; `held` is the last angle shown with power on.
@@ -73,10 +70,6 @@ impl<S: Scalar> Resolver<S> {
         let lost = S::select(S::splat(0.5).lt(self.zero_when_off), S::zero(), *held);
         let angle = S::select(off, lost, shown);
         let speed = S::select(off, S::zero(), omega * rate);
-        Reading {
-            angle,
-            position: self.gain * angle,
-            speed: self.gain * speed,
-        }
+        Reading { angle, position: self.gain * angle, speed: self.gain * speed }
     }
 }

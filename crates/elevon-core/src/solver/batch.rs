@@ -67,12 +67,7 @@ fn shape<W: Wiring>(run: &RunSpec, recorded: &[usize]) -> Shape<W::Structure> {
     }
 }
 
-fn run_block<W: Wiring, S: Scalar>(
-    runs: &[&RunSpec],
-    clocks: &[Clock],
-    recorded: &[usize],
-    monitor: &Monitor,
-) -> Vec<RunOutput> {
+fn run_block<W: Wiring, S: Scalar>(runs: &[&RunSpec], clocks: &[Clock], recorded: &[usize], monitor: &Monitor) -> Vec<RunOutput> {
     let mut padded = runs.to_vec();
     while padded.len() % S::LANES != 0 {
         padded.push(runs[runs.len() - 1]);
@@ -80,13 +75,7 @@ fn run_block<W: Wiring, S: Scalar>(
     Block::<W, S, Plain>::new(&padded, runs.len(), Plain(&padded), clocks, recorded).run(monitor)
 }
 
-fn run_width<W: Wiring>(
-    width: Width,
-    runs: &[&RunSpec],
-    clocks: &[Clock],
-    recorded: &[usize],
-    monitor: &Monitor,
-) -> Vec<RunOutput> {
+fn run_width<W: Wiring>(width: Width, runs: &[&RunSpec], clocks: &[Clock], recorded: &[usize], monitor: &Monitor) -> Vec<RunOutput> {
     match width {
         Width::Single => run_block::<W, f64>(runs, clocks, recorded, monitor),
         #[cfg(target_arch = "x86_64")]
@@ -99,23 +88,14 @@ fn run_width<W: Wiring>(
 
 /// The signals any clock keeps.
 fn recorded(clocks: &[Clock]) -> Vec<usize> {
-    let mut all: Vec<usize> = clocks
-        .iter()
-        .flat_map(|c| c.signals.iter().copied())
-        .collect();
+    let mut all: Vec<usize> = clocks.iter().flat_map(|c| c.signals.iter().copied()).collect();
     all.sort_unstable();
     all.dedup();
     all
 }
 
 /// Runs everything; the outputs stand in the order of the runs. `threads` 0 means all cores.
-pub fn run_all<W: Wiring>(
-    runs: &[RunSpec],
-    clocks: &[Clock],
-    threads: usize,
-    width: Width,
-    monitor: &Monitor,
-) -> Vec<RunOutput> {
+pub fn run_all<W: Wiring>(runs: &[RunSpec], clocks: &[Clock], threads: usize, width: Width, monitor: &Monitor) -> Vec<RunOutput> {
     let recorded = recorded(clocks);
     if let [run] = runs {
         return run_width::<W>(Width::Single, &[run], clocks, &recorded, monitor);
@@ -127,11 +107,7 @@ pub fn run_all<W: Wiring>(
             .map(|indices| {
                 let members: Vec<&RunSpec> = indices.iter().map(|&i| &runs[i]).collect();
                 // A lone run gains nothing from lanes.
-                let width = if members.len() == 1 {
-                    Width::Single
-                } else {
-                    width
-                };
+                let width = if members.len() == 1 { Width::Single } else { width };
                 let outputs = run_width::<W>(width, &members, clocks, &recorded, monitor);
                 (indices, outputs)
             })
@@ -152,12 +128,7 @@ pub fn run_all<W: Wiring>(
 
 /// Groups runs by shape and cuts the groups into blocks: large enough to hide latencies, enough of them for
 /// the threads.
-fn blocks<W: Wiring>(
-    runs: &[RunSpec],
-    recorded: &[usize],
-    width: Width,
-    threads: usize,
-) -> Vec<Vec<usize>> {
+fn blocks<W: Wiring>(runs: &[RunSpec], recorded: &[usize], width: Width, threads: usize) -> Vec<Vec<usize>> {
     let mut order: Vec<Shape<W::Structure>> = Vec::new();
     let mut groups: HashMap<Shape<W::Structure>, Vec<usize>> = HashMap::new();
     for (i, run) in runs.iter().enumerate() {
@@ -167,11 +138,7 @@ fn blocks<W: Wiring>(
         }
         groups.entry(key).or_default().push(i);
     }
-    let threads = if threads == 0 {
-        rayon::current_num_threads()
-    } else {
-        threads
-    };
+    let threads = if threads == 0 { rayon::current_num_threads() } else { threads };
     let lanes = width.lanes();
     let mut all = Vec::new();
     for key in order {
@@ -234,15 +201,9 @@ pub fn sensitivities<W: Wiring>(
         .map(|pass| {
             let parameters: Vec<usize> = pass.iter().filter(|x| x.0).map(|x| x.1).collect();
             let faults: Vec<usize> = pass.iter().filter(|x| !x.0).map(|x| x.1).collect();
-            let seeds = Seeds::<SLOTS> {
-                run,
-                parameters: &parameters,
-                faults: &faults,
-            };
+            let seeds = Seeds::<SLOTS> { run, parameters: &parameters, faults: &faults };
             let runs = [run];
-            let mut outputs =
-                Block::<W, Dual<SLOTS>, Seeds<SLOTS>>::new(&runs, 1, seeds, clocks, &recorded)
-                    .run(monitor);
+            let mut outputs = Block::<W, Dual<SLOTS>, Seeds<SLOTS>>::new(&runs, 1, seeds, clocks, &recorded).run(monitor);
             outputs.remove(0)
         })
         .collect()

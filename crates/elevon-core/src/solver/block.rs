@@ -46,12 +46,7 @@ pub fn structure<W: Wiring>(run: &RunSpec, recorded: &[usize]) -> W::Structure {
     for index in run.faults.iter().flat_map(|f| f.touched()) {
         touched[index] = true;
     }
-    W::structure(&Setup {
-        raw: &run.parameters,
-        touched: &touched,
-        driven: &run.driven,
-        recorded,
-    })
+    W::structure(&Setup { raw: &run.parameters, touched: &touched, driven: &run.driven, recorded })
 }
 
 struct Advance<'a, W: Wiring, S: Scalar> {
@@ -67,14 +62,7 @@ impl<W: Wiring, S: Scalar> Kernel for Advance<'_, W, S> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        W::advance(
-            self.structure,
-            self.models,
-            self.inputs,
-            self.states,
-            self.from,
-            self.count,
-        );
+        W::advance(self.structure, self.models, self.inputs, self.states, self.from, self.count);
     }
 }
 
@@ -103,39 +91,20 @@ pub struct Block<'a, W: Wiring, S: Scalar, L: Lift<S>> {
 
 impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
     /// `runs` is padded to whole chunks; the first `real` are kept.
-    pub fn new(
-        runs: &'a [&'a RunSpec],
-        real: usize,
-        lift: L,
-        clocks: &'a [Clock],
-        recorded: &[usize],
-    ) -> Self {
+    pub fn new(runs: &'a [&'a RunSpec], real: usize, lift: L, clocks: &'a [Clock], recorded: &[usize]) -> Self {
         let first = runs[0];
         let dt = W::step(&first.parameters);
         let steps = (first.duration / dt).round() as Steps;
         let structure = structure::<W>(first, recorded);
         let chunks = runs.len() / S::LANES;
         let count = first.parameters.len();
-        let healthy: Vec<Vec<S>> = (0..chunks)
-            .map(|c| {
-                (0..count)
-                    .map(|i| lift.parameter(c * S::LANES, i))
-                    .collect()
-            })
-            .collect();
+        let healthy: Vec<Vec<S>> = (0..chunks).map(|c| (0..count).map(|i| lift.parameter(c * S::LANES, i)).collect()).collect();
         let grid = (W::fault_grid(&first.parameters) / dt).round() as Steps;
         let faults = FaultLanes::new(runs.iter().map(|r| r.faults.clone()).collect(), grid);
-        let sources = (0..W::PORTS.len())
-            .map(|p| SourceLanes::new(runs.iter().map(|r| r.ports[p].clone()).collect()))
-            .collect();
+        let sources = (0..W::PORTS.len()).map(|p| SourceLanes::new(runs.iter().map(|r| r.ports[p].clone()).collect())).collect();
         let ticks = W::ticks(&first.parameters, &structure);
         let kept = (0..real)
-            .map(|_| {
-                clocks
-                    .iter()
-                    .map(|c| Vec::with_capacity((steps / c.period + 1) as usize * c.signals.len()))
-                    .collect()
-            })
+            .map(|_| clocks.iter().map(|c| Vec::with_capacity((steps / c.period + 1) as usize * c.signals.len())).collect())
             .collect();
         let mut block = Self {
             runs,
@@ -168,9 +137,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             let model = W::derive(&raw, &self.structure);
             let count = W::INITIAL.len();
             let first = chunk * S::LANES;
-            let initial: Vec<S> = (0..count)
-                .map(|i| S::from_fn(|l| self.runs[first + l].initial[i]))
-                .collect();
+            let initial: Vec<S> = (0..count).map(|i| S::from_fn(|l| self.runs[first + l].initial[i])).collect();
             self.states.push(W::start(&model, &raw, &initial));
             self.models.push(model);
         }
@@ -178,10 +145,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
 
     fn parameters_now(&self, chunk: usize) -> Vec<S> {
         let mut raw = self.healthy[chunk].clone();
-        self.faults
-            .apply(chunk * S::LANES, &mut raw, &|lane, fault| {
-                self.lift.severity(lane, fault)
-            });
+        self.faults.apply(chunk * S::LANES, &mut raw, &|lane, fault| self.lift.severity(lane, fault));
         raw
     }
 
@@ -231,11 +195,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         }
         if renewed {
             for chunk in 0..self.inputs.len() {
-                self.inputs[chunk] = self
-                    .sources
-                    .iter()
-                    .map(|s| s.pack(chunk * S::LANES))
-                    .collect();
+                self.inputs[chunk] = self.sources.iter().map(|s| s.pack(chunk * S::LANES)).collect();
             }
         }
         if k > 0 && self.faults.next() <= k {
@@ -257,21 +217,9 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             for chunk in 0..self.states.len() {
                 let first = chunk * S::LANES;
                 let runs = self.runs;
-                let mut noise = |channel: u64| {
-                    S::from_fn(|i| {
-                        Key::new(runs[first + i].seed, runs[first + i].run, channel).gaussian(count)
-                    })
-                };
+                let mut noise = |channel: u64| S::from_fn(|i| Key::new(runs[first + i].seed, runs[first + i].run, channel).gaussian(count));
                 let t = S::splat(k as f64 * self.dt);
-                W::tick(
-                    tick.kind,
-                    &self.structure,
-                    &self.models[chunk],
-                    &self.inputs[chunk],
-                    &mut self.states[chunk],
-                    t,
-                    &mut noise,
-                );
+                W::tick(tick.kind, &self.structure, &self.models[chunk], &self.inputs[chunk], &mut self.states[chunk], t, &mut noise);
             }
         }
     }
@@ -304,14 +252,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
 
     fn observe(&self, chunk: usize, k: Steps, out: &mut [S]) {
         let t = S::splat(k as f64 * self.dt);
-        W::observe(
-            &self.structure,
-            &self.models[chunk],
-            &self.inputs[chunk],
-            &self.states[chunk],
-            t,
-            out,
-        );
+        W::observe(&self.structure, &self.models[chunk], &self.inputs[chunk], &self.states[chunk], t, out);
     }
 
     /// Marks lanes that diverged or tripped; false when no lane is left.
@@ -324,10 +265,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
                     let lane = chunk * S::LANES + i;
                     let x = watch.value.lane(i);
                     if self.stopped[lane].is_none() && !(x.abs() <= watch.limit) {
-                        self.status[lane] = Status::Diverged {
-                            time,
-                            signal: watch.name,
-                        };
+                        self.status[lane] = Status::Diverged { time, signal: watch.name };
                         self.stopped[lane] = Some(k);
                     }
                 }
@@ -336,10 +274,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
                 for i in 0..S::LANES {
                     let lane = chunk * S::LANES + i;
                     if self.stopped[lane].is_none() && heat.over.lane(i) > 0.0 {
-                        self.status[lane] = Status::Overheated {
-                            time,
-                            temperature: heat.temperature.lane(i),
-                        };
+                        self.status[lane] = Status::Overheated { time, temperature: heat.temperature.lane(i) };
                         self.stopped[lane] = Some(k);
                     }
                 }
@@ -359,12 +294,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         for source in &self.sources {
             next = next.min(source.next());
         }
-        for period in self
-            .ticks
-            .iter()
-            .map(|t| t.period)
-            .chain(self.clocks.iter().map(|c| c.period))
-        {
+        for period in self.ticks.iter().map(|t| t.period).chain(self.clocks.iter().map(|c| c.period)) {
             next = next.min((k / period + 1) * period);
         }
         next.max(k + 1)
@@ -397,11 +327,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
                 steps,
                 time: steps as f64 * self.dt,
                 wall: self.wall / self.real as f64,
-                columns: self
-                    .clocks
-                    .iter()
-                    .map(|c| (c.signals.len() + labels) * width)
-                    .collect(),
+                columns: self.clocks.iter().map(|c| (c.signals.len() + labels) * width).collect(),
                 clocks: std::mem::take(&mut self.kept[lane]),
                 last,
             });

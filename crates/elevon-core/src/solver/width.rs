@@ -14,9 +14,7 @@ impl Width {
     pub fn detect() -> Self {
         #[cfg(target_arch = "x86_64")]
         {
-            let wide = is_x86_feature_detected!("avx512f")
-                && is_x86_feature_detected!("avx512dq")
-                && is_x86_feature_detected!("avx512vl");
+            let wide = is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") && is_x86_feature_detected!("avx512vl");
             let fused = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
             if wide && fused {
                 return Self::Avx512;

@@ -25,11 +25,7 @@ impl<S: Scalar> Play<S> {
     pub fn derive(raw: &[S]) -> Self {
         use PlayParameter as P;
         let g = |p: P| raw[p as usize];
-        Self {
-            half: S::splat(0.5) * (g(P::Total) + g(P::Extra)),
-            stiffness: g(P::Stiffness),
-            damping: g(P::Damping),
-        }
+        Self { half: S::splat(0.5) * (g(P::Total) + g(P::Extra)), stiffness: g(P::Stiffness), damping: g(P::Damping) }
     }
 
     /// User position dragged by `driver` through the play (T1 eq. 3).
@@ -46,10 +42,6 @@ impl<S: Scalar> Play<S> {
         let torque = self.stiffness * beyond + self.damping * rate;
         let above = zero.lt(beyond);
         let below = beyond.lt(zero);
-        S::select(
-            above,
-            torque.maximum(zero),
-            S::select(below, torque.minimum(zero), zero),
-        )
+        S::select(above, torque.maximum(zero), S::select(below, torque.minimum(zero), zero))
     }
 }

@@ -79,21 +79,14 @@ pub struct Screw<S> {
 /// Friction coefficients of driving and back-driving.
 fn coefficients<S: Scalar>(t: S, eta: S, aiding: S) -> [S; 2] {
     let one = S::one();
-    [
-        (one - eta) * t / (eta + t * t),
-        (one - aiding) * t / (one + aiding * t * t),
-    ]
+    [(one - eta) * t / (eta + t * t), (one - aiding) * t / (one + aiding * t * t)]
 }
 
 impl<S: Scalar> Screw<S> {
     /// No screw: nothing is lost in it.
     pub fn none() -> Self {
         let (zero, one) = (S::zero(), S::one());
-        let defect = Defect {
-            passes: zero,
-            per_width: zero,
-            drop: zero,
-        };
+        let defect = Defect { passes: zero, per_width: zero, drop: zero };
         Self {
             efficiency: one,
             efficiency_aiding: one,
@@ -117,48 +110,25 @@ impl<S: Scalar> Screw<S> {
         let level = one / (one + slope * slope).sqrt();
         let (sin, cos) = g(P::ContactAngle).sin_cos();
         let spacing = S::splat(PI) * g(P::PitchDiameter) / (g(P::BallsPerTurn) * level);
-        let (balls, mu) = (
-            g(P::BallsPerTurn) * g(P::Circuits),
-            coefficients(slope, g(P::Efficiency), g(P::EfficiencyAiding)),
-        );
+        let (balls, mu) = (g(P::BallsPerTurn) * g(P::Circuits), coefficients(slope, g(P::Efficiency), g(P::EfficiencyAiding)));
         let spalls = [g(P::SpallGroove), g(P::SpallNut), g(P::SpallBall)];
-        let sliding = g(P::BlockedCircuits).floor() / g(P::Circuits)
-            + (spalls[0] + spalls[1] + spalls[2]) / (balls * spacing);
+        let sliding = g(P::BlockedCircuits).floor() / g(P::Circuits) + (spalls[0] + spalls[1] + spalls[2]) / (balls * spacing);
         let full = S::splat(-FULL_FILM).exp();
-        let asperities =
-            ((S::splat(-FULL_FILM) * (one - g(P::LubricantLost))).exp() - full) / (one - full);
+        let asperities = ((S::splat(-FULL_FILM) * (one - g(P::LubricantLost))).exp() - full) / (one - full);
         let debris = S::splat(DEBRIS_FRICTION) * g(P::Debris);
-        let worn = mu.map(|mu| {
-            sliding * (g(P::FrictionSliding) - mu) + asperities * (g(P::FrictionDry) - mu) + debris
-        });
+        let worn = mu.map(|mu| sliding * (g(P::FrictionSliding) - mu) + asperities * (g(P::FrictionDry) - mu) + debris);
         let healthy = sliding.equals(zero) & asperities.equals(zero) & debris.equals(zero);
         let (drive, back) = (mu[0] + worn[0], mu[1] + worn[1]);
-        let efficiency = S::select(
-            healthy,
-            g(P::Efficiency),
-            (one - drive * slope) / (one + drive / slope),
-        );
-        let aiding = S::select(
-            healthy,
-            g(P::EfficiencyAiding),
-            (one - back / slope) / (one + back * slope),
-        );
+        let efficiency = S::select(healthy, g(P::Efficiency), (one - drive * slope) / (one + drive / slope));
+        let aiding = S::select(healthy, g(P::EfficiencyAiding), (one - back / slope) / (one + back * slope));
         let gamma = g(P::BallDiameter) * cos / g(P::PitchDiameter);
         let half = S::splat(0.5) * g(P::BallsPerTurn);
-        let passes = [
-            half * (one + gamma),
-            half * (one - gamma),
-            g(P::PitchDiameter) / g(P::BallDiameter) * (one - gamma * gamma),
-        ];
+        let passes = [half * (one + gamma), half * (one - gamma), g(P::PitchDiameter) / g(P::BallDiameter) * (one - gamma * gamma)];
         let defect = |i: usize| {
             let (length, present) = (spalls[i], zero.lt(spalls[i]));
             let chord = length * length / (S::splat(4.0) * g(P::BallDiameter));
             let per_width = spacing / (S::splat(PI) * S::select(present, length, spacing));
-            Defect {
-                passes: passes[i] / gear,
-                per_width,
-                drop: chord.minimum(g(P::SpallDepth)),
-            }
+            Defect { passes: passes[i] / gear, per_width, drop: chord.minimum(g(P::SpallDepth)) }
         };
         Self {
             efficiency,
@@ -186,11 +156,7 @@ impl<S: Scalar> Screw<S> {
             let turned = d.passes * angle;
             let psi = turned - S::splat(TAU) * (turned * S::splat(1.0 / TAU)).round();
             let u = psi * d.per_width;
-            let felt = if i == 0 {
-                S::select(covered, ball * d.drop, zero)
-            } else {
-                ball * d.drop
-            };
+            let felt = if i == 0 { S::select(covered, ball * d.drop, zero) } else { ball * d.drop };
             // E = -Q delta (1 - u^2)^2 inside the spall.
             let inside = u.abs().lt(S::one());
             let pull = S::splat(-4.0) * felt * u * (S::one() - u * u) * d.per_width * d.passes;

@@ -38,15 +38,8 @@ impl Form for Ballscrew {
         Screw::derive(records::screw(raw), raw[GearParameter::Ratio.at()])
     }
     fn worn(departs: &dyn Fn(usize, f64) -> bool) -> (bool, bool) {
-        let spalls = [
-            ScrewParameter::SpallGroove,
-            ScrewParameter::SpallNut,
-            ScrewParameter::SpallBall,
-        ];
-        (
-            spalls.into_iter().any(|p| departs(p.place(), 0.0)),
-            departs(ScrewParameter::Debris.place(), 0.0),
-        )
+        let spalls = [ScrewParameter::SpallGroove, ScrewParameter::SpallNut, ScrewParameter::SpallBall];
+        (spalls.into_iter().any(|p| departs(p.place(), 0.0)), departs(ScrewParameter::Debris.place(), 0.0))
     }
     fn check(raw: &[f64]) -> Vec<Finding> {
         records::check(raw)

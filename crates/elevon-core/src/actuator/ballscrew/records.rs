@@ -6,79 +6,35 @@ use crate::actuator::{Finding, Port};
 use crate::control::position_speed::{ControlParameter as C, CONTROL};
 use crate::sensor::encoder::{EncoderParameter as E, ENCODER};
 use crate::transmission::friction::{FrictionParameter as F, FRICTION};
-use crate::transmission::gear::{
-    GearParameter, LoadParameter as D, StopParameter as T, GEAR, LOAD, STOP,
-};
+use crate::transmission::gear::{GearParameter, LoadParameter as D, StopParameter as T, GEAR, LOAD, STOP};
 use crate::transmission::play::{PlayParameter as P, PLAY};
 use crate::transmission::screw::{RatingParameter, ScrewParameter, RATING, SCREW};
 use crate::variable::{extended, offset, relabelled, Group, Relabel, Signal, Variable};
 
-const fn change(
-    index: usize,
-    name: &'static str,
-    unit: &'static str,
-    text: &'static str,
-) -> Relabel {
-    Relabel {
-        index,
-        name,
-        unit,
-        text,
-    }
+const fn change(index: usize, name: &'static str, unit: &'static str, text: &'static str) -> Relabel {
+    Relabel { index, name, unit, text }
 }
 const fn unit(index: usize, unit: &'static str) -> Relabel {
     change(index, "", unit, "")
 }
 
-const RAM_GEAR: [Variable; GEAR.len()] = relabelled(
-    GEAR,
-    &[change(
-        GearParameter::Ratio as usize,
-        "",
-        "",
-        "motor speed over screw speed",
-    )],
-);
-const RAM_FRICTION: [Variable; FRICTION.len()] =
-    relabelled(FRICTION, &[unit(F::JamPosition as usize, "m")]);
+const RAM_GEAR: [Variable; GEAR.len()] = relabelled(GEAR, &[change(GearParameter::Ratio as usize, "", "", "motor speed over screw speed")]);
+const RAM_FRICTION: [Variable; FRICTION.len()] = relabelled(FRICTION, &[unit(F::JamPosition as usize, "m")]);
 const RAM_PLAY: [Variable; PLAY.len()] = relabelled(
     PLAY,
     &[
-        change(
-            P::Total as usize,
-            "",
-            "m",
-            "total play between ram and load",
-        ),
+        change(P::Total as usize, "", "m", "total play between ram and load"),
         unit(P::Extra as usize, "m"),
-        change(
-            P::Stiffness as usize,
-            "",
-            "N/m",
-            "contact stiffness between ram and load (elastic model)",
-        ),
-        change(
-            P::Damping as usize,
-            "",
-            "N s/m",
-            "contact damping between ram and load (elastic model)",
-        ),
+        change(P::Stiffness as usize, "", "N/m", "contact stiffness between ram and load (elastic model)"),
+        change(P::Damping as usize, "", "N s/m", "contact damping between ram and load (elastic model)"),
     ],
 );
-const RAM_STOP: [Variable; STOP.len()] = relabelled(
-    STOP,
-    &[unit(T::Upper as usize, "m"), unit(T::Lower as usize, "m")],
-);
+const RAM_STOP: [Variable; STOP.len()] = relabelled(STOP, &[unit(T::Upper as usize, "m"), unit(T::Lower as usize, "m")]);
 const RAM_LOAD: [Variable; LOAD.len()] = relabelled(
     LOAD,
     &[
         change(D::Inertia as usize, "mass", "kg", "mass of the load side"),
-        change(
-            D::Stiffness as usize,
-            "",
-            "N/m",
-            "spring on the load side, force proportional to the load's position",
-        ),
+        change(D::Stiffness as usize, "", "N/m", "spring on the load side, force proportional to the load's position"),
         unit(D::SpringZero as usize, "m"),
         unit(D::Damping as usize, "N s/m"),
         unit(D::Friction as usize, "N"),
@@ -86,27 +42,13 @@ const RAM_LOAD: [Variable; LOAD.len()] = relabelled(
 );
 const RAM_CONTROL: [Variable; CONTROL.len()] = relabelled(
     CONTROL,
-    &[
-        unit(C::PositionGain as usize, "rad/(m s)"),
-        unit(C::AntiWindupThreshold as usize, "m"),
-        unit(C::NoiseDeviation as usize, "m"),
-    ],
+    &[unit(C::PositionGain as usize, "rad/(m s)"), unit(C::AntiWindupThreshold as usize, "m"), unit(C::NoiseDeviation as usize, "m")],
 );
 const RAM_ENCODER: [Variable; ENCODER.len()] = relabelled(
     ENCODER,
     &[
-        change(
-            E::Pulses as usize,
-            "",
-            "1/m",
-            "pulses per metre of a linear scale on the load side",
-        ),
-        change(
-            E::WheelRatio as usize,
-            "encoder.interpolation",
-            "",
-            "interpolation between the scale's pulses",
-        ),
+        change(E::Pulses as usize, "", "1/m", "pulses per metre of a linear scale on the load side"),
+        change(E::WheelRatio as usize, "encoder.interpolation", "", "interpolation between the scale's pulses"),
         unit(E::Offset as usize, "m"),
     ],
 );
@@ -163,208 +105,74 @@ pub const PORTS: &[Port] = &[
         text: "position, speed or torque command (m at the ram, rad/s or N m at the motor)",
         parameter: "",
     },
-    Port {
-        name: "brake",
-        unit: "N",
-        text: "resistive force on the load side: opposes motion of either direction",
-        parameter: "",
-    },
-    Port {
-        name: "shaft",
-        unit: "N m",
-        text: "signed torque on the fast shaft, positive opposes positive motion",
-        parameter: "",
-    },
-    Port {
-        name: "user",
-        unit: "N",
-        text: "signed force on the load side, positive (compressive) opposes extension",
-        parameter: "",
-    },
-    Port {
-        name: "supply",
-        unit: "V",
-        text: "DC link voltage",
-        parameter: "inverter.supply_voltage",
-    },
+    Port { name: "brake", unit: "N", text: "resistive force on the load side: opposes motion of either direction", parameter: "" },
+    Port { name: "shaft", unit: "N m", text: "signed torque on the fast shaft, positive opposes positive motion", parameter: "" },
+    Port { name: "user", unit: "N", text: "signed force on the load side, positive (compressive) opposes extension", parameter: "" },
+    Port { name: "supply", unit: "V", text: "DC link voltage", parameter: "inverter.supply_voltage" },
 ];
 
 const fn signal(name: &'static str, unit: &'static str, text: &'static str) -> Signal {
-    Signal {
-        name,
-        symbol: "-",
-        unit,
-        text,
-    }
+    Signal { name, symbol: "-", unit, text }
 }
 
 const HIGH_OWN: &[Signal] = &[
-    signal(
-        "ram_position",
-        "m",
-        "ram position, on the nut's side of the play",
-    ),
-    signal(
-        "ram_speed",
-        "m/s",
-        "ram speed, on the nut's side of the play",
-    ),
-    signal(
-        "load_friction_force",
-        "N",
-        "friction and damping of the load side, the brake's force included",
-    ),
-    signal(
-        "screw_torque",
-        "N m",
-        "force through the nut, referred to the fast shaft without losses",
-    ),
-    signal(
-        "spall_torque",
-        "N m",
-        "torque of balls falling into spalls, positive drives forwards",
-    ),
-    signal(
-        "screw_efficiency",
-        "1",
-        "applied efficiency under a load that opposes motion",
-    ),
-    signal(
-        "screw_efficiency_aiding",
-        "1",
-        "applied efficiency under a load that aids motion",
-    ),
+    signal("ram_position", "m", "ram position, on the nut's side of the play"),
+    signal("ram_speed", "m/s", "ram speed, on the nut's side of the play"),
+    signal("load_friction_force", "N", "friction and damping of the load side, the brake's force included"),
+    signal("screw_torque", "N m", "force through the nut, referred to the fast shaft without losses"),
+    signal("spall_torque", "N m", "torque of balls falling into spalls, positive drives forwards"),
+    signal("screw_efficiency", "1", "applied efficiency under a load that opposes motion"),
+    signal("screw_efficiency_aiding", "1", "applied efficiency under a load that aids motion"),
 ];
 const LOW_OWN: &[Signal] = &[
-    signal(
-        "ram_position",
-        "m",
-        "ram position, on the nut's side of the play",
-    ),
-    signal(
-        "ram_speed",
-        "m/s",
-        "ram speed, on the nut's side of the play",
-    ),
-    signal(
-        "screw_torque",
-        "N m",
-        "force through the nut, referred to the fast shaft without losses",
-    ),
-    signal(
-        "screw_efficiency",
-        "1",
-        "applied efficiency under a load that opposes motion",
-    ),
-    signal(
-        "screw_efficiency_aiding",
-        "1",
-        "applied efficiency under a load that aids motion",
-    ),
-    signal(
-        "circuit_current",
-        "A",
-        "current of the printed L-R circuit, sqrt(3/2) i_q: its I^2 R is the heat of all phases",
-    ),
-    signal(
-        "circuit_voltage",
-        "V",
-        "voltage of the printed L-R circuit, sqrt(3/2) v_q",
-    ),
+    signal("ram_position", "m", "ram position, on the nut's side of the play"),
+    signal("ram_speed", "m/s", "ram speed, on the nut's side of the play"),
+    signal("screw_torque", "N m", "force through the nut, referred to the fast shaft without losses"),
+    signal("screw_efficiency", "1", "applied efficiency under a load that opposes motion"),
+    signal("screw_efficiency_aiding", "1", "applied efficiency under a load that aids motion"),
+    signal("circuit_current", "A", "current of the printed L-R circuit, sqrt(3/2) i_q: its I^2 R is the heat of all phases"),
+    signal("circuit_voltage", "V", "voltage of the printed L-R circuit, sqrt(3/2) v_q"),
 ];
 
 pub const HIGH: &[Signal] = &extended::<{ signals::HIGH.len() + HIGH_OWN.len() }>(
     signals::HIGH,
     &[
-        change(
-            H::Command as usize,
-            "",
-            "m",
-            "command with its noise (m at the ram, rad/s or N m by the control mode)",
-        ),
-        change(
-            H::UserPosition as usize,
-            "",
-            "m",
-            "position of the load side",
-        ),
+        change(H::Command as usize, "", "m", "command with its noise (m at the ram, rad/s or N m by the control mode)"),
+        change(H::UserPosition as usize, "", "m", "position of the load side"),
         change(H::UserSpeed as usize, "", "m/s", "speed of the load side"),
-        change(
-            H::BrakeTorque as usize,
-            "brake_force",
-            "N",
-            "force the brake can oppose on the load side",
-        ),
-        change(
-            H::UserTorque as usize,
-            "load_force",
-            "N",
-            "signed load on the load side, spring included",
-        ),
+        change(H::BrakeTorque as usize, "brake_force", "N", "force the brake can oppose on the load side"),
+        change(H::UserTorque as usize, "load_force", "N", "signed load on the load side, spring included"),
         change(
             H::TransmissionTorque as usize,
             "joint_force",
             "N",
             "force through the joint between ram and load: what the load cell shows",
         ),
-        change(
-            H::EncoderPosition as usize,
-            "",
-            "m",
-            "load position the encoder shows",
-        ),
+        change(H::EncoderPosition as usize, "", "m", "load position the encoder shows"),
     ],
     HIGH_OWN,
 );
 pub const LOW: &[Signal] = &extended::<{ signals::LOW.len() + LOW_OWN.len() }>(
     signals::LOW,
     &[
-        change(
-            L::Command as usize,
-            "",
-            "m",
-            "command (m at the ram, rad/s or N m by the control mode)",
-        ),
-        change(
-            L::UserPosition as usize,
-            "",
-            "m",
-            "position of the load side",
-        ),
+        change(L::Command as usize, "", "m", "command (m at the ram, rad/s or N m by the control mode)"),
+        change(L::UserPosition as usize, "", "m", "position of the load side"),
         change(L::UserSpeed as usize, "", "m/s", "speed of the load side"),
-        change(
-            L::BrakeTorque as usize,
-            "brake_force",
-            "N",
-            "force the brake can oppose on the load side",
-        ),
-        change(
-            L::EncoderPosition as usize,
-            "",
-            "m",
-            "load position the encoder shows",
-        ),
+        change(L::BrakeTorque as usize, "brake_force", "N", "force the brake can oppose on the load side"),
+        change(L::EncoderPosition as usize, "", "m", "load position the encoder shows"),
     ],
     LOW_OWN,
 );
 
 fn finding(path: &str, value: f64, limit: f64, message: String) -> Finding {
-    Finding {
-        path: path.to_string(),
-        value,
-        limit,
-        message,
-    }
+    Finding { path: path.to_string(), value, limit, message }
 }
 
 /// What a screw cannot be.
 pub fn check(raw: &[f64]) -> Vec<Finding> {
     let g = |p: ScrewParameter| raw[p.place()];
     let mut out = Vec::new();
-    let (ball, pitch) = (
-        g(ScrewParameter::BallDiameter),
-        g(ScrewParameter::PitchDiameter),
-    );
+    let (ball, pitch) = (g(ScrewParameter::BallDiameter), g(ScrewParameter::PitchDiameter));
     if ball >= pitch {
         out.push(finding(
             "screw.ball_diameter",
@@ -373,10 +181,7 @@ pub fn check(raw: &[f64]) -> Vec<Finding> {
             format!("screw.ball_diameter: {ball} m is not below screw.pitch_diameter, {pitch} m"),
         ));
     }
-    let (eta, aiding) = (
-        g(ScrewParameter::Efficiency),
-        g(ScrewParameter::EfficiencyAiding),
-    );
+    let (eta, aiding) = (g(ScrewParameter::Efficiency), g(ScrewParameter::EfficiencyAiding));
     if aiding > eta {
         out.push(finding(
             "screw.efficiency_aiding",
@@ -386,26 +191,24 @@ pub fn check(raw: &[f64]) -> Vec<Finding> {
         ));
     }
     let (circuits, balls) = (g(ScrewParameter::Circuits), g(ScrewParameter::BallsPerTurn));
-    for (path, value) in [
-        ("screw.circuits", circuits),
-        ("screw.balls_per_turn", balls),
-    ] {
+    for (path, value) in [("screw.circuits", circuits), ("screw.balls_per_turn", balls)] {
         if value.fract() != 0.0 {
             out.push(finding(
                 path,
                 value,
                 value.floor(),
-                format!(
-                    "{path}: {value} is not a whole number; {} or {}",
-                    value.floor(),
-                    value.ceil()
-                ),
+                format!("{path}: {value} is not a whole number; {} or {}", value.floor(), value.ceil()),
             ));
         }
     }
     let blocked = g(ScrewParameter::BlockedCircuits);
     if blocked.fract() != 0.0 {
-        out.push(finding("screw.blocked_circuits", blocked, blocked.floor(), format!("screw.blocked_circuits: a circuit is blocked or not, {blocked} is neither; {} or {}", blocked.floor(), blocked.ceil())));
+        out.push(finding(
+            "screw.blocked_circuits",
+            blocked,
+            blocked.floor(),
+            format!("screw.blocked_circuits: a circuit is blocked or not, {blocked} is neither; {} or {}", blocked.floor(), blocked.ceil()),
+        ));
     } else if blocked > circuits {
         out.push(finding(
             "screw.blocked_circuits",
@@ -416,12 +219,7 @@ pub fn check(raw: &[f64]) -> Vec<Finding> {
     }
     let ratio = raw[GearParameter::Ratio.at()];
     if ratio <= 0.0 {
-        out.push(finding(
-            "gear.ratio",
-            ratio,
-            0.0,
-            format!("gear.ratio: {ratio} must be above 0"),
-        ));
+        out.push(finding("gear.ratio", ratio, 0.0, format!("gear.ratio: {ratio} must be above 0")));
     }
     out
 }

@@ -18,22 +18,12 @@ use crate::transmission::gear::{GearParameter, LoadParameter, StopParameter};
 use crate::transmission::play::PlayParameter;
 
 pub fn finding(path: &str, value: f64, limit: f64, message: String) -> Finding {
-    Finding {
-        path: path.to_string(),
-        value,
-        limit,
-        message,
-    }
+    Finding { path: path.to_string(), value, limit, message }
 }
 
 fn step_limit(out: &mut Vec<Finding>, dt: f64, limit: f64, pole: &str) {
     if dt > limit {
-        out.push(finding(
-            "solver.step",
-            dt,
-            limit,
-            format!("solver.step: {dt:e} s is too large for the {pole}; at most {limit:.3e} s"),
-        ));
+        out.push(finding("solver.step", dt, limit, format!("solver.step: {dt:e} s is too large for the {pole}; at most {limit:.3e} s")));
     }
 }
 
@@ -54,30 +44,14 @@ fn derivative_inertia(out: &mut Vec<Finding>, raw: &[f64], inertia: f64) {
 fn common<F: Form>(out: &mut Vec<Finding>, raw: &[f64]) {
     out.extend(F::check(raw));
     thermal(out, raw);
-    let (fsj, fdj) = (
-        raw[FrictionParameter::Static.at()],
-        raw[FrictionParameter::Dynamic.at()],
-    );
+    let (fsj, fdj) = (raw[FrictionParameter::Static.at()], raw[FrictionParameter::Dynamic.at()]);
     if fdj > fsj {
-        out.push(finding(
-            "friction.dynamic",
-            fdj,
-            fsj,
-            format!("friction.dynamic: {fdj} N m exceeds friction.static, {fsj} N m"),
-        ));
+        out.push(finding("friction.dynamic", fdj, fsj, format!("friction.dynamic: {fdj} N m exceeds friction.static, {fsj} N m")));
     }
     let unit = if F::LINEAR { "m" } else { "rad" };
-    let (lower, upper) = (
-        raw[StopParameter::Lower.at()],
-        raw[StopParameter::Upper.at()],
-    );
+    let (lower, upper) = (raw[StopParameter::Lower.at()], raw[StopParameter::Upper.at()]);
     if lower >= upper {
-        out.push(finding(
-            "stop.lower",
-            lower,
-            upper,
-            format!("stop.lower: {lower} {unit} is not below stop.upper, {upper} {unit}"),
-        ));
+        out.push(finding("stop.lower", lower, upper, format!("stop.lower: {lower} {unit} is not below stop.upper, {upper} {unit}")));
     }
 }
 
@@ -88,19 +62,18 @@ fn thermal(out: &mut Vec<Finding>, raw: &[f64]) {
     }
     let [convection, emissivity] = [Thermal::Convection, Thermal::Emissivity].map(|p| raw[p.at()]);
     if convection == 0.0 && emissivity == 0.0 {
-        out.push(finding("thermal.convection", 0.0, 0.0, "thermal.convection: 0 W/(m2 K) with thermal.emissivity 0 leaves the heat no way out; one of them must be above 0".into()));
+        out.push(finding(
+            "thermal.convection",
+            0.0,
+            0.0,
+            "thermal.convection: 0 W/(m2 K) with thermal.emissivity 0 leaves the heat no way out; one of them must be above 0".into(),
+        ));
     }
     let names = ["thermal.ambient", "thermal.warning", "thermal.trip"];
     let values = [Thermal::Ambient, Thermal::Warning, Thermal::Trip].map(|p| raw[p.at()]);
     for i in 1..3 {
         if values[i] <= values[i - 1] {
-            let message = format!(
-                "{}: {} K must be above {}, {} K",
-                names[i],
-                values[i],
-                names[i - 1],
-                values[i - 1]
-            );
+            let message = format!("{}: {} K must be above {}, {} K", names[i], values[i], names[i - 1], values[i - 1]);
             out.push(finding(names[i], values[i], values[i - 1], message));
         }
     }
@@ -110,10 +83,7 @@ fn thermal(out: &mut Vec<Finding>, raw: &[f64]) {
             "motor.winding_temperature",
             start,
             values[2],
-            format!(
-                "motor.winding_temperature: {start} K is not below thermal.trip, {} K",
-                values[2]
-            ),
+            format!("motor.winding_temperature: {start} K is not below thermal.trip, {} K", values[2]),
         ));
     }
 }
@@ -127,18 +97,12 @@ pub fn faulted<F: Form>(raw: &[f64]) -> Vec<Finding> {
 
 /// A resistor at the centre tap needs legs that always hold their terminals.
 fn tapped(out: &mut Vec<Finding>, raw: &[f64]) {
-    let Some(level) = [Tap::LevelA, Tap::LevelB, Tap::LevelC]
-        .map(|p| raw[p.at()])
-        .into_iter()
-        .find(|&f| f > 0.0)
-    else {
+    let Some(level) = [Tap::LevelA, Tap::LevelB, Tap::LevelC].map(|p| raw[p.at()]).into_iter().find(|&f| f > 0.0) else {
         return;
     };
     let base = Inverter::SupplyVoltage.at();
-    let detailed = Inverter::DETAIL.clone().any(|i| raw[base + i] != 0.0)
-        || (0..3).any(|j| raw[Motor::OpenA.at() + j] != 0.0);
-    let drops = raw[DriveParameter::FeedbackLoss.at()] == 1.0
-        && raw[ResolverParameter::PowerOff.at()] != 0.0;
+    let detailed = Inverter::DETAIL.clone().any(|i| raw[base + i] != 0.0) || (0..3).any(|j| raw[Motor::OpenA.at() + j] != 0.0);
+    let drops = raw[DriveParameter::FeedbackLoss.at()] == 1.0 && raw[ResolverParameter::PowerOff.at()] != 0.0;
     if detailed || drops || raw[DriveParameter::Kind.at()] == 2.0 {
         let message = format!("motor.tap_level: {level} cannot go with an open phase, a drive that is off, or the details of the bridge (inverter.on_resistance, diode_drop, dead_time, trip_current, open or shorted switches): a floating terminal at a resistor is not modelled; at most 0");
         out.push(finding("motor.tap_level", level, 0.0, message));
@@ -148,15 +112,8 @@ fn tapped(out: &mut Vec<Finding>, raw: &[f64]) {
 fn whole_multiple(out: &mut Vec<Finding>, raw: &[f64], index: usize, path: &str) {
     let (period, dt) = (raw[index], raw[SolverParameter::Step.at()]);
     let steps = period / dt;
-    if period > 0.0
-        && (steps.round() < 1.0 || (steps - steps.round()).abs() > 1e-6 * steps.max(1.0))
-    {
-        out.push(finding(
-            path,
-            period,
-            dt,
-            format!("{path}: {period:e} s is not a whole multiple of solver.step, {dt:e} s"),
-        ));
+    if period > 0.0 && (steps.round() < 1.0 || (steps - steps.round()).abs() > 1e-6 * steps.max(1.0)) {
+        out.push(finding(path, period, dt, format!("{path}: {period:e} s is not a whole multiple of solver.step, {dt:e} s")));
     }
 }
 
@@ -166,64 +123,50 @@ pub fn high<F: Form>(raw: &[f64]) -> Vec<Finding> {
     tapped(&mut out, raw);
     let dt = raw[SolverParameter::Step.at()];
     let (r, l) = (raw[Motor::Resistance.at()], raw[Motor::Inductance.at()]);
-    let turns = (0..3)
-        .map(|j| raw[Motor::TurnsA.at() + j])
-        .fold(1.0, f64::min);
-    step_limit(
-        &mut out,
-        dt,
-        turns * l / r,
-        "electrical pole R / L of motor.winding_resistance and motor.winding_inductance",
-    );
+    let turns = (0..3).map(|j| raw[Motor::TurnsA.at() + j]).fold(1.0, f64::min);
+    step_limit(&mut out, dt, turns * l / r, "electrical pole R / L of motor.winding_resistance and motor.winding_inductance");
     shorted_loops(&mut out, raw, dt);
     relay_band(&mut out, raw, dt, turns * turns * l);
-    let rotor = raw[Motor::Inertia.at()]
-        + raw[GearParameter::Inertia.at()]
-        + F::screw_inertia(raw)
-        + raw[UnbalanceParameter::Inertia.at()];
+    let rotor = raw[Motor::Inertia.at()] + raw[GearParameter::Inertia.at()] + F::screw_inertia(raw) + raw[UnbalanceParameter::Inertia.at()];
     let user = raw[LoadParameter::Inertia.at()];
     let ratio = F::ratio(raw);
     let elastic = raw[PlayParameter::Model.at()] == 1.0;
-    let inertia = if elastic {
-        rotor
-    } else {
-        rotor + user / (ratio * ratio)
-    };
+    let inertia = if elastic { rotor } else { rotor + user / (ratio * ratio) };
     derivative_inertia(&mut out, raw, inertia);
     let td = raw[Control::DerivativeTime.at()];
     if td > 0.0 && raw[Control::SampleTime.at()] == 0.0 {
-        step_limit(&mut out, dt, td / raw[Control::DerivativeFilter.at()], "derivative filter's pole N / T_d of control.derivative_filter and control.derivative_time");
-    }
-    let viscous = raw[FrictionParameter::Viscous.at()] * raw[FrictionParameter::ViscousScale.at()];
-    if viscous > 0.0 {
         step_limit(
             &mut out,
             dt,
-            inertia / viscous,
-            "viscous pole C / J of friction.viscous",
+            td / raw[Control::DerivativeFilter.at()],
+            "derivative filter's pole N / T_d of control.derivative_filter and control.derivative_time",
         );
+    }
+    let viscous = raw[FrictionParameter::Viscous.at()] * raw[FrictionParameter::ViscousScale.at()];
+    if viscous > 0.0 {
+        step_limit(&mut out, dt, inertia / viscous, "viscous pole C / J of friction.viscous");
     }
     if elastic {
         contact::<F>(&mut out, raw, dt, rotor * ratio * ratio, user);
     }
     if raw[DriveParameter::Commutation.at()] == 1.0 && raw[DriveParameter::Kind.at()] == 1.0 {
-        out.push(finding("drive.commutation", 1.0, 0.0, "drive.commutation: six_step needs drive.kind = hysteresis; a carrier-PWM drive controls sinusoidal currents".into()));
+        out.push(finding(
+            "drive.commutation",
+            1.0,
+            0.0,
+            "drive.commutation: six_step needs drive.kind = hysteresis; a carrier-PWM drive controls sinusoidal currents".into(),
+        ));
     }
     for (index, path) in [
         (Control::SampleTime.at(), "control.sample_time"),
         (Control::NoiseSampleTime.at(), "control.noise_sample_time"),
-        (
-            CurrentSensorParameter::NoiseSampleTime.at(),
-            "sensor.current.noise_sample_time",
-        ),
+        (CurrentSensorParameter::NoiseSampleTime.at(), "sensor.current.noise_sample_time"),
         (PwmParameter::SampleTime.at(), "pwm.sample_time"),
         (Thermal::SampleTime.at(), "thermal.sample_time"),
     ] {
         let used = match path {
             "control.noise_sample_time" => raw[Control::NoiseDeviation.at()] > 0.0,
-            "sensor.current.noise_sample_time" => {
-                raw[CurrentSensorParameter::NoiseDeviation.at()] > 0.0
-            }
+            "sensor.current.noise_sample_time" => raw[CurrentSensorParameter::NoiseDeviation.at()] > 0.0,
             "thermal.sample_time" => raw[Thermal::Model.at()] != 0.0,
             "pwm.sample_time" => raw[DriveParameter::Kind.at()] == 1.0,
             _ => true,
@@ -245,12 +188,7 @@ fn shorted_loops(out: &mut Vec<Finding>, raw: &[f64], dt: f64) {
             let kappa = raw[Motor::ShortCoupling.at()];
             let inductance = mu * mu * raw[Motor::Inductance.at()] * (1.0 - kappa * kappa);
             let resistance = mu * raw[Motor::Resistance.at()] + raw[Motor::ShortContact.at()];
-            step_limit(
-                out,
-                dt,
-                inductance / resistance,
-                "pole of the shorted turns (motor.short_model = loop)",
-            );
+            step_limit(out, dt, inductance / resistance, "pole of the shorted turns (motor.short_model = loop)");
         }
     }
 }
@@ -270,38 +208,17 @@ fn relay_band(out: &mut Vec<Finding>, raw: &[f64], dt: f64, inductance: f64) {
 /// Two masses on the contact spring: semi-implicit needs dt below 2 / omega, explicit Euler below C / K.
 fn contact<F: Form>(out: &mut Vec<Finding>, raw: &[f64], dt: f64, motor: f64, user: f64) {
     if user <= 0.0 {
-        let (path, unit) = if F::LINEAR {
-            ("load.mass", "kg")
-        } else {
-            ("load.inertia", "kg m2")
-        };
-        out.push(finding(
-            path,
-            user,
-            0.0,
-            format!("{path}: the elastic play needs a second mass, above 0 {unit}"),
-        ));
+        let (path, unit) = if F::LINEAR { ("load.mass", "kg") } else { ("load.inertia", "kg m2") };
+        out.push(finding(path, user, 0.0, format!("{path}: the elastic play needs a second mass, above 0 {unit}")));
         return;
     }
-    let (k, c) = (
-        raw[PlayParameter::Stiffness.at()],
-        raw[PlayParameter::Damping.at()],
-    );
+    let (k, c) = (raw[PlayParameter::Stiffness.at()], raw[PlayParameter::Damping.at()]);
     let per_mass = 1.0 / motor + 1.0 / user;
     let omega = (k * per_mass).sqrt();
-    let damped = if c > 0.0 {
-        1.0 / (c * per_mass)
-    } else {
-        f64::INFINITY
-    };
+    let damped = if c > 0.0 { 1.0 / (c * per_mass) } else { f64::INFINITY };
     let semi = raw[SolverParameter::Method.at()] == 1.0;
     let limit = if semi { 1.0 / omega } else { c / k };
-    step_limit(
-        out,
-        dt,
-        limit.min(damped),
-        "contact stiffness play.stiffness and damping play.damping",
-    );
+    step_limit(out, dt, limit.min(damped), "contact stiffness play.stiffness and damping play.damping");
 }
 
 pub fn low<F: Form>(raw: &[f64]) -> Vec<Finding> {
@@ -319,7 +236,12 @@ pub fn low<F: Form>(raw: &[f64]) -> Vec<Finding> {
     let effective = inertia + gain * raw[Control::DerivativeTime.at()];
     let pole = (gain + raw[FrictionParameter::Viscous.at()]) / effective;
     if dt * pole > 1.0 {
-        out.push(finding("low.step", dt, 1.0 / pole, format!("low.step: {dt:e} s is too large for the speed loop's pole K_p / J; at most {:.3e} s", 1.0 / pole)));
+        out.push(finding(
+            "low.step",
+            dt,
+            1.0 / pole,
+            format!("low.step: {dt:e} s is too large for the speed loop's pole K_p / J; at most {:.3e} s", 1.0 / pole),
+        ));
     }
     out
 }

@@ -16,13 +16,7 @@ pub(super) struct Coupling<S> {
 }
 
 #[inline(always)]
-pub(super) fn coupling<S: Scalar, const FULL: bool>(
-    m: &Model<S>,
-    structure: &Structure,
-    s: &State<S>,
-    sin: S,
-    cos: S,
-) -> Coupling<S> {
+pub(super) fn coupling<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &State<S>, sin: S, cos: S) -> Coupling<S> {
     let (mut shape, _) = three_phase(sin, cos);
     let mut gap = [S::one(); 3];
     if structure.motor.static_eccentricity {
@@ -42,19 +36,11 @@ pub(super) fn coupling<S: Scalar, const FULL: bool>(
             loop_k = m.star.loop_coefficients(shape, gap);
         }
     }
-    Coupling {
-        k: m.star.coefficients(shape, gap),
-        loop_k,
-    }
+    Coupling { k: m.star.coefficients(shape, gap), loop_k }
 }
 
 #[inline(always)]
-pub(super) fn motor_torque<S: Scalar, const FULL: bool>(
-    m: &Model<S>,
-    structure: &Structure,
-    s: &State<S>,
-    c: &Coupling<S>,
-) -> S {
+pub(super) fn motor_torque<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &State<S>, c: &Coupling<S>) -> S {
     let mut torque = m.star.torque(c.k, s.star.current);
     if FULL && structure.motor.shorted_loop {
         torque = torque + m.star.torque(c.loop_k, s.star.loop_current);
@@ -89,16 +75,8 @@ pub(super) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
     let drops = |terminal: &[S; 3]| three!(|j| (-resistance[j]).fma(i[j], terminal[j] - emf[j]));
     let neutral;
     if FULL && structure.bridge {
-        let windings = Windings {
-            current: i,
-            emf,
-            per_inductance: m.star.per_inductance,
-            resistance,
-            open: m.star.open,
-        };
-        let (connection, v_n) =
-            m.bridge
-                .connect(&mut s.bridge, old_legs, s.legs, half_supply, &windings);
+        let windings = Windings { current: i, emf, per_inductance: m.star.per_inductance, resistance, open: m.star.open };
+        let (connection, v_n) = m.bridge.connect(&mut s.bridge, old_legs, s.legs, half_supply, &windings);
         let all = connection.connected[0] & connection.connected[1] & connection.connected[2];
         terminal = connection.voltage;
         rail = connection.rail;
@@ -108,10 +86,7 @@ pub(super) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
         terminal = three!(|j| S::select(connection.connected[j], terminal[j], neutral + emf[j]));
         legs = Some(connection);
     } else if EXTRA && structure.tap {
-        neutral = m
-            .extra
-            .tap
-            .neutral(terminal, drops(&terminal), i, m.star.per_inductance);
+        neutral = m.extra.tap.neutral(terminal, drops(&terminal), i, m.star.per_inductance);
     } else {
         neutral = m.star.neutral(drops(&terminal));
     }

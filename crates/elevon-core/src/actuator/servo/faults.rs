@@ -18,20 +18,8 @@ macro_rules! places {
     }};
 }
 
-pub const fn attribute(
-    name: &'static str,
-    unit: &'static str,
-    path: &'static str,
-    text: &'static str,
-) -> Attribute {
-    Attribute {
-        name,
-        unit,
-        default: None,
-        path,
-        flag: "",
-        text,
-    }
+pub const fn attribute(name: &'static str, unit: &'static str, path: &'static str, text: &'static str) -> Attribute {
+    Attribute { name, unit, default: None, path, flag: "", text }
 }
 
 /// What differs between a turning and a travelling output.
@@ -54,57 +42,27 @@ const fn jam_position(unit: &'static str) -> Attribute {
     }
 }
 
-pub const ROTARY: Side = Side {
-    coordinate: "rad",
-    play: 1.0,
-    jam: &[jam_position("rad")],
-};
-pub const LINEAR: Side = Side {
-    coordinate: "m",
-    play: 5e-3,
-    jam: &[jam_position("m")],
-};
+pub const ROTARY: Side = Side { coordinate: "rad", play: 1.0, jam: &[jam_position("rad")] };
+pub const LINEAR: Side = Side { coordinate: "m", play: 5e-3, jam: &[jam_position("m")] };
 
 /// Faults of a star motor and its inverter.
 pub fn electrical() -> Vec<FaultKind> {
-    const PHASE: &[Attribute] = &[attribute(
-        "phase",
-        "rad",
-        "motor.eccentricity_static_phase",
-        "electrical phase angle of the narrow gap",
-    )];
-    const PHASE_DYNAMIC: &[Attribute] = &[attribute(
-        "phase",
-        "rad",
-        "motor.eccentricity_dynamic_phase",
-        "mechanical phase angle of the narrow gap",
-    )];
-    const REFERENCE: &[Attribute] = &[attribute(
-        "reference",
-        "ohm",
-        "motor.tap_reference",
-        "resistance that stands for a level of one half",
-    )];
+    const PHASE: &[Attribute] = &[attribute("phase", "rad", "motor.eccentricity_static_phase", "electrical phase angle of the narrow gap")];
+    const PHASE_DYNAMIC: &[Attribute] =
+        &[attribute("phase", "rad", "motor.eccentricity_dynamic_phase", "mechanical phase angle of the narrow gap")];
+    const REFERENCE: &[Attribute] = &[Attribute {
+        default: Some(25.0),
+        ..attribute("reference", "ohm", "motor.tap_reference", "resistance that stands for a level of one half")
+    }];
     const UNBALANCE: &[Attribute] = &[
-        attribute(
-            "phase",
-            "rad",
-            "motor.unbalance_phase",
-            "mechanical angle of the excess mass",
-        ),
-        attribute(
-            "gap_share",
-            "1",
-            "motor.unbalance_gap_share",
-            "dynamic eccentricity per share of excess inertia",
-        ),
+        attribute("phase", "rad", "motor.unbalance_phase", "mechanical angle of the excess mass"),
+        Attribute {
+            default: Some(1.0),
+            ..attribute("gap_share", "1", "motor.unbalance_gap_share", "dynamic eccentricity per share of excess inertia")
+        },
     ];
-    const CONTACT: &[Attribute] = &[attribute(
-        "contact_resistance",
-        "ohm",
-        "motor.short_contact_resistance",
-        "resistance of the short itself (loop model)",
-    )];
+    const CONTACT: &[Attribute] =
+        &[attribute("contact_resistance", "ohm", "motor.short_contact_resistance", "resistance of the short itself (loop model)")];
     vec![
         FaultKind {
             kind: "short", unit: "1", range: Range::Between(0.0, 0.95), low: true, attributes: CONTACT,
@@ -191,53 +149,75 @@ pub fn electrical() -> Vec<FaultKind> {
 
 /// Faults of controller and position sensors.
 pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
-    const PERIOD: &[Attribute] = &[Attribute {
-        name: "period",
-        unit: "s",
-        default: Some(0.1),
-        path: "",
-        flag: "",
-        text: "period of the interruptions",
-    }];
+    const PERIOD: &[Attribute] =
+        &[Attribute { name: "period", unit: "s", default: Some(0.1), path: "", flag: "", text: "period of the interruptions" }];
     vec![
         FaultKind {
-            kind: "gain_drift", unit: "1", range: Range::Between(-1.0, 10.0), low: true, attributes: &[],
+            kind: "gain_drift",
+            unit: "1",
+            range: Range::Between(-1.0, 10.0),
+            low: true,
+            attributes: &[],
             places: places!("control.position": "control.position_gain_scale" Grow, "control.speed": "control.speed_gain_scale" Grow),
             effect: "relative drift of a loop gain: -0.2 means gain x 0.8",
             source: "T1 (proportional gain drift)",
         },
         FaultKind {
-            kind: "dropout", unit: "1", range: Range::Between(0.0, 1.0), low: true, attributes: PERIOD,
+            kind: "dropout",
+            unit: "1",
+            range: Range::Between(0.0, 1.0),
+            low: true,
+            attributes: PERIOD,
             places: places!("sensor.resolver": "sensor.resolver.power_off" Pulse),
             effect: "duty of the resolver's power lost: while off the drive sees a shaft at rest, then the position jumps back",
             source: "N 4.5",
         },
         FaultKind {
-            kind: "mismatch", unit: "1", range: Range::Between(0.0, 0.99), low: true, attributes: &[],
+            kind: "mismatch",
+            unit: "1",
+            range: Range::Between(0.0, 0.99),
+            low: true,
+            attributes: &[],
             places: places!("sensor.resolver": "sensor.resolver.mismatch" Add),
             effect: "amplitude lost by one resolver channel: atan2(g sin, cos), an angle error at twice the shaft frequency",
             source: "N 4.5",
         },
         FaultKind {
-            kind: "offset", unit: "rad", range: Range::Any, low: true, attributes: &[],
+            kind: "offset",
+            unit: "rad",
+            range: Range::Any,
+            low: true,
+            attributes: &[],
             places: places!("sensor.resolver": "sensor.resolver.offset" Add),
             effect: "offset of the motor's position; it misplaces the commutation where the resolver gives its angle",
             source: "T3 Table 1.1 (position sensor)",
         },
         FaultKind {
-            kind: "offset", unit: side.coordinate, range: Range::Any, low: true, attributes: &[],
+            kind: "offset",
+            unit: side.coordinate,
+            range: Range::Any,
+            low: true,
+            attributes: &[],
             places: places!("sensor.encoder": "sensor.encoder.offset" Add),
             effect: "offset of the shown user position",
             source: "T3 Table 1.1 (position sensor)",
         },
         FaultKind {
-            kind: "gain", unit: "1", range: Range::Between(-1.0, 10.0), low: true, attributes: &[],
+            kind: "gain",
+            unit: "1",
+            range: Range::Between(-1.0, 10.0),
+            low: true,
+            attributes: &[],
             places: places!("sensor.resolver": "sensor.resolver.gain" Grow, "sensor.encoder": "sensor.encoder.gain" Grow),
             effect: "relative gain error of a position sensor",
             source: "T3 Table 1.1 (position sensor)",
         },
         FaultKind {
-            kind: "missing_counts", unit: "1", range: Range::Unit, low: true, attributes: &[],
+            kind: "missing_counts",
+            unit: "1",
+            range: Range::Unit,
+            low: true,
+            attributes: &[],
             places: places!("sensor.encoder": "sensor.encoder.missing_counts" Add),
             effect: "fraction of the encoder's counts lost, spread evenly: the shown travel is too short",
             source: "N 4.5",
@@ -255,8 +235,7 @@ pub fn mechanical(side: Side) -> Vec<FaultKind> {
             low: true,
             attributes: &[],
             places: places!("transmission": "friction.dry_scale" Grow),
-            effect:
-                "fraction added to the dry friction, static and dynamic: the moving current rises",
+            effect: "fraction added to the dry friction, static and dynamic: the moving current rises",
             source: "T2 (friction fault)",
         },
         FaultKind {

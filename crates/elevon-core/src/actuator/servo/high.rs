@@ -60,42 +60,15 @@ impl<F: Form> Wiring for High<F> {
         let mut ticks = Vec::new();
         let mut add = |present: bool, index: usize, kind: u8| {
             if present {
-                ticks.push(Tick {
-                    period: sample_steps(raw, index).max(1),
-                    kind,
-                });
+                ticks.push(Tick { period: sample_steps(raw, index).max(1), kind });
             }
         };
-        add(
-            raw[ControlParameter::NoiseDeviation.at()] != 0.0,
-            ControlParameter::NoiseSampleTime.at(),
-            TICK_COMMAND_NOISE,
-        );
-        add(
-            raw[CurrentSensorParameter::NoiseDeviation.at()] != 0.0,
-            CurrentSensorParameter::NoiseSampleTime.at(),
-            TICK_CURRENT_NOISE,
-        );
-        add(
-            !structure.control_every_step,
-            ControlParameter::SampleTime.at(),
-            TICK_CONTROL,
-        );
-        add(
-            structure.drive == Drive::Pwm,
-            PwmParameter::SampleTime.at(),
-            TICK_CURRENT_CONTROL,
-        );
-        add(
-            structure.heat,
-            ThermalParameter::SampleTime.at(),
-            TICK_THERMAL,
-        );
-        add(
-            structure.debris,
-            ControlParameter::SampleTime.at(),
-            TICK_DEBRIS,
-        );
+        add(raw[ControlParameter::NoiseDeviation.at()] != 0.0, ControlParameter::NoiseSampleTime.at(), TICK_COMMAND_NOISE);
+        add(raw[CurrentSensorParameter::NoiseDeviation.at()] != 0.0, CurrentSensorParameter::NoiseSampleTime.at(), TICK_CURRENT_NOISE);
+        add(!structure.control_every_step, ControlParameter::SampleTime.at(), TICK_CONTROL);
+        add(structure.drive == Drive::Pwm, PwmParameter::SampleTime.at(), TICK_CURRENT_CONTROL);
+        add(structure.heat, ThermalParameter::SampleTime.at(), TICK_THERMAL);
+        add(structure.debris, ControlParameter::SampleTime.at(), TICK_DEBRIS);
         ticks
     }
 
@@ -135,17 +108,9 @@ impl<F: Form> Wiring for High<F> {
             }
             TICK_THERMAL => {
                 m.extra.network.tick(&mut s.extra.network);
-                (s.star.resistance_factor, s.star.flux_factor) =
-                    m.extra.network.factors(&s.extra.network);
+                (s.star.resistance_factor, s.star.flux_factor) = m.extra.network.factors(&s.extra.network);
             }
-            TICK_DEBRIS => {
-                s.extra.scatter = m
-                    .extra
-                    .screw
-                    .scatter
-                    .fma(noise(4), S::one())
-                    .maximum(S::zero())
-            }
+            TICK_DEBRIS => s.extra.scatter = m.extra.screw.scatter.fma(noise(4), S::one()).maximum(S::zero()),
             _ => {
                 let reading = shaft_reading::<S, true>(m, structure, s);
                 let angle = m.star.electrical_angle(reading.angle);
@@ -176,40 +141,17 @@ impl<F: Form> Wiring for High<F> {
         from: Steps,
         count: Steps,
     ) {
-        match (
-            structure.full,
-            structure.extra,
-            structure.drive == Drive::Pwm,
-        ) {
-            (false, _, false) => {
-                steps::<S, false, false, false>(structure, models, inputs, states, from, count)
-            }
-            (false, _, true) => {
-                steps::<S, false, false, true>(structure, models, inputs, states, from, count)
-            }
-            (true, false, false) => {
-                steps::<S, true, false, false>(structure, models, inputs, states, from, count)
-            }
-            (true, false, true) => {
-                steps::<S, true, false, true>(structure, models, inputs, states, from, count)
-            }
-            (true, true, false) => {
-                steps::<S, true, true, false>(structure, models, inputs, states, from, count)
-            }
-            (true, true, true) => {
-                steps::<S, true, true, true>(structure, models, inputs, states, from, count)
-            }
+        match (structure.full, structure.extra, structure.drive == Drive::Pwm) {
+            (false, _, false) => steps::<S, false, false, false>(structure, models, inputs, states, from, count),
+            (false, _, true) => steps::<S, false, false, true>(structure, models, inputs, states, from, count),
+            (true, false, false) => steps::<S, true, false, false>(structure, models, inputs, states, from, count),
+            (true, false, true) => steps::<S, true, false, true>(structure, models, inputs, states, from, count),
+            (true, true, false) => steps::<S, true, true, false>(structure, models, inputs, states, from, count),
+            (true, true, true) => steps::<S, true, true, true>(structure, models, inputs, states, from, count),
         }
     }
 
-    fn observe<S: Scalar>(
-        structure: &Structure,
-        m: &Model<S>,
-        inputs: &Inputs<S>,
-        state: &State<S>,
-        t: S,
-        out: &mut [S],
-    ) {
+    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, state: &State<S>, t: S, out: &mut [S]) {
         super::observe::high::<F, S>(structure, m, inputs, state, t, out);
     }
 
@@ -221,26 +163,10 @@ impl<F: Form> Wiring for High<F> {
             + s.star.loop_current[1].abs()
             + s.star.loop_current[2].abs();
         vec![
-            Watch {
-                name: "motor_speed",
-                value: s.motor_speed,
-                limit: 1e6,
-            },
-            Watch {
-                name: "current_a",
-                value: currents,
-                limit: 1e7,
-            },
-            Watch {
-                name: "user_position",
-                value: s.user_position,
-                limit: 1e9,
-            },
-            Watch {
-                name: "torque_ref",
-                value: s.control.integral + s.control.filtered_error,
-                limit: 1e12,
-            },
+            Watch { name: "motor_speed", value: s.motor_speed, limit: 1e6 },
+            Watch { name: "current_a", value: currents, limit: 1e7 },
+            Watch { name: "user_position", value: s.user_position, limit: 1e9 },
+            Watch { name: "torque_ref", value: s.control.integral + s.control.filtered_error, limit: 1e12 },
         ]
     }
 
@@ -249,9 +175,6 @@ impl<F: Form> Wiring for High<F> {
     }
     fn overheated<S: Scalar>(s: &State<S>) -> Option<Overheat<S>> {
         let network = &s.extra.network;
-        Some(Overheat {
-            over: network.over,
-            temperature: network.winding,
-        })
+        Some(Overheat { over: network.over, temperature: network.winding })
     }
 }

@@ -103,30 +103,10 @@ pub const PORTS: &[Port] = &[
         text: "position, speed or torque command (rad at the user, rad/s or N m at the fast shaft)",
         parameter: "",
     },
-    Port {
-        name: "brake",
-        unit: "N m",
-        text: "resistive torque on the fast shaft",
-        parameter: "",
-    },
-    Port {
-        name: "shaft",
-        unit: "N m",
-        text: "signed torque on the fast shaft, positive opposes positive motion",
-        parameter: "",
-    },
-    Port {
-        name: "user",
-        unit: "N m",
-        text: "signed torque on the user side, positive opposes positive motion",
-        parameter: "",
-    },
-    Port {
-        name: "supply",
-        unit: "V",
-        text: "DC link voltage",
-        parameter: "inverter.supply_voltage",
-    },
+    Port { name: "brake", unit: "N m", text: "resistive torque on the fast shaft", parameter: "" },
+    Port { name: "shaft", unit: "N m", text: "signed torque on the fast shaft, positive opposes positive motion", parameter: "" },
+    Port { name: "user", unit: "N m", text: "signed torque on the user side, positive opposes positive motion", parameter: "" },
+    Port { name: "supply", unit: "V", text: "DC link voltage", parameter: "inverter.supply_voltage" },
 ];
 
 pub const COMMAND: usize = 0;

@@ -125,18 +125,9 @@ pub struct State<S> {
 
 /// Torque constant, resistance and inductance of the equivalent phase at the present angle.
 #[inline(always)]
-fn coefficients<S: Scalar>(
-    m: &Model<S>,
-    structure: &Structure,
-    s: &State<S>,
-    commutation: S,
-) -> (S, S, S) {
+fn coefficients<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, commutation: S) -> (S, S, S) {
     if !structure.angle {
-        return (
-            m.healthy_constant * s.flux_factor,
-            m.healthy_resistance * s.resistance_factor,
-            m.healthy_inductance,
-        );
+        return (m.healthy_constant * s.flux_factor, m.healthy_resistance * s.resistance_factor, m.healthy_inductance);
     }
     let (sin, cos) = m.star.electrical_angle(s.motor_position).sin_cos();
     let (shape, _) = three_phase(sin, cos);
@@ -153,32 +144,16 @@ fn coefficients<S: Scalar>(
         shape
     };
     let resistance = three!(|j| m.resistance[j] * s.resistance_factor);
-    let e = equivalent(
-        k,
-        resistance,
-        m.inductance,
-        imposed_shape(sines, m.star.open),
-    );
-    (
-        e.torque_constant * s.flux_factor,
-        e.resistance,
-        e.inductance,
-    )
+    let e = equivalent(k, resistance, m.inductance, imposed_shape(sines, m.star.open));
+    (e.torque_constant * s.flux_factor, e.resistance, e.inductance)
 }
 
 #[inline(always)]
-fn step<S: Scalar>(
-    m: &Model<S>,
-    structure: &Structure,
-    inputs: &Inputs<S>,
-    s: &mut State<S>,
-    t: S,
-) {
+fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &mut State<S>, t: S) {
     let zero = S::zero();
     let speed = s.motor_speed;
     // Sensors.
-    let (mut angle, mut shown_speed, mut shown_position) =
-        (s.motor_position, speed, s.motor_position);
+    let (mut angle, mut shown_speed, mut shown_position) = (s.motor_position, speed, s.motor_position);
     if structure.resolver {
         let reading = m.resolver.read(s.motor_position, speed, &mut s.held_angle);
         (angle, shown_speed, shown_position) = (reading.angle, reading.speed, reading.position);
@@ -205,29 +180,16 @@ fn step<S: Scalar>(
     let error = speed_ref - shown_speed;
     let slope = (speed_ref - s.speed_ref) * m.per_dt;
     let torque_mode = structure.mode == Mode::Torque;
-    let derivative_inertia = if torque_mode {
-        zero
-    } else {
-        m.derivative_inertia
-    };
-    let demand = if torque_mode {
-        command
-    } else {
-        m.speed_gain * error + s.integral + derivative_inertia * slope
-    };
+    let derivative_inertia = if torque_mode { zero } else { m.derivative_inertia };
+    let demand = if torque_mode { command } else { m.speed_gain * error + s.integral + derivative_inertia * slope };
 
     // Loads.
     let brake = inputs[BRAKE].at(t).maximum(zero);
-    let user_torque =
-        inputs[USER].at(t) + m.gear.stiffness * (s.user_position - m.gear.spring_zero);
+    let user_torque = inputs[USER].at(t) + m.gear.stiffness * (s.user_position - m.gear.spring_zero);
     let mut load = inputs[SHAFT].at(t) + user_torque * m.gear.per_ratio;
     let (k_t, resistance, inductance) = coefficients(m, structure, s, angle);
     let efficacy = k_t * m.per_torque_constant;
-    let resistive = if structure.linear {
-        (brake + m.load_friction) * m.gear.per_ratio
-    } else {
-        brake
-    };
+    let resistive = if structure.linear { (brake + m.load_friction) * m.gear.per_ratio } else { brake };
     let mut added = resistive + s.jammed * m.friction.jam_torque;
     let mut viscous = m.friction.viscous * speed;
     if structure.load_side {
@@ -237,11 +199,7 @@ fn step<S: Scalar>(
         }
     }
     if structure.spall {
-        let (torque, friction) = m.screw.spall(
-            s.motor_position,
-            user_torque,
-            s.motor_position * m.gear.per_ratio,
-        );
+        let (torque, friction) = m.screw.spall(s.motor_position, user_torque, s.motor_position * m.gear.per_ratio);
         load = load - torque;
         added = added + friction;
     }
@@ -253,15 +211,13 @@ fn step<S: Scalar>(
         let direction = S::select(speed.equals(zero), start, speed.sign());
         added = added + m.gear.load_friction(user_torque, direction);
     }
-    let (mut static_limit, mut dynamic) =
-        (m.friction.static_limit + added, m.friction.dynamic + added);
+    let (mut static_limit, mut dynamic) = (m.friction.static_limit + added, m.friction.dynamic + added);
     if structure.debris {
         (static_limit, dynamic) = (static_limit * s.scatter, dynamic * s.scatter);
     }
     let wanted = efficacy * demand - load;
     let acceleration =
-        (wanted - Friction::dry_torque(wanted, speed, static_limit, dynamic) - viscous)
-            / (m.inertia + efficacy * derivative_inertia);
+        (wanted - Friction::dry_torque(wanted, speed, static_limit, dynamic) - viscous) / (m.inertia + efficacy * derivative_inertia);
     s.torque_ref = (demand - derivative_inertia * acceleration).clamp_abs(m.torque_limit);
     s.speed_ref = speed_ref;
     if structure.integral {
@@ -274,9 +230,7 @@ fn step<S: Scalar>(
     let circuit = Circuit::new(resistance, inductance, m.dt);
     let target = match structure.drive {
         // The relays act only at the edges of their band; inside it the EMF drives the current.
-        0 => circuit
-            .current(s.current, -emf)
-            .clamp(current_ref - m.band, current_ref + m.band),
+        0 => circuit.current(s.current, -emf).clamp(current_ref - m.band, current_ref + m.band),
         1 => s.current + m.tracking * (current_ref - s.current),
         _ => zero,
     };
@@ -311,11 +265,7 @@ fn step<S: Scalar>(
     s.motor_speed = held;
     s.user_position = m.play.drag(position * m.gear.per_ratio, s.user_position);
     let passed = ((s.user_position - m.friction.jam_position) * s.jam_side).le(zero);
-    s.jammed = S::select(
-        passed | S::splat(0.5).lt(m.friction.jam_anywhere),
-        S::one(),
-        s.jammed,
-    );
+    s.jammed = S::select(passed | S::splat(0.5).lt(m.friction.jam_anywhere), S::one(), s.jammed);
 
     // Acquisition.
     s.filtered[0] = low_pass(m.filter, s.filtered[0], s.current);
@@ -351,13 +301,11 @@ impl<F: Form> Wiring for Low<F> {
         let departs = |i: usize, healthy: f64| setup.departs(i, healthy);
         let feedback = raw[ControlParameter::PositionFeedback.at()] as u8;
         let first = ResolverParameter::Mismatch.at();
-        let resolver = !Resolver::<f64>::ideal(Raw(raw).resolver())
-            || (0..5).any(|i| setup.touched[first + i]);
+        let resolver = !Resolver::<f64>::ideal(Raw(raw).resolver()) || (0..5).any(|i| setup.touched[first + i]);
         let phases = MotorParameter::TurnsA.at()..=MotorParameter::TurnsC.at();
         let opens = MotorParameter::OpenA.at()..=MotorParameter::OpenC.at();
         let unbalance = departs(UnbalanceParameter::Inertia.at(), 0.0);
-        let dynamic_eccentricity =
-            unbalance || departs(MotorParameter::EccentricityDynamic.at(), 0.0);
+        let dynamic_eccentricity = unbalance || departs(MotorParameter::EccentricityDynamic.at(), 0.0);
         let commutated = raw[DriveParameter::CommutationSource.at()] == 0.0;
         let (spall, debris) = F::worn(&departs);
         let mut turns = phases.map(|i| departs(i, 1.0));
@@ -370,9 +318,7 @@ impl<F: Form> Wiring for Low<F> {
             commutated,
             feedforward: raw[ControlParameter::SpeedFeedforward.at()] != 0.0,
             linear: F::LINEAR,
-            load_side: F::LINEAR
-                || departs(LoadParameter::Damping.at(), 0.0)
-                || departs(LoadParameter::Friction.at(), 0.0),
+            load_side: F::LINEAR || departs(LoadParameter::Damping.at(), 0.0) || departs(LoadParameter::Friction.at(), 0.0),
             heat: raw[ThermalParameter::Model.at()] != 0.0,
             unbalance,
             spall,
@@ -383,27 +329,18 @@ impl<F: Form> Wiring for Low<F> {
                 || opens.clone().any(|i| departs(i, 0.0))
                 || departs(MotorParameter::EccentricityStatic.at(), 0.0),
             dynamic_eccentricity,
-            loaded: F::LINEAR
-                || departs(GearParameter::Efficiency.at(), 1.0)
-                || departs(GearParameter::EfficiencyAiding.at(), 1.0),
+            loaded: F::LINEAR || departs(GearParameter::Efficiency.at(), 1.0) || departs(GearParameter::EfficiencyAiding.at(), 1.0),
         }
     }
 
     fn ticks(raw: &[f64], structure: &Structure) -> Vec<Tick> {
-        let period =
-            |seconds: f64| ((seconds / raw[LowParameter::Step.at()]).round() as Steps).max(1);
+        let period = |seconds: f64| ((seconds / raw[LowParameter::Step.at()]).round() as Steps).max(1);
         let mut ticks = Vec::new();
         if structure.heat {
-            ticks.push(Tick {
-                period: period(raw[ThermalParameter::SampleTime.at()]),
-                kind: TICK_THERMAL,
-            });
+            ticks.push(Tick { period: period(raw[ThermalParameter::SampleTime.at()]), kind: TICK_THERMAL });
         }
         if structure.debris {
-            ticks.push(Tick {
-                period: period(raw[ControlParameter::SampleTime.at()]),
-                kind: TICK_DEBRIS,
-            });
+            ticks.push(Tick { period: period(raw[ControlParameter::SampleTime.at()]), kind: TICK_DEBRIS });
         }
         ticks
     }
@@ -421,32 +358,14 @@ impl<F: Form> Wiring for Low<F> {
         let one = S::one();
         let dt = at(LowParameter::Step.at());
         let (screw, ratio) = (F::screw(raw), F::ratio(raw));
-        let gear = Gear::derive(
-            ratio,
-            view.gear(),
-            view.stop(),
-            view.load(),
-            [screw.efficiency, screw.efficiency_aiding],
-        );
+        let gear = Gear::derive(ratio, view.gear(), view.stop(), view.load(), [screw.efficiency, screw.efficiency_aiding]);
         let unbalance = Unbalance::derive(view.unbalance());
-        let rotor = at(MotorParameter::Inertia.at())
-            + at(GearParameter::Inertia.at())
-            + (F::screw_inertia(raw) + unbalance.inertia);
+        let rotor = at(MotorParameter::Inertia.at()) + at(GearParameter::Inertia.at()) + (F::screw_inertia(raw) + unbalance.inertia);
         let inertia = rotor + at(LoadParameter::Inertia.at()) * gear.per_ratio * gear.per_ratio;
         let mut friction = Friction::derive(view.friction());
-        friction.preloaded(
-            screw.preload_torque,
-            screw.viscous,
-            at(FrictionParameter::Static.at()),
-            at(FrictionParameter::Dynamic.at()),
-        );
+        friction.preloaded(screw.preload_torque, screw.viscous, at(FrictionParameter::Static.at()), at(FrictionParameter::Dynamic.at()));
         // The reduced short: missing turns only; loop currents do not show in one phase.
-        let reduced = MotorStructure {
-            trapezoidal: false,
-            shorted_loop: false,
-            static_eccentricity: false,
-            dynamic_eccentricity: false,
-        };
+        let reduced = MotorStructure { trapezoidal: false, shorted_loop: false, static_eccentricity: false, dynamic_eccentricity: false };
         let mut star = Star::derive(view.motor(), &reduced, dt);
         star.lean(unbalance.eccentricity(inertia));
         let gain = at(ControlParameter::SpeedGain.at()) * at(ControlParameter::SpeedGainScale.at());
@@ -460,51 +379,33 @@ impl<F: Form> Wiring for Low<F> {
             per_dt: one / dt,
             resistance: star.resistance,
             inductance: three!(|j| one / star.per_inductance[j]),
-            healthy_constant: S::splat(1.5)
-                * at(MotorParameter::EmfConstant.at())
-                * at(MotorParameter::FluxFraction.at()),
+            healthy_constant: S::splat(1.5) * at(MotorParameter::EmfConstant.at()) * at(MotorParameter::FluxFraction.at()),
             healthy_resistance: at(MotorParameter::Resistance.at()),
             healthy_inductance: at(MotorParameter::Inductance.at()),
             star,
             voltage_ratio: at(LowParameter::VoltageRatio.at()),
             band: at(LowParameter::BandRatio.at()) * at(InverterParameter::HysteresisBand.at()),
             tracking: if drive == 1.0 {
-                one - (-(at(PwmParameter::ProportionalGain.at())
-                    / at(MotorParameter::Inductance.at())
-                    * dt))
-                    .exp()
+                one - (-(at(PwmParameter::ProportionalGain.at()) / at(MotorParameter::Inductance.at()) * dt)).exp()
             } else {
                 one
             },
             supply_scale: at(InverterParameter::SupplyScale.at()),
             tripped: S::indicator(S::splat(0.5).lt(shorted)),
-            position_gain: at(ControlParameter::PositionGain.at())
-                * at(ControlParameter::PositionGainScale.at()),
+            position_gain: at(ControlParameter::PositionGain.at()) * at(ControlParameter::PositionGainScale.at()),
             feedforward: at(ControlParameter::SpeedFeedforward.at()) * ratio / dt,
             speed_gain: gain,
-            integral_step: S::select(
-                has_integral,
-                gain / S::select(has_integral, ti, one) * dt,
-                S::zero(),
-            ),
+            integral_step: S::select(has_integral, gain / S::select(has_integral, ti, one) * dt, S::zero()),
             derivative_inertia: gain * at(ControlParameter::DerivativeTime.at()),
             speed_limit: at(ControlParameter::SpeedLimit.at()),
-            torque_limit: at(ControlParameter::TorqueConstant.at())
-                * at(ControlParameter::CurrentLimit.at()),
+            torque_limit: at(ControlParameter::TorqueConstant.at()) * at(ControlParameter::CurrentLimit.at()),
             per_torque_constant: one / at(ControlParameter::TorqueConstant.at()),
             friction,
             load_friction: at(LoadParameter::Friction.at()),
             load_viscous: at(LoadParameter::Damping.at()) * gear.per_ratio * gear.per_ratio,
             gear,
             play: Play::derive(view.play()),
-            encoder: Encoder::derive(
-                view.encoder(),
-                if F::LINEAR {
-                    1.0
-                } else {
-                    std::f64::consts::TAU
-                },
-            ),
+            encoder: Encoder::derive(view.encoder(), if F::LINEAR { 1.0 } else { std::f64::consts::TAU }),
             resolver: Resolver::derive(view.resolver()),
             filter: closing(at(CurrentSensorParameter::FilterCutoff.at()), dt.lane(0)),
             inertia,
@@ -589,28 +490,16 @@ impl<F: Form> Wiring for Low<F> {
         }
     }
 
-    fn observe<S: Scalar>(
-        structure: &Structure,
-        m: &Model<S>,
-        inputs: &Inputs<S>,
-        s: &State<S>,
-        t: S,
-        out: &mut [S],
-    ) {
+    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
         let lag = s.motor_position * m.gear.per_ratio - s.user_position;
-        let pushing =
-            (m.play.half * S::splat(1.0 - 1e-9)).le(lag.abs()) & S::zero().le(lag * s.motor_speed);
+        let pushing = (m.play.half * S::splat(1.0 - 1e-9)).le(lag.abs()) & S::zero().le(lag * s.motor_speed);
         let mut held = s.held_angle;
         let reading = m.resolver.read(s.motor_position, s.motor_speed, &mut held);
-        let user_torque =
-            inputs[USER].at(t) + m.gear.stiffness * (s.user_position - m.gear.spring_zero);
+        let user_torque = inputs[USER].at(t) + m.gear.stiffness * (s.user_position - m.gear.spring_zero);
         let mut set = |q: Q, x: S| out[q as usize] = x;
         set(Q::Command, inputs[COMMAND].at(t));
         set(Q::UserPosition, s.user_position);
-        set(
-            Q::UserSpeed,
-            S::select(pushing, s.motor_speed * m.gear.per_ratio, S::zero()),
-        );
+        set(Q::UserSpeed, S::select(pushing, s.motor_speed * m.gear.per_ratio, S::zero()));
         set(Q::MotorPosition, s.motor_position);
         set(Q::MotorSpeed, s.motor_speed);
         set(Q::SpeedRef, s.speed_ref);
@@ -623,19 +512,9 @@ impl<F: Form> Wiring for Low<F> {
         set(Q::MotorTorque, s.motor_torque);
         set(Q::FrictionTorque, s.friction_torque);
         set(Q::BrakeTorque, inputs[BRAKE].at(t).maximum(S::zero()));
-        set(
-            Q::LoadTorque,
-            inputs[SHAFT].at(t) + user_torque * m.gear.per_ratio,
-        );
+        set(Q::LoadTorque, inputs[SHAFT].at(t) + user_torque * m.gear.per_ratio);
         set(Q::SupplyVoltage, inputs[SUPPLY].at(t) * m.supply_scale);
-        set(
-            Q::WindingTemperature,
-            if structure.heat {
-                s.network.winding
-            } else {
-                m.temperature
-            },
-        );
+        set(Q::WindingTemperature, if structure.heat { s.network.winding } else { m.temperature });
         set(Q::SurfaceTemperature, s.network.surface);
         set(Q::HeatCopper, s.network.power[0]);
         set(Q::HeatAir, s.network.power[2]);
@@ -665,31 +544,16 @@ impl<F: Form> Wiring for Low<F> {
 
     fn watch<S: Scalar>(s: &State<S>) -> Vec<Watch<S>> {
         vec![
-            Watch {
-                name: "motor_speed",
-                value: s.motor_speed,
-                limit: 1e6,
-            },
-            Watch {
-                name: "current_q",
-                value: s.current,
-                limit: 1e7,
-            },
-            Watch {
-                name: "user_position",
-                value: s.user_position,
-                limit: 1e9,
-            },
+            Watch { name: "motor_speed", value: s.motor_speed, limit: 1e6 },
+            Watch { name: "current_q", value: s.current, limit: 1e7 },
+            Watch { name: "user_position", value: s.user_position, limit: 1e9 },
         ]
     }
     fn tripped<S: Scalar>(s: &State<S>) -> S {
         s.tripped
     }
     fn overheated<S: Scalar>(s: &State<S>) -> Option<Overheat<S>> {
-        Some(Overheat {
-            over: s.network.over,
-            temperature: s.network.winding,
-        })
+        Some(Overheat { over: s.network.over, temperature: s.network.winding })
     }
 }
 
@@ -697,10 +561,7 @@ impl<F: Form> Wiring for Low<F> {
 fn heat<S: Scalar>(raw: &[S], warm: &NetworkState<S>) -> (S, S) {
     if raw[ThermalParameter::Model.at()].lane(0) == 0.0 {
         let mut star = StarState::rest();
-        star.heat(
-            Raw(raw).motor(),
-            raw[MotorParameter::WindingTemperature.at()],
-        );
+        star.heat(Raw(raw).motor(), raw[MotorParameter::WindingTemperature.at()]);
         return (star.resistance_factor, star.flux_factor);
     }
     network(raw, raw[LowParameter::Step.at()].lane(0)).factors(warm)

@@ -116,13 +116,7 @@ impl<S: Scalar> Model<S> {
         let ts = at(ControlParameter::SampleTime.at()).lane(0).max(dt0);
         let screw = F::screw(raw);
         let ratio = F::ratio(raw);
-        let gear = Gear::derive(
-            ratio,
-            view.gear(),
-            view.stop(),
-            view.load(),
-            [screw.efficiency, screw.efficiency_aiding],
-        );
+        let gear = Gear::derive(ratio, view.gear(), view.stop(), view.load(), [screw.efficiency, screw.efficiency_aiding]);
         let user_inertia = at(LoadParameter::Inertia.at());
         let reflected = user_inertia * gear.per_ratio * gear.per_ratio;
         let unbalance = Unbalance::derive(view.unbalance());
@@ -132,18 +126,9 @@ impl<S: Scalar> Model<S> {
             rotor = rotor + F::screw_inertia(raw) + unbalance.inertia;
             star.lean(unbalance.eccentricity(rotor + reflected));
         }
-        let inertia = if structure.elastic {
-            rotor
-        } else {
-            rotor + reflected
-        };
+        let inertia = if structure.elastic { rotor } else { rotor + reflected };
         let mut friction = Friction::derive(view.friction());
-        friction.preloaded(
-            screw.preload_torque,
-            screw.viscous,
-            at(FrictionParameter::Static.at()),
-            at(FrictionParameter::Dynamic.at()),
-        );
+        friction.preloaded(screw.preload_torque, screw.viscous, at(FrictionParameter::Static.at()), at(FrictionParameter::Dynamic.at()));
         Self {
             dt,
             star,
@@ -156,25 +141,13 @@ impl<S: Scalar> Model<S> {
             gear,
             play: Play::derive(view.play()),
             sensor: CurrentSensor::derive(view.current_sensor()),
-            encoder: Encoder::derive(
-                view.encoder(),
-                if F::LINEAR {
-                    1.0
-                } else {
-                    std::f64::consts::TAU
-                },
-            ),
+            encoder: Encoder::derive(view.encoder(), if F::LINEAR { 1.0 } else { std::f64::consts::TAU }),
             resolver: Resolver::derive(view.resolver()),
             filter: closing(at(CurrentSensorParameter::FilterCutoff.at()), dt0),
             inertia,
             dt_per_inertia: dt / inertia,
-            user_inertia: if structure.elastic {
-                user_inertia
-            } else {
-                S::zero()
-            },
-            per_user_inertia: S::one()
-                / S::select(S::zero().lt(user_inertia), user_inertia, S::one()),
+            user_inertia: if structure.elastic { user_inertia } else { S::zero() },
+            per_user_inertia: S::one() / S::select(S::zero().lt(user_inertia), user_inertia, S::one()),
             noise_deviation: at(ControlParameter::NoiseDeviation.at()),
             temperature: at(MotorParameter::WindingTemperature.at()),
             extra: Extra {
@@ -194,10 +167,7 @@ impl<S: Scalar> Model<S> {
 /// The thermal network at the whole number of solver steps next to its sample time.
 pub(super) fn network<S: Scalar>(raw: &[S], dt: f64) -> Network<S> {
     let at = |p: MotorParameter| raw[p.at()];
-    let period = (raw[ThermalParameter::SampleTime.at()].lane(0) / dt)
-        .round()
-        .max(1.0)
-        * dt;
+    let period = (raw[ThermalParameter::SampleTime.at()].lane(0) / dt).round().max(1.0) * dt;
     let temperature = [
         at(MotorParameter::ReferenceTemperature),
         at(MotorParameter::TemperatureCoefficient),

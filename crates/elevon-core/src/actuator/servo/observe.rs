@@ -13,14 +13,7 @@ use crate::scalar::{three_phase, Scalar};
 use crate::three;
 use crate::transmission::friction::Friction;
 
-pub(super) fn high<F: Form, S: Scalar>(
-    structure: &Structure,
-    m: &Model<S>,
-    inputs: &Inputs<S>,
-    s: &State<S>,
-    t: S,
-    out: &mut [S],
-) {
+pub(super) fn high<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
     let mut set = |q: Q, x: S| out[q as usize] = x;
     set(Q::Command, inputs[COMMAND].at(t) + s.command_noise);
     set(Q::UserPosition, s.user_position);
@@ -33,14 +26,7 @@ pub(super) fn high<F: Form, S: Scalar>(
     set(Q::LegTransitions, s.transitions);
     set(Q::Tripped, s.bridge.tripped);
     let warm = &s.extra.network;
-    set(
-        Q::WindingTemperature,
-        if structure.heat {
-            warm.winding
-        } else {
-            m.temperature
-        },
-    );
+    set(Q::WindingTemperature, if structure.heat { warm.winding } else { m.temperature });
     set(Q::SurfaceTemperature, warm.surface);
     set(Q::HeatCopper, warm.power[0]);
     set(Q::HeatLoop, warm.power[1]);
@@ -62,28 +48,11 @@ pub(super) fn high<F: Form, S: Scalar>(
 }
 
 /// What a ballscrew adds, in the order of its further signals.
-fn screw<S: Scalar>(
-    structure: &Structure,
-    m: &Model<S>,
-    inputs: &Inputs<S>,
-    s: &State<S>,
-    t: S,
-) -> [S; 7] {
+fn screw<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S) -> [S; 7] {
     let x = Moment::at(inputs, t);
-    let user = m
-        .gear
-        .stiffness
-        .fma(s.user_position - m.gear.spring_zero, x.user);
-    let through = if structure.elastic {
-        contact_torque(m, s)
-    } else {
-        user
-    };
-    let unbalance = if structure.unbalance {
-        m.extra.unbalance.torque(s.motor_position)
-    } else {
-        S::zero()
-    };
+    let user = m.gear.stiffness.fma(s.user_position - m.gear.spring_zero, x.user);
+    let through = if structure.elastic { contact_torque(m, s) } else { user };
+    let unbalance = if structure.unbalance { m.extra.unbalance.torque(s.motor_position) } else { S::zero() };
     let limit = load_side_friction(m, structure, &x);
     let dry = Friction::dry_torque(through - user, s.user_speed, limit, limit);
     [
@@ -98,25 +67,9 @@ fn screw<S: Scalar>(
 }
 
 /// The same for the low fidelity, and current and voltage of the printed L-R circuit.
-pub(super) fn low_screw<S: Scalar>(
-    per_ratio: S,
-    angle: S,
-    speed: S,
-    force: S,
-    efficiency: [S; 2],
-    current: S,
-    voltage: S,
-) -> [S; 7] {
+pub(super) fn low_screw<S: Scalar>(per_ratio: S, angle: S, speed: S, force: S, efficiency: [S; 2], current: S, voltage: S) -> [S; 7] {
     let root = S::splat(1.5_f64.sqrt());
-    [
-        angle * per_ratio,
-        speed * per_ratio,
-        force * per_ratio,
-        efficiency[0],
-        efficiency[1],
-        root * current,
-        root * voltage,
-    ]
+    [angle * per_ratio, speed * per_ratio, force * per_ratio, efficiency[0], efficiency[1], root * current, root * voltage]
 }
 
 /// In the operator model the user moves with the motor while the play is taken up, else it rests.
@@ -130,14 +83,7 @@ fn user_speed<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>) -> S
     S::select(pushing, s.motor_speed * m.gear.per_ratio, S::zero())
 }
 
-fn electrical<S: Scalar>(
-    structure: &Structure,
-    m: &Model<S>,
-    inputs: &Inputs<S>,
-    s: &State<S>,
-    t: S,
-    out: &mut [S],
-) {
+fn electrical<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
     let mut set = |q: Q, x: S| out[q as usize] = x;
     let (sin, cos) = m.star.electrical_angle(s.motor_position).sin_cos();
     let (sines, cosines) = three_phase(sin, cos);
@@ -146,17 +92,9 @@ fn electrical<S: Scalar>(
     let (q, d) = park(s.star.current, sines, cosines);
     set(Q::CurrentQ, q);
     set(Q::CurrentD, d);
-    let voltage = if structure.bridge || structure.tap {
-        s.voltage
-    } else {
-        ideal_voltage(structure, m, s, supply, sin, cos)
-    };
+    let voltage = if structure.bridge || structure.tap { s.voltage } else { ideal_voltage(structure, m, s, supply, sin, cos) };
     let measured = seen_current(m, structure, s);
-    let drawn = if structure.tap {
-        m.extra.tap.currents(s.voltage)
-    } else {
-        [S::zero(); 3]
-    };
+    let drawn = if structure.tap { m.extra.tap.currents(s.voltage) } else { [S::zero(); 3] };
     let legs = leg_current(m, structure, s);
     for j in 0..3 {
         out[Q::LegCurrentA as usize + j] = legs[j];
@@ -171,64 +109,30 @@ fn electrical<S: Scalar>(
 }
 
 /// Phase-to-neutral voltages of an ideal bridge in its present switching state.
-fn ideal_voltage<S: Scalar>(
-    structure: &Structure,
-    m: &Model<S>,
-    s: &State<S>,
-    supply: S,
-    sin: S,
-    cos: S,
-) -> [S; 3] {
+fn ideal_voltage<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, supply: S, sin: S, cos: S) -> [S; 3] {
     let c = coupling::<S, true>(m, structure, s, sin, cos);
     let terminal = three!(|j| s.legs[j] * S::splat(0.5) * supply);
-    let drop: [S; 3] = three!(|j| terminal[j]
-        - c.k[j] * s.motor_speed
-        - m.star.resistance[j] * s.star.resistance_factor * s.star.current[j]);
+    let drop: [S; 3] =
+        three!(|j| terminal[j] - c.k[j] * s.motor_speed - m.star.resistance[j] * s.star.resistance_factor * s.star.current[j]);
     let neutral = m.star.neutral(drop);
     three!(|j| terminal[j] - neutral)
 }
 
-fn mechanical<S: Scalar>(
-    structure: &Structure,
-    m: &Model<S>,
-    inputs: &Inputs<S>,
-    s: &State<S>,
-    t: S,
-    out: &mut [S],
-) {
+fn mechanical<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
     let (sin, cos) = m.star.electrical_angle(s.motor_position).sin_cos();
     let c = coupling::<S, true>(m, structure, s, sin, cos);
     let torque = motor_torque::<S, true>(m, structure, s, &c);
     let loads = shaft_loads::<S, true, true>(m, structure, &Moment::at(inputs, t), s, torque);
-    let dry = Friction::dry_torque(
-        torque - loads.load,
-        s.motor_speed,
-        loads.static_limit,
-        loads.dynamic,
-    );
+    let dry = Friction::dry_torque(torque - loads.load, s.motor_speed, loads.static_limit, loads.dynamic);
     let mut set = |q: Q, x: S| out[q as usize] = x;
     set(Q::MotorTorque, torque);
-    let unbalance = if structure.unbalance {
-        m.extra.unbalance.torque(s.motor_position)
-    } else {
-        S::zero()
-    };
+    let unbalance = if structure.unbalance { m.extra.unbalance.torque(s.motor_position) } else { S::zero() };
     set(Q::UnbalanceTorque, unbalance);
-    set(
-        Q::FrictionTorque,
-        dry + m.friction.viscous_torque(s.motor_speed),
-    );
+    set(Q::FrictionTorque, dry + m.friction.viscous_torque(s.motor_speed));
     set(Q::BrakeTorque, loads.brake);
     set(Q::LoadTorque, loads.load);
     set(Q::UserTorque, loads.user_torque);
-    set(
-        Q::TransmissionTorque,
-        if structure.elastic {
-            contact_torque(m, s)
-        } else {
-            loads.user_torque
-        },
-    );
+    set(Q::TransmissionTorque, if structure.elastic { contact_torque(m, s) } else { loads.user_torque });
 }
 
 fn energies<S: Scalar>(m: &Model<S>, s: &State<S>, out: &mut [S]) {
@@ -247,11 +151,8 @@ fn energies<S: Scalar>(m: &Model<S>, s: &State<S>, out: &mut [S]) {
     out[Q::EnergyHeatStored as usize] = m.extra.network.stored(&s.extra.network);
     out[Q::EnergyAir as usize] = s.extra.network.heat_out;
     let half = S::splat(0.5);
-    let kinetic = half * m.inertia * s.motor_speed * s.motor_speed
-        + half * m.user_inertia * s.user_speed * s.user_speed;
+    let kinetic = half * m.inertia * s.motor_speed * s.motor_speed + half * m.user_inertia * s.user_speed * s.user_speed;
     out[Q::EnergyKinetic as usize] = kinetic;
-    let magnetic = (0..3).fold(S::zero(), |sum, j| {
-        sum + half * s.star.current[j] * s.star.current[j] / m.star.per_inductance[j]
-    });
+    let magnetic = (0..3).fold(S::zero(), |sum, j| sum + half * s.star.current[j] * s.star.current[j] / m.star.per_inductance[j]);
     out[Q::EnergyMagnetic as usize] = magnetic;
 }

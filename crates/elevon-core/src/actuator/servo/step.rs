@@ -46,33 +46,17 @@ impl<S: Scalar> Moment<S> {
 
     fn none() -> Self {
         let zero = S::zero();
-        Self {
-            t: zero,
-            command: zero,
-            brake: zero,
-            shaft: zero,
-            user: zero,
-            supply: zero,
-        }
+        Self { t: zero, command: zero, brake: zero, shaft: zero, user: zero, supply: zero }
     }
 }
 
 /// What the controller is told of the shaft.
 #[inline(always)]
-pub(super) fn shaft_reading<S: Scalar, const FULL: bool>(
-    m: &Model<S>,
-    structure: &Structure,
-    s: &mut State<S>,
-) -> Reading<S> {
+pub(super) fn shaft_reading<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &mut State<S>) -> Reading<S> {
     if FULL && structure.resolver {
-        m.resolver
-            .read(s.motor_position, s.motor_speed, &mut s.held_angle)
+        m.resolver.read(s.motor_position, s.motor_speed, &mut s.held_angle)
     } else {
-        Reading {
-            angle: s.motor_position,
-            position: s.motor_position,
-            speed: s.motor_speed,
-        }
+        Reading { angle: s.motor_position, position: s.motor_position, speed: s.motor_speed }
     }
 }
 
@@ -90,21 +74,11 @@ pub(super) fn control_step<S: Scalar, const FULL: bool>(
         _ => s.user_position,
     };
     let command = command + s.command_noise;
-    s.current_ref = m.control.step(
-        &structure.control,
-        &mut s.control,
-        command,
-        position,
-        reading.speed,
-    );
+    s.current_ref = m.control.step(&structure.control, &mut s.control, command, position, reading.speed);
 }
 
 #[inline(always)]
-fn measured_current<S: Scalar, const FULL: bool, const EXTRA: bool>(
-    m: &Model<S>,
-    structure: &Structure,
-    s: &State<S>,
-) -> [S; 3] {
+fn measured_current<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure: &Structure, s: &State<S>) -> [S; 3] {
     let mut current = s.star.current;
     if EXTRA && structure.tap {
         current = leg_current(m, structure, s);
@@ -176,11 +150,7 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     if PWM {
         s.legs = m.current_control.compare(&s.current_control, x.t);
     } else if !FULL || structure.drive == Drive::Hysteresis {
-        let shape = if EXTRA && structure.six_step {
-            six_step(sin_phases)
-        } else {
-            sin_phases
-        };
+        let shape = if EXTRA && structure.six_step { six_step(sin_phases) } else { sin_phases };
         let error = three!(|j| s.current_ref * shape[j] - measured[j]);
         s.legs = relays(m.half_band, old_legs, error);
     }
@@ -193,8 +163,7 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     // Motor electromagnetics.
     let c = coupling::<S, FULL>(m, structure, s, sin, cos);
     let torque = motor_torque::<S, FULL>(m, structure, s, &c);
-    let (current, voltage) =
-        electric_step::<S, FULL, EXTRA>(m, structure, s, &c, half_supply, old_legs);
+    let (current, voltage) = electric_step::<S, FULL, EXTRA>(m, structure, s, &c, half_supply, old_legs);
     if structure.acquisition {
         let (q, d) = park(measured, sin_phases, cos_phases);
         let (v_q, _) = park(voltage, sin_phases, cos_phases);

@@ -73,57 +73,34 @@ impl Structure {
             trapezoidal: choice(MotorParameter::EmfShape.at()) == 1,
             shorted_loop: choice(MotorParameter::ShortModel.at()) == 1,
             static_eccentricity: departs(MotorParameter::EccentricityStatic.at(), 0.0),
-            dynamic_eccentricity: unbalance
-                || departs(MotorParameter::EccentricityDynamic.at(), 0.0),
+            dynamic_eccentricity: unbalance || departs(MotorParameter::EccentricityDynamic.at(), 0.0),
         };
         let resolver_lost = departs(ResolverParameter::PowerOff.at(), 0.0);
-        let open_phase =
-            (MotorParameter::OpenA.at()..=MotorParameter::OpenC.at()).any(|i| departs(i, 0.0));
+        let open_phase = (MotorParameter::OpenA.at()..=MotorParameter::OpenC.at()).any(|i| departs(i, 0.0));
         let base = InverterParameter::SupplyVoltage.at();
-        let detailed = InverterParameter::DETAIL
-            .clone()
-            .any(|i| departs(base + i, 0.0));
+        let detailed = InverterParameter::DETAIL.clone().any(|i| departs(base + i, 0.0));
         let stops = resolver_lost && choice(DriveParameter::FeedbackLoss.at()) == 1;
         let bridge = open_phase || detailed || drive == Drive::Off || stops;
         let elastic = choice(PlayParameter::Model.at()) == 1;
         let first_gain = CurrentSensorParameter::GainA.at();
-        let measured_current = !CurrentSensor::<f64>::ideal(raw.current_sensor())
-            || (0..9).any(|i| setup.touched[first_gain + i]);
+        let measured_current = !CurrentSensor::<f64>::ideal(raw.current_sensor()) || (0..9).any(|i| setup.touched[first_gain + i]);
         let first_resolver = ResolverParameter::Mismatch.at();
-        let resolver = !Resolver::<f64>::ideal(raw.resolver())
-            || (0..5).any(|i| setup.touched[first_resolver + i]);
-        let accounts = setup
-            .recorded
-            .iter()
-            .any(|&s| F::HIGH[s].name.starts_with("energy"));
-        let loaded = departs(GearParameter::Efficiency.at(), 1.0)
-            || departs(GearParameter::EfficiencyAiding.at(), 1.0);
-        let mechanical = loaded
-            || departs(FrictionParameter::ViscousSlope.at(), 0.0)
-            || departs(FrictionParameter::JamTorque.at(), 0.0);
-        let thermal = departs(MotorParameter::TemperatureCoefficient.at(), 0.0)
-            || departs(MotorParameter::FluxTemperatureCoefficient.at(), 0.0);
+        let resolver = !Resolver::<f64>::ideal(raw.resolver()) || (0..5).any(|i| setup.touched[first_resolver + i]);
+        let accounts = setup.recorded.iter().any(|&s| F::HIGH[s].name.starts_with("energy"));
+        let loaded = departs(GearParameter::Efficiency.at(), 1.0) || departs(GearParameter::EfficiencyAiding.at(), 1.0);
+        let mechanical = loaded || departs(FrictionParameter::ViscousSlope.at(), 0.0) || departs(FrictionParameter::JamTorque.at(), 0.0);
+        let thermal =
+            departs(MotorParameter::TemperatureCoefficient.at(), 0.0) || departs(MotorParameter::FluxTemperatureCoefficient.at(), 0.0);
         let told = control.feedback != 0;
         let heat = choice(ThermalParameter::Model.at()) != 0;
         let tap = (TapParameter::LevelA.at()..=TapParameter::LevelC.at()).any(|i| departs(i, 0.0));
-        let load_side = F::LINEAR
-            || departs(LoadParameter::Damping.at(), 0.0)
-            || departs(LoadParameter::Friction.at(), 0.0);
+        let load_side = F::LINEAR || departs(LoadParameter::Damping.at(), 0.0) || departs(LoadParameter::Friction.at(), 0.0);
         let current_filter = setup.raw[CurrentSensorParameter::Bandwidth.at()] > 0.0;
         let six_step = choice(DriveParameter::Commutation.at()) == 1;
         let commutated = choice(DriveParameter::CommutationSource.at()) == 0;
         let (spall, debris) = F::worn(&departs);
         let separate = resolver && !commutated;
-        let extra = load_side
-            || heat
-            || tap
-            || unbalance
-            || spall
-            || debris
-            || current_filter
-            || six_step
-            || separate
-            || stops;
+        let extra = load_side || heat || tap || unbalance || spall || debris || current_filter || six_step || separate || stops;
         let full = bridge
             || extra
             || elastic
@@ -142,9 +119,10 @@ impl Structure {
             motor,
             control_every_step: sample_steps(setup.raw, ControlParameter::SampleTime.at()) <= 1,
             semi_implicit: choice(SolverParameter::Method.at()) == 1,
-            acquisition: setup.recorded.iter().any(|&s| {
-                (HighSignal::CurrentQMeas as usize..=HighSignal::VoltageQMeas as usize).contains(&s)
-            }),
+            acquisition: setup
+                .recorded
+                .iter()
+                .any(|&s| (HighSignal::CurrentQMeas as usize..=HighSignal::VoltageQMeas as usize).contains(&s)),
             full,
             bridge,
             elastic,
