@@ -5,4 +5,4 @@ pub mod rotary;
 pub mod servo;
 mod wiring;
 
-pub use wiring::{Finding, Inputs, Overheat, Port, Setup, Tick, Watch, Wiring, MAX_CHUNKS};
+pub use wiring::{Finding, Inputs, Overheat, Port, Setup, Tick, Watch, Wiring, MAX_CHUNKS, WATCHED};

@@ -11,6 +11,9 @@ use std::hash::Hash;
 /// Most chunks of lanes that one thread runs side by side.
 pub const MAX_CHUNKS: usize = 4;
 
+/// Quantities that the solver watches.
+pub const WATCHED: usize = 4;
+
 /// An input of a wiring that waveforms drive.
 #[derive(Clone, Copy, Debug)]
 pub struct Port {
@@ -133,7 +136,8 @@ pub trait Wiring: Sized + Send + Sync + 'static {
         t: S,
         out: &mut [S],
     );
-    fn watch<S: Scalar>(state: &Self::State<S>) -> Vec<Watch<S>>;
+    /// Quantities whose leaving of their limit means divergence.
+    fn watch<S: Scalar>(state: &Self::State<S>) -> [Watch<S>; WATCHED];
     /// The winding and whether it has passed its limit, which ends a run; none where nothing heats.
     fn overheated<S: Scalar>(_state: &Self::State<S>) -> Option<Overheat<S>> {
         None

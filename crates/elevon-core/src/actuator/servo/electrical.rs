@@ -18,8 +18,12 @@ pub(super) struct Coupling<S> {
 #[inline(always)]
 pub(super) fn coupling<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &State<S>, sin: S, cos: S) -> Coupling<S> {
     let (mut shape, _) = three_phase(sin, cos);
+    let eccentric = structure.motor.static_eccentricity;
+    if !FULL && !eccentric {
+        return Coupling { k: m.star.even_coefficients(shape), loop_k: [S::zero(); 3] };
+    }
     let mut gap = [S::one(); 3];
-    if structure.motor.static_eccentricity {
+    if eccentric {
         gap = m.star.static_gap(sin, cos);
     }
     let mut loop_k = [S::zero(); 3];
@@ -31,7 +35,9 @@ pub(super) fn coupling<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &St
             let turning = m.star.dynamic_gap(s.motor_position);
             gap = three!(|j| gap[j] * turning[j]);
         }
-        gap = three!(|j| gap[j] * s.star.flux_factor);
+        if structure.thermal {
+            gap = three!(|j| gap[j] * s.star.flux_factor);
+        }
         if structure.motor.shorted_loop {
             loop_k = m.star.loop_coefficients(shape, gap);
         }
@@ -63,7 +69,9 @@ pub(super) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
     let mut emf: [S; 3] = three!(|j| c.k[j] * speed);
     let mut resistance = m.star.resistance;
     if FULL {
-        resistance = three!(|j| resistance[j] * s.star.resistance_factor);
+        if structure.thermal {
+            resistance = three!(|j| resistance[j] * s.star.resistance_factor);
+        }
         if structure.motor.shorted_loop {
             let added = m.star.loop_emf(&s.star, c.loop_k, speed);
             emf = three!(|j| emf[j] + added[j]);
@@ -76,15 +84,19 @@ pub(super) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
     let neutral;
     if FULL && structure.bridge {
         let windings = Windings { current: i, emf, per_inductance: m.star.per_inductance, resistance, open: m.star.open };
-        let (connection, v_n) = m.bridge.connect(&mut s.bridge, old_legs, s.legs, half_supply, &windings);
-        let all = connection.connected[0] & connection.connected[1] & connection.connected[2];
-        terminal = connection.voltage;
-        rail = connection.rail;
+        let connection = m.bridge.connect(&mut s.bridge, &structure.bridge_structure, old_legs, s.legs, half_supply, &windings);
+        terminal = connection.legs.voltage;
+        rail = connection.legs.rail;
         let plain = m.star.neutral(drops(&terminal));
-        neutral = S::select(all, plain, v_n);
-        // A floating phase shows its EMF over the neutral.
-        terminal = three!(|j| S::select(connection.connected[j], terminal[j], neutral + emf[j]));
-        legs = Some(connection);
+        if let Some(v_n) = connection.loose {
+            let connected = connection.legs.connected;
+            neutral = S::select(connected[0] & connected[1] & connected[2], plain, v_n);
+            // A floating phase shows its EMF over the neutral.
+            terminal = three!(|j| S::select(connected[j], terminal[j], neutral + emf[j]));
+            legs = Some(connection.legs);
+        } else {
+            neutral = plain;
+        }
     } else if EXTRA && structure.tap {
         neutral = m.extra.tap.neutral(terminal, drops(&terminal), i, m.star.per_inductance);
     } else {

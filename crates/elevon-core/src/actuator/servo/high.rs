@@ -2,11 +2,12 @@
 
 use super::form::Form;
 use super::layout::*;
+use super::march::march;
 use super::model::{Model, State};
 use super::start;
-use super::step::{control_step, park, seen_current, shaft_reading, steps};
+use super::step::{control_step, park, seen_current, shaft_reading, HighStep};
 use super::structure::{sample_steps, Drive, Structure};
-use crate::actuator::{Finding, Inputs, Overheat, Port, Setup, Tick, Watch, Wiring};
+use crate::actuator::{Finding, Inputs, Overheat, Port, Setup, Tick, Watch, Wiring, WATCHED};
 use crate::control::current_dq::{CurrentSample, PwmParameter};
 use crate::control::position_speed::ControlParameter;
 use crate::fault::FaultKind;
@@ -142,27 +143,29 @@ impl<F: Form> Wiring for High<F> {
         count: Steps,
     ) {
         match (structure.full, structure.extra, structure.drive == Drive::Pwm) {
-            (false, _, false) => steps::<S, false, false, false>(structure, models, inputs, states, from, count),
-            (false, _, true) => steps::<S, false, false, true>(structure, models, inputs, states, from, count),
-            (true, false, false) => steps::<S, true, false, false>(structure, models, inputs, states, from, count),
-            (true, false, true) => steps::<S, true, false, true>(structure, models, inputs, states, from, count),
-            (true, true, false) => steps::<S, true, true, false>(structure, models, inputs, states, from, count),
-            (true, true, true) => steps::<S, true, true, true>(structure, models, inputs, states, from, count),
+            (false, _, false) => march::<HighStep<false, false, false>, S>(structure, models, inputs, states, from, count),
+            (false, _, true) => march::<HighStep<false, false, true>, S>(structure, models, inputs, states, from, count),
+            (true, false, false) => march::<HighStep<true, false, false>, S>(structure, models, inputs, states, from, count),
+            (true, false, true) => march::<HighStep<true, false, true>, S>(structure, models, inputs, states, from, count),
+            (true, true, false) => march::<HighStep<true, true, false>, S>(structure, models, inputs, states, from, count),
+            (true, true, true) => march::<HighStep<true, true, true>, S>(structure, models, inputs, states, from, count),
         }
     }
 
+    #[inline(always)]
     fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, state: &State<S>, t: S, out: &mut [S]) {
         super::observe::high::<F, S>(structure, m, inputs, state, t, out);
     }
 
-    fn watch<S: Scalar>(s: &State<S>) -> Vec<Watch<S>> {
+    #[inline(always)]
+    fn watch<S: Scalar>(s: &State<S>) -> [Watch<S>; WATCHED] {
         let currents = s.star.current[0].abs()
             + s.star.current[1].abs()
             + s.star.current[2].abs()
             + s.star.loop_current[0].abs()
             + s.star.loop_current[1].abs()
             + s.star.loop_current[2].abs();
-        vec![
+        [
             Watch { name: "motor_speed", value: s.motor_speed, limit: 1e6 },
             Watch { name: "current_a", value: currents, limit: 1e7 },
             Watch { name: "user_position", value: s.user_position, limit: 1e9 },
@@ -170,8 +173,9 @@ impl<F: Form> Wiring for High<F> {
         ]
     }
 
+    #[inline(always)]
     fn tripped<S: Scalar>(s: &State<S>) -> S {
-        s.bridge.tripped
+        s.bridge.tripped.maximum(s.extra.network.over)
     }
     fn overheated<S: Scalar>(s: &State<S>) -> Option<Overheat<S>> {
         let network = &s.extra.network;

@@ -1,7 +1,7 @@
 //! Shaft, transmission and load side of a step.
 
+use super::march::Moment;
 use super::model::*;
-use super::step::Moment;
 use super::structure::Structure;
 use crate::scalar::Scalar;
 use crate::transmission::friction::Friction;
@@ -48,9 +48,14 @@ pub(super) fn shaft_loads<S: Scalar, const FULL: bool, const EXTRA: bool>(
         added = added + friction;
     }
     if FULL {
-        let moving = s.motor_speed.sign();
-        let direction = S::select(s.motor_speed.equals(S::zero()), (torque - load).sign(), moving);
-        added = added + m.gear.load_friction(through, direction) + s.jammed * m.friction.jam_torque;
+        if structure.loaded {
+            let moving = s.motor_speed.sign();
+            let direction = S::select(s.motor_speed.equals(S::zero()), (torque - load).sign(), moving);
+            added = added + m.gear.load_friction(through, direction);
+        }
+        if structure.jams {
+            added = added + s.jammed * m.friction.jam_torque;
+        }
     }
     let mut loads = ShaftLoads {
         brake: x.brake,
@@ -114,7 +119,7 @@ pub(super) fn mechanical_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
 ) {
     let loads = shaft_loads::<S, FULL, EXTRA>(m, structure, x, s, torque);
     let speed = s.motor_speed;
-    let mut viscous = if FULL { m.friction.viscous_torque(speed) } else { m.friction.viscous * speed };
+    let mut viscous = if FULL && structure.sloped { m.friction.viscous_torque(speed) } else { m.friction.viscous * speed };
     if EXTRA && structure.load_side && !structure.elastic {
         viscous = viscous + m.extra.load_damping * m.gear.per_ratio * m.gear.per_ratio * speed;
     }
@@ -133,7 +138,7 @@ pub(super) fn mechanical_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
     } else {
         s.user_position = m.play.drag(position * m.gear.per_ratio, s.user_position);
     }
-    if FULL {
+    if FULL && structure.jams {
         let passed = ((s.user_position - m.friction.jam_position) * s.jam_side).le(S::zero());
         let seized = passed | S::splat(0.5).lt(m.friction.jam_anywhere);
         s.jammed = S::select(seized, S::one(), s.jammed);

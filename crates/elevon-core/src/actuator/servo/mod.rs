@@ -9,6 +9,7 @@ mod form;
 mod high;
 pub mod layout;
 mod low;
+mod march;
 mod mechanical;
 mod model;
 mod observe;

@@ -3,16 +3,19 @@
 use super::electrical::{coupling, motor_torque};
 use super::form::Form;
 use super::layout::*;
+use super::march::Moment;
 use super::mechanical::{contact_torque, disturbance, load_side_friction, shaft_loads};
 use super::model::*;
 use super::signals::{HighSignal as Q, HIGH};
-use super::step::{leg_current, park, seen_current, Moment};
+use super::step::{leg_current, park, seen_current};
 use super::structure::Structure;
 use crate::actuator::Inputs;
 use crate::scalar::{three_phase, Scalar};
+use crate::sensor::resolver::Reading;
 use crate::three;
 use crate::transmission::friction::Friction;
 
+#[inline(always)]
 pub(super) fn high<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
     let mut set = |q: Q, x: S| out[q as usize] = x;
     set(Q::Command, inputs[COMMAND].at(t) + s.command_noise);
@@ -24,7 +27,7 @@ pub(super) fn high<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, inpu
     set(Q::TorqueRef, s.control.torque_ref);
     set(Q::CurrentRef, s.current_ref);
     set(Q::LegTransitions, s.transitions);
-    set(Q::Tripped, s.bridge.tripped);
+    set(Q::Tripped, s.bridge.tripped.maximum(s.extra.network.over));
     let warm = &s.extra.network;
     set(Q::WindingTemperature, if structure.heat { warm.winding } else { m.temperature });
     set(Q::SurfaceTemperature, warm.surface);
@@ -35,7 +38,8 @@ pub(super) fn high<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, inpu
     set(Q::Limited, m.control.limited(&s.control));
     set(Q::EncoderPosition, m.encoder.read(s.user_position));
     let mut held = s.held_angle;
-    let reading = m.resolver.read(s.motor_position, s.motor_speed, &mut held);
+    let ideal = Reading { angle: s.motor_position, position: s.motor_position, speed: s.motor_speed };
+    let reading = if structure.resolver { m.resolver.read(s.motor_position, s.motor_speed, &mut held) } else { ideal };
     set(Q::ResolverPosition, reading.position);
     set(Q::ResolverSpeed, reading.speed);
     electrical(structure, m, inputs, s, t, out);
@@ -48,6 +52,7 @@ pub(super) fn high<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, inpu
 }
 
 /// What a ballscrew adds, in the order of its further signals.
+#[inline(always)]
 fn screw<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S) -> [S; 7] {
     let x = Moment::at(inputs, t);
     let user = m.gear.stiffness.fma(s.user_position - m.gear.spring_zero, x.user);
@@ -67,12 +72,14 @@ fn screw<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: 
 }
 
 /// The same for the low fidelity, and current and voltage of the printed L-R circuit.
+#[inline(always)]
 pub(super) fn low_screw<S: Scalar>(per_ratio: S, angle: S, speed: S, force: S, efficiency: [S; 2], current: S, voltage: S) -> [S; 7] {
     let root = S::splat(1.5_f64.sqrt());
     [angle * per_ratio, speed * per_ratio, force * per_ratio, efficiency[0], efficiency[1], root * current, root * voltage]
 }
 
 /// In the operator model the user moves with the motor while the play is taken up, else it rests.
+#[inline(always)]
 fn user_speed<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>) -> S {
     if structure.elastic {
         return s.user_speed;
@@ -83,6 +90,7 @@ fn user_speed<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>) -> S
     S::select(pushing, s.motor_speed * m.gear.per_ratio, S::zero())
 }
 
+#[inline(always)]
 fn electrical<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
     let mut set = |q: Q, x: S| out[q as usize] = x;
     let (sin, cos) = m.star.electrical_angle(s.motor_position).sin_cos();
@@ -109,6 +117,7 @@ fn electrical<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>
 }
 
 /// Phase-to-neutral voltages of an ideal bridge in its present switching state.
+#[inline(always)]
 fn ideal_voltage<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, supply: S, sin: S, cos: S) -> [S; 3] {
     let c = coupling::<S, true>(m, structure, s, sin, cos);
     let terminal = three!(|j| s.legs[j] * S::splat(0.5) * supply);
@@ -118,6 +127,7 @@ fn ideal_voltage<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, s
     three!(|j| terminal[j] - neutral)
 }
 
+#[inline(always)]
 fn mechanical<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
     let (sin, cos) = m.star.electrical_angle(s.motor_position).sin_cos();
     let c = coupling::<S, true>(m, structure, s, sin, cos);
@@ -135,6 +145,7 @@ fn mechanical<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>
     set(Q::TransmissionTorque, if structure.elastic { contact_torque(m, s) } else { loads.user_torque });
 }
 
+#[inline(always)]
 fn energies<S: Scalar>(m: &Model<S>, s: &State<S>, out: &mut [S]) {
     for (q, i) in [
         (Q::EnergySupply, E_SUPPLY),

@@ -3,52 +3,15 @@
 //! that only some servos have; a detail at its healthy value changes no bit, so the forms agree exactly where both apply.
 
 use super::electrical::{coupling, electric_step, motor_torque};
-use super::layout::*;
+use super::march::{Moment, Stepper};
 use super::mechanical::mechanical_step;
 use super::model::{Model, State};
 use super::structure::{Drive, Structure};
-use crate::actuator::{Inputs, MAX_CHUNKS};
 use crate::inverter::hysteresis::{count_transitions, relays, six_step};
 use crate::scalar::{three_phase, Scalar};
 use crate::sensor::filter::low_pass;
 use crate::sensor::resolver::Reading;
 use crate::three;
-use crate::time::Steps;
-
-/// Steps whose inputs are evaluated together.
-const AHEAD: usize = 8;
-
-/// The inputs at one instant.
-#[derive(Clone, Copy)]
-pub(super) struct Moment<S> {
-    pub t: S,
-    pub command: S,
-    /// A brake cannot push: negative values count as zero.
-    pub brake: S,
-    pub shaft: S,
-    pub user: S,
-    pub supply: S,
-}
-
-impl<S: Scalar> Moment<S> {
-    #[inline(always)]
-    pub(super) fn at(inputs: &Inputs<S>, t: S) -> Self {
-        let brake = inputs[BRAKE].at(t).maximum(S::zero());
-        Self {
-            t,
-            command: inputs[COMMAND].at(t),
-            brake,
-            shaft: inputs[SHAFT].at(t),
-            user: inputs[USER].at(t),
-            supply: inputs[SUPPLY].at(t),
-        }
-    }
-
-    fn none() -> Self {
-        let zero = S::zero();
-        Self { t: zero, command: zero, brake: zero, shaft: zero, user: zero, supply: zero }
-    }
-}
 
 /// What the controller is told of the shaft.
 #[inline(always)]
@@ -149,7 +112,9 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     let old_legs = s.legs;
     if PWM {
         s.legs = m.current_control.compare(&s.current_control, x.t);
-    } else if !FULL || structure.drive == Drive::Hysteresis {
+    } else if FULL && structure.drive == Drive::Off {
+        s.legs = [S::zero(); 3];
+    } else {
         let shape = if EXTRA && structure.six_step { six_step(sin_phases) } else { sin_phases };
         let error = three!(|j| s.current_ref * shape[j] - measured[j]);
         s.legs = relays(m.half_band, old_legs, error);
@@ -177,40 +142,20 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     s.star.current = current;
 }
 
-#[inline(always)]
-pub(super) fn steps<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
-    structure: &Structure,
-    models: &[Model<S>],
-    inputs: &[Inputs<S>],
-    states: &mut [State<S>],
-    from: Steps,
-    count: Steps,
-) {
-    // Inputs depend on time alone: evaluated some steps ahead, they leave the chain from state to state.
-    let mut ahead = [[Moment::none(); AHEAD]; MAX_CHUNKS];
-    let mut k = from;
-    while k < from + count {
-        let some = (from + count - k).min(AHEAD as Steps) as usize;
-        for ((model, inputs), moments) in models.iter().zip(inputs).zip(&mut ahead) {
-            for (i, moment) in moments[..some].iter_mut().enumerate() {
-                *moment = Moment::at(inputs, S::splat((k + i as Steps) as f64) * model.dt);
-            }
-        }
-        if let ([model], [state]) = (models, &mut *states) {
-            // One chunk: its state may stay in registers.
-            let mut s = *state;
-            for moment in &ahead[0][..some] {
-                step::<S, FULL, EXTRA, PWM>(model, structure, moment, &mut s);
-            }
-            *state = s;
-        } else {
-            // Several chunks side by side hide each other's latencies.
-            for i in 0..some {
-                for ((model, state), moments) in models.iter().zip(states.iter_mut()).zip(&ahead) {
-                    step::<S, FULL, EXTRA, PWM>(model, structure, &moments[i], state);
-                }
-            }
-        }
-        k += some as Steps;
+/// The step of the inner loop with and without details, behind relays or a carrier.
+pub(super) struct HighStep<const FULL: bool, const EXTRA: bool, const PWM: bool>;
+
+impl<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool> Stepper<S> for HighStep<FULL, EXTRA, PWM> {
+    type Model = Model<S>;
+    type Structure = Structure;
+    type State = State<S>;
+
+    #[inline(always)]
+    fn dt(model: &Model<S>) -> S {
+        model.dt
+    }
+    #[inline(always)]
+    fn step(model: &Model<S>, structure: &Structure, moment: &Moment<S>, state: &mut State<S>) {
+        step::<S, FULL, EXTRA, PWM>(model, structure, moment, state);
     }
 }

@@ -5,7 +5,7 @@ use super::layout::*;
 use super::signals::HighSignal;
 use crate::actuator::Setup;
 use crate::control::position_speed::{ControlParameter, ControlStructure};
-use crate::inverter::bridge::InverterParameter;
+use crate::inverter::bridge::{BridgeStructure, InverterParameter};
 use crate::motor::star::{MotorParameter, MotorStructure};
 use crate::motor::tap::TapParameter;
 use crate::motor::thermal::ThermalParameter;
@@ -35,10 +35,15 @@ pub struct Structure {
     pub(super) acquisition: bool,
     pub(super) full: bool,
     pub(super) bridge: bool,
+    pub(super) bridge_structure: BridgeStructure,
     pub(super) elastic: bool,
     pub(super) measured_current: bool,
     pub(super) resolver: bool,
     pub(super) accounts: bool,
+    pub(super) loaded: bool,
+    pub(super) sloped: bool,
+    pub(super) jams: bool,
+    pub(super) thermal: bool,
     /// Any of the following: details that only some servos have.
     pub(super) extra: bool,
     pub(super) linear: bool,
@@ -81,14 +86,20 @@ impl Structure {
         let detailed = InverterParameter::DETAIL.clone().any(|i| departs(base + i, 0.0));
         let stops = resolver_lost && choice(DriveParameter::FeedbackLoss.at()) == 1;
         let bridge = open_phase || detailed || drive == Drive::Off || stops;
+        let switches = InverterParameter::OpenAHigh as usize..=InverterParameter::ShortedCLow as usize;
+        let switch_faults = switches.into_iter().any(|i| departs(base + i, 0.0));
+        let trips = switch_faults || departs(InverterParameter::TripCurrent.at(), 0.0);
+        let bridge_structure = BridgeStructure { switch_faults, open_phases: open_phase, trips };
         let elastic = choice(PlayParameter::Model.at()) == 1;
         let first_gain = CurrentSensorParameter::GainA.at();
         let measured_current = !CurrentSensor::<f64>::ideal(raw.current_sensor()) || (0..9).any(|i| setup.touched[first_gain + i]);
         let first_resolver = ResolverParameter::Mismatch.at();
         let resolver = !Resolver::<f64>::ideal(raw.resolver()) || (0..5).any(|i| setup.touched[first_resolver + i]);
         let accounts = setup.recorded.iter().any(|&s| F::HIGH[s].name.starts_with("energy"));
-        let loaded = departs(GearParameter::Efficiency.at(), 1.0) || departs(GearParameter::EfficiencyAiding.at(), 1.0);
-        let mechanical = loaded || departs(FrictionParameter::ViscousSlope.at(), 0.0) || departs(FrictionParameter::JamTorque.at(), 0.0);
+        let loaded = F::LINEAR || departs(GearParameter::Efficiency.at(), 1.0) || departs(GearParameter::EfficiencyAiding.at(), 1.0);
+        let sloped = departs(FrictionParameter::ViscousSlope.at(), 0.0);
+        let jams = departs(FrictionParameter::JamTorque.at(), 0.0);
+        let mechanical = loaded || sloped || jams;
         let thermal =
             departs(MotorParameter::TemperatureCoefficient.at(), 0.0) || departs(MotorParameter::FluxTemperatureCoefficient.at(), 0.0);
         let told = control.feedback != 0;
@@ -125,10 +136,15 @@ impl Structure {
                 .any(|&s| (HighSignal::CurrentQMeas as usize..=HighSignal::VoltageQMeas as usize).contains(&s)),
             full,
             bridge,
+            bridge_structure,
             elastic,
             measured_current,
             resolver,
             accounts,
+            loaded,
+            sloped,
+            jams,
+            thermal,
             extra,
             linear: F::LINEAR,
             load_side,
