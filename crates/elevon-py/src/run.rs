@@ -110,7 +110,7 @@ fn result<'py>(
     d.set_item("final", last)?;
     let kept = PyDict::new(py);
     for (((clock, name), values), columns) in clocks.iter().zip(names).zip(output.clocks).zip(output.columns) {
-        let rows = if columns == 0 { 0 } else { values.len() / columns };
+        let rows = values.len().checked_div(columns).unwrap_or(0);
         let time: Vec<f64> = (0..rows).map(|i| (i as u64 * clock.period) as f64 * dt).collect();
         let entry = PyDict::new(py);
         entry.set_item("time", PyArray1::from_vec(py, time))?;

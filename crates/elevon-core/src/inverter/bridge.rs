@@ -263,6 +263,8 @@ pub fn quench<S: Scalar>(legs: &Legs<S>, old: [S; 3], new: [S; 3]) -> [S; 3] {
     }
     let count = carrying[0] + carrying[1] + carrying[2];
     let residue = current[0] + current[1] + current[2];
-    let share = S::select(count.equals(zero), zero, residue / count.maximum(S::one()));
+    // With all three carrying nothing was cut and the rounding of the sum is left alone.
+    let whole = count.equals(zero) | count.equals(S::splat(3.0));
+    let share = S::select(whole, zero, residue / count.maximum(S::one()));
     three!(|j| current[j] - carrying[j] * share)
 }

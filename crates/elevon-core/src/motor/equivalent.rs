@@ -12,7 +12,7 @@ variables! {
     /// The few numbers that only the low fidelity has.
     LowParameter, LOW {
         Step => "step", "dt", "s", Positive, Solver, Some(5e-4), "solver step of the low fidelity";
-        VoltageRatio => "voltage_ratio", "-", "1", Positive, Plant, Some(0.636_619_772_367_581_4), "largest phase voltage, peak, over the DC link: 2/pi in six-step, 1/sqrt 3 for a linear PWM";
+        VoltageRatio => "voltage_ratio", "-", "1", Positive, Plant, Some(std::f64::consts::FRAC_2_PI), "largest phase voltage, peak, over the DC link: 2/pi in six-step, 1/sqrt 3 for a linear PWM";
         BandRatio => "band_ratio", "-", "1", Between(0.0, 2.0), Plant, Some(0.5), "mean current error the relays allow before they act, in half bands";
     }
 }

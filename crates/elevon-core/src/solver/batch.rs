@@ -69,7 +69,7 @@ fn shape<W: Wiring>(run: &RunSpec, recorded: &[usize]) -> Shape<W::Structure> {
 
 fn run_block<W: Wiring, S: Scalar>(runs: &[&RunSpec], clocks: &[Clock], recorded: &[usize], monitor: &Monitor) -> Vec<RunOutput> {
     let mut padded = runs.to_vec();
-    while padded.len() % S::LANES != 0 {
+    while !padded.len().is_multiple_of(S::LANES) {
         padded.push(runs[runs.len() - 1]);
     }
     Block::<W, S, Plain>::new(&padded, runs.len(), Plain(&padded), clocks, recorded).run(monitor)

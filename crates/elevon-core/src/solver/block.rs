@@ -390,7 +390,8 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             if self.stopped[lane].is_some() {
                 continue;
             }
-            let beyond = watched.iter().find(|w| !(w.value.lane(i).abs() <= w.limit));
+            // Not a number is beyond every limit.
+            let beyond = watched.iter().find(|w| w.value.lane(i).is_nan() || w.value.lane(i).abs() > w.limit);
             if let Some(watch) = beyond {
                 self.status[lane] = Status::Diverged { time, signal: watch.name };
                 self.stopped[lane] = Some(k);

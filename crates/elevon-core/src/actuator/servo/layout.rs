@@ -69,7 +69,8 @@ pub struct Raw<'a, S>(pub &'a [S]);
 macro_rules! views {
     ($($name:ident $index:literal $id:ident),*) => {
         impl<'a, S> Raw<'a, S> {
-            $(pub fn $name(self) -> &'a [S] {
+            // Some components are read by single numbers only.
+            $(#[allow(dead_code)] pub fn $name(self) -> &'a [S] {
                 const AT: usize = offset(GROUPS, $index);
                 &self.0[AT..AT + GROUPS[$index].variables.len()]
             })*

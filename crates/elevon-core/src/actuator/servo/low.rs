@@ -249,8 +249,8 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, x: &Moment<S>, s: &mut S
     if structure.debris {
         (static_limit, dynamic) = (static_limit * s.scatter, dynamic * s.scatter);
     }
-    let wanted = efficacy * demand - load;
-    let acceleration = (wanted - Friction::dry_torque(wanted, speed, static_limit, dynamic) - viscous) * p.per_effective_inertia;
+    let resist = load + speed.signed(dynamic) + viscous;
+    let acceleration = Friction::net_torque(efficacy * demand, load, resist, speed, static_limit) * p.per_effective_inertia;
     s.torque_ref = (demand - derivative_inertia * acceleration).clamp_abs(m.torque_limit);
     s.speed_ref = speed_ref;
     if structure.integral {
@@ -274,14 +274,16 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, x: &Moment<S>, s: &mut S
     // v_q^2 + v_d^2 stays inside the largest phase voltage; v_d is the cross coupling p omega L i_q.
     let room = largest * largest - cross * cross;
     s.voltage = driving + emf;
-    if S::any(room.lt(s.voltage * s.voltage)) {
-        s.voltage = s.voltage.clamp_abs(room.maximum(zero).sqrt());
+    let limited = room.lt(s.voltage * s.voltage);
+    let mut reached = target;
+    if S::any(limited) {
+        let held = s.voltage.clamp_abs(room.maximum(zero).sqrt());
+        s.voltage = S::select(limited, held, s.voltage);
+        reached = S::select(limited, circuit.current(s.current, held - emf), target);
     }
     s.tripped = s.tripped.maximum(m.tripped);
-    let live = S::one() - s.tripped;
-    let reached = circuit.current(s.current, s.voltage - emf) * live;
     let before = s.current;
-    s.current = if structure.drive == 2 { zero } else { reached };
+    s.current = reached * (S::one() - s.tripped);
     if structure.heat {
         // Sum of R_j i_j^2 of the three phases, at the step's middle.
         let middle = S::splat(0.5) * (before + s.current);
@@ -293,9 +295,8 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, x: &Moment<S>, s: &mut S
     // Motor and transmission dynamics.
     s.motor_torque = m.star.saturate(p.torque_constant * s.current);
     let active = s.motor_torque - load;
-    let dry = Friction::dry_torque(active, speed, static_limit, dynamic);
-    s.friction_torque = dry + viscous;
-    let free = m.dt_per_inertia.fma(active - dry - viscous, speed);
+    s.friction_torque = Friction::dry_torque(active, speed, static_limit, dynamic) + viscous;
+    let free = m.dt_per_inertia.fma(Friction::net_torque(s.motor_torque, load, resist, speed, static_limit), speed);
     let new_speed = Friction::stop_at_reversal(speed, free);
     let (position, held) = m.gear.stop(s.motor_position + m.dt * new_speed, new_speed);
     s.motor_position = position;
