@@ -1,6 +1,6 @@
 //! The wirings by name, and one entry for each thing a caller may ask of any of them.
 
-use crate::actuator::{rotary, Finding, Port, Wiring};
+use crate::actuator::{ballscrew, rotary, Finding, Port, Wiring};
 use crate::fault::FaultKind;
 use crate::solver::{self, Clock, Monitor, RunOutput, RunSpec, Width};
 use crate::variable::{Group, Signal};
@@ -10,6 +10,8 @@ use crate::variable::{Group, Signal};
 pub enum Model {
     RotaryHigh,
     RotaryLow,
+    BallscrewHigh,
+    BallscrewLow,
 }
 
 /// A kind of actuator and its fidelities.
@@ -21,11 +23,18 @@ pub struct Kind {
 }
 
 /// Every kind of actuator.
-pub const KINDS: &[Kind] = &[Kind {
-    name: "rotary",
-    text: "three-phase motor, inverter, gearbox with friction and play",
-    fidelities: &[("high", Model::RotaryHigh), ("low", Model::RotaryLow)],
-}];
+pub const KINDS: &[Kind] = &[
+    Kind {
+        name: "rotary",
+        text: "three-phase motor, inverter, gearbox with friction and play",
+        fidelities: &[("high", Model::RotaryHigh), ("low", Model::RotaryLow)],
+    },
+    Kind {
+        name: "ballscrew",
+        text: "three-phase motor, inverter, ball screw, ram with play and a load side of its own",
+        fidelities: &[("high", Model::BallscrewHigh), ("low", Model::BallscrewLow)],
+    },
+];
 
 macro_rules! dispatch {
     ($model:expr, $w:ident => $body:expr) => {
@@ -36,6 +45,14 @@ macro_rules! dispatch {
             }
             Model::RotaryLow => {
                 type $w = rotary::Low;
+                $body
+            }
+            Model::BallscrewHigh => {
+                type $w = ballscrew::High;
+                $body
+            }
+            Model::BallscrewLow => {
+                type $w = ballscrew::Low;
                 $body
             }
         }
@@ -65,6 +82,10 @@ impl Model {
     pub fn check(self, raw: &[f64]) -> Vec<Finding> {
         dispatch!(self, W => W::check(raw))
     }
+    /// Findings on the parameters with every fault at its whole severity.
+    pub fn check_faulted(self, raw: &[f64]) -> Vec<Finding> {
+        dispatch!(self, W => W::check_faulted(raw))
+    }
     pub fn step(self, raw: &[f64]) -> f64 {
         dispatch!(self, W => W::step(raw))
     }
@@ -72,10 +93,18 @@ impl Model {
         dispatch!(self, W => solver::run_all::<W>(runs, clocks, threads, width, monitor))
     }
     /// Low fidelities only: the relays of a switching inverter have no useful derivative.
-    pub fn sensitivities(self, run: &RunSpec, parameters: &[usize], faults: &[usize], clocks: &[Clock], monitor: &Monitor) -> Option<Vec<RunOutput>> {
+    pub fn sensitivities(
+        self,
+        run: &RunSpec,
+        parameters: &[usize],
+        faults: &[usize],
+        clocks: &[Clock],
+        monitor: &Monitor,
+    ) -> Option<Vec<RunOutput>> {
         match self {
             Self::RotaryLow => Some(solver::sensitivities::<rotary::Low>(run, parameters, faults, clocks, monitor)),
-            Self::RotaryHigh => None,
+            Self::BallscrewLow => Some(solver::sensitivities::<ballscrew::Low>(run, parameters, faults, clocks, monitor)),
+            Self::RotaryHigh | Self::BallscrewHigh => None,
         }
     }
 }

@@ -1,6 +1,8 @@
 //! Wirings: how components make an actuator. A wiring reads like the paper's block diagram.
 
+pub mod ballscrew;
 pub mod rotary;
+pub mod servo;
 mod wiring;
 
-pub use wiring::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring, MAX_CHUNKS, WATCHED};
+pub use wiring::{Finding, Inputs, Overheat, Port, Setup, Tick, Watch, Wiring, MAX_CHUNKS, WATCHED};

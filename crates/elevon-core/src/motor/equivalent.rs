@@ -5,8 +5,8 @@
 //! k_T = sum k_j sin a_j, R_q = 2/3 sum R_j sin^2 a_j, L_q likewise, v_q = R_q i + L_q di/dt + 2/3 k_T omega.
 
 use crate::scalar::Scalar;
-use crate::variables;
 use crate::three;
+use crate::variables;
 
 variables! {
     /// The few numbers that only the low fidelity has.
@@ -55,7 +55,7 @@ pub fn imposed_shape<S: Scalar>(sines: [S; 3], open: [S; 3]) -> [S; 3] {
 /// diagonal Pade form of order 3 (error x^7 / 100800, x = R dt / L).
 #[derive(Clone, Copy, Debug)]
 pub struct Circuit<S> {
-    per_resistance: S,
+    pub per_resistance: S,
     /// exp(-x).
     decay: S,
     /// R / (1 - exp(-x)).

@@ -186,7 +186,13 @@ const SLOTS: usize = 8;
 
 /// One run with exact derivatives: each value is followed by its derivatives with respect to the chosen
 /// parameters, then to the severities of the chosen faults.
-pub fn sensitivities<W: Wiring>(run: &RunSpec, parameters: &[usize], faults: &[usize], clocks: &[Clock], monitor: &Monitor) -> Vec<RunOutput> {
+pub fn sensitivities<W: Wiring>(
+    run: &RunSpec,
+    parameters: &[usize],
+    faults: &[usize],
+    clocks: &[Clock],
+    monitor: &Monitor,
+) -> Vec<RunOutput> {
     let recorded = recorded(clocks);
     let mut chosen: Vec<(bool, usize)> = parameters.iter().map(|&p| (true, p)).collect();
     chosen.extend(faults.iter().map(|&f| (false, f)));

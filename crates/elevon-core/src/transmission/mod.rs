@@ -3,3 +3,4 @@
 pub mod friction;
 pub mod gear;
 pub mod play;
+pub mod screw;
