@@ -26,6 +26,7 @@ import peers
 import yardsticks
 
 import elevon
+from elevon import _core
 
 STEPS = 1_000_000
 LANE_STEPS = 100_000
@@ -144,19 +145,15 @@ def summary(found: list[dict[str, float]]) -> dict[str, float]:
     return result
 
 
-def report(result: dict[str, Any]) -> None:
+def report(result: dict[str, Any], indent: str = "") -> None:
     """The table for people."""
     for name, value in result.items():
         if isinstance(value, dict):
-            print(name)
-            for key, inner in value.items():
-                print(
-                    f"    {key:32s} {inner:.6g}"
-                    if isinstance(inner, float)
-                    else f"    {key:32s} {inner}"
-                )
+            print(f"{indent}{name}")
+            report(value, indent + "    ")
         else:
-            print(f"{name:36s} {value:.6g}")
+            shown = f"{value:.6g}" if isinstance(value, float) else value
+            print(f"{indent}{name:{36 - len(indent)}s} {shown}")
 
 
 def main() -> int:
@@ -178,6 +175,7 @@ def main() -> int:
     result["machine"] = {
         "cpu": yardsticks.cpu_model(),
         "flags": " ".join(yardsticks.cpu_flags()),
+        "widths": _core.widths(),
         "lanes_c": LANES,
         "c_batch_flags": " ".join(flags),
         "rounds": given.rounds,

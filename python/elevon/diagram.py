@@ -42,7 +42,7 @@ class Diagram:
     loads : mapping of int to str
         Index of a box to what acts on it from outside.
     feedback : tuple of (int, int, str)
-        From box, to box, signal.
+        From box, to box, signal; the shortest first, so that no line crosses another.
     """
 
     blocks: tuple[Block, ...]
@@ -82,9 +82,9 @@ _ROTARY = Diagram(
     ),
     loads=((1, "supply"), (3, "brake, shaft load"), (4, "user load")),
     feedback=(
-        (4, 0, "user_position / encoder"),
-        (3, 0, "motor_speed, motor_position (resolver)"),
         (2, 1, "current_a, b, c (sensors)"),
+        (3, 0, "motor_speed, motor_position (resolver)"),
+        (4, 0, "user_position / encoder"),
     ),
 )
 
@@ -184,7 +184,7 @@ def _feedback(row: int, source: int, target: int, signal: str) -> list[str]:
     # Each return line leaves and enters its boxes at its own abscissa: none hides another.
     y = _TOP + _HEIGHT + 34 + 44 * row
     start = _x(source) + _WIDTH * (0.5 + 0.12 * row)
-    end = _x(target) + _WIDTH * (0.35 + 0.15 * row)
+    end = _x(target) + _WIDTH * (0.65 - 0.15 * row)
     path = f"M{start} {_TOP + _HEIGHT}V{y}H{end}V{_TOP + _HEIGHT}"
     return [
         f'<path d="{path}" fill="none" stroke="#234" stroke-width="1.4" marker-end="url(#tip)"/>',

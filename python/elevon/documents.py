@@ -149,8 +149,9 @@ def _fields(model: Any, location: Sequence[str | int]) -> list[str]:
     from pydantic import BaseModel
 
     for part in location:
-        if isinstance(model, type) and issubclass(model, BaseModel) and part in model.model_fields:
-            model = _inner_model(model.model_fields[str(part)].annotation)
+        if isinstance(model, type) and issubclass(model, BaseModel):
+            fields = {field.alias or name: field for name, field in model.model_fields.items()}
+            model = _inner_model(fields[str(part)].annotation) if part in fields else model
     if isinstance(model, type) and issubclass(model, BaseModel):
         return [field.alias or name for name, field in model.model_fields.items()]
     return []

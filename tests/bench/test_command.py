@@ -47,6 +47,31 @@ def test_a_sine_is_recovered_from_a_noisy_log_of_20_s(tmp_path, seed):
     assert abs(fit.values["frequency"] - truth.frequency) < 6 * fit.std["frequency"] + 1e-7
 
 
+@pytest.mark.parametrize("fidelity", ["low", "high"])
+def test_a_sine_is_recovered_from_a_simulated_log(tmp_path, fidelity):
+    pytest.importorskip("elevon._core")
+    import elevon
+
+    sine = {
+        "kind": "sine", "amplitude": "7 deg", "bias": "10 deg", "frequency": "0.2 Hz",
+        "phase": "20 deg",
+    }  # fmt: skip
+    scenario = elevon.Scenario.from_dict(
+        {"duration": "20 s", "command": {"mode": "position", "terms": [sine]}}
+    )
+    record = "encoder_position,resolver_position,resolver_speed,speed_ref,current_q_meas@400 Hz"
+    actuator = elevon.Actuator.load("torino-rotary")
+    run = elevon.simulate(actuator, scenario, fidelity=fidelity, record=record, seed=3)
+    signals = {"time": run.clock().time, **{c.name: c.values for c in run.channels}}
+    log = import_log(write_drive_csv(tmp_path / "log.csv", signals))
+    fit = fit_waveform(reconstruct_from(log.recording))
+    assert abs(fit.values["phase"] - 20 * DEG) < 0.05 * DEG
+    assert abs(fit.values["frequency"] - 0.2) < 1e-5
+    assert fit.values["amplitude"] == pytest.approx(7 * DEG, rel=1e-3)
+    assert fit.values["bias"] == pytest.approx(10 * DEG, abs=0.01 * DEG)
+    assert fit.outliers <= 2  # the first row, taken before the first set point
+
+
 def test_a_command_that_starts_late_is_found(tmp_path):
     t = np.arange(0.0, 20.0, 1 / 400)
     values = {"amplitude": 7 * DEG, "frequency": 0.2, "phase": 0.4, "bias": 10 * DEG}

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from elevon.errors import InputError
 from elevon.reproduce.backlash.estimate import flat_lengths, lost_motion, play_from_encoder
+from elevon.reproduce.backlash.table import measured_rows
 
 STEP, FREQUENCY, START = 1e-3, 0.2, 10.0
 COUNT = np.radians(360.0 / 80000.0)
@@ -54,16 +55,37 @@ def _recover(time, encoder, blank, gain):
     amplitude=st.floats(4.0, 45.0),
     seed=st.integers(0, 2**32 - 1),
 )
-def test_within_a_count_and_two_percent(gain, integral, friction, amplitude, seed):
+def test_exact_but_for_the_encoders_resolution(gain, integral, friction, amplitude, seed):
     plays = np.radians(np.random.default_rng(seed).uniform(0.05, 3.0, 8))
     size = np.full(9, np.radians(amplitude))
     time, encoder, _ = closed_loop(
         np.append(plays, 0.0), size, gain=gain, integral=integral, friction=friction
     )
-    seen = _counts(encoder)[::5]
+    seen = _counts(encoder)
+    held = flat_lengths(time, seen[:, -1], FREQUENCY, START).mean()
     for k, play in enumerate(plays):
-        found = _recover(time[::5], seen[:, k], seen[:, -1], gain)
-        assert abs(found.total - play) <= COUNT + 0.02 * play
+        found = _recover(time, encoder[:, k], encoder[:, -1], gain)
+        assert abs(found.total - play) <= 0.005 * play + 1e-5
+        # A flat holds one reading that is off by half a count at most, in either run.
+        flat = flat_lengths(time, seen[:, k], FREQUENCY, START).mean()
+        counted = _recover(time, seen[:, k], seen[:, -1], gain)
+        resolution = 0.5 * COUNT * gain * (flat + held)
+        assert abs(counted.total - play) <= 0.005 * play + 1e-5 + resolution
+
+
+@pytest.mark.parametrize("row", range(15))
+def test_the_campaigns_plays_within_a_count_and_two_percent(row, campaign):
+    time, encoder, plays = campaign
+    found = _recover(time, _counts(encoder[:, row]), _counts(encoder[:, -1]), 16.7)
+    assert abs(found.total - plays[row]) <= COUNT + 0.02 * plays[row]
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    """The bench's own motion at its own plays, on a lively loop with friction; the blank last."""
+    plays = np.radians([*(row.measured_total_deg for row in measured_rows()), 0.0])
+    time, encoder, _ = closed_loop(plays, np.full(16, np.radians(7.0)), friction=0.5)
+    return time, encoder, plays
 
 
 def test_noise_averages_out():

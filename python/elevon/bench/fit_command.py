@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -31,7 +31,10 @@ FREE: dict[str, tuple[str, ...]] = {
 }
 _ANGLES = {"phase"}
 _OUTLIER = 6.0
+_FAR = 10.0  # of the robust spread: no noise reaches it
+_FEW = 0.01  # of the samples: more than that is no stray but a model that does not fit
 _LEAST = 20
+_SCORED = 2000  # samples enough to tell the kinds apart
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +58,9 @@ class WaveformFit:
         RMS of the residual [rad].
     samples : int
         Samples used.
+    outliers : int
+        Single samples left out because they stray far from all others, such as the first row of a
+        log, taken before the drive had computed its first set point.
     window : (float, float)
         First and last instant used [s]: before it the command had not begun, or was another.
     converged : bool
@@ -69,6 +75,7 @@ class WaveformFit:
     samples: int
     window: tuple[float, float]
     converged: bool
+    outliers: int = 0
 
     def at(self, time: npt.ArrayLike) -> FloatArray:
         """Return the fitted command [rad] at instants [s]."""
@@ -134,8 +141,13 @@ def fit_waveform(
             break
         t, y = t[first:], y[first:]
         values, jacobian, residual, converged = _best(kind, t, y, known, free=free, start=values)
+    strays = _strays(y, residual)
+    if strays.any():
+        t, y = t[~strays], y[~strays]
+        values, jacobian, residual, converged = _best(kind, t, y, known, free=free, start=values)
     solution = (jacobian, residual, converged)
-    return _result(kind, values, free, t, solution, timing_std=timing_std)
+    fit = _result(kind, values, free, t, solution, timing_std=timing_std)
+    return replace(fit, outliers=int(strays.sum()))
 
 
 def best_waveform(
@@ -152,16 +164,19 @@ def best_waveform(
         Too few valid samples for any of them.
     """
     t, y = _selected(trace, None)
+    step = max(1, len(t) // _SCORED)
+    t, y = t[::step], y[::step]
+    thin = CommandTrace(t, y, np.ones(len(t), dtype=bool))
     scored = []
     for kind in kinds:
-        fit = fit_waveform(trace, kind)
+        fit = fit_waveform(thin, kind)
         inside = (t >= fit.window[0]) & (t <= fit.window[1])
         # Samples a kind leaves out are charged at the spread of the whole trace: a fit to a
         # fragment must not win against one that explains everything.
         rest = np.where(inside, y - fit.at(t), y - y.mean())
         power = max(float(np.mean(rest**2)), 1e-300)
-        scored.append((len(t) * math.log(power) + len(fit.std) * math.log(len(t)), fit))
-    return min(scored, key=lambda item: item[0])[1]
+        scored.append((len(t) * math.log(power) + len(fit.std) * math.log(len(t)), kind))
+    return fit_waveform(trace, min(scored)[1])
 
 
 def _selected(
@@ -195,6 +210,14 @@ def _first_explained(t: FloatArray, residual: FloatArray) -> int:
     spread = 1.4826 * float(np.median(np.abs(residual[half:] - np.median(residual[half:]))))
     off = np.flatnonzero(np.abs(residual[:half]) > max(_OUTLIER * spread, 1e-12))
     return int(off[-1]) + 1 if off.size > 3 else 0
+
+
+def _strays(y: FloatArray, residual: FloatArray) -> npt.NDArray[np.bool_]:
+    """Mark samples far outside the spread of the others; none when they are more than a few."""
+    middle = float(np.median(residual))
+    spread = 1.4826 * float(np.median(np.abs(residual - middle)))
+    far = np.abs(residual - middle) > max(_FAR * spread, 1e-6 * float(np.ptp(y)))
+    return far if far.mean() <= _FEW else np.zeros_like(far)
 
 
 def _best(

@@ -15,6 +15,7 @@ __all__ = ["guesses"]
 FloatArray = npt.NDArray[np.float64]
 _TAU = 2.0 * math.pi
 _COARSE = 1200  # samples enough for a scan
+_CHUNK = 128  # rows of a scan held at once
 _HIGHEST = 50.0  # Hz: no position command of an actuator goes faster
 
 
@@ -68,15 +69,42 @@ def _scan(
 ) -> list[tuple[float, tuple[float, float, float]]]:
     """Best frequencies of a sine with free amplitude, phase and bias (variable projection)."""
     x, v = _thin(t, y)
-    found = []
-    for frequency in grid.tolist():
-        angle = _TAU * frequency * x
-        basis = np.column_stack((np.sin(angle), np.cos(angle), np.ones_like(x)))
-        weights, *_ = np.linalg.lstsq(basis, v, rcond=1e-8)
-        cost = float(np.sum((v - basis @ weights) ** 2))
-        found.append((cost, frequency, tuple(float(w) for w in weights)))
-    found.sort(key=lambda item: item[0])
-    return [(frequency, (w[0], w[1], w[2])) for _, frequency, w in found[:2]]
+    costs, weights = [], []
+    for first in range(0, len(grid), _CHUNK):
+        cost, weight = _project(_TAU * np.outer(grid[first : first + _CHUNK], x), v)
+        costs.append(cost)
+        weights.append(weight)
+    cost, weight = np.concatenate(costs), np.concatenate(weights)
+    best = np.argsort(cost, kind="stable")[:2]
+    return [
+        (float(grid[k]), (float(weight[k, 0]), float(weight[k, 1]), float(weight[k, 2])))
+        for k in best
+    ]
+
+
+def _project(angle: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Project values on sin, cos and a constant for each row of angles.
+
+    Parameters
+    ----------
+    angle : ndarray, shape (m, n)
+        Radians.
+    v : ndarray, shape (n,)
+        Values.
+
+    Returns
+    -------
+    cost : ndarray, shape (m,)
+        Sum of squares left.
+    weights : ndarray, shape (m, 3)
+        Of sin, cos and the constant; a whisper of ridge keeps rows without a turn solvable.
+    """
+    basis = np.stack((np.sin(angle), np.cos(angle), np.ones_like(angle)), axis=1)
+    normal = basis @ basis.transpose(0, 2, 1) + 1e-9 * len(v) * np.eye(3)
+    right = basis @ v
+    weights = np.linalg.solve(normal, right[..., None])[..., 0]
+    rest = v - np.einsum("mk,mkn->mn", weights, basis)
+    return np.einsum("mn,mn->m", rest, rest), np.asarray(weights, dtype=np.float64)
 
 
 def _chirp(t: FloatArray, y: FloatArray, known: Mapping[str, float]) -> list[dict[str, float]]:
@@ -92,14 +120,14 @@ def _chirp(t: FloatArray, y: FloatArray, known: Mapping[str, float]) -> list[dic
     step = max(1, len(x) // _COARSE)
     x, v = x[::step], v[::step]
     scored = []
+    rates = np.array(highs)
     for low in lows:
-        for high in highs:
-            angle = _TAU * (low + 0.5 * (high - low) / sweep * x) * x
-            basis = np.column_stack((np.sin(angle), np.cos(angle), np.ones_like(x)))
-            normal = basis.T @ basis + 1e-9 * len(x) * np.eye(3)
-            right = basis.T @ v
-            weights = np.linalg.solve(normal, right)
-            scored.append((-float(weights @ right), low, high, weights))
+        turns = low * x + 0.5 * np.outer((rates - low) / sweep, x**2)
+        costs, weights = _project(_TAU * turns, v)
+        scored += [
+            (float(cost), low, high, tuple(map(float, weight)))
+            for cost, high, weight in zip(costs, highs, weights, strict=True)
+        ]
     scored.sort(key=lambda item: item[0])
     starts = []
     for _, low, high, (a, b, bias) in scored[:4]:
@@ -107,7 +135,7 @@ def _chirp(t: FloatArray, y: FloatArray, known: Mapping[str, float]) -> list[dic
             **base,
             "amplitude": math.hypot(a, b),
             "phase": math.atan2(b, a),
-            "bias": float(bias),
+            "bias": bias,
             "start_frequency": low,
             "end_frequency": high,
         }

@@ -7,6 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from elevon.cli.common import (
+    ActuatorArgument,
+    FaultOption,
+    ForceOption,
+    JsonOption,
+    ScenarioOption,
+    SeedOption,
+    SetOption,
+    check_outputs,
+    read_actuator,
+)
 from elevon.cli.output import print_json, print_table, progress_bar, say
 
 if TYPE_CHECKING:
@@ -18,69 +29,46 @@ app = typer.Typer(rich_markup_mode=None)
 
 @app.command()
 def compare(
-    actuator: Annotated[str, typer.Argument(help="Name of a set, or a TOML file.")],
+    actuator: ActuatorArgument,
     *,
-    scenario: Annotated[
-        Path | None,
-        typer.Option("--scenario", help="Scenario file; default: 45 deg, 0.05 Hz, 1 N m of brake."),
-    ] = None,
-    fault: Annotated[
-        list[str] | None, typer.Option("--fault", help="KIND@PLACE=VALUE[unit]...; repeatable.")
-    ] = None,
-    set_value: Annotated[
-        list[str] | None, typer.Option("--set", help="PATH=VALUE[unit]; repeatable.")
-    ] = None,
-    after: Annotated[float, typer.Option("--after", min=0.0, help="Left out before [s].")] = 10.0,
-    cutoff: Annotated[float, typer.Option("--cutoff", help="Of the one filter [Hz].")] = 10.0,
+    scenario: ScenarioOption = None,
+    settings: SetOption = None,
+    fault: FaultOption = None,
+    after: Annotated[float, typer.Option(min=0.0, help="Left out before [s].")] = 10.0,
+    cutoff: Annotated[float, typer.Option(help="Cut-off of the one filter [Hz].")] = 10.0,
     faults_table: Annotated[
         bool, typer.Option("--faults-table", help="What each fault changes in either model.")
     ] = False,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the random numbers.")] = 0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
-    out: Annotated[Path | None, typer.Option("--out", help="Folder for report.html.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
-    date: Annotated[str | None, typer.Option("--date", help="Date printed in the report.")] = None,
+    seed: SeedOption = 0,
+    json: JsonOption = False,
+    out: Annotated[Path | None, typer.Option(help="Folder for report.html.")] = None,
+    force: ForceOption = False,
+    date: Annotated[str | None, typer.Option(help="Date printed in the report.")] = None,
 ) -> int:
-    """Run one scenario at high and at low fidelity and report how far apart they are."""
-    from elevon.actuator import Actuator
+    """Run one scenario at high and at low fidelity; default: 45 deg, 0.05 Hz, 1 N m of brake."""
     from elevon.compare import compare as run
     from elevon.compare import default_scenario
     from elevon.scenario import Scenario
 
-    if out is not None:
-        from elevon.files import check_output
-
-        check_output(out / "report.html", force=force)
-    model = Actuator.load(actuator).with_values(_pairs(set_value or []), place="--set")
+    page = None if out is None else out / "report.html"
+    check_outputs([page], force=force)
+    model = read_actuator(actuator, settings)
     asked = Scenario.load(scenario) if scenario is not None else default_scenario()
     asked = asked.with_faults(fault or [])
     if faults_table:
-        return _faults_table(model, asked, after, seed, as_json)
+        return _faults_table(model, asked, after, seed, json)
     with progress_bar("comparing") as advance:
         found = run(model, asked, seed=seed, start=after, cutoff=cutoff, progress=advance)
     values = found.to_dict()
-    if out is not None:
+    if page is not None:
         from elevon.reproduce.compare_page import compare_report
 
-        report = compare_report(found, actuator, date=date)
-        say(f"report: {report.save(out / 'report.html', force=force)}")
-    if as_json:
+        say(f"report: {compare_report(found, actuator, date=date).save(page, force=force)}")
+    if json:
         print_json(values)
     else:
         _print(values)
     return 0
-
-
-def _pairs(given: list[str]) -> dict[str, str | float]:
-    from elevon.errors import InputError
-
-    pairs: dict[str, str | float] = {}
-    for text in given:
-        path, equals, value = text.partition("=")
-        if not (path and equals and value):
-            raise InputError(f"--set {text!r} is not of the form PATH=VALUE[unit]")
-        pairs[path.strip()] = value.strip()
-    return pairs
 
 
 def _print(values: dict[str, Any]) -> None:

@@ -34,23 +34,35 @@ def _group() -> None:
 
 @app.command("torino-backlash")
 def torino_backlash(
+    *,
     as_json: Json = False,
     out: Out = None,
     force: Force = False,
     seed: Seed = 0,
     date: Date = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", help="File for the summary plot: .svg, .png, .pdf.")
+    ] = None,
 ) -> int:
     """Simulate the no-load campaign at all fifteen measured plays and recover each play."""
     from elevon.cli.output import progress_bar
     from elevon.reproduce.backlash import reproduce_backlash
-    from elevon.reproduce.backlash.page import backlash_report
+    from elevon.reproduce.backlash.page import backlash_report, summary_figure
 
     _check_folder(out, force)
+    if picture is not None:
+        from elevon.files import check_output
+
+        check_output(picture, force=force)
     with progress_bar("simulating 16 runs") as advance:
         result = reproduce_backlash(seed=seed, progress=advance)
     values = result.to_dict()
     if out is not None:
         _write(out, backlash_report(result, date=date), values["rows"], force)
+    if picture is not None:
+        from elevon.report.figures import save_figure
+
+        say(f"picture: {save_figure(summary_figure(result), picture, force=force)}")
     if as_json:
         print_json(values)
     else:
@@ -68,6 +80,7 @@ def torino_backlash(
 
 @app.command("torino-compliance")
 def torino_compliance(
+    *,
     as_json: Json = False,
     out: Out = None,
     force: Force = False,

@@ -36,7 +36,7 @@ def show(
     json: JsonOption = False,
 ) -> None:
     """Show an actuator: block diagram, parameters with units and sources, references."""
-    from elevon.diagram import diagram_svg, diagram_text
+    from elevon.diagram import diagram_svg, diagram_text, diagrams
 
     check_outputs([svg, schema], force=force)
     loaded = read_actuator(actuator, settings)
@@ -51,7 +51,8 @@ def show(
         print_json(_as_json(loaded, svg))
         return
     typer.echo(f"{loaded.name}: {loaded.title}\n")
-    typer.echo(diagram_text(loaded.wiring) + "\n")
+    if loaded.wiring in diagrams():
+        typer.echo(diagram_text(loaded.wiring) + "\n")
     _print_parameters(loaded, notes)
     if loaded.references:
         typer.echo("")

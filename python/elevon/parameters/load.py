@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from elevon.documents import Document, read_toml, validated
-from elevon.errors import InputError, did_you_mean
+from elevon.errors import InputError, unknown
 from elevon.parameters.find import find_set
 from elevon.parameters.parameter import Parameter
 from elevon.parameters.records import Record, records, wiring_names
@@ -116,8 +116,12 @@ def _chain(path: Path) -> Iterator[_Layer]:
             raise InputError(f"{path}: the bases go round in a circle: {names}")
         seen.append(resolved)
         document = read_toml(following)
-        head = {key: document.data[key] for key in _HEADER_KEYS if key in document.data}
-        rest = {key: value for key, value in document.data.items() if key not in _HEADER_KEYS}
+        rest = {
+            key: value
+            for key, value in document.data.items()
+            if key not in _HEADER_KEYS and isinstance(value, dict)
+        }
+        head = {key: value for key, value in document.data.items() if key not in rest}
         header = validated(Header, head, document)
         yield _Layer(document, header, rest)
         base = header.base
@@ -132,7 +136,7 @@ def _parameters(layer: _Layer, wiring: str) -> dict[str, Parameter]:
     for path, raw in _leaves(layer, layer.entries, ()):
         place = layer.document.place(tuple(path.split(".")))
         if path not in known:
-            raise InputError(f"{place}: unknown parameter{did_you_mean(path, known)}")
+            raise unknown("parameter", path, known, place)
         entry = validated(Entry, raw, layer.document.within(tuple(path.split("."))))
         found[path] = _parameter(path, entry, known[path], place)
     return found
@@ -145,9 +149,8 @@ def _leaves(
     for key, item in table.items():
         location = (*prefix, key)
         if not isinstance(item, dict):
-            hint = did_you_mean(key, _HEADER_KEYS) if not prefix else ""
             raise InputError(
-                f"{layer.document.place(location)}: unknown key{hint}; a parameter is a table with "
+                f"{layer.document.place(location)}: a parameter is a table with "
                 "value, unit, source, note, confidence"
             )
         if "value" in item or "source" in item:

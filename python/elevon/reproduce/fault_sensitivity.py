@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from elevon.compare import RATES, filtered
 from elevon.errors import InputError, SimulationError
-from elevon.faults import Fault, catalogue
+from elevon.faults import Fault, find_record
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -101,6 +101,8 @@ class Sensitivity:
             return "not seen by the high model in this scenario"
         if self.ratio >= 0.5:
             return "seen by both"
+        if abs(self.ratio) < 1e-6:
+            return "not in the low model: only the relays' ripple changes, and it has no relays"
         return "wrong sign in the low model" if self.ratio < 0.0 else "too weak in the low model"
 
     def to_dict(self) -> dict[str, Any]:
@@ -157,8 +159,7 @@ def fault_sensitivity(
     from elevon.progress import part
 
     parsed = [Fault.parse(text) for text in _default(actuator, faults)]
-    known = catalogue(actuator.wiring)
-    in_low = [fault for fault in parsed if "low" in known[fault.kind].fidelities]
+    in_low = [fault for fault in parsed if _low_has(actuator.wiring, fault)]
     other_step = actuator.with_values(
         {"solver.step": 0.8 * actuator.parameters.value("solver.step")}
     )
@@ -249,6 +250,10 @@ def features(recording: Recording, ratio: float, start: float) -> dict[str, floa
     return found | {"drive tripped [1]": float(tripped)}
 
 
+def _low_has(wiring: str, fault: Fault) -> bool:
+    return "low" in find_record(fault.kind, fault.place, wiring).fidelities
+
+
 def _default(actuator: Actuator, faults: Sequence[str] | None) -> Sequence[str]:
     if faults is not None:
         return faults
@@ -273,6 +278,6 @@ def _strongest(
 
     name = max(changes, key=height)
     if low[1] is None:
-        reason = "the one-phase model does not have it: it acts on single phases or switches"
+        reason = "not in the low model: it has no single phases, switches or phase sensors"
         return Sensitivity(fault, name, changes[name], math.nan, floors[name], reason)
     return Sensitivity(fault, name, changes[name], low[1][name] - low[0][name], floors[name])

@@ -69,7 +69,7 @@ def simulate(
     )[0]
     if recording.status == "diverged":
         raise DivergedError(
-            f"the run diverged at {recording.meta['sim_s']:.9g} s: {recording.meta['message']}",
+            f"the run stopped: {recording.meta['message']}",
             time=recording.meta["sim_s"],
             signal=recording.meta.get("signal", ""),
         )

@@ -3,4 +3,4 @@
 pub mod rotary;
 mod wiring;
 
-pub use wiring::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring};
+pub use wiring::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring, MAX_CHUNKS};

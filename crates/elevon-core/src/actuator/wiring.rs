@@ -8,6 +8,9 @@ use crate::variable::{Group, Signal};
 use std::fmt::Debug;
 use std::hash::Hash;
 
+/// Most chunks of lanes that one thread runs side by side.
+pub const MAX_CHUNKS: usize = 4;
+
 /// An input of a wiring that waveforms drive.
 #[derive(Clone, Copy, Debug)]
 pub struct Port {

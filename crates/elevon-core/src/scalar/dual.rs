@@ -63,6 +63,7 @@ impl<const N: usize> Neg for Dual<N> {
 
 impl<const N: usize> Scalar for Dual<N> {
     type Mask = bool;
+    type Quarters = u64;
     const LANES: usize = 1;
 
     #[inline(always)]
@@ -139,6 +140,17 @@ impl<const N: usize> Scalar for Dual<N> {
     fn powf(self, exponent: f64) -> Self {
         let value = libm::pow(self.value, exponent);
         self.chain(value, exponent * libm::pow(self.value, exponent - 1.0))
+    }
+    #[inline(always)]
+    fn quarters(self) -> (Self, u64) {
+        let (nearest, quarters) = self.value.quarters();
+        (Self::splat(nearest), quarters)
+    }
+    #[inline(always)]
+    fn turn(sin: Self, cos: Self, quarters: u64) -> (Self, Self) {
+        let (s, c) = if quarters & 1 != 0 { (cos, sin) } else { (sin, cos) };
+        let s = if quarters & 2 != 0 { -s } else { s };
+        (s, if quarters.wrapping_add(1) & 2 != 0 { -c } else { c })
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {

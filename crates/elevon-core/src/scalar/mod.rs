@@ -40,6 +40,8 @@ pub trait Scalar:
     + 'static
 {
     type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask> + Not<Output = Self::Mask>;
+    /// Quarter turns as an integer, low bits valid.
+    type Quarters: Copy;
     const LANES: usize;
 
     fn splat(x: f64) -> Self;
@@ -63,8 +65,15 @@ pub trait Scalar:
     fn floor(self) -> Self;
     fn exp(self) -> Self;
     fn powf(self, exponent: f64) -> Self;
+    /// Nearest integer (ties to even) as a number and as quarter turns; for magnitudes below 2^51.
+    fn quarters(self) -> (Self, Self::Quarters);
+    /// Sine and cosine of an angle turned by quarter turns.
+    fn turn(sin: Self, cos: Self, quarters: Self::Quarters) -> (Self, Self);
     /// Sine and cosine by our own polynomials: the same bits on every platform and lane width.
-    fn sin_cos(self) -> (Self, Self);
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        trig::sin_cos(self)
+    }
 
     /// Runs `kernel` with the instruction set of this type enabled.
     fn vectorize<K: Kernel>(kernel: K) -> K::Output;
@@ -133,6 +142,9 @@ pub trait Scalar:
         (0..Self::LANES).all(|i| self.lane(i).is_finite())
     }
 }
+
+/// 1.5 * 2^52: adding it rounds to an integer, which then stands in the low bits.
+const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
 /// Runs code without vector types with AVX2 and FMA where the processor has them: faster, the same results.
 #[inline(always)]

@@ -1,6 +1,6 @@
 //! Lanes as a plain array: the baseline that compiles everywhere (SSE2, NEON, anything).
 
-use super::{trig, Kernel, Scalar};
+use super::{Kernel, Scalar};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 #[derive(Clone, Copy, Debug)]
@@ -54,6 +54,7 @@ impl<const N: usize> Not for PortableMask<N> {
 
 impl<const N: usize> Scalar for Portable<N> {
     type Mask = PortableMask<N>;
+    type Quarters = [u64; N];
     const LANES: usize = N;
 
     #[inline(always)]
@@ -119,8 +120,14 @@ impl<const N: usize> Scalar for Portable<N> {
         Self(self.0.map(|x| libm::pow(x, exponent)))
     }
     #[inline(always)]
-    fn sin_cos(self) -> (Self, Self) {
-        trig::sin_cos(self)
+    fn quarters(self) -> (Self, [u64; N]) {
+        let both = self.0.map(|x| x.quarters());
+        (Self(both.map(|b| b.0)), both.map(|b| b.1))
+    }
+    #[inline(always)]
+    fn turn(sin: Self, cos: Self, quarters: [u64; N]) -> (Self, Self) {
+        let both: [(f64, f64); N] = std::array::from_fn(|i| f64::turn(sin.0[i], cos.0[i], quarters[i]));
+        (Self(both.map(|b| b.0)), Self(both.map(|b| b.1)))
     }
     #[inline(always)]
     fn vectorize<K: Kernel>(kernel: K) -> K::Output {

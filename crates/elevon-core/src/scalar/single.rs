@@ -1,9 +1,10 @@
 //! One run: `f64`.
 
-use super::{trig, Kernel, Scalar};
+use super::{Kernel, Scalar, ROUNDER};
 
 impl Scalar for f64 {
     type Mask = bool;
+    type Quarters = u64;
     const LANES: usize = 1;
 
     #[inline(always)]
@@ -73,8 +74,16 @@ impl Scalar for f64 {
         libm::pow(self, exponent)
     }
     #[inline(always)]
-    fn sin_cos(self) -> (Self, Self) {
-        trig::sin_cos(self)
+    fn quarters(self) -> (Self, u64) {
+        let shifted = self + ROUNDER;
+        (shifted - ROUNDER, shifted.to_bits())
+    }
+    #[inline(always)]
+    fn turn(sin: Self, cos: Self, quarters: u64) -> (Self, Self) {
+        let (s, c) = if quarters & 1 != 0 { (cos, sin) } else { (sin, cos) };
+        let sin_sign = (quarters & 2) << 62;
+        let cos_sign = (quarters.wrapping_add(1) & 2) << 62;
+        (f64::from_bits(s.to_bits() ^ sin_sign), f64::from_bits(c.to_bits() ^ cos_sign))
     }
     #[inline(always)]
     fn vectorize<K: Kernel>(kernel: K) -> K::Output {

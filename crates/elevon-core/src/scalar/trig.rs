@@ -37,20 +37,12 @@ fn six<S: Scalar>(c: &[f64; 6], z: S) -> S {
 
 #[inline(always)]
 pub fn sin_cos<S: Scalar>(x: S) -> (S, S) {
-    let q = (x * S::splat(TWO_OVER_PI)).round();
+    let (q, quarters) = (x * S::splat(TWO_OVER_PI)).quarters();
     let r = q.fma(S::splat(-HALF_PI_LOW), q.fma(S::splat(-HALF_PI_HIGH), x));
     let z = r * r;
     let s = (r * z).fma(six(&SIN, z), r);
     let c = (z * z).fma(six(&COS, z), z.fma(S::splat(-0.5), S::one()));
-    // Quadrant from the quotient modulo 4, in floating point so that lanes need no integers.
-    let quarter = q * S::splat(0.25);
-    let m = S::splat(-4.0).fma(quarter.floor(), q);
-    let one = S::one();
-    let odd = m.equals(one) | m.equals(S::splat(3.0));
-    let (sin, cos) = (S::select(odd, c, s), S::select(odd, s, c));
-    let sin_negative = m.ge(S::splat(2.0));
-    let cos_negative = m.equals(one) | m.equals(S::splat(2.0));
-    (S::select(sin_negative, -sin, sin), S::select(cos_negative, -cos, cos))
+    S::turn(s, c, quarters)
 }
 
 /// Arctangent of `y / x`, `x > 0`: one reduction by 1/x when |y| > x, one by tan(pi/8), then the

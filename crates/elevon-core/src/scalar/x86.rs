@@ -4,7 +4,7 @@
 //! are created only below `Scalar::vectorize`, and the solver chooses a type only after detecting its instruction
 //! set (`solver::width`): that is the whole of the safety argument for this file.
 
-use super::{trig, Kernel, Scalar};
+use super::{Kernel, Scalar, ROUNDER};
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
@@ -22,10 +22,38 @@ unsafe fn with_avx512<K: Kernel>(kernel: K) -> K::Output {
     kernel.run()
 }
 
+/// From quarter turns: is the turn odd, and the sign bits to flip in sine and cosine.
+///
+/// # Safety
+/// The processor must have AVX2.
+#[inline(always)]
+unsafe fn signs_avx2(quarters: __m256i) -> (Avx2Mask, __m256d, __m256d) {
+    let sign = _mm256_set1_epi64x(i64::MIN);
+    let odd = _mm256_slli_epi64::<63>(quarters);
+    let sin_sign = _mm256_and_si256(_mm256_slli_epi64::<62>(quarters), sign);
+    // cos changes sign with quarters + 1: the second bit of the sum is the exclusive or of the two low bits.
+    let cos_sign = _mm256_xor_si256(sin_sign, odd);
+    (Avx2Mask(_mm256_castsi256_pd(odd)), _mm256_castsi256_pd(sin_sign), _mm256_castsi256_pd(cos_sign))
+}
+
+/// As `signs_avx2`.
+///
+/// # Safety
+/// The processor must have AVX-512 F and DQ.
+#[inline(always)]
+unsafe fn signs_avx512(quarters: __m512i) -> (Avx512Mask, __m512d, __m512d) {
+    let sign = _mm512_set1_epi64(i64::MIN);
+    let odd = _mm512_slli_epi64::<63>(quarters);
+    let sin_sign = _mm512_and_si512(_mm512_slli_epi64::<62>(quarters), sign);
+    let cos_sign = _mm512_xor_si512(sin_sign, odd);
+    (Avx512Mask(_mm512_movepi64_mask(odd)), _mm512_castsi512_pd(sin_sign), _mm512_castsi512_pd(cos_sign))
+}
+
 macro_rules! vector_type {
     ($name:ident, $mask:ident, $lanes:literal, $align:literal, $register:ty,
      $add:ident, $sub:ident, $mul:ident, $div:ident, $splat:ident, $load:ident, $store:ident,
-     $sqrt:ident, $fma:ident, $with:ident) => {
+     $sqrt:ident, $fma:ident, $with:ident,
+     $integers:ty, $to_bits:ident, $signs:ident, $xor:ident) => {
         #[derive(Clone, Copy, Debug)]
         pub struct $name($register);
 
@@ -74,6 +102,7 @@ macro_rules! vector_type {
 
         impl Scalar for $name {
             type Mask = $mask;
+            type Quarters = $integers;
             const LANES: usize = $lanes;
 
             #[inline(always)]
@@ -139,8 +168,15 @@ macro_rules! vector_type {
                 Self::from_array(self.array().map(|x| libm::pow(x, exponent)))
             }
             #[inline(always)]
-            fn sin_cos(self) -> (Self, Self) {
-                trig::sin_cos(self)
+            fn quarters(self) -> (Self, $integers) {
+                let shifted = self + Self::splat(ROUNDER);
+                (shifted - Self::splat(ROUNDER), unsafe { $to_bits(shifted.0) })
+            }
+            #[inline(always)]
+            fn turn(sin: Self, cos: Self, quarters: $integers) -> (Self, Self) {
+                let (odd, sin_sign, cos_sign) = unsafe { $signs(quarters) };
+                let (s, c) = (Self::select(odd, cos, sin), Self::select(odd, sin, cos));
+                unsafe { (Self($xor(s.0, sin_sign)), Self($xor(c.0, cos_sign))) }
             }
             #[inline(always)]
             fn vectorize<K: Kernel>(kernel: K) -> K::Output {
@@ -152,11 +188,13 @@ macro_rules! vector_type {
 
 vector_type!(
     Avx2x4, Avx2Mask, 4, 32, __m256d, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd,
-    _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd, _mm256_sqrt_pd, _mm256_fmadd_pd, with_avx2
+    _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd, _mm256_sqrt_pd, _mm256_fmadd_pd, with_avx2,
+    __m256i, _mm256_castpd_si256, signs_avx2, _mm256_xor_pd
 );
 vector_type!(
     Avx512x8, Avx512Mask, 8, 64, __m512d, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd,
-    _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd, _mm512_sqrt_pd, _mm512_fmadd_pd, with_avx512
+    _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd, _mm512_sqrt_pd, _mm512_fmadd_pd, with_avx512,
+    __m512i, _mm512_castpd_si512, signs_avx512, _mm512_xor_pd
 );
 
 #[derive(Clone, Copy, Debug)]

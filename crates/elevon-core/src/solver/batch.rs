@@ -3,7 +3,7 @@
 use super::block::{structure, Block, Lift, Plain};
 use super::spec::{Clock, RunOutput, RunSpec};
 use super::width::Width;
-use crate::actuator::{Tick, Wiring};
+use crate::actuator::{Tick, Wiring, MAX_CHUNKS};
 use crate::scalar::{Dual, Portable, Scalar};
 use crate::time::Steps;
 use rayon::prelude::*;
@@ -12,9 +12,6 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
 #[cfg(target_arch = "x86_64")]
 use crate::scalar::{Avx2x4, Avx512x8};
-
-/// Chunks of lanes that one thread runs side by side.
-const CHUNKS: usize = 4;
 
 /// Progress out, interruption in; shared between threads.
 #[derive(Debug, Default)]
@@ -147,7 +144,7 @@ fn blocks<W: Wiring>(runs: &[RunSpec], recorded: &[usize], width: Width, threads
     for key in order {
         let members = groups.remove(&key).unwrap_or_default();
         let fair = members.len().div_ceil(threads).div_ceil(lanes).max(1);
-        let size = lanes * fair.min(CHUNKS);
+        let size = lanes * fair.min(MAX_CHUNKS);
         all.extend(members.chunks(size).map(<[usize]>::to_vec));
     }
     all

@@ -62,14 +62,23 @@ impl<S: Scalar> Friction<S> {
     /// (loads, dynamic dry and viscous friction): two early sums, so that the motor torque enters last.
     #[inline(always)]
     pub fn net_torque(torque: S, load: S, resist: S, speed: S, static_limit: S) -> S {
+        let rest = speed.equals(S::zero());
+        if !S::any(rest) {
+            return torque - resist;
+        }
         let active = torque - load;
         let from_rest = active - active.clamp_abs(static_limit);
-        S::select(speed.equals(S::zero()), from_rest, torque - resist)
+        S::select(rest, from_rest, torque - resist)
     }
 
     /// The new speed, stopped for one step where it would change sign.
     #[inline(always)]
     pub fn stop_at_reversal(old: S, new: S) -> S {
-        S::select((old * new).lt(S::zero()), S::zero(), new)
+        let reversed = (old * new).lt(S::zero());
+        if S::any(reversed) {
+            S::select(reversed, S::zero(), new)
+        } else {
+            new
+        }
     }
 }

@@ -71,6 +71,9 @@ impl<S: Scalar> Gear<S> {
     #[inline(always)]
     pub fn stop(&self, angle: S, speed: S) -> (S, S) {
         let (above, below) = (self.upper.lt(angle), angle.lt(self.lower));
+        if !S::any(above | below) {
+            return (angle, speed);
+        }
         let held = S::select(above, self.upper, S::select(below, self.lower, angle));
         (held, S::select(above | below, S::zero(), speed))
     }

@@ -19,6 +19,9 @@ from elevon.units import to_display
 __all__ = ["DriveFormat", "write_drive_csv"]
 
 
+_STAND_INS = {"motor_position": "resolver_position", "resolver_speed": "motor_speed"}
+
+
 @dataclass(frozen=True, slots=True)
 class DriveFormat:
     r"""How a drive trace is written.
@@ -84,7 +87,8 @@ def write_drive_csv(
         By recording name: ``time`` [s] and any of the drive's signals: positions [rad] each on its
         own shaft (``encoder_position`` at the user, ``resolver_position`` at the motor),
         ``speed_ref``, ``motor_speed`` [rad/s], currents and ``voltage_q_ref`` [A, V peak],
-        ``trigger``. Columns that are not given are left out.
+        ``trigger``. Columns that are not given are left out. A simulation's ``motor_position`` and
+        ``resolver_speed`` stand in for ``resolver_position`` and ``motor_speed`` where those lack.
     layout : DriveFormat, optional
         How to write it.
     force : bool
@@ -104,6 +108,11 @@ def write_drive_csv(
     """
     layout = layout or DriveFormat()
     known = [column.signal for column in DRIVE_COLUMNS]
+    signals = dict(signals)
+    for given, wanted in _STAND_INS.items():
+        if given in signals:
+            values = signals.pop(given)
+            signals.setdefault(wanted, values)
     for name in signals:
         if name not in known:
             raise InputError(f"drive trace: no column for {name!r}{did_you_mean(name, known)}")

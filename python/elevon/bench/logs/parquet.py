@@ -9,6 +9,7 @@ import numpy as np
 
 from elevon.bench.logs.limits import DEFAULT_LIMITS, Limits, existing_file, quoted
 from elevon.bench.logs.table import FloatArray, RawTable, split_unit, unique_names
+from elevon.bench.logs.vectors import quiet
 from elevon.errors import FormatError
 
 __all__ = ["read_parquet"]
@@ -64,7 +65,8 @@ def _read(source: str, parquet: Any, limits: Limits) -> RawTable:
     units = {name: _unit(schema.field(name)) for name in names}
     labels = unique_names(source, [split_unit(name)[0] for name in names])
     columns = {
-        label: np.concatenate(pieces[name]) for label, name in zip(labels, names, strict=True)
+        label: quiet(np.concatenate(pieces[name]))
+        for label, name in zip(labels, names, strict=True)
     }
     stated = {label: units[name] for label, name in zip(labels, names, strict=True) if units[name]}
     return RawTable(source, columns, stated, tuple(notes), "parquet")

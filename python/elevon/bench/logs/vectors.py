@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from elevon.bench.logs.limits import Limits, quoted
 from elevon.bench.logs.table import FloatArray, RawTable
 from elevon.errors import FormatError
 
-__all__ = ["table_of_vectors"]
+__all__ = ["quiet", "table_of_vectors"]
 
 _TIMES = ("xms", "time", "t", "time_s", "time_ms", "timems", "x")
 
@@ -36,7 +38,7 @@ def table_of_vectors(
     length = _length(vectors)
     if length == 0:
         raise FormatError(f"{source}: the vectors are empty")
-    kept = {name: values for name, values in vectors.items() if len(values) == length}
+    kept = {name: quiet(values) for name, values in vectors.items() if len(values) == length}
     for name in vectors.keys() - kept.keys():
         notes.append(f"{quoted(name)} passed over: {len(vectors[name])} values, not {length}")
     limits.check_shape(source, length, len(kept))
@@ -47,6 +49,15 @@ def table_of_vectors(
     columns = {short[name]: values for name, values in kept.items()}
     stated = {short[name]: unit for name, unit in units.items() if name in kept}
     return RawTable(source, columns, stated, tuple(notes), file_format)
+
+
+def quiet(values: FloatArray) -> FloatArray:
+    """Return the values with every kind of NaN replaced by the plain one.
+
+    A file may hold signalling NaNs, which raise floating-point flags in the next operation.
+    """
+    missing = np.isnan(values)
+    return np.where(missing, np.nan, values) if missing.any() else values
 
 
 def _length(vectors: Mapping[str, FloatArray]) -> int:

@@ -30,6 +30,9 @@ Array = npt.NDArray[np.float64]
 _HUBER = 1.345
 """Residuals beyond this many standard deviations weigh less: 95 % efficient without outliers."""
 
+_CONVERGED = 1e-6
+"""Weights that move less than this leave the stiffness alone to seven digits."""
+
 
 @dataclass(frozen=True, slots=True)
 class ComplianceFit:
@@ -131,15 +134,15 @@ def fit_compliance(
         )
     weights = np.ones(len(load))
     for _ in range(100 if robust else 1):
-        root = np.sqrt(weights)
-        solved = np.linalg.lstsq(design * root[:, None], loss * root, rcond=None)[0]
+        weighted = design * weights[:, None]
+        solved = np.linalg.solve(weighted.T @ design, weighted.T @ loss)
         beta: Array = np.asarray(solved, dtype=np.float64)
         residuals: Array = np.asarray(loss - design @ beta, dtype=np.float64)
         scale = 1.4826 * float(np.median(np.abs(residuals)))
         fresh = _weights(residuals, scale) if robust else weights
         moved = float(np.abs(fresh - weights).max())
         weights = fresh
-        if moved < 1e-9:
+        if moved < _CONVERGED:
             break
     return ComplianceFit(1.0 / beta[0], float(beta[1]), beta[2:], residuals, weights, scale)
 

@@ -6,8 +6,7 @@
 
 use super::layout::*;
 use super::signals::{HighSignal, HIGH};
-use crate::actuator::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring};
-use crate::command::Source;
+use crate::actuator::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring, MAX_CHUNKS};
 use crate::control::current_dq::{CurrentControl, CurrentControlState, CurrentSample, PwmParameter};
 use crate::control::position_speed::{ControlParameter, ControlStructure, PositionSpeed, PositionSpeedState};
 use crate::fault::FaultKind;
@@ -111,10 +110,38 @@ pub(super) const E_BRAKE: usize = 4;
 pub(super) const E_LOAD: usize = 5;
 pub(super) const E_IMPACT: usize = 6;
 
+/// Steps whose inputs are evaluated together.
+const AHEAD: usize = 8;
+
 const TICK_COMMAND_NOISE: u8 = 0;
 const TICK_CURRENT_NOISE: u8 = 1;
 const TICK_CONTROL: u8 = 2;
 const TICK_CURRENT_CONTROL: u8 = 3;
+
+/// The inputs at one instant.
+#[derive(Clone, Copy)]
+pub(super) struct Moment<S> {
+    t: S,
+    command: S,
+    /// A brake cannot push: negative values count as zero.
+    brake: S,
+    shaft: S,
+    user: S,
+    supply: S,
+}
+
+impl<S: Scalar> Moment<S> {
+    #[inline(always)]
+    pub(super) fn at(inputs: &Inputs<S>, t: S) -> Self {
+        let brake = inputs[BRAKE].at(t).maximum(S::zero());
+        Self { t, command: inputs[COMMAND].at(t), brake, shaft: inputs[SHAFT].at(t), user: inputs[USER].at(t), supply: inputs[SUPPLY].at(t) }
+    }
+
+    fn none() -> Self {
+        let zero = S::zero();
+        Self { t: zero, command: zero, brake: zero, shaft: zero, user: zero, supply: zero }
+    }
+}
 
 /// What acts on the fast shaft.
 #[derive(Clone, Copy)]
@@ -124,6 +151,8 @@ pub(super) struct ShaftLoads<S> {
     /// Signed torque on the fast shaft, and the part of it that is not the contact of the elastic play.
     pub load: S,
     own: S,
+    /// Torque between gear and user, at the user.
+    pub through: S,
     pub static_limit: S,
     pub dynamic: S,
 }
@@ -193,21 +222,19 @@ fn sample_steps(raw: &[f64], index: usize) -> Steps {
 }
 
 #[inline(always)]
-pub(super) fn shaft_loads<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &State<S>, torque: S, t: S) -> ShaftLoads<S> {
-    let brake = inputs[BRAKE].at(t).maximum(S::zero());
-    let shaft = inputs[SHAFT].at(t);
-    let user_torque = m.gear.stiffness.fma(s.user_position - m.gear.spring_zero, inputs[USER].at(t));
+pub(super) fn shaft_loads<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &Moment<S>, s: &State<S>, torque: S) -> ShaftLoads<S> {
+    let user_torque = m.gear.stiffness.fma(s.user_position - m.gear.spring_zero, x.user);
     let elastic = FULL && structure.elastic;
     let through = if elastic { contact_torque(m, s) } else { user_torque };
-    let load = through.fma(m.gear.per_ratio, shaft);
-    let own = if elastic { shaft } else { load };
-    let mut added = brake;
+    let load = through.fma(m.gear.per_ratio, x.shaft);
+    let own = if elastic { x.shaft } else { load };
+    let mut added = x.brake;
     if FULL {
         let moving = s.motor_speed.sign();
         let direction = S::select(s.motor_speed.equals(S::zero()), (torque - load).sign(), moving);
         added = added + m.gear.load_friction(through, direction) + s.jammed * m.friction.jam_torque;
     }
-    ShaftLoads { brake, user_torque, load, own, static_limit: m.friction.static_limit + added, dynamic: m.friction.dynamic + added }
+    ShaftLoads { brake: x.brake, user_torque, load, own, through, static_limit: m.friction.static_limit + added, dynamic: m.friction.dynamic + added }
 }
 
 /// Torque on the user through the elastic play.
@@ -271,13 +298,13 @@ fn shaft_reading<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structur
 }
 
 #[inline(always)]
-fn control_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, command: &Source<S>, s: &mut State<S>, reading: &Reading<S>, t: S) {
+fn control_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, command: S, s: &mut State<S>, reading: &Reading<S>) {
     let position = match structure.control.feedback {
         1 if FULL => m.encoder.read(s.user_position),
         2 if FULL => reading.position * m.gear.per_ratio,
         _ => s.user_position,
     };
-    let command = command.at(t) + s.command_noise;
+    let command = command + s.command_noise;
     s.current_ref = m.control.step(&structure.control, &mut s.control, command, position, reading.speed);
 }
 
@@ -300,11 +327,11 @@ pub(super) fn park<S: Scalar>(x: [S; 3], sin: [S; 3], cos: [S; 3]) -> (S, S) {
 }
 
 #[inline(always)]
-fn step<S: Scalar, const FULL: bool, const PWM: bool>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &mut State<S>, t: S) {
+fn step<S: Scalar, const FULL: bool, const PWM: bool>(m: &Model<S>, structure: &Structure, x: &Moment<S>, s: &mut State<S>) {
     // Sensors and control electronics.
     let reading = shaft_reading::<S, FULL>(m, structure, s);
     if structure.control_every_step {
-        control_step::<S, FULL>(m, structure, &inputs[COMMAND], s, &reading, t);
+        control_step::<S, FULL>(m, structure, x.command, s, &reading);
     }
     let (sin, cos) = m.star.electrical_angle(s.motor_position).sin_cos();
     let measured = measured_current::<S, FULL>(m, structure, s);
@@ -312,10 +339,10 @@ fn step<S: Scalar, const FULL: bool, const PWM: bool>(m: &Model<S>, structure: &
     let (sin_phases, cos_phases) = three_phase(sin_c, cos_c);
 
     // Power electronics.
-    let half_supply = S::splat(0.5) * (inputs[SUPPLY].at(t) * m.supply_scale);
+    let half_supply = S::splat(0.5) * (x.supply * m.supply_scale);
     let old_legs = s.legs;
     if PWM {
-        s.legs = m.current_control.compare(&s.current_control, t);
+        s.legs = m.current_control.compare(&s.current_control, x.t);
     } else if !FULL || structure.drive == Drive::Hysteresis {
         let error = three!(|j| s.current_ref * sin_phases[j] - measured[j]);
         s.legs = relays(m.half_band, old_legs, error);
@@ -335,7 +362,7 @@ fn step<S: Scalar, const FULL: bool, const PWM: bool>(m: &Model<S>, structure: &
     }
 
     // Motor and transmission dynamics.
-    mechanical_step::<S, FULL>(m, structure, inputs, s, torque, t);
+    mechanical_step::<S, FULL>(m, structure, x, s, torque);
     s.star.current = current;
 }
 
@@ -411,8 +438,8 @@ fn account_electric<S: Scalar>(m: &Model<S>, s: &mut State<S>, old: [S; 3], new:
 }
 
 #[inline(always)]
-fn mechanical_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &mut State<S>, torque: S, t: S) {
-    let loads = shaft_loads::<S, FULL>(m, structure, inputs, s, torque, t);
+fn mechanical_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &Moment<S>, s: &mut State<S>, torque: S) {
+    let loads = shaft_loads::<S, FULL>(m, structure, x, s, torque);
     let speed = s.motor_speed;
     let viscous = if FULL { m.friction.viscous_torque(speed) } else { m.friction.viscous * speed };
     let resist = loads.load + speed.signed(loads.dynamic) + viscous;
@@ -442,7 +469,7 @@ fn mechanical_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Struct
 /// The second mass of the elastic play.
 #[inline(always)]
 fn user_step<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, loads: &ShaftLoads<S>) {
-    let through = contact_torque(m, s);
+    let through = loads.through;
     let speed = s.user_speed;
     let new_speed = speed + m.dt * (m.per_user_inertia * (through - loads.user_torque));
     if structure.accounts {
@@ -470,11 +497,32 @@ fn account_mechanical<S: Scalar>(m: &Model<S>, s: &mut State<S>, loads: &ShaftLo
 
 #[inline(always)]
 fn steps<S: Scalar, const FULL: bool, const PWM: bool>(structure: &Structure, models: &[Model<S>], inputs: &[Inputs<S>], states: &mut [State<S>], from: Steps, count: Steps) {
-    // Several chunks side by side hide each other's latencies.
-    for k in from..from + count {
-        for ((model, inputs), state) in models.iter().zip(inputs).zip(states.iter_mut()) {
-            step::<S, FULL, PWM>(model, structure, inputs, state, S::splat(k as f64) * model.dt);
+    // Inputs depend on time alone: evaluated some steps ahead, they leave the chain from state to state.
+    let mut ahead = [[Moment::none(); AHEAD]; MAX_CHUNKS];
+    let mut k = from;
+    while k < from + count {
+        let some = (from + count - k).min(AHEAD as Steps) as usize;
+        for ((model, inputs), moments) in models.iter().zip(inputs).zip(&mut ahead) {
+            for (i, moment) in moments[..some].iter_mut().enumerate() {
+                *moment = Moment::at(inputs, S::splat((k + i as Steps) as f64) * model.dt);
+            }
         }
+        if let ([model], [state]) = (models, &mut *states) {
+            // One chunk: its state may stay in registers.
+            let mut s = *state;
+            for moment in &ahead[0][..some] {
+                step::<S, FULL, PWM>(model, structure, moment, &mut s);
+            }
+            *state = s;
+        } else {
+            // Several chunks side by side hide each other's latencies.
+            for i in 0..some {
+                for ((model, state), moments) in models.iter().zip(states.iter_mut()).zip(&ahead) {
+                    step::<S, FULL, PWM>(model, structure, &moments[i], state);
+                }
+            }
+        }
+        k += some as Steps;
     }
 }
 
@@ -604,7 +652,7 @@ impl Wiring for High {
             TICK_CURRENT_NOISE => s.current_noise = three!(|j| noise(1 + j as u64)),
             TICK_CONTROL => {
                 let reading = shaft_reading::<S, true>(m, structure, s);
-                control_step::<S, true>(m, structure, &inputs[COMMAND], s, &reading, t);
+                control_step::<S, true>(m, structure, inputs[COMMAND].at(t), s, &reading);
             }
             _ => {
                 let reading = shaft_reading::<S, true>(m, structure, s);

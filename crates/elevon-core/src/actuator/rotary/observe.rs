@@ -76,7 +76,7 @@ fn mechanical<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>
     let (sin, cos) = m.star.electrical_angle(s.motor_position).sin_cos();
     let c = coupling::<S, true>(m, structure, s, sin, cos);
     let torque = motor_torque::<S, true>(m, structure, s, &c);
-    let loads = shaft_loads::<S, true>(m, structure, inputs, s, torque, t);
+    let loads = shaft_loads::<S, true>(m, structure, &Moment::at(inputs, t), s, torque);
     let dry = Friction::dry_torque(torque - loads.load, s.motor_speed, loads.static_limit, loads.dynamic);
     let mut set = |q: Q, x: S| out[q as usize] = x;
     set(Q::MotorTorque, torque);

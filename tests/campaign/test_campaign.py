@@ -1,0 +1,326 @@
+"""Plans, folders, resuming, and every plan that cannot be."""
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import elevon
+from elevon.campaign import execute as execute_module
+from elevon.campaign import load_plan, load_run, read_manifest, resolve_plan
+from elevon.cli import main
+from elevon.errors import FormatError, InputError
+
+HEAD = 'actuator = "torino-rotary"\nfidelity = "low"\nrecord = "user_position,motor_speed@400 Hz"\n'
+SCENARIO = """
+[scenario]
+duration = "0.2 s"
+[[scenario.command.terms]]
+kind = "sine"
+amplitude = "7 deg"
+frequency = "2 Hz"
+"""
+SHORTS = '[[vary]]\nfault = "short@motor.phase_a"\nvalues = [0, 0.1, "20 %"]\n'
+FRICTION = '[[vary]]\nparameter = "friction.dynamic"\nfrom = "0.2 N m"\nto = "0.4 N m"\ncount = 3\n'
+RANDOM = """
+[random]
+count = 8
+seed = 3
+[[random.draw]]
+parameter = "motor.winding_temperature"
+from = "20 degC"
+to = "80 degC"
+[[random.draw]]
+fault = "play@transmission"
+from = "0.01 deg"
+to = "1 deg"
+spacing = "log"
+probability = 0.5
+"""
+
+
+@pytest.fixture
+def write(tmp_path):
+    def make(*parts):
+        path = tmp_path / "plan.toml"
+        path.write_text("".join(parts))
+        return path
+
+    return make
+
+
+def planned(path):
+    return resolve_plan(*load_plan(path))
+
+
+def run(path, out, capsys=None):
+    code = main(["batch", str(path), "--out", str(out), "--json"])
+    return code, capsys.readouterr() if capsys else None
+
+
+def test_runs_are_all_combinations(write):
+    runs = planned(write(HEAD, "seeds = [1, 2]\n", SCENARIO, SHORTS, FRICTION, RANDOM))
+    assert len(runs) == 2 * 3 * 3 * 8
+    assert [item.run.number for item in runs] == list(range(len(runs)))
+    assert {item.values["friction.dynamic"] for item in runs} == {
+        "0.2 N m", "0.30000000000000004 N m", "0.4 N m"
+    }  # fmt: skip
+    assert {item.values["short@motor.phase_a"] for item in runs} == {0, 0.1, "20 %"}
+    temperatures = {
+        item.run.actuator.parameters["motor.winding_temperature"].value for item in runs
+    }
+    assert len(temperatures) == 8
+    assert 293.15 <= min(temperatures) < max(temperatures) <= 353.15
+
+
+def test_draws_fill_their_ranges_and_leave_some_faults_out(write):
+    text = RANDOM.replace("count = 8", "count = 64")
+    runs = planned(write(HEAD, SCENARIO, text))
+    plays = [item.values["play@transmission"] for item in runs]
+    present = [float(text.split()[0]) for text in plays if text is not None]
+    assert 25 <= len(present) <= 39
+    assert 0.01 <= min(present) < 0.03 < 0.5 < max(present) <= 1.0
+    assert np.median(present) == pytest.approx(0.1, rel=0.6)
+    assert [len(item.run.scenario.fault) for item in runs] == [int(p is not None) for p in plays]
+
+
+@pytest.mark.parametrize("method", ["latin_hypercube", "sobol", "halton", "uniform"])
+def test_draws_repeat(write, method):
+    path = write(HEAD, SCENARIO, RANDOM.replace("seed = 3", f'seed = 3\nmethod = "{method}"'))
+    assert [i.values for i in planned(path)] == [i.values for i in planned(path)]
+
+
+def test_splits_keep_seeds_of_one_draw_together(write):
+    split = "[split]\ntrain = 0.75\ntest = 0.25\n"
+    runs = planned(write(HEAD, "seeds = [1, 2]\n", SCENARIO, RANDOM, split))
+    assert sum(item.split == "train" for item in runs) == 12
+    for first, second in zip(runs[::2], runs[1::2], strict=True):
+        assert first.split == second.split
+
+
+def test_cases_change_several_things(write):
+    cases = (
+        '[[case]]\nname = "healthy"\n[[case]]\nname = "worn"\n'
+        'faults = ["play@transmission=0.1 deg", "friction@transmission=0.2"]\n'
+        'parameters = { "motor.winding_temperature" = "60 degC" }\n'
+        'scenario = { duration = "0.1 s" }\n'
+    )
+    healthy, worn = planned(write(HEAD, SCENARIO, cases))
+    assert not healthy.run.scenario.fault
+    assert [str(fault) for fault in worn.run.scenario.fault][1] == "friction@transmission=0.2"
+    assert worn.run.scenario.seconds == 0.1
+
+
+def test_a_batch_is_its_single_runs(write, tmp_path):
+    path = write(HEAD, "seeds = [1, 2]\n", SCENARIO, SHORTS)
+    assert run(path, tmp_path / "out")[0] == 0
+    for item in planned(path):
+        alone = elevon.simulate(
+            item.run.actuator,
+            item.run.scenario,
+            fidelity="low",
+            record="user_position,motor_speed@400 Hz",
+            seed=item.run.seed,
+            number=item.run.number,
+        )
+        kept = load_run(tmp_path / "out", item.run.number)
+        assert kept.names == alone.names
+        for name in alone.names:
+            assert kept[name].values.tobytes() == alone[name].values.tobytes()
+            assert kept[name].unit == alone[name].unit
+        assert kept.clocks["at_400_hz"].equals(alone.clocks["at_400_hz"])
+        assert kept.meta["status"] == "ok"
+
+
+def test_the_folder_tells_everything(write, tmp_path, capsys):
+    path = write(HEAD, SCENARIO, SHORTS, "[split]\ntrain = 1.0\n")
+    out = tmp_path / "out"
+    code, captured = run(path, out, capsys)
+    summary = json.loads(captured.out)
+    assert code == 0
+    assert (summary["runs"], summary["status"], summary["counts"]) == (3, "ok", {"ok": 3})
+    assert "3 runs in 1 block(s)" in captured.err
+    assert (out / "plan.toml").read_text() == path.read_text()
+    resolved = json.loads((out / "resolved.json").read_text())
+    assert len(resolved["runs"]) == 3
+    manifest = read_manifest(out)
+    for block in manifest.blocks:
+        for file in block["files"]:
+            data = (out / file["file"]).read_bytes()
+            assert hashlib.sha256(data).hexdigest() == file["sha256"]
+    assert "| user_position | rad | at_400_hz | user position |" in (out / "README.md").read_text()
+
+
+def test_blocks_hold_at_most_fifty_runs(write, tmp_path):
+    many = '[[vary]]\nparameter = "friction.dynamic"\nfrom = 0.1\nto = 0.3\ncount = 60\n'
+    path = write(HEAD, SCENARIO.replace("0.2 s", "10 ms"), many)
+    assert run(path, tmp_path / "out")[0] == 0
+    blocks = read_manifest(tmp_path / "out").blocks
+    assert [(block["first"], block["last"]) for block in blocks] == [(0, 49), (50, 59)]
+    assert load_run(tmp_path / "out", 59).meta["run"] == 59
+
+
+def test_a_diverged_run_is_marked_and_the_rest_is_kept(write, tmp_path, capsys):
+    load = (
+        '[[scenario.load.shaft.terms]]\nkind = "ramp"\nslope = 0\n'
+        '[[vary]]\nscenario = "load.shaft.terms[0].slope"\nvalues = [0, "-1e9 N m/s"]\n'
+    )
+    path = write(HEAD, SCENARIO, load, "[parameters]\nstop.upper = 1e9\n")
+    code, captured = run(path, tmp_path / "out", capsys)
+    summary = json.loads(captured.out)
+    assert code == 1
+    assert summary["status"] == "failed"
+    assert summary["failed_runs"] == [1]
+    assert load_run(tmp_path / "out", 0).meta["status"] == "ok"
+    assert "motor_speed diverged" in load_run(tmp_path / "out", 1).meta["message"]
+
+
+def test_going_on_does_only_what_is_missing(write, tmp_path, capsys):
+    path = write(HEAD, "runs_per_file = 1\n", SCENARIO, SHORTS)
+    out = tmp_path / "out"
+    run(path, out, capsys)
+    whole = {file.name: file.read_bytes() for file in (out / "runs").iterdir()}
+    (out / "runs" / "block_00001.at_400_hz.parquet").unlink()
+    _, captured = run(path, out, capsys)
+    assert json.loads(captured.out)["skipped"] == 2
+    assert {file.name: file.read_bytes() for file in (out / "runs").iterdir()} == whole
+
+
+def test_a_killed_batch_goes_on(write, tmp_path):
+    scenario = SCENARIO.replace("0.2 s", "300 s")
+    path = write(HEAD, "runs_per_file = 1\n", "seeds = [1, 2, 3, 4]\n", scenario, SHORTS)
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "elevon.cli", "batch", str(path), "--out", str(out)]
+    for number, code in ((signal.SIGKILL, -9), (signal.SIGINT, 130)):
+        before = len(list(out.glob("runs/*.parquet")))
+        process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=os.environ
+        )
+        for _ in range(400):
+            if len(list(out.glob("runs/*.parquet"))) > before or process.poll() is not None:
+                break
+            time.sleep(0.02)
+        process.send_signal(number)
+        process.communicate(timeout=20)
+        assert process.returncode in (code, 0)
+        manifest = read_manifest(out)
+        assert all((out / file["file"]).is_file() for b in manifest.blocks for file in b["files"])
+    assert run(path, out)[0] == 0
+    assert [item["run"] for item in read_manifest(out).runs] == list(range(12))
+
+
+def test_another_plan_is_refused(write, tmp_path, capsys):
+    out = tmp_path / "out"
+    run(write(HEAD, SCENARIO, SHORTS), out, capsys)
+    code, captured = run(write(HEAD, SCENARIO, FRICTION), out, capsys)
+    assert code == 2
+    assert captured.out == ""
+    assert "holds another campaign" in captured.err
+
+
+def test_a_folder_of_something_else_is_refused(write, tmp_path, capsys):
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "thesis.txt").write_text("precious")
+    code, captured = run(write(HEAD, SCENARIO), out, capsys)
+    assert code == 2
+    assert "is not a campaign folder" in captured.err
+    assert [file.name for file in out.iterdir()] == ["thesis.txt"]
+
+
+def test_damaged_manifest(tmp_path):
+    (tmp_path / "manifest.json").write_text("{")
+    with pytest.raises(FormatError, match="damaged"):
+        read_manifest(tmp_path)
+    (tmp_path / "manifest.json").write_text('{"schema": 99}')
+    with pytest.raises(FormatError, match="form"):
+        read_manifest(tmp_path)
+
+
+def test_a_plan_that_does_not_fit_says_how_much(write, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(execute_module, "available_bytes", lambda: 30_000)
+    path = write(HEAD, SCENARIO.replace("0.2 s", "10 s"), SHORTS)
+    code, captured = run(path, tmp_path / "out", capsys)
+    assert code == 2
+    assert "would take" in captured.err
+    assert "30 kB available" in captured.err
+    assert "all 3 runs" in captured.err
+    assert not (tmp_path / "out").exists()
+
+
+REFUSED = {
+    "no runs": (HEAD + "seeds = []\n" + SCENARIO, "the plan is empty"),
+    "no draws": (HEAD + SCENARIO + RANDOM.replace("count = 8", "count = 0"), "plan is empty"),
+    "no cases": (HEAD + "case = []\n" + SCENARIO, "the plan is empty"),
+    "no values": (HEAD + SCENARIO + '[[vary]]\nparameter = "gear.ratio"\nvalues = []\n', "empty"),
+    "unknown key": (HEAD + "fidelty = 1\n" + SCENARIO, "did you mean 'fidelity'"),
+    "unknown actuator": (HEAD.replace("torino-rotary", "torino-rotry"), "did you mean"),
+    "unknown fidelity": (HEAD.replace('"low"', '"lo"') + SCENARIO, "did you mean 'low'"),
+    "no actuator": (SCENARIO, "actuator: is missing"),
+    "two targets": (
+        HEAD + SCENARIO + SHORTS.replace("fault", 'parameter = "gear.ratio"\nfault'),
+        "exactly one of",
+    ),
+    "fault form": (HEAD + SCENARIO + SHORTS.replace("@", "-"), "KIND@PLACE"),
+    "unknown fault": (HEAD + SCENARIO + SHORTS.replace("short", "sort"), "did you mean 'short'"),
+    "unknown place": (HEAD + SCENARIO + SHORTS.replace("phase_a", "phase_d"), "places: motor"),
+    "severity": (HEAD + SCENARIO + SHORTS.replace('"20 %"', "2"), "run 2: .*outside"),
+    "unknown parameter": (
+        HEAD + SCENARIO + FRICTION.replace("friction.dynamic", "friction.dynamik"),
+        "did you mean 'friction.dynamic'",
+    ),
+    "range and list": (HEAD + SCENARIO + FRICTION + "values = [1]\n", "either 'values'"),
+    "two units": (HEAD + SCENARIO + FRICTION.replace("0.4 N m", "400 N mm"), "in one unit"),
+    "wrong unit": (HEAD + SCENARIO + FRICTION.replace("N m", "N"), "expected a torque"),
+    "log of zero": (
+        HEAD + SCENARIO + FRICTION.replace("0.2 N m", "0 N m") + 'spacing = "log"\n',
+        "above zero",
+    ),
+    "twice": (HEAD + SCENARIO + SHORTS + SHORTS, "varied twice"),
+    "split": (HEAD + SCENARIO + "[split]\ntrain = 0.5\n", "add up to 1"),
+    "sobol": (
+        HEAD + SCENARIO + RANDOM.replace("count = 8", 'count = 9\nmethod = "sobol"'),
+        "nearest: 8 or 16",
+    ),
+    "probability": (
+        HEAD + SCENARIO + RANDOM.replace('to = "80 degC"', 'to = "80 degC"\nprobability = 0.5'),
+        "belongs to a fault",
+    ),
+    "place": (
+        HEAD + SCENARIO + '[[vary]]\nscenario = "command.terms[3].phase"\nvalues = [1]\n',
+        "no entry 3",
+    ),
+    "place form": (
+        HEAD + SCENARIO + '[[vary]]\nscenario = "command/terms"\nvalues = [1]\n',
+        "is not a place",
+    ),
+    "place key": (
+        HEAD + SCENARIO + '[[vary]]\nscenario = "comand.mode"\nvalues = ["speed"]\n',
+        "did you mean 'command'",
+    ),
+    "contradiction": (
+        HEAD + SCENARIO + SHORTS + SHORTS.replace("short", "open_phase"),
+        "contradict",
+    ),
+    "signal": (HEAD.replace("user_position", "user_positon") + SCENARIO, "did you mean 'user_pos"),
+    "rate": (HEAD.replace("400 Hz", "300 Hz") + SCENARIO, "nearest"),
+    "block": (HEAD + "runs_per_file = 51\n" + SCENARIO, "less than or equal to 50"),
+    "no scenario file": (HEAD + 'scenario = "absent.toml"\n', "cannot be read"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_refused_before_anything_is_written(write, tmp_path, capsys, name):
+    text, message = REFUSED[name]
+    code, captured = run(write(text), tmp_path / "out", capsys)
+    assert code == 2
+    assert captured.out == ""
+    with pytest.raises(InputError, match=message):
+        raise InputError(captured.err)
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,104 @@
+"""`list` and `show`."""
+
+import json
+import xml.etree.ElementTree as ET
+
+import pytest
+
+from elevon import _core
+from elevon.cli.registry import COMMANDS
+
+
+def test_actuators(elevon_cli):
+    rows = elevon_cli("list", "actuators", "--json").json["actuators"]
+    assert "torino-rotary" in [row["name"] for row in rows]
+    assert "torino-rotary" in elevon_cli("list", "actuators").out
+
+
+@pytest.mark.parametrize("fidelity", ["high", "low"])
+def test_signals(elevon_cli, fidelity):
+    rows = elevon_cli("list", "signals", "torino-rotary", "--fidelity", fidelity, "--json").json
+    expected = [item["name"] for item in _core.signals("rotary", fidelity)]
+    assert [row["name"] for row in rows["signals"]] == expected
+
+
+def test_parameters(elevon_cli):
+    rows = elevon_cli("list", "parameters", "torino-rotary", "--json").json["parameters"]
+    assert len(rows) == len(_core.parameters("rotary"))
+    turns = next(row for row in rows if row["path"] == "motor.turns_a")
+    assert turns["range"] == "(0, 1]"
+
+
+def test_faults(elevon_cli):
+    rows = elevon_cli("list", "faults", "torino-rotary", "--json").json["faults"]
+    assert len(rows) == len(_core.faults("rotary"))
+    assert {"kind", "places", "unit", "range", "effect", "source"} <= rows[0].keys()
+    text = elevon_cli("list", "faults").out
+    assert "motor.phase_a" in text
+
+
+def test_waveforms(elevon_cli):
+    rows = elevon_cli("list", "waveforms", "--json").json["waveforms"]
+    assert {"sine", "chirp", "table"} <= {row["kind"] for row in rows}
+    assert "amplitude*" in elevon_cli("list", "waveforms").out
+
+
+def test_show_gives_every_number_with_its_source(elevon_cli):
+    shown = elevon_cli("show", "torino-rotary", "--json").json
+    assert len(shown["parameters"]) == len(_core.parameters("rotary"))
+    assert all(row["source"] for row in shown["parameters"])
+    text = elevon_cli("show", "torino-rotary").out
+    assert "7.7 kg cm2" in text
+    assert "T1 Table 1" in text
+    assert "Power electronics" in text
+
+
+def test_show_follows_set(elevon_cli):
+    shown = elevon_cli("show", "torino-rotary", "--set", "motor.inertia=9 kg cm2", "--json").json
+    row = next(row for row in shown["parameters"] if row["path"] == "motor.inertia")
+    assert row["value"] == 9e-4
+    assert row["confidence"] == "override"
+
+
+def test_diagram_and_schema_are_files(elevon_cli, tmp_path):
+    svg, schema = tmp_path / "d.svg", tmp_path / "s.json"
+    arguments = ("show", "torino-rotary", "--svg", svg, "--schema", schema)
+    assert elevon_cli(*arguments).code == 0
+    root = ET.fromstring(svg.read_text())
+    assert root.tag.endswith("svg")
+    assert "motor" in json.loads(schema.read_text())["properties"]
+    again = elevon_cli(*arguments)
+    assert again.code == 2
+    assert "--force" in again.err
+    assert elevon_cli(*arguments, "--force").code == 0
+
+
+def test_every_command_has_help(elevon_cli):
+    overview = elevon_cli("--help").out
+    for name, command in COMMANDS.items():
+        if command.available:
+            assert name in overview
+            result = elevon_cli(name, "--help")
+            assert result.code == 0
+            assert "Usage" in result.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("simulte",), "Did you mean simulate"),
+        (("list", "signals", "torino-rotry"), "did you mean 'torino-rotary'"),
+        (("list", "signals", "torino-rotary", "--fidelity", "hihg"), "did you mean 'high'"),
+        (("show", "torino-rotary", "--svgg", "x"), "--svg"),
+        (("show",), "Missing argument"),
+        (("show", "absent.toml"), "no such actuator file"),
+    ],
+)
+def test_bad_usage(elevon_cli, arguments, message):
+    result = elevon_cli(*arguments)
+    assert result.code == 2
+    assert message in result.err
+
+
+def test_version(elevon_cli):
+    assert elevon_cli("--version").out.strip() == _core.version()

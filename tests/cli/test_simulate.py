@@ -1,0 +1,198 @@
+"""`simulate`: the contract of its output, and every bad input."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+import elevon
+
+RUN = ("simulate", "torino-rotary", "--duration", "20 ms")
+
+
+def test_json_contract(elevon_cli):
+    result = elevon_cli(*RUN, "--json")
+    data = result.json
+    assert data["status"] == "ok"
+    assert data["sim_s"] == pytest.approx(0.02)
+    assert data["steps"] == 20000
+    assert data["wall_s"] > 0.0
+    assert data["ns_per_step"] == pytest.approx(1e9 * data["wall_s"] / data["steps"])
+    assert set(data["final"]) >= {"user_position", "motor_speed", "current_a"}
+    assert data["out"] is None
+
+
+def test_a_table_for_the_reader(elevon_cli):
+    out = elevon_cli(*RUN).out
+    assert "torino-rotary, high fidelity: ok" in out
+    assert "user_position" in out
+
+
+@pytest.mark.parametrize("ending", [".parquet", ".nc", ".csv", ".mat"])
+def test_out(elevon_cli, tmp_path, ending):
+    out = tmp_path / f"run{ending}"
+    data = elevon_cli(*RUN, "--out", out, "--json").json
+    assert data["out"] == str(out)
+    assert elevon.Recording.load(out).final["user_position"] == data["final"]["user_position"]
+
+
+@pytest.mark.parametrize("ending", [".png", ".html"])
+def test_plot(elevon_cli, tmp_path, ending):
+    plot = tmp_path / f"run{ending}"
+    assert elevon_cli(*RUN, "--plot", plot).code == 0
+    assert plot.stat().st_size > 1000
+
+
+def test_seed_and_everything_else_reach_the_run(elevon_cli, tmp_path):
+    scenario = tmp_path / "scenario.toml"
+    scenario.write_text('duration = "1 s"\n[[command.terms]]\nkind = "constant"\nvalue = "1 deg"\n')
+    arguments = (
+        "--scenario", scenario, "--set", "motor.inertia=9 kg cm2", "--set", "drive.kind=pwm",
+        "--set", "control.noise_deviation=1e-5 rad", "--fault", "short@motor.phase_a=10 %",
+        "--fidelity", "high", "--record", "user_position@100 Hz", "--record", "current_a@every",
+    )  # fmt: skip
+    first, same, other = (
+        elevon_cli(*RUN, *arguments, "--seed", seed, "--json").json for seed in (1, 1, 2)
+    )
+    assert first["final"] == same["final"]
+    assert first["final"] != other["final"]
+    assert first["labels"][0]["severity"] == 0.1
+
+
+def test_a_tripped_drive_is_a_result(elevon_cli):
+    result = elevon_cli(*RUN, "--fault", "shorted_switch@inverter.a_high=1", "--json")
+    assert result.code == 0
+    assert result.json["status"] == "tripped"
+
+
+BAD = {
+    "unknown actuator": (("simulate", "torino-rotry"), "did you mean 'torino-rotary'"),
+    "unknown path": ((*RUN, "--set", "motor.inertai=1"), "did you mean 'motor.inertia'"),
+    "unknown unit": ((*RUN, "--set", "motor.inertia=1 kg cn2"), "did you mean 'kg cm2'"),
+    "wrong kind": ((*RUN, "--set", "motor.inertia=1 N"), "expected an inertia"),
+    "nan": ((*RUN, "--set", "motor.inertia=nan"), "not a finite number"),
+    "negative inertia": ((*RUN, "--set", "motor.inertia=-1"), "outside (0, inf)"),
+    "no turns": ((*RUN, "--set", "motor.turns_a=0"), "outside (0, 1]"),
+    "too many turns": ((*RUN, "--set", "motor.turns_a=1.1"), "outside (0, 1]"),
+    "zero step": ((*RUN, "--set", "solver.step=0"), "outside (0, inf)"),
+    "step and electrical pole": ((*RUN, "--set", "solver.step=20 ms"), "electrical pole"),
+    "step and filter": ((*RUN, "--set", "solver.step=20 us"), "derivative filter"),
+    "step and contact": (
+        (*RUN, "--set", "play.model=elastic", "--set", "play.stiffness=1e12"),
+        "play.stiffness",
+    ),
+    "no value": ((*RUN, "--set", "motor.inertia"), "PATH=VALUE"),
+    "twice": ((*RUN, "--set", "gear.ratio=1", "--set", "gear.ratio=2"), "given twice"),
+    "unknown signal": ((*RUN, "--record", "user_positon@400 Hz"), "did you mean 'user_position'"),
+    "no rate": ((*RUN, "--record", "user_position"), "SIGNALS@RATE"),
+    "zero rate": ((*RUN, "--record", "user_position@0 Hz"), "must be positive"),
+    "unit of the rate": ((*RUN, "--record", "user_position@400 rad/s"), "expected a frequency"),
+    "rate that does not divide": ((*RUN, "--record", "user_position@300 Hz"), "nearest: 299.94"),
+    "two rates": (
+        (*RUN, "--record", "user_position@400 Hz", "--record", "user_position@100 Hz"),
+        "asked for twice",
+    ),
+    "too much": (
+        ("simulate", "torino-rotary", "--duration", "1e9", "--record", "all@every"),
+        "of memory",
+    ),
+    "fault": ((*RUN, "--fault", "short@motor.phase_d=0.1"), "places: motor.phase_a"),
+    "severity": ((*RUN, "--fault", "short@motor.phase_a=2"), "outside [0, 0.95]"),
+    "contradiction": (
+        (*RUN, "--fault", "short@motor.phase_a=0.1", "--fault", "open_phase@motor.phase_a=1"),
+        "contradict",
+    ),
+    "profile": ((*RUN, "--fault", "short@motor.phase_a=0.1:ramp(start=2,end=1)"), "ends before"),
+    "fidelity": ((*RUN, "--fidelity", "hihg"), "did you mean 'high'"),
+    "duration": (("simulate", "torino-rotary", "--duration", "0"), "longer than zero"),
+    "short duration": (("simulate", "torino-rotary", "--duration", "1 ns"), "shorter than a step"),
+    "seed": ((*RUN, "--seed", "-1"), "--seed"),
+    "out ending": ((*RUN, "--out", "run.xlsx"), "ending"),
+    "plot ending": ((*RUN, "--plot", "run.bmp"), "ending"),
+    "out is a folder": ((*RUN, "--out", "folder.csv"), "is a folder"),
+    "same file": ((*RUN, "--out", "a.csv", "--plot", "a.csv"), "ending"),
+    "no scenario": ((*RUN, "--scenario", "absent.toml"), "cannot be read"),
+    "scenario key": ((*RUN, "--scenario", "unknown.toml"), "did you mean 'duration'"),
+    "scenario table": ((*RUN, "--scenario", "table.toml"), "times must increase"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_input(elevon_cli, tmp_path, name):
+    (tmp_path / "folder.csv").mkdir()
+    (tmp_path / "unknown.toml").write_text("duraton = 1\n")
+    (tmp_path / "table.toml").write_text(
+        "duration = 1\n[[command.terms]]\nkind = 'table'\ntimes = [0, 0]\nvalues = [1, 2]\n"
+    )
+    arguments, message = BAD[name]
+    before = sorted(tmp_path.rglob("*"))
+    result = elevon_cli(*arguments, "--json")
+    assert result.code == 2
+    assert message in result.err
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_existing_output_is_kept(elevon_cli, tmp_path):
+    out = tmp_path / "run.csv"
+    out.write_text("precious")
+    result = elevon_cli(*RUN, "--out", out)
+    assert result.code == 2
+    assert "--force" in result.err
+    assert out.read_text() == "precious"
+    assert elevon_cli(*RUN, "--out", out, "--force").code == 0
+    assert out.read_text() != "precious"
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_unwritable_output(elevon_cli, tmp_path):
+    folder = tmp_path / "sealed"
+    folder.mkdir(mode=0o500)
+    result = elevon_cli(*RUN, "--out", folder / "run.csv")
+    assert result.code == 2
+    assert "not writable" in result.err
+
+
+def test_output_in_a_place_that_cannot_be(elevon_cli, tmp_path):
+    (tmp_path / "file").write_text("")
+    result = elevon_cli(*RUN, "--out", tmp_path / "file" / "run.csv")
+    assert result.code == 2
+    assert "cannot make the folder" in result.err
+
+
+def test_a_diverging_run_names_time_and_signal(elevon_cli, tmp_path):
+    scenario = tmp_path / "scenario.toml"
+    scenario.write_text(
+        'duration = 1\n[[load.shaft.terms]]\nkind = "ramp"\nslope = "-1e9 N m/s"\n'
+        "[parameters]\nstop.upper = 1e9\n"
+    )
+    out = tmp_path / "run.csv"
+    result = elevon_cli("simulate", "torino-rotary", "--scenario", scenario, "--out", out, "--json")
+    assert result.code == 1
+    assert result.out == ""
+    assert "motor_speed diverged at" in result.err
+    assert not out.exists()
+
+
+def start(*arguments, cwd):
+    command = [sys.executable, "-m", "elevon.cli", *map(str, arguments)]
+    return subprocess.Popen(
+        command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+LONG = ("simulate", "torino-rotary", "--duration", "500", "--out", "run.parquet", "--json")
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGKILL, -9)])
+def test_a_stopped_run_leaves_nothing(tmp_path, number, code):
+    process = start(*LONG, cwd=tmp_path)
+    time.sleep(2.0)
+    assert process.poll() is None
+    process.send_signal(number)
+    out, err = process.communicate(timeout=20)
+    assert process.returncode == code, err
+    assert out == ""
+    assert list(tmp_path.iterdir()) == []

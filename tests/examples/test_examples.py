@@ -1,0 +1,44 @@
+"""Every example runs as its reader would run it."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from elevon.cli import main
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+SAYS = {
+    "first_run.py": "greatest position: 6.",
+    "short_in_a_phase.py": "shorted: ripple of the q voltage",
+    "many_runs.py": "play@transmission=0.9 deg lost motion",
+}
+
+
+@pytest.mark.parametrize("name", SAYS)
+def test_script(name, tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-W", "error", EXAMPLES / name],
+        cwd=tmp_path,
+        env=os.environ,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert done.returncode == 0, done.stderr
+    assert SAYS[name] in done.stdout
+
+
+def test_own_actuator_and_scenario(capsys):
+    actuator, scenario = EXAMPLES / "own_actuator.toml", EXAMPLES / "sine_with_short.toml"
+    arguments = ["simulate", actuator, "--scenario", scenario, "--duration", "0.1", "--json"]
+    assert main([str(item) for item in arguments]) == 0
+    assert '"actuator": "torino-large-rotor"' in capsys.readouterr().out
+
+
+def test_batch_plan(tmp_path):
+    assert main(["batch", str(EXAMPLES / "batch.toml"), "--out", str(tmp_path / "runs")]) == 0

@@ -1,0 +1,86 @@
+"""Every command and example of README and of the guide runs as written."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = ["README.md", "docs/reproduce.md"]
+LONG = ("reproduce torino-backlash", "--faults-table")
+"""These take tens of seconds; the short ones run with every `make test`."""
+
+
+def _blocks(page, language):
+    text = (ROOT / page).read_text("utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.M | re.S)
+
+
+def _commands():
+    for page in PAGES:
+        for block in _blocks(page, "sh"):
+            for line in block.splitlines():
+                command = line.split("#")[0].strip()
+                if command:
+                    yield page, command
+
+
+COMMANDS = sorted(set(_commands()))
+ELEVON = [
+    pytest.param(page, command, marks=[pytest.mark.long] if any(k in command for k in LONG) else [])
+    for page, command in COMMANDS
+    if "elevon" in command
+]
+
+
+def test_there_are_commands_and_an_example():
+    assert len(ELEVON) >= 6
+    assert len(_blocks("README.md", "python")) == 1
+
+
+@pytest.mark.parametrize(("page", "command"), ELEVON)
+def test_command(page, command, tmp_path):
+    words = shlex.split(command)
+    assert words[0] in (".venv/bin/elevon", "elevon")
+    done = subprocess.run(
+        [sys.executable, "-m", "elevon.cli", *words[1:]],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout
+
+
+@pytest.mark.parametrize("target", [c.split()[1] for _, c in COMMANDS if c.startswith("make ")])
+def test_make_targets_exist(target):
+    makefile = (ROOT / "Makefile").read_text("utf-8")
+    assert re.search(rf"^{target}:", makefile, re.M)
+
+
+def test_demo_is_the_command_of_this_page():
+    assert "reproduce torino-backlash --out out/demo" in (ROOT / "Makefile").read_text("utf-8")
+
+
+def test_example(tmp_path):
+    (code,) = _blocks("README.md", "python")
+    assert len([line for line in code.splitlines() if line.strip()]) <= 10
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("ok ")
+    assert (tmp_path / "run.parquet").is_file()
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_and_pictures_are_there(page):
+    text = (ROOT / page).read_text("utf-8")
+    for target in re.findall(r"\]\(([^)#]+)\)", text):
+        path = (ROOT / page).parent / target
+        assert path.is_file(), target
+        assert path.suffix not in (".svg", ".png") or path.stat().st_size < 200_000

@@ -1,0 +1,89 @@
+"""The comparison of the two fidelities: its filter, its numbers, its refusals."""
+
+import json
+
+import numpy as np
+import pytest
+
+import elevon
+from elevon.cli import main
+from elevon.compare import compare, filtered
+from elevon.errors import InputError
+
+SHORT = {
+    "duration": "3 s",
+    "command": {"terms": [{"kind": "sine", "amplitude": "3 deg", "frequency": "0.5 Hz"}]},
+    "load": {"brake": {"terms": [{"kind": "constant", "value": "1 N m"}]}},
+}
+
+
+@pytest.fixture(scope="module")
+def short():
+    actuator = elevon.Actuator.load("torino-rotary")
+    return compare(actuator, elevon.Scenario.from_dict(SHORT), start=1.0)
+
+
+def test_the_low_model_follows(short):
+    assert 0.0 < short.position_nrmse < 0.02
+    assert 0.0 < short.speed_nrmse < 0.2
+    assert 0.0 < short.q_current_nrmse < 0.2
+    assert short.speed_up > 10.0
+
+
+def test_numbers_are_what_their_names_say(short):
+    values = short.to_dict()
+    error = short.low["current_q"] - short.high["current_q"]
+    rms = np.sqrt(np.mean(short.high["current_q"] ** 2))
+    assert values["q_current_nrmse"] == pytest.approx(np.sqrt(np.mean(error**2)) / rms)
+    assert values["amplitude_rad"] == pytest.approx(np.radians(3.0), rel=0.05)
+
+
+def test_the_filter_passes_the_slow_stops_the_fast_and_delays_nothing():
+    time = np.arange(0.0, 20.0, 1e-3)
+    for hertz, gain in ((0.2, 1.0), (10.0, 0.5), (400.0, 0.0)):
+        wave = np.sin(2 * np.pi * hertz * time)
+        recording = elevon.Recording.build(time, {"x": wave}, {"x": "A"})
+        middle = time[(time > 5) & (time < 15)]
+        smooth = filtered(recording, "x", middle, 10.0)
+        expected = gain * np.sin(2 * np.pi * hertz * middle)
+        assert np.abs(smooth - expected).max() < 0.01
+
+
+def test_refusals():
+    actuator = elevon.Actuator.load("torino-rotary")
+    scenario = elevon.Scenario.from_dict(SHORT)
+    with pytest.raises(InputError, match="lasts 3 s"):
+        compare(actuator, scenario)
+    with pytest.raises(InputError, match="nothing moves"):
+        compare(actuator, elevon.Scenario.from_dict({"duration": "0.2 s"}), start=0.05, cutoff=50.0)
+
+
+def test_command(tmp_path, capsys):
+    scenario = tmp_path / "short.toml"
+    scenario.write_text(
+        'duration = "3 s"\n[[command.terms]]\nkind = "sine"\namplitude = "3 deg"\n'
+        'frequency = "0.5 Hz"\n'
+    )
+    words = ["compare", "torino-rotary", "--scenario", str(scenario), "--after", "1", "--json"]
+    assert main([*words, "--fault", "friction@transmission=0.5", "--out", str(tmp_path)]) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert {"position_nrmse", "speed_nrmse", "q_current_nrmse", "speed_up"} <= values.keys()
+    assert values["faults"] == ["friction@transmission=0.5"]
+    assert (tmp_path / "report.html").is_file()
+    assert main([*words, "--fault", "frition@transmission=0.5"]) == 2
+    assert "friction" in capsys.readouterr().err
+
+
+@pytest.mark.long
+def test_default_scenario_keeps_the_promised_limits():
+    found = compare(elevon.Actuator.load("torino-rotary"))
+    assert found.position_nrmse <= 0.005
+    assert found.q_current_nrmse <= 0.05
+
+
+def test_every_kind_of_fault_is_in_the_default_table():
+    from elevon.faults import Fault, catalogue
+    from elevon.reproduce.fault_sensitivity import ROTARY_FAULTS
+
+    asked = {Fault.parse(text).kind for text in ROTARY_FAULTS}
+    assert asked == {record.kind for record in catalogue("rotary")}
