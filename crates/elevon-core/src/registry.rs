@@ -1,6 +1,6 @@
 //! The wirings by name, and one entry for each thing a caller may ask of any of them.
 
-use crate::actuator::{rotary, Finding, Port, Wiring};
+use crate::actuator::{landing_gear, rotary, Finding, Port, Wiring};
 use crate::fault::FaultKind;
 use crate::solver::{self, Clock, Monitor, RunOutput, RunSpec, Width};
 use crate::variable::{Group, Signal};
@@ -10,6 +10,8 @@ use crate::variable::{Group, Signal};
 pub enum Model {
     RotaryHigh,
     RotaryLow,
+    LandingGearHigh,
+    LandingGearLow,
 }
 
 /// A kind of actuator and its fidelities.
@@ -21,11 +23,18 @@ pub struct Kind {
 }
 
 /// Every kind of actuator.
-pub const KINDS: &[Kind] = &[Kind {
-    name: "rotary",
-    text: "three-phase motor, inverter, gearbox with friction and play",
-    fidelities: &[("high", Model::RotaryHigh), ("low", Model::RotaryLow)],
-}];
+pub const KINDS: &[Kind] = &[
+    Kind {
+        name: "rotary",
+        text: "three-phase motor, inverter, gearbox with friction and play",
+        fidelities: &[("high", Model::RotaryHigh), ("low", Model::RotaryLow)],
+    },
+    Kind {
+        name: "landing_gear",
+        text: "six-step motor, planetary gearbox with release, roller screw, down-lock, leg on a lever, control unit",
+        fidelities: &[("high", Model::LandingGearHigh), ("low", Model::LandingGearLow)],
+    },
+];
 
 macro_rules! dispatch {
     ($model:expr, $w:ident => $body:expr) => {
@@ -36,6 +45,14 @@ macro_rules! dispatch {
             }
             Model::RotaryLow => {
                 type $w = rotary::Low;
+                $body
+            }
+            Model::LandingGearHigh => {
+                type $w = landing_gear::High;
+                $body
+            }
+            Model::LandingGearLow => {
+                type $w = landing_gear::Low;
                 $body
             }
         }
@@ -59,6 +76,12 @@ impl Model {
     pub fn initial(self) -> &'static [&'static str] {
         dispatch!(self, W => W::INITIAL)
     }
+    pub fn modes(self) -> &'static [&'static str] {
+        dispatch!(self, W => W::MODES)
+    }
+    pub fn actions(self) -> &'static [&'static str] {
+        dispatch!(self, W => W::ACTIONS)
+    }
     pub fn faults(self) -> Vec<FaultKind> {
         dispatch!(self, W => W::faults())
     }
@@ -71,11 +94,11 @@ impl Model {
     pub fn run_all(self, runs: &[RunSpec], clocks: &[Clock], threads: usize, width: Width, monitor: &Monitor) -> Vec<RunOutput> {
         dispatch!(self, W => solver::run_all::<W>(runs, clocks, threads, width, monitor))
     }
-    /// Low fidelities only: the relays of a switching inverter have no useful derivative.
+    /// Low fidelities without a state machine only: switching has no useful derivative.
     pub fn sensitivities(self, run: &RunSpec, parameters: &[usize], faults: &[usize], clocks: &[Clock], monitor: &Monitor) -> Option<Vec<RunOutput>> {
         match self {
             Self::RotaryLow => Some(solver::sensitivities::<rotary::Low>(run, parameters, faults, clocks, monitor)),
-            Self::RotaryHigh => None,
+            Self::RotaryHigh | Self::LandingGearHigh | Self::LandingGearLow => None,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Wirings: how components make an actuator. A wiring reads like the paper's block diagram.
 
+pub mod landing_gear;
 pub mod rotary;
 mod wiring;
 

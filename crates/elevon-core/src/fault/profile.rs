@@ -80,7 +80,7 @@ impl Profile {
                 }
             }
             Self::Table { times, values } => {
-                let term = Term { wave: crate::command::Wave::Table, enabled: true, parameters: vec![0.0, 0.0, 1.0], times: times.clone(), values: values.clone() };
+                let term = Term { wave: crate::command::Wave::Table, enabled: true, parameters: vec![0.0, 0.0, 1.0, 0.0], times: times.clone(), values: values.clone() };
                 let line = term.line(t);
                 (line.value + line.slope * (t - line.at), if line.slope == 0.0 { line.until } else { t })
             }

@@ -33,7 +33,7 @@ pub struct Clock {
 pub enum Status {
     Ok,
     /// The drive tripped at this time; the run went on without it.
-    Tripped { time: f64 },
+    Tripped { time: f64, reason: String },
     /// A signal left all bounds at this time.
     Diverged { time: f64, signal: &'static str },
     Interrupted,

@@ -40,6 +40,10 @@ pub struct Coil {
 }
 
 impl Coil {
+    pub fn new(free: bool) -> Self {
+        Self { free, waiting: 0.0 }
+    }
+
     /// After a tick of `dt` with the coil powered or not.
     pub fn step(&mut self, powered: bool, release_delay: f64, engage_delay: f64, dt: f64) {
         if powered == self.free {

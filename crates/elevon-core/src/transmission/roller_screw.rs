@@ -6,7 +6,7 @@ use crate::variables;
 variables! {
     /// The screw, its nut and the ram.
     ScrewParameter, SCREW {
-        Lead => "lead", "p_s", "m", Positive, Plant, None, "travel per turn of the screw";
+        Lead => "lead", "p_s", "m/rad", Positive, Plant, None, "travel of the nut per radian of the screw";
         Inertia => "inertia", "J_s", "kg m2", NonNegative, Plant, None, "inertia of the screw, at the screw";
         MovingMass => "moving_mass", "m_n", "kg", NonNegative, Plant, None, "mass of ram and nut";
         EfficiencyUnloaded => "efficiency_unloaded", "eta_0", "1", Fraction, Plant, None, "efficiency at no load";
@@ -23,7 +23,7 @@ variables! {
 
 #[derive(Clone, Copy, Debug)]
 pub struct RollerScrew<S> {
-    /// 2 pi / lead.
+    /// Screw angle per travel.
     pub turns: S,
     loaded: S,
     excess: S,
@@ -40,7 +40,7 @@ impl<S: Scalar> RollerScrew<S> {
         use ScrewParameter as P;
         let g = |p: P| raw[p as usize];
         Self {
-            turns: S::splat(std::f64::consts::TAU) / g(P::Lead),
+            turns: S::one() / g(P::Lead),
             loaded: g(P::EfficiencyLoaded),
             excess: g(P::EfficiencyUnloaded) - g(P::EfficiencyLoaded),
             per_force: S::one() / g(P::EfficiencyForce),

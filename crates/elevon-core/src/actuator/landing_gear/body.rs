@@ -76,6 +76,8 @@ pub struct Body<S> {
     pub bus: S,
     charge: S,
     cell_noise: S,
+    /// Share of the lock's strength in use, at the last tick.
+    pub lock_use: S,
     pub energy: [S; 5],
 }
 
@@ -130,6 +132,7 @@ impl<S: Scalar> Constants<S> {
             bus: zero,
             charge: zero,
             cell_noise: zero,
+            lock_use: zero,
             energy: [zero; 5],
         };
         body.obey();
@@ -167,6 +170,7 @@ impl<S: Scalar> Constants<S> {
             s.units[lane].tick(&self.raw[lane], &shown);
         }
         s.charge = S::zero();
+        s.lock_use = s.motion.locked * self.mechanics.end_load(inputs[USER].at(t)).abs() * self.mechanics.lock.per_strength;
         s.obey();
         if S::any(S::zero().lt(self.cell_noise)) {
             s.cell_noise = self.cell_noise * noise(0);

@@ -51,7 +51,7 @@ impl Unit {
             [true, ..] => Phase::Retracted,
             _ => Phase::Stopped,
         };
-        let coil = Coil { free: raw.brake()[BrakeParameter::Powered as usize] > 0.5, ..Coil::default() };
+        let coil = Coil::new(raw.brake()[BrakeParameter::Powered as usize] > 0.5);
         Self {
             sequence: Sequence::start(phase, released),
             speed: PiRate::default(),
