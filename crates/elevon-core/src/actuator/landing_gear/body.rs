@@ -75,6 +75,9 @@ pub struct Body<S> {
     pub flow: Link<S>,
     pub bus: S,
     charge: S,
+    /// Sum and largest magnitude of the line current since the last tick, and what they were then.
+    line: [S; 2],
+    shown_line: [S; 2],
     cell_noise: S,
     /// Share of the lock's strength in use, at the last tick.
     pub lock_use: S,
@@ -131,6 +134,8 @@ impl<S: Scalar> Constants<S> {
             flow: Link { source: zero, dump: zero },
             bus: zero,
             charge: zero,
+            line: [zero; 2],
+            shown_line: [zero; 2],
             cell_noise: zero,
             lock_use: zero,
             energy: [zero; 5],
@@ -170,6 +175,8 @@ impl<S: Scalar> Constants<S> {
             s.units[lane].tick(&self.raw[lane], &shown);
         }
         s.charge = S::zero();
+        s.shown_line = [s.line[0] * self.dt * self.per_control_period, s.line[1]];
+        s.line = [S::zero(); 2];
         s.lock_use = s.motion.locked * self.mechanics.end_load(inputs[USER].at(t)).abs() * self.mechanics.lock.per_strength;
         s.obey();
         if S::any(S::zero().lt(self.cell_noise)) {
@@ -222,6 +229,12 @@ impl<S: Scalar> Constants<S> {
         s.flow = flow;
     }
 
+    /// Keeps account of the line current of a step.
+    #[inline(always)]
+    pub fn meter(s: &mut Body<S>, line: S) {
+        s.line = [s.line[0] + line, s.line[1].maximum(line.abs())];
+    }
+
     pub fn trip_reason(&self, s: &Body<S>, lane: usize) -> Option<String> {
         s.units[lane].reason()
     }
@@ -255,6 +268,8 @@ impl<S: Scalar> Constants<S> {
         set(Q::CurrentBus, s.bus);
         set(Q::CurrentSource, s.flow.source);
         set(Q::SupplyVoltage, s.link);
+        set(Q::CurrentMean, s.shown_line[0]);
+        set(Q::CurrentPeak, s.shown_line[1]);
         set(Q::HallA, s.hall.code[0]);
         set(Q::HallB, s.hall.code[1]);
         set(Q::HallC, s.hall.code[2]);
@@ -263,6 +278,7 @@ impl<S: Scalar> Constants<S> {
         set(Q::BrakeTorque, m.brake_torque(s.brake_free));
         set(Q::BrakeReleased, s.brake_free);
         let forces = m.forces(&s.motion, user, structure.rig);
+        set(Q::FrictionForce, m.friction_force(&s.motion, s.released));
         let locked = S::splat(0.5).lt(s.motion.locked);
         set(Q::LoadForce, S::select(locked, m.end_load(user), forces.load));
         set(Q::LockForce, S::select(locked, m.end_load(user), forces.spring));

@@ -121,6 +121,8 @@ fn electric<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, so
     s.current = whole.current;
     s.voltage = whole.voltage;
     s.torque = s.torque + whole.impulse;
+    let size = S::splat(0.5) * (s.current[0].abs() + s.current[1].abs() + s.current[2].abs());
+    Constants::meter(&mut s.body, whole.impulse.signed(size));
     if structure.accounts {
         s.body.energy[E_COPPER] = s.body.energy[E_COPPER] + whole.copper;
         s.body.energy[E_INVERTER] = s.body.energy[E_INVERTER] + whole.inverter;

@@ -109,6 +109,7 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
     let follow = S::select(S::splat(0.5).lt(p.closed), (dt * p.resistance / inductance).minimum(one), one);
     s.current = follow.fma(target - s.current, s.current);
     let i = s.current;
+    Constants::meter(&mut s.body, i);
     let square = i * i;
     s.torque = m.c.star.saturate(p.constant * i);
     let speed = s.body.motion.motor_speed;

@@ -212,6 +212,12 @@ impl<S: Scalar> Mechanics<S> {
         -(self.detent * sin)
     }
 
+    /// Kinetic friction of what moves with the nut.
+    pub fn friction_force(&self, s: &Motion<S>, released: S) -> S {
+        let rubs = self.friction.at(s.nut_speed, S::zero().le(s.nut_speed), s.nut_position, self.screw.turns);
+        S::select(S::splat(0.5).lt(released), rubs.screw, rubs.train)
+    }
+
     pub fn brake_torque(&self, brake_free: S) -> S {
         self.brake.torque(brake_free)
     }

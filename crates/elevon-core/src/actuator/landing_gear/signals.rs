@@ -22,6 +22,8 @@ signals! {
         CurrentSource => "current_source", "i_s", "A", "current of the source";
         SupplyVoltage => "supply_voltage", "V_dc", "V", "link voltage";
         CurrentLine => "current_line", "i", "A", "current of the conducting pair, positive gives torque towards extension (half the sum of the magnitudes)";
+        CurrentMean => "current_mean", "-", "A", "mean of current_line over the last control period";
+        CurrentPeak => "current_peak", "-", "A", "largest current of the pair over the last control period";
         HallA => "hall_a", "-", "1", "Hall sensor a";
         HallB => "hall_b", "-", "1", "Hall sensor b";
         HallC => "hall_c", "-", "1", "Hall sensor c";
@@ -29,6 +31,7 @@ signals! {
         DetentTorque => "detent_torque", "T_mc", "N m", "detent torque";
         BrakeTorque => "brake_torque", "T_br", "N m", "torque the brake can oppose";
         BrakeReleased => "brake_released", "-", "1", "1 while the brake is open";
+        FrictionForce => "friction_force", "F_f", "N", "kinetic friction of the tables at the present speed and position, without the efficiencies";
         LoadForce => "load_force", "F", "N", "load on the ram, positive towards extension";
         LockForce => "lock_force", "-", "N", "force in the locked segments, else of the sleeve spring on the nut";
         Efficiency => "efficiency", "eta", "1", "efficiency of the train in its present state";
