@@ -4,4 +4,4 @@ pub mod landing_gear;
 pub mod rotary;
 mod wiring;
 
-pub use wiring::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring, MAX_CHUNKS};
+pub use wiring::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring, MAX_CHUNKS, WATCHED};

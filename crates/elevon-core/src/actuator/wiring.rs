@@ -11,6 +11,9 @@ use std::hash::Hash;
 /// Most chunks of lanes that one thread runs side by side.
 pub const MAX_CHUNKS: usize = 4;
 
+/// Quantities that the solver watches.
+pub const WATCHED: usize = 4;
+
 /// An input of a wiring that waveforms drive.
 #[derive(Clone, Copy, Debug)]
 pub struct Port {
@@ -102,7 +105,8 @@ pub trait Wiring: Sized + Send + Sync + 'static {
     fn advance<S: Scalar>(structure: &Self::Structure, models: &[Self::Model<S>], inputs: &[Inputs<S>], states: &mut [Self::State<S>], from: Steps, count: Steps);
     /// All signals, in the order of `signals()`.
     fn observe<S: Scalar>(structure: &Self::Structure, model: &Self::Model<S>, inputs: &Inputs<S>, state: &Self::State<S>, t: S, out: &mut [S]);
-    fn watch<S: Scalar>(state: &Self::State<S>) -> Vec<Watch<S>>;
+    /// Quantities whose leaving of their limit means divergence.
+    fn watch<S: Scalar>(state: &Self::State<S>) -> [Watch<S>; WATCHED];
     /// Positive once the drive of a lane has tripped.
     fn tripped<S: Scalar>(_state: &Self::State<S>) -> S {
         S::zero()

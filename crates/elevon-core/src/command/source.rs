@@ -59,16 +59,17 @@ pub struct SourceLanes {
     lines: Vec<[f64; 3]>,
     oscillations: Vec<Vec<Oscillation>>,
     next: Vec<Steps>,
+    soonest: Steps,
 }
 
 impl SourceLanes {
     pub fn new(plans: Vec<SourcePlan>) -> Self {
         let n = plans.len();
-        Self { plans, lines: vec![[0.0; 3]; n], oscillations: vec![Vec::new(); n], next: vec![0; n] }
+        Self { plans, lines: vec![[0.0; 3]; n], oscillations: vec![Vec::new(); n], next: vec![0; n], soonest: 0 }
     }
 
     pub fn next(&self) -> Steps {
-        self.next.iter().copied().min().unwrap_or(Steps::MAX)
+        self.soonest
     }
 
     /// Renews the lanes whose breakpoint is step `k`; true if any did.
@@ -87,6 +88,7 @@ impl SourceLanes {
             self.next[lane] = next;
             renewed = true;
         }
+        self.soonest = self.next.iter().copied().min().unwrap_or(Steps::MAX);
         renewed
     }
 
@@ -106,6 +108,12 @@ impl SourceLanes {
 }
 
 impl<S: Scalar> Source<S> {
+    /// The value does not change before the next breakpoint.
+    #[inline(always)]
+    pub fn flat(&self) -> bool {
+        self.flat
+    }
+
     #[inline(always)]
     pub fn at(&self, t: S) -> S {
         if self.flat {

@@ -63,18 +63,20 @@ pub struct FaultLanes {
     faults: Vec<Vec<FaultSpec>>,
     held: Vec<Vec<Held>>,
     next: Vec<Steps>,
+    soonest: Steps,
     grid: Steps,
 }
 
 impl FaultLanes {
     pub fn new(faults: Vec<Vec<FaultSpec>>, grid: Steps) -> Self {
         let held = faults.iter().map(|f| vec![Held::default(); f.len()]).collect();
-        let next = faults.iter().map(|f| if f.is_empty() { Steps::MAX } else { 0 }).collect();
-        Self { faults, held, next, grid: grid.max(1) }
+        let next: Vec<Steps> = faults.iter().map(|f| if f.is_empty() { Steps::MAX } else { 0 }).collect();
+        let soonest = next.iter().copied().min().unwrap_or(Steps::MAX);
+        Self { faults, held, next, soonest, grid: grid.max(1) }
     }
 
     pub fn next(&self) -> Steps {
-        self.next.iter().copied().min().unwrap_or(Steps::MAX)
+        self.soonest
     }
 
     pub fn labels(&self, lane: usize) -> impl Iterator<Item = f64> + '_ {
@@ -99,6 +101,7 @@ impl FaultLanes {
             }
             self.next[lane] = next;
         }
+        self.soonest = self.next.iter().copied().min().unwrap_or(Steps::MAX);
     }
 
     /// Writes the held severities of lanes `first..` into a copy of the healthy parameters. `severity(lane,

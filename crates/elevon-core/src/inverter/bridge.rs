@@ -71,6 +71,24 @@ pub struct Legs<S: Scalar> {
     pub passive: [S::Mask; 3],
 }
 
+/// What of the bridge a run can need beyond switches and dead time; equal over a lane block.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct BridgeStructure {
+    /// Some switch is open or shorted at some time.
+    pub switch_faults: bool,
+    /// Some phase is interrupted at some time.
+    pub open_phases: bool,
+    /// Something may trip the drive.
+    pub trips: bool,
+}
+
+/// The legs of one step, and the neutral voltage where some leg is loose.
+#[derive(Clone, Copy)]
+pub struct Connection<S: Scalar> {
+    pub legs: Legs<S>,
+    pub loose: Option<S>,
+}
+
 /// What the windings show to the bridge at the start of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Windings<S> {
@@ -99,36 +117,73 @@ impl<S: Scalar> Bridge<S> {
         }
     }
 
-    /// Legs from the commands (+1 high, -1 low, 0 off) and the windings; `v_n` in the second place.
+    /// Gate signals after dead time: which switch of each leg conducts.
     #[inline(always)]
-    pub fn connect(&self, s: &mut BridgeState<S>, old: [S; 3], new: [S; 3], half_supply: S, w: &Windings<S>) -> (Legs<S>, S) {
+    fn gates(&self, s: &mut BridgeState<S>, old: [S; 3], new: [S; 3]) -> [[S::Mask; 2]; 3] {
         let zero = S::zero();
         let tiny = S::splat(0.5);
-        let mut legs = Legs { voltage: [zero; 3], rail: [zero; 3], connected: [S::mask(false); 3], passive: [S::mask(false); 3] };
+        let changed: [S::Mask; 3] = three!(|j| !old[j].equals(new[j]));
+        let blank = s.blanking[0].maximum(s.blanking[1]).maximum(s.blanking[2]);
+        if S::any(changed[0] | changed[1] | changed[2] | zero.lt(blank)) {
+            s.blanking = three!(|j| S::select(changed[j], self.dead_time, (s.blanking[j] - self.dt).maximum(zero)));
+        }
+        let running = s.tripped.le(tiny);
+        three!(|j| {
+            let live = s.blanking[j].le(tiny * self.dt) & running;
+            [live & zero.lt(new[j]), live & new[j].lt(zero)]
+        })
+    }
+
+    /// Legs from the commands (+1 high, -1 low, 0 off) and the windings; `None` when every leg is held by a switch,
+    /// as it is most of the time, then with the terminal voltages and rails alone.
+    #[inline(always)]
+    pub fn connect(&self, s: &mut BridgeState<S>, structure: &BridgeStructure, old: [S; 3], new: [S; 3], half_supply: S, w: &Windings<S>) -> Connection<S> {
+        let tiny = S::splat(0.5);
+        let mut gates = self.gates(s, old, new);
+        if structure.switch_faults {
+            gates = three!(|j| [
+                (gates[j][0] & self.open[j][0].le(tiny)) | tiny.lt(self.shorted[j][0]),
+                (gates[j][1] & self.open[j][1].le(tiny)) | tiny.lt(self.shorted[j][1]),
+            ]);
+        }
+        if structure.trips {
+            for j in 0..3 {
+                self.watch(s, gates[j][0] & gates[j][1], w.current[j]);
+            }
+        }
+        let mut legs = Legs {
+            voltage: three!(|j| {
+                let rail = S::select(gates[j][0], half_supply, -half_supply);
+                (-self.on_resistance).fma(w.current[j], rail)
+            }),
+            rail: three!(|j| S::select(gates[j][0], half_supply, -half_supply)),
+            connected: [S::mask(true); 3],
+            passive: three!(|j| !(gates[j][0] | gates[j][1])),
+        };
+        let all_held = !S::any(legs.passive[0] | legs.passive[1] | legs.passive[2]);
+        if all_held && !structure.open_phases {
+            return Connection { legs, loose: None };
+        }
+        let neutral = self.release(&mut legs, half_supply, w);
+        Connection { legs, loose: Some(neutral) }
+    }
+
+    /// Legs that no switch holds, or whose phase is interrupted: diodes by the current's sign, floating at zero.
+    #[inline(always)]
+    fn release(&self, legs: &mut Legs<S>, half_supply: S, w: &Windings<S>) -> S {
+        let zero = S::zero();
+        let diode = half_supply + self.diode_drop;
         for j in 0..3 {
-            let changed = !old[j].equals(new[j]);
-            s.blanking[j] = S::select(changed, self.dead_time, (s.blanking[j] - self.dt).maximum(zero));
-            let live = s.blanking[j].le(tiny * self.dt) & s.tripped.le(tiny);
-            let gate_high = live & zero.lt(new[j]);
-            let gate_low = live & new[j].lt(zero);
-            let high = (gate_high & self.open[j][0].le(tiny)) | tiny.lt(self.shorted[j][0]);
-            let low = (gate_low & self.open[j][1].le(tiny)) | tiny.lt(self.shorted[j][1]);
-            self.watch(s, high & low, w.current[j]);
-            let switched = self.on_resistance * w.current[j];
-            let diode = half_supply + self.diode_drop;
             let positive = zero.lt(w.current[j]);
             let carrying = !w.current[j].equals(zero);
-            let off_voltage = S::select(positive, -diode, diode);
-            let held = high | low;
-            let rail_held = S::select(high, half_supply, -half_supply);
-            legs.rail[j] = S::select(held, rail_held, S::select(positive, -half_supply, half_supply));
-            legs.voltage[j] = S::select(held, rail_held - switched, off_voltage);
-            let intact = w.open[j].le(tiny);
-            legs.connected[j] = carrying | (held & intact);
-            legs.passive[j] = !(held & intact);
+            let off = legs.passive[j];
+            legs.voltage[j] = S::select(off, S::select(positive, -diode, diode), legs.voltage[j]);
+            legs.rail[j] = S::select(off, S::select(positive, -half_supply, half_supply), legs.rail[j]);
+            let interrupted = S::splat(0.5).lt(w.open[j]);
+            legs.connected[j] = carrying | !(off | interrupted);
+            legs.passive[j] = off | interrupted;
         }
-        let neutral = self.turn_on(&mut legs, half_supply, w);
-        (legs, neutral)
+        self.turn_on(legs, half_supply, w)
     }
 
     #[inline(always)]

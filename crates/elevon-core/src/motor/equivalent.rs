@@ -11,7 +11,7 @@ use crate::three;
 variables! {
     /// The few numbers that only the low fidelity has.
     LowParameter, LOW {
-        Step => "step", "dt", "s", Positive, Solver, Some(2.5e-4), "solver step of the low fidelity";
+        Step => "step", "dt", "s", Positive, Solver, Some(5e-4), "solver step of the low fidelity";
         VoltageRatio => "voltage_ratio", "-", "1", Positive, Plant, Some(0.636_619_772_367_581_4), "largest phase voltage, peak, over the DC link: 2/pi in six-step, 1/sqrt 3 for a linear PWM";
         BandRatio => "band_ratio", "-", "1", Between(0.0, 2.0), Plant, Some(0.5), "mean current error the relays allow before they act, in half bands";
     }
@@ -55,10 +55,11 @@ pub fn imposed_shape<S: Scalar>(sines: [S; 3], open: [S; 3]) -> [S; 3] {
 /// diagonal Pade form of order 3 (error x^7 / 100800, x = R dt / L).
 #[derive(Clone, Copy, Debug)]
 pub struct Circuit<S> {
-    resistance: S,
-    /// exp(-x) = numerator / denominator.
-    numerator: S,
-    denominator: S,
+    per_resistance: S,
+    /// exp(-x).
+    decay: S,
+    /// R / (1 - exp(-x)).
+    stiffness: S,
 }
 
 impl<S: Scalar> Circuit<S> {
@@ -68,20 +69,25 @@ impl<S: Scalar> Circuit<S> {
         let square = x * x;
         let even = S::one() + square * S::splat(0.1);
         let odd = x * (S::splat(0.5) + square * S::splat(1.0 / 120.0));
-        Self { resistance, numerator: even - odd, denominator: even + odd }
+        let per_denominator = S::one() / (even + odd);
+        Self {
+            per_resistance: S::one() / resistance,
+            decay: (even - odd) * per_denominator,
+            // 1 - (even - odd) / (even + odd), without cancellation.
+            stiffness: resistance * (even + odd) / (odd + odd),
+        }
     }
 
     /// Current after the step under the driving voltage (terminal voltage less EMF).
     #[inline(always)]
     pub fn current(&self, start: S, driving: S) -> S {
-        let settled = driving / self.resistance;
-        settled + (start - settled) * (self.numerator / self.denominator)
+        let settled = driving * self.per_resistance;
+        (start - settled).fma(self.decay, settled)
     }
 
     /// Driving voltage that brings the current from `start` to `end` in the step.
     #[inline(always)]
     pub fn voltage(&self, start: S, end: S) -> S {
-        let settled = (end * self.denominator - start * self.numerator) / (self.denominator - self.numerator);
-        self.resistance * settled
+        self.stiffness * (-start).fma(self.decay, end)
     }
 }

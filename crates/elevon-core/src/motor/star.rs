@@ -129,6 +129,12 @@ impl<S: Scalar> Star<S> {
         self.pole_pairs.fma(theta, self.offset)
     }
 
+    /// As `coefficients` with an even gap.
+    #[inline(always)]
+    pub fn even_coefficients(&self, shape: [S; 3]) -> [S; 3] {
+        three!(|j| self.emf_constant[j] * shape[j])
+    }
+
     /// k_j of the three phases (sheet 1.5): `shape` is f of the three phase angles.
     #[inline(always)]
     pub fn coefficients(&self, shape: [S; 3], gap: [S; 3]) -> [S; 3] {

@@ -14,6 +14,7 @@ mod x86;
 
 pub use dual::Dual;
 pub use portable::Portable;
+pub(crate) use trig::reduced_sin_cos;
 #[cfg(target_arch = "x86_64")]
 pub use x86::{Avx2x4, Avx512x8};
 

@@ -35,6 +35,13 @@ fn six<S: Scalar>(c: &[f64; 6], z: S) -> S {
     z2.fma(z2.fma(high, mid), low)
 }
 
+/// Sine and cosine of an angle within a quarter turn of zero, by the same polynomials without fused operations.
+pub fn reduced_sin_cos(r: f64) -> (f64, f64) {
+    let z = r * r;
+    let horner = |c: &[f64; 6]| c.iter().rev().fold(0.0, |sum, &x| x + z * sum);
+    (r + r * (z * horner(&SIN)), 1.0 - 0.5 * z + z * (z * horner(&COS)))
+}
+
 #[inline(always)]
 pub fn sin_cos<S: Scalar>(x: S) -> (S, S) {
     let (q, quarters) = (x * S::splat(TWO_OVER_PI)).quarters();

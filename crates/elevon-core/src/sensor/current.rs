@@ -14,7 +14,7 @@ variables! {
         OffsetB => "current.offset_b", "-", "A", Any, Sensor, Some(0.0), "offset of the sensor of phase b";
         OffsetC => "current.offset_c", "-", "A", Any, Sensor, Some(0.0), "offset of the sensor of phase c";
         NoiseDeviation => "current.noise_deviation", "-", "A", NonNegative, Sensor, Some(0.0), "standard deviation of the noise of each sensor";
-        NoiseSampleTime => "current.noise_sample_time", "-", "s", Positive, Sensor, Some(1e-5), "the noise is held over this time, which sets its band";
+        NoiseSampleTime => "current.noise_sample_time", "-", "s", Positive, Sensor, Some(5e-5), "the noise is held over this time, which sets its band";
         Bits => "current.bits", "-", "1", Between(0.0, 32.0), Sensor, Some(0.0), "resolution over twice the range; 0: not quantised";
         FullScale => "current.full_scale", "-", "A", Positive, Sensor, Some(40.0), "largest current the quantised sensor shows";
         FilterCutoff => "filter_cutoff", "f_c", "Hz", Positive, Sensor, Some(100.0), "cut-off of the first-order filters of the logged d and q quantities";
@@ -35,9 +35,9 @@ impl<S: Scalar> CurrentSensor<S> {
     pub fn derive(raw: &[S]) -> Self {
         use CurrentSensorParameter as P;
         let g = |p: P| raw[p as usize];
-        let bits = g(P::Bits).lane(0);
-        let levels = if bits > 0.0 { libm::exp2(bits) } else { 0.0 };
-        let resolution = if levels > 0.0 { S::splat(2.0) * g(P::FullScale) / S::splat(levels) } else { S::zero() };
+        let bits = g(P::Bits);
+        let levels = S::from_fn(|i| libm::exp2(bits.lane(i)));
+        let resolution = S::select(S::zero().lt(bits), S::splat(2.0) * g(P::FullScale) / levels, S::zero());
         let quantised = S::zero().lt(resolution);
         Self {
             gain: three!(|j| raw[P::GainA as usize + j]),

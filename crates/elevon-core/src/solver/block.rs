@@ -2,7 +2,7 @@
 
 use super::batch::Monitor;
 use super::spec::{Clock, RunOutput, RunSpec, Status};
-use crate::actuator::{Inputs, Setup, Tick, Wiring};
+use crate::actuator::{Inputs, Setup, Tick, Watch, Wiring};
 use crate::command::SourceLanes;
 use crate::fault::FaultLanes;
 use crate::noise::Key;
@@ -32,6 +32,7 @@ impl<S: Scalar> Lift<S> for Plain<'_> {
     fn severity(&self, lane: usize, fault: usize) -> S {
         S::splat(self.0[lane].faults[fault].severity)
     }
+    #[inline(always)]
     fn emit(&self, x: S, lane: usize, out: &mut Vec<f64>) {
         out.push(x.lane(lane));
     }
@@ -59,10 +60,96 @@ struct Advance<'a, W: Wiring, S: Scalar> {
 }
 
 impl<W: Wiring, S: Scalar> Kernel for Advance<'_, W, S> {
+    /// Some lane has left its limits or tripped.
+    type Output = bool;
+    #[inline(always)]
+    fn run(self) -> bool {
+        W::advance(self.structure, self.models, self.inputs, self.states, self.from, self.count);
+        let mut trouble = S::mask(false);
+        for state in self.states.iter() {
+            trouble = trouble | S::zero().lt(W::tripped(state));
+            for watch in W::watch(state) {
+                trouble = trouble | !watch.value.abs().le(S::splat(watch.limit));
+            }
+        }
+        S::any(trouble)
+    }
+}
+
+struct Observe<'a, W: Wiring, S: Scalar> {
+    structure: &'a W::Structure,
+    model: &'a W::Model<S>,
+    inputs: &'a Inputs<S>,
+    state: &'a W::State<S>,
+    t: f64,
+    out: &'a mut [S],
+}
+
+impl<W: Wiring, S: Scalar> Kernel for Observe<'_, W, S> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        W::advance(self.structure, self.models, self.inputs, self.states, self.from, self.count);
+        W::observe(self.structure, self.model, self.inputs, self.state, S::splat(self.t), self.out);
+    }
+}
+
+/// Observes one chunk and keeps a row of each of its lanes on every clock that is due.
+struct Keep<'a, W: Wiring, S: Scalar, L: Lift<S>> {
+    structure: &'a W::Structure,
+    model: &'a W::Model<S>,
+    inputs: &'a Inputs<S>,
+    state: &'a W::State<S>,
+    t: f64,
+    out: &'a mut [S],
+    lift: &'a L,
+    clocks: &'a [Clock],
+    due: &'a [Steps],
+    k: Steps,
+    first: usize,
+    stopped: &'a [Option<Steps>],
+    faults: &'a FaultLanes,
+    kept: &'a mut [Vec<Vec<f64>>],
+}
+
+impl<W: Wiring, S: Scalar, L: Lift<S>> Kernel for Keep<'_, W, S, L> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        W::observe(self.structure, self.model, self.inputs, self.state, S::splat(self.t), self.out);
+        for ((i, kept), stopped) in self.kept.iter_mut().enumerate().zip(self.stopped) {
+            if stopped.is_some() {
+                continue;
+            }
+            for ((clock, kept), &due) in self.clocks.iter().zip(kept).zip(self.due) {
+                if self.k < due {
+                    continue;
+                }
+                for &signal in &clock.signals {
+                    self.lift.emit(self.out[signal], i, kept);
+                }
+                for label in self.faults.labels(self.first + i) {
+                    self.lift.emit(S::splat(label), i, kept);
+                }
+            }
+        }
+    }
+}
+
+struct Ticking<'a, W: Wiring, S: Scalar> {
+    kind: u8,
+    structure: &'a W::Structure,
+    model: &'a W::Model<S>,
+    inputs: &'a Inputs<S>,
+    state: &'a mut W::State<S>,
+    t: f64,
+    noise: &'a mut dyn FnMut(u64) -> S,
+}
+
+impl<W: Wiring, S: Scalar> Kernel for Ticking<'_, W, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        W::tick(self.kind, self.structure, self.model, self.inputs, self.state, S::splat(self.t), self.noise);
     }
 }
 
@@ -83,6 +170,9 @@ pub struct Block<'a, W: Wiring, S: Scalar, L: Lift<S>> {
     sources: Vec<SourceLanes>,
     faults: FaultLanes,
     ticks: Vec<Tick>,
+    /// Steps at which each tick and each clock is due next.
+    tick_due: Vec<Steps>,
+    clock_due: Vec<Steps>,
     status: Vec<Status>,
     stopped: Vec<Option<Steps>>,
     kept: Vec<Vec<Vec<f64>>>,
@@ -103,8 +193,10 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         let faults = FaultLanes::new(runs.iter().map(|r| r.faults.clone()).collect(), grid);
         let sources = (0..W::PORTS.len()).map(|p| SourceLanes::new(runs.iter().map(|r| r.ports[p].clone()).collect())).collect();
         let ticks = W::ticks(&first.parameters, &structure);
-        let kept = (0..real).map(|_| clocks.iter().map(|c| Vec::with_capacity((steps / c.period + 1) as usize * c.signals.len())).collect()).collect();
+        let kept = (0..real).map(|r| clocks.iter().map(|c| Vec::with_capacity((steps / c.period + 1) as usize * (c.signals.len() + faults.count(r)))).collect()).collect();
         let mut block = Self {
+            tick_due: vec![0; ticks.len()],
+            clock_due: vec![0; clocks.len()],
             runs, real, lift, clocks, dt, steps, healthy, faults, sources, ticks, kept,
             models: Vec::new(),
             states: Vec::new(),
@@ -140,17 +232,17 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
     /// Runs to the end or until interrupted.
     pub fn run(mut self, monitor: &Monitor) -> Vec<RunOutput> {
         let began = Instant::now();
-        let mut k: Steps = 0;
+        let (mut k, mut trouble): (Steps, bool) = (0, true);
         let mut out = vec![S::zero(); W::signals().len()];
         loop {
             self.renew(k);
             self.tick(k);
             self.record(k, &mut out);
-            if k >= self.steps || !self.watch(k) {
+            if trouble && !self.watch(k) || k >= self.steps {
                 break;
             }
             let next = self.next_event(k);
-            self.advance(k, next - k);
+            trouble = self.advance(k, next - k);
             let advanced = next - k;
             k = next;
             if !monitor.advance(advanced * self.real as u64) {
@@ -162,8 +254,15 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         self.finish(k, out)
     }
 
-    fn advance(&mut self, from: Steps, count: Steps) {
-        S::vectorize(Advance::<W, S> { structure: &self.structure, models: &self.models, inputs: &self.inputs, states: &mut self.states, from, count });
+    fn advance(&mut self, from: Steps, count: Steps) -> bool {
+        S::vectorize(Advance::<W, S> {
+            structure: &self.structure,
+            models: &self.models,
+            inputs: &self.inputs,
+            states: &mut self.states,
+            from,
+            count,
+        })
     }
 
     /// Inputs and parameters that change at step `k`.
@@ -190,76 +289,94 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
     }
 
     fn tick(&mut self, k: Steps) {
-        for tick in &self.ticks {
-            if k % tick.period != 0 {
+        for (tick, due) in self.ticks.iter().zip(&mut self.tick_due) {
+            if k < *due {
                 continue;
             }
+            *due += tick.period;
             let count = k / tick.period;
             for chunk in 0..self.states.len() {
                 let first = chunk * S::LANES;
                 let runs = self.runs;
                 let mut noise = |channel: u64| S::from_fn(|i| Key::new(runs[first + i].seed, runs[first + i].run, channel).gaussian(count));
-                let t = S::splat(k as f64 * self.dt);
-                W::tick(tick.kind, &self.structure, &self.models[chunk], &self.inputs[chunk], &mut self.states[chunk], t, &mut noise);
+                S::vectorize(Ticking::<W, S> {
+                    kind: tick.kind,
+                    structure: &self.structure,
+                    model: &self.models[chunk],
+                    inputs: &self.inputs[chunk],
+                    state: &mut self.states[chunk],
+                    t: k as f64 * self.dt,
+                    noise: &mut noise,
+                });
             }
         }
     }
 
     fn record(&mut self, k: Steps, out: &mut [S]) {
-        if !self.clocks.iter().any(|c| k % c.period == 0) {
+        if self.clock_due.iter().all(|&due| k < due) {
             return;
         }
         for chunk in 0..self.states.len() {
-            self.observe(chunk, k, out);
-            for i in 0..S::LANES {
-                let lane = chunk * S::LANES + i;
-                if lane >= self.real || self.stopped[lane].is_some() {
-                    continue;
-                }
-                for (c, clock) in self.clocks.iter().enumerate() {
-                    if k % clock.period == 0 {
-                        for &signal in &clock.signals {
-                            self.lift.emit(out[signal], i, &mut self.kept[lane][c]);
-                        }
-                        let labels: Vec<f64> = self.faults.labels(lane).collect();
-                        for label in labels {
-                            self.lift.emit(S::splat(label), i, &mut self.kept[lane][c]);
-                        }
-                    }
-                }
+            let first = chunk * S::LANES;
+            let last = (first + S::LANES).min(self.real);
+            if first < last {
+                S::vectorize(Keep::<W, S, L> {
+                    structure: &self.structure,
+                    model: &self.models[chunk],
+                    inputs: &self.inputs[chunk],
+                    state: &self.states[chunk],
+                    t: k as f64 * self.dt,
+                    out,
+                    lift: &self.lift,
+                    clocks: self.clocks,
+                    due: &self.clock_due,
+                    k,
+                    first,
+                    stopped: &self.stopped[first..last],
+                    faults: &self.faults,
+                    kept: &mut self.kept[first..last],
+                });
+            }
+        }
+        for (due, clock) in self.clock_due.iter_mut().zip(self.clocks) {
+            if k >= *due {
+                *due += clock.period;
             }
         }
     }
 
     fn observe(&self, chunk: usize, k: Steps, out: &mut [S]) {
-        let t = S::splat(k as f64 * self.dt);
-        W::observe(&self.structure, &self.models[chunk], &self.inputs[chunk], &self.states[chunk], t, out);
+        let t = k as f64 * self.dt;
+        S::vectorize(Observe::<W, S> { structure: &self.structure, model: &self.models[chunk], inputs: &self.inputs[chunk], state: &self.states[chunk], t, out });
     }
 
     /// Marks lanes that diverged or tripped; false when no lane is left.
     fn watch(&mut self, k: Steps) -> bool {
         let time = k as f64 * self.dt;
         for chunk in 0..self.states.len() {
+            let watched = W::watch(&self.states[chunk]);
             let tripped = W::tripped(&self.states[chunk]);
-            for watch in W::watch(&self.states[chunk]) {
-                for i in 0..S::LANES {
-                    let lane = chunk * S::LANES + i;
-                    let x = watch.value.lane(i);
-                    if self.stopped[lane].is_none() && !(x.abs() <= watch.limit) {
-                        self.status[lane] = Status::Diverged { time, signal: watch.name };
-                        self.stopped[lane] = Some(k);
-                    }
-                }
-            }
-            for i in 0..S::LANES {
-                let lane = chunk * S::LANES + i;
-                if self.status[lane] == Status::Ok && tripped.lane(i) > 0.0 {
-                    let reason = W::trip_reason(&self.models[chunk], &self.states[chunk], i).unwrap_or_default();
-                    self.status[lane] = Status::Tripped { time, reason };
-                }
-            }
+            self.mark(chunk, time, k, &watched, tripped);
         }
         self.stopped[..self.real].iter().any(|s| s.is_none())
+    }
+
+    /// Marks the lanes of a chunk that just diverged or tripped.
+    fn mark(&mut self, chunk: usize, time: f64, k: Steps, watched: &[Watch<S>], tripped: S) {
+        for i in 0..S::LANES {
+            let lane = chunk * S::LANES + i;
+            if self.stopped[lane].is_some() {
+                continue;
+            }
+            let beyond = watched.iter().find(|w| !(w.value.lane(i).abs() <= w.limit));
+            if let Some(watch) = beyond {
+                self.status[lane] = Status::Diverged { time, signal: watch.name };
+                self.stopped[lane] = Some(k);
+            } else if self.status[lane] == Status::Ok && tripped.lane(i) > 0.0 {
+                let reason = W::trip_reason(&self.models[chunk], &self.states[chunk], i).unwrap_or_default();
+                self.status[lane] = Status::Tripped { time, reason };
+            }
+        }
     }
 
     fn next_event(&self, k: Steps) -> Steps {
@@ -267,9 +384,8 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         for source in &self.sources {
             next = next.min(source.next());
         }
-        for period in self.ticks.iter().map(|t| t.period).chain(self.clocks.iter().map(|c| c.period)) {
-            next = next.min((k / period + 1) * period);
-        }
+        let due = self.tick_due.iter().chain(&self.clock_due).copied().min();
+        next = next.min(due.unwrap_or(Steps::MAX));
         next.max(k + 1)
     }
 

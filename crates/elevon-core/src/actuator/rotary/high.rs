@@ -5,12 +5,13 @@
 //! changes no bit, so both forms agree exactly where both apply.
 
 use super::layout::*;
+use super::march::{march, Moment, Stepper};
 use super::signals::{HighSignal, HIGH};
-use crate::actuator::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring, MAX_CHUNKS};
+use crate::actuator::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring, WATCHED};
 use crate::control::current_dq::{CurrentControl, CurrentControlState, CurrentSample, PwmParameter};
 use crate::control::position_speed::{ControlParameter, ControlStructure, PositionSpeed, PositionSpeedState};
 use crate::fault::FaultKind;
-use crate::inverter::bridge::{quench, Bridge, BridgeState, InverterParameter, Windings};
+use crate::inverter::bridge::{quench, Bridge, BridgeState, BridgeStructure, InverterParameter, Windings};
 use crate::inverter::hysteresis::{count_transitions, relays};
 use crate::motor::star::{MotorParameter, MotorStructure, Star, StarState};
 use crate::scalar::{three_phase, Scalar};
@@ -46,10 +47,15 @@ pub struct Structure {
     pub(super) acquisition: bool,
     pub(super) full: bool,
     pub(super) bridge: bool,
+    bridge_structure: BridgeStructure,
     pub(super) elastic: bool,
     pub(super) measured_current: bool,
     pub(super) resolver: bool,
     pub(super) accounts: bool,
+    loaded: bool,
+    sloped: bool,
+    jams: bool,
+    thermal: bool,
 }
 
 /// Constants of a run.
@@ -110,38 +116,10 @@ pub(super) const E_BRAKE: usize = 4;
 pub(super) const E_LOAD: usize = 5;
 pub(super) const E_IMPACT: usize = 6;
 
-/// Steps whose inputs are evaluated together.
-const AHEAD: usize = 8;
-
 const TICK_COMMAND_NOISE: u8 = 0;
 const TICK_CURRENT_NOISE: u8 = 1;
 const TICK_CONTROL: u8 = 2;
 const TICK_CURRENT_CONTROL: u8 = 3;
-
-/// The inputs at one instant.
-#[derive(Clone, Copy)]
-pub(super) struct Moment<S> {
-    t: S,
-    command: S,
-    /// A brake cannot push: negative values count as zero.
-    brake: S,
-    shaft: S,
-    user: S,
-    supply: S,
-}
-
-impl<S: Scalar> Moment<S> {
-    #[inline(always)]
-    pub(super) fn at(inputs: &Inputs<S>, t: S) -> Self {
-        let brake = inputs[BRAKE].at(t).maximum(S::zero());
-        Self { t, command: inputs[COMMAND].at(t), brake, shaft: inputs[SHAFT].at(t), user: inputs[USER].at(t), supply: inputs[SUPPLY].at(t) }
-    }
-
-    fn none() -> Self {
-        let zero = S::zero();
-        Self { t: zero, command: zero, brake: zero, shaft: zero, user: zero, supply: zero }
-    }
-}
 
 /// What acts on the fast shaft.
 #[derive(Clone, Copy)]
@@ -178,6 +156,10 @@ impl Structure {
         let base = InverterParameter::SupplyVoltage.at();
         let detailed = InverterParameter::DETAIL.clone().any(|i| departs(base + i, 0.0));
         let bridge = open_phase || detailed || drive == Drive::Off;
+        let switches = InverterParameter::OpenAHigh as usize..=InverterParameter::ShortedCLow as usize;
+        let switch_faults = switches.into_iter().any(|i| departs(base + i, 0.0));
+        let trips = switch_faults || departs(InverterParameter::TripCurrent.at(), 0.0);
+        let bridge_structure = BridgeStructure { switch_faults, open_phases: open_phase, trips };
         let elastic = choice(PlayParameter::Model.at()) == 1;
         let first_gain = CurrentSensorParameter::GainA.at();
         let measured_current = !CurrentSensor::<f64>::ideal(raw.current_sensor()) || (0..9).any(|i| setup.touched[first_gain + i]);
@@ -185,7 +167,9 @@ impl Structure {
         let resolver = !Resolver::<f64>::ideal(raw.resolver()) || (0..5).any(|i| setup.touched[first_resolver + i]) || control.feedback == 2;
         let accounts = setup.recorded.iter().any(|&s| s >= HighSignal::EnergySupply as usize);
         let loaded = departs(GearParameter::Efficiency.at(), 1.0) || departs(GearParameter::EfficiencyAiding.at(), 1.0);
-        let mechanical = loaded || departs(FrictionParameter::ViscousSlope.at(), 0.0) || departs(FrictionParameter::JamTorque.at(), 0.0);
+        let sloped = departs(FrictionParameter::ViscousSlope.at(), 0.0);
+        let jams = departs(FrictionParameter::JamTorque.at(), 0.0);
+        let mechanical = loaded || sloped || jams;
         let thermal = departs(MotorParameter::TemperatureCoefficient.at(), 0.0) || departs(MotorParameter::FluxTemperatureCoefficient.at(), 0.0);
         let saturable = control.feedback == 1;
         let full = bridge
@@ -208,10 +192,15 @@ impl Structure {
             acquisition: setup.recorded.iter().any(|&s| (HighSignal::CurrentQMeas as usize..=HighSignal::VoltageQMeas as usize).contains(&s)),
             full,
             bridge,
+            bridge_structure,
             elastic,
             measured_current,
             resolver,
             accounts,
+            loaded,
+            sloped,
+            jams,
+            thermal,
         }
     }
 }
@@ -230,9 +219,14 @@ pub(super) fn shaft_loads<S: Scalar, const FULL: bool>(m: &Model<S>, structure: 
     let own = if elastic { x.shaft } else { load };
     let mut added = x.brake;
     if FULL {
-        let moving = s.motor_speed.sign();
-        let direction = S::select(s.motor_speed.equals(S::zero()), (torque - load).sign(), moving);
-        added = added + m.gear.load_friction(through, direction) + s.jammed * m.friction.jam_torque;
+        if structure.loaded {
+            let moving = s.motor_speed.sign();
+            let direction = S::select(s.motor_speed.equals(S::zero()), (torque - load).sign(), moving);
+            added = added + m.gear.load_friction(through, direction);
+        }
+        if structure.jams {
+            added = added + s.jammed * m.friction.jam_torque;
+        }
     }
     ShaftLoads { brake: x.brake, user_torque, load, own, through, static_limit: m.friction.static_limit + added, dynamic: m.friction.dynamic + added }
 }
@@ -257,8 +251,12 @@ pub(super) struct Coupling<S> {
 #[inline(always)]
 pub(super) fn coupling<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &State<S>, sin: S, cos: S) -> Coupling<S> {
     let (mut shape, _) = three_phase(sin, cos);
+    let eccentric = structure.motor.static_eccentricity;
+    if !FULL && !eccentric {
+        return Coupling { k: m.star.even_coefficients(shape), loop_k: [S::zero(); 3] };
+    }
     let mut gap = [S::one(); 3];
-    if structure.motor.static_eccentricity {
+    if eccentric {
         gap = m.star.static_gap(sin, cos);
     }
     let mut loop_k = [S::zero(); 3];
@@ -270,7 +268,9 @@ pub(super) fn coupling<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &St
             let turning = m.star.dynamic_gap(s.motor_position);
             gap = three!(|j| gap[j] * turning[j]);
         }
-        gap = three!(|j| gap[j] * s.star.flux_factor);
+        if structure.thermal {
+            gap = three!(|j| gap[j] * s.star.flux_factor);
+        }
         if structure.motor.shorted_loop {
             loop_k = m.star.loop_coefficients(shape, gap);
         }
@@ -343,7 +343,9 @@ fn step<S: Scalar, const FULL: bool, const PWM: bool>(m: &Model<S>, structure: &
     let old_legs = s.legs;
     if PWM {
         s.legs = m.current_control.compare(&s.current_control, x.t);
-    } else if !FULL || structure.drive == Drive::Hysteresis {
+    } else if FULL && structure.drive == Drive::Off {
+        s.legs = [S::zero(); 3];
+    } else {
         let error = three!(|j| s.current_ref * sin_phases[j] - measured[j]);
         s.legs = relays(m.half_band, old_legs, error);
     }
@@ -374,7 +376,9 @@ fn electric_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structur
     let mut emf: [S; 3] = three!(|j| c.k[j] * speed);
     let mut resistance = m.star.resistance;
     if FULL {
-        resistance = three!(|j| resistance[j] * s.star.resistance_factor);
+        if structure.thermal {
+            resistance = three!(|j| resistance[j] * s.star.resistance_factor);
+        }
         if structure.motor.shorted_loop {
             let added = m.star.loop_emf(&s.star, c.loop_k, speed);
             emf = three!(|j| emf[j] + added[j]);
@@ -387,15 +391,19 @@ fn electric_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structur
     let neutral;
     if FULL && structure.bridge {
         let windings = Windings { current: i, emf, per_inductance: m.star.per_inductance, resistance, open: m.star.open };
-        let (connection, v_n) = m.bridge.connect(&mut s.bridge, old_legs, s.legs, half_supply, &windings);
-        let all = connection.connected[0] & connection.connected[1] & connection.connected[2];
-        terminal = connection.voltage;
-        rail = connection.rail;
+        let connection = m.bridge.connect(&mut s.bridge, &structure.bridge_structure, old_legs, s.legs, half_supply, &windings);
+        terminal = connection.legs.voltage;
+        rail = connection.legs.rail;
         let plain = m.star.neutral(drops(&terminal));
-        neutral = S::select(all, plain, v_n);
-        // A floating phase shows its EMF over the neutral.
-        terminal = three!(|j| S::select(connection.connected[j], terminal[j], neutral + emf[j]));
-        legs = Some(connection);
+        if let Some(v_n) = connection.loose {
+            let connected = connection.legs.connected;
+            neutral = S::select(connected[0] & connected[1] & connected[2], plain, v_n);
+            // A floating phase shows its EMF over the neutral.
+            terminal = three!(|j| S::select(connected[j], terminal[j], neutral + emf[j]));
+            legs = Some(connection.legs);
+        } else {
+            neutral = plain;
+        }
     } else {
         neutral = m.star.neutral(drops(&terminal));
     }
@@ -441,7 +449,7 @@ fn account_electric<S: Scalar>(m: &Model<S>, s: &mut State<S>, old: [S; 3], new:
 fn mechanical_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &Moment<S>, s: &mut State<S>, torque: S) {
     let loads = shaft_loads::<S, FULL>(m, structure, x, s, torque);
     let speed = s.motor_speed;
-    let viscous = if FULL { m.friction.viscous_torque(speed) } else { m.friction.viscous * speed };
+    let viscous = if FULL && structure.sloped { m.friction.viscous_torque(speed) } else { m.friction.viscous * speed };
     let resist = loads.load + speed.signed(loads.dynamic) + viscous;
     let net = Friction::net_torque(torque, loads.load, resist, speed, loads.static_limit);
     let free = m.dt_per_inertia.fma(net, speed);
@@ -457,7 +465,7 @@ fn mechanical_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Struct
     } else {
         s.user_position = m.play.drag(position * m.gear.per_ratio, s.user_position);
     }
-    if FULL {
+    if FULL && structure.jams {
         let passed = ((s.user_position - m.friction.jam_position) * s.jam_side).le(S::zero());
         let seized = passed | S::splat(0.5).lt(m.friction.jam_anywhere);
         s.jammed = S::select(seized, S::one(), s.jammed);
@@ -495,34 +503,21 @@ fn account_mechanical<S: Scalar>(m: &Model<S>, s: &mut State<S>, loads: &ShaftLo
     s.energy[E_IMPACT] = s.energy[E_IMPACT] + half * m.inertia * (new * new - held * held);
 }
 
-#[inline(always)]
-fn steps<S: Scalar, const FULL: bool, const PWM: bool>(structure: &Structure, models: &[Model<S>], inputs: &[Inputs<S>], states: &mut [State<S>], from: Steps, count: Steps) {
-    // Inputs depend on time alone: evaluated some steps ahead, they leave the chain from state to state.
-    let mut ahead = [[Moment::none(); AHEAD]; MAX_CHUNKS];
-    let mut k = from;
-    while k < from + count {
-        let some = (from + count - k).min(AHEAD as Steps) as usize;
-        for ((model, inputs), moments) in models.iter().zip(inputs).zip(&mut ahead) {
-            for (i, moment) in moments[..some].iter_mut().enumerate() {
-                *moment = Moment::at(inputs, S::splat((k + i as Steps) as f64) * model.dt);
-            }
-        }
-        if let ([model], [state]) = (models, &mut *states) {
-            // One chunk: its state may stay in registers.
-            let mut s = *state;
-            for moment in &ahead[0][..some] {
-                step::<S, FULL, PWM>(model, structure, moment, &mut s);
-            }
-            *state = s;
-        } else {
-            // Several chunks side by side hide each other's latencies.
-            for i in 0..some {
-                for ((model, state), moments) in models.iter().zip(states.iter_mut()).zip(&ahead) {
-                    step::<S, FULL, PWM>(model, structure, &moments[i], state);
-                }
-            }
-        }
-        k += some as Steps;
+/// The step of the inner loop with and without details, behind relays or a carrier.
+struct HighStep<const FULL: bool, const PWM: bool>;
+
+impl<S: Scalar, const FULL: bool, const PWM: bool> Stepper<S> for HighStep<FULL, PWM> {
+    type Model = Model<S>;
+    type Structure = Structure;
+    type State = State<S>;
+
+    #[inline(always)]
+    fn dt(model: &Model<S>) -> S {
+        model.dt
+    }
+    #[inline(always)]
+    fn step(model: &Model<S>, structure: &Structure, moment: &Moment<S>, state: &mut State<S>) {
+        step::<S, FULL, PWM>(model, structure, moment, state);
     }
 }
 
@@ -646,6 +641,7 @@ impl Wiring for High {
         state.jam_side = S::select(free & state.jam_side.equals(S::zero()), side, state.jam_side);
     }
 
+    #[inline(always)]
     fn tick<S: Scalar>(kind: u8, structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &mut State<S>, t: S, noise: &mut dyn FnMut(u64) -> S) {
         match kind {
             TICK_COMMAND_NOISE => s.command_noise = m.noise_deviation * noise(0),
@@ -670,20 +666,22 @@ impl Wiring for High {
     #[inline(always)]
     fn advance<S: Scalar>(structure: &Structure, models: &[Model<S>], inputs: &[Inputs<S>], states: &mut [State<S>], from: Steps, count: Steps) {
         match (structure.full, structure.drive == Drive::Pwm) {
-            (false, false) => steps::<S, false, false>(structure, models, inputs, states, from, count),
-            (false, true) => steps::<S, false, true>(structure, models, inputs, states, from, count),
-            (true, false) => steps::<S, true, false>(structure, models, inputs, states, from, count),
-            (true, true) => steps::<S, true, true>(structure, models, inputs, states, from, count),
+            (false, false) => march::<HighStep<false, false>, S>(structure, models, inputs, states, from, count),
+            (false, true) => march::<HighStep<false, true>, S>(structure, models, inputs, states, from, count),
+            (true, false) => march::<HighStep<true, false>, S>(structure, models, inputs, states, from, count),
+            (true, true) => march::<HighStep<true, true>, S>(structure, models, inputs, states, from, count),
         }
     }
 
+    #[inline(always)]
     fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, state: &State<S>, t: S, out: &mut [S]) {
         super::observe::high(structure, m, inputs, state, t, out);
     }
 
-    fn watch<S: Scalar>(s: &State<S>) -> Vec<Watch<S>> {
+    #[inline(always)]
+    fn watch<S: Scalar>(s: &State<S>) -> [Watch<S>; WATCHED] {
         let currents = s.star.current[0].abs() + s.star.current[1].abs() + s.star.current[2].abs() + s.star.loop_current[0].abs() + s.star.loop_current[1].abs() + s.star.loop_current[2].abs();
-        vec![
+        [
             Watch { name: "motor_speed", value: s.motor_speed, limit: 1e6 },
             Watch { name: "current_a", value: currents, limit: 1e7 },
             Watch { name: "user_position", value: s.user_position, limit: 1e9 },
@@ -691,6 +689,7 @@ impl Wiring for High {
         ]
     }
 
+    #[inline(always)]
     fn tripped<S: Scalar>(s: &State<S>) -> S {
         s.bridge.tripped
     }

@@ -2,8 +2,9 @@
 //! without anti-windup and derivative filter, linear viscous friction; Borello friction and play kept.
 
 use super::layout::*;
+use super::march::{march, Moment, Stepper};
 use super::signals::{LowSignal as Q, LOW};
-use crate::actuator::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring};
+use crate::actuator::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring, WATCHED};
 use crate::control::current_dq::PwmParameter;
 use crate::control::position_speed::{ControlParameter, Mode};
 use crate::fault::FaultKind;
@@ -14,7 +15,7 @@ use crate::scalar::{three_phase, Scalar};
 use crate::sensor::current::CurrentSensorParameter;
 use crate::sensor::encoder::Encoder;
 use crate::sensor::filter::{closing, low_pass};
-use crate::sensor::resolver::{Resolver, ResolverParameter};
+use crate::sensor::resolver::{Reading, Resolver, ResolverParameter};
 use crate::time::Steps;
 use crate::transmission::friction::{Friction, FrictionParameter};
 use crate::transmission::gear::{Gear, GearParameter, LoadParameter};
@@ -37,6 +38,7 @@ pub struct Structure {
     angle: bool,
     dynamic_eccentricity: bool,
     loaded: bool,
+    jams: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -46,9 +48,8 @@ pub struct Model<S> {
     star: Star<S>,
     resistance: [S; 3],
     inductance: [S; 3],
-    healthy_constant: S,
-    healthy_resistance: S,
-    healthy_inductance: S,
+    healthy: Phase<S>,
+    electrical_inductance: S,
     flux_factor: S,
     voltage_ratio: S,
     band: S,
@@ -69,7 +70,7 @@ pub struct Model<S> {
     resolver: Resolver<S>,
     filter: S,
     inertia: S,
-    per_inertia: S,
+    dt_per_inertia: S,
     temperature: S,
 }
 
@@ -92,11 +93,29 @@ pub struct State<S> {
     tripped: S,
 }
 
-/// Torque constant, resistance and inductance of the equivalent phase at the present angle.
+/// The equivalent phase at one rotor angle.
+#[derive(Clone, Copy, Debug)]
+struct Phase<S> {
+    torque_constant: S,
+    circuit: Circuit<S>,
+    /// Torque per torque the controller believes in.
+    efficacy: S,
+    /// 1 / (J + efficacy K_p T_d): the derivative of the speed acts as inertia.
+    per_effective_inertia: S,
+}
+
+impl<S: Scalar> Phase<S> {
+    #[inline(always)]
+    fn new(torque_constant: S, circuit: Circuit<S>, per_torque_constant: S, inertia: S, derivative_inertia: S) -> Self {
+        let efficacy = torque_constant * per_torque_constant;
+        Self { torque_constant, circuit, efficacy, per_effective_inertia: S::one() / efficacy.fma(derivative_inertia, inertia) }
+    }
+}
+
 #[inline(always)]
-fn coefficients<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, commutation: S) -> (S, S, S) {
+fn phase<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, commutation: S) -> Phase<S> {
     if !structure.angle {
-        return (m.healthy_constant, m.healthy_resistance, m.healthy_inductance);
+        return m.healthy;
     }
     let (sin, cos) = m.star.electrical_angle(s.motor_position).sin_cos();
     let (shape, _) = three_phase(sin, cos);
@@ -113,11 +132,12 @@ fn coefficients<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, co
         shape
     };
     let e = equivalent(k, m.resistance, m.inductance, imposed_shape(sines, m.star.open));
-    (e.torque_constant * m.flux_factor, e.resistance, e.inductance)
+    let circuit = Circuit::new(e.resistance, e.inductance, m.dt);
+    Phase::new(e.torque_constant * m.flux_factor, circuit, m.per_torque_constant, m.inertia, m.derivative_inertia)
 }
 
 #[inline(always)]
-fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &mut State<S>, t: S) {
+fn step<S: Scalar>(m: &Model<S>, structure: &Structure, x: &Moment<S>, s: &mut State<S>) {
     let zero = S::zero();
     let speed = s.motor_speed;
     // Sensors.
@@ -133,7 +153,7 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
     };
 
     // Control electronics: P and PID; the derivative of the measured speed is solved with the acceleration.
-    let command = inputs[COMMAND].at(t);
+    let command = x.command;
     let demanded = match structure.mode {
         Mode::Position => m.position_gain * (command - position),
         _ => command,
@@ -142,16 +162,19 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
     let error = speed_ref - shown_speed;
     let slope = (speed_ref - s.speed_ref) * m.per_dt;
     let torque_mode = structure.mode == Mode::Torque;
-    let derivative_inertia = if torque_mode { zero } else { m.derivative_inertia };
+    let derivative_inertia = m.derivative_inertia;
     let demand = if torque_mode { command } else { m.speed_gain * error + s.integral + derivative_inertia * slope };
 
     // Loads.
-    let brake = inputs[BRAKE].at(t).maximum(zero);
-    let user_torque = inputs[USER].at(t) + m.gear.stiffness * (s.user_position - m.gear.spring_zero);
-    let load = inputs[SHAFT].at(t) + user_torque * m.gear.per_ratio;
-    let (k_t, resistance, inductance) = coefficients(m, structure, s, angle);
-    let efficacy = k_t * m.per_torque_constant;
-    let mut added = brake + s.jammed * m.friction.jam_torque;
+    let brake = x.brake;
+    let user_torque = x.user + m.gear.stiffness * (s.user_position - m.gear.spring_zero);
+    let load = x.shaft + user_torque * m.gear.per_ratio;
+    let p = phase(m, structure, s, angle);
+    let efficacy = p.efficacy;
+    let mut added = brake;
+    if structure.jams {
+        added = added + s.jammed * m.friction.jam_torque;
+    }
     let viscous = m.friction.viscous * speed;
     if structure.loaded {
         let start = (efficacy * demand - load).sign();
@@ -160,7 +183,7 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
     }
     let (static_limit, dynamic) = (m.friction.static_limit + added, m.friction.dynamic + added);
     let wanted = efficacy * demand - load;
-    let acceleration = (wanted - Friction::dry_torque(wanted, speed, static_limit, dynamic) - viscous) / (m.inertia + efficacy * derivative_inertia);
+    let acceleration = (wanted - Friction::dry_torque(wanted, speed, static_limit, dynamic) - viscous) * p.per_effective_inertia;
     s.torque_ref = (demand - derivative_inertia * acceleration).clamp_abs(m.torque_limit);
     s.speed_ref = speed_ref;
     if structure.integral {
@@ -168,9 +191,9 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
     }
 
     // Equivalent phase.
-    let emf = S::splat(2.0 / 3.0) * k_t * speed;
+    let emf = S::splat(2.0 / 3.0) * p.torque_constant * speed;
     let current_ref = s.torque_ref * m.per_torque_constant;
-    let circuit = Circuit::new(resistance, inductance, m.dt);
+    let circuit = &p.circuit;
     let target = match structure.drive {
         // The relays act only at the edges of their band; inside it the EMF drives the current.
         0 => circuit.current(s.current, -emf).clamp(current_ref - m.band, current_ref + m.band),
@@ -178,33 +201,56 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
         _ => zero,
     };
     let driving = circuit.voltage(s.current, target);
-    let supply = inputs[SUPPLY].at(t) * m.supply_scale;
-    let cross = m.star.pole_pairs * speed * m.healthy_inductance * s.current;
+    let supply = x.supply * m.supply_scale;
+    let cross = m.electrical_inductance * speed * s.current;
     let largest = m.voltage_ratio * supply;
-    let limit = (largest * largest - cross * cross).maximum(zero).sqrt();
-    s.voltage = (driving + emf).clamp_abs(limit);
+    // v_q^2 + v_d^2 stays inside the largest phase voltage; v_d is the cross coupling p omega L i_q.
+    let room = largest * largest - cross * cross;
+    s.voltage = driving + emf;
+    if S::any(room.lt(s.voltage * s.voltage)) {
+        s.voltage = s.voltage.clamp_abs(room.maximum(zero).sqrt());
+    }
     s.tripped = s.tripped.maximum(m.tripped);
     let live = S::one() - s.tripped;
     let reached = circuit.current(s.current, s.voltage - emf) * live;
     s.current = if structure.drive == 2 { zero } else { reached };
 
     // Motor and transmission dynamics.
-    s.motor_torque = m.star.saturate(k_t * s.current);
+    s.motor_torque = m.star.saturate(p.torque_constant * s.current);
     let active = s.motor_torque - load;
     let dry = Friction::dry_torque(active, speed, static_limit, dynamic);
     s.friction_torque = dry + viscous;
-    let free = speed + m.dt * (m.per_inertia * (active - dry - viscous));
+    let free = m.dt_per_inertia.fma(active - dry - viscous, speed);
     let new_speed = Friction::stop_at_reversal(speed, free);
     let (position, held) = m.gear.stop(s.motor_position + m.dt * new_speed, new_speed);
     s.motor_position = position;
     s.motor_speed = held;
     s.user_position = m.play.drag(position * m.gear.per_ratio, s.user_position);
-    let passed = ((s.user_position - m.friction.jam_position) * s.jam_side).le(zero);
-    s.jammed = S::select(passed | S::splat(0.5).lt(m.friction.jam_anywhere), S::one(), s.jammed);
+    if structure.jams {
+        let passed = ((s.user_position - m.friction.jam_position) * s.jam_side).le(zero);
+        s.jammed = S::select(passed | S::splat(0.5).lt(m.friction.jam_anywhere), S::one(), s.jammed);
+    }
 
     // Acquisition.
     s.filtered[0] = low_pass(m.filter, s.filtered[0], s.current);
     s.filtered[1] = low_pass(m.filter, s.filtered[1], s.voltage);
+}
+
+struct LowStep;
+
+impl<S: Scalar> Stepper<S> for LowStep {
+    type Model = Model<S>;
+    type Structure = Structure;
+    type State = State<S>;
+
+    #[inline(always)]
+    fn dt(model: &Model<S>) -> S {
+        model.dt
+    }
+    #[inline(always)]
+    fn step(model: &Model<S>, structure: &Structure, moment: &Moment<S>, state: &mut State<S>) {
+        step(model, structure, moment, state);
+    }
 }
 
 impl Wiring for Low {
@@ -249,6 +295,7 @@ impl Wiring for Low {
             resolver,
             angle: resolver || dynamic_eccentricity || turns.any(|x| x) || opens.clone().any(|i| departs(i, 0.0)) || departs(MotorParameter::EccentricityStatic.at(), 0.0),
             dynamic_eccentricity,
+            jams: departs(FrictionParameter::JamTorque.at(), 0.0),
             loaded: departs(GearParameter::Efficiency.at(), 1.0) || departs(GearParameter::EfficiencyAiding.at(), 1.0),
         }
     }
@@ -260,7 +307,7 @@ impl Wiring for Low {
         super::checks::low(raw)
     }
 
-    fn derive<S: Scalar>(raw: &[S], _structure: &Structure) -> Model<S> {
+    fn derive<S: Scalar>(raw: &[S], structure: &Structure) -> Model<S> {
         let view = Raw(raw);
         let at = |i: usize| raw[i];
         let one = S::one();
@@ -279,14 +326,20 @@ impl Wiring for Low {
         let drive = at(DriveParameter::Kind.at()).lane(0);
         let first_shorted = InverterParameter::ShortedAHigh.at();
         let shorted = (0..6).fold(S::zero(), |sum, i| sum + at(first_shorted + i));
+        let per_torque_constant = one / at(ControlParameter::TorqueConstant.at());
+        // A torque command passes the loops by, their derivative included.
+        let torque_mode = structure.mode == Mode::Torque;
+        let derivative_inertia = if torque_mode { S::zero() } else { gain * at(ControlParameter::DerivativeTime.at()) };
+        let constant = S::splat(1.5) * at(MotorParameter::EmfConstant.at()) * at(MotorParameter::FluxFraction.at()) * flux_factor;
+        let circuit = Circuit::new(at(MotorParameter::Resistance.at()) * resistance_factor, at(MotorParameter::Inductance.at()), dt);
+        let healthy = Phase::new(constant, circuit, per_torque_constant, inertia, derivative_inertia);
         Model {
             dt,
             per_dt: one / dt,
             resistance: three!(|j| star.resistance[j] * resistance_factor),
             inductance: three!(|j| one / star.per_inductance[j]),
-            healthy_constant: S::splat(1.5) * at(MotorParameter::EmfConstant.at()) * at(MotorParameter::FluxFraction.at()) * flux_factor,
-            healthy_resistance: at(MotorParameter::Resistance.at()) * resistance_factor,
-            healthy_inductance: at(MotorParameter::Inductance.at()),
+            healthy,
+            electrical_inductance: at(MotorParameter::PolePairs.at()) * at(MotorParameter::Inductance.at()),
             star,
             flux_factor,
             voltage_ratio: at(LowParameter::VoltageRatio.at()),
@@ -297,10 +350,10 @@ impl Wiring for Low {
             position_gain: at(ControlParameter::PositionGain.at()) * at(ControlParameter::PositionGainScale.at()),
             speed_gain: gain,
             integral_step: S::select(has_integral, gain / S::select(has_integral, ti, one) * dt, S::zero()),
-            derivative_inertia: gain * at(ControlParameter::DerivativeTime.at()),
+            derivative_inertia,
             speed_limit: at(ControlParameter::SpeedLimit.at()),
             torque_limit: at(ControlParameter::TorqueConstant.at()) * at(ControlParameter::CurrentLimit.at()),
-            per_torque_constant: one / at(ControlParameter::TorqueConstant.at()),
+            per_torque_constant,
             friction: Friction::derive(view.friction()),
             gear,
             play: Play::derive(view.play()),
@@ -308,7 +361,7 @@ impl Wiring for Low {
             resolver: Resolver::derive(view.resolver()),
             filter: closing(at(CurrentSensorParameter::FilterCutoff.at()), dt.lane(0)),
             inertia,
-            per_inertia: one / inertia,
+            dt_per_inertia: dt / inertia,
             temperature: at(MotorParameter::WindingTemperature.at()),
         }
     }
@@ -348,18 +401,16 @@ impl Wiring for Low {
 
     #[inline(always)]
     fn advance<S: Scalar>(structure: &Structure, models: &[Model<S>], inputs: &[Inputs<S>], states: &mut [State<S>], from: Steps, count: Steps) {
-        for k in from..from + count {
-            for ((m, inputs), s) in models.iter().zip(inputs).zip(states.iter_mut()) {
-                step(m, structure, inputs, s, S::splat(k as f64) * m.dt);
-            }
-        }
+        march::<LowStep, S>(structure, models, inputs, states, from, count);
     }
 
-    fn observe<S: Scalar>(_structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
+    #[inline(always)]
+    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
         let lag = s.motor_position * m.gear.per_ratio - s.user_position;
         let pushing = (m.play.half * S::splat(1.0 - 1e-9)).le(lag.abs()) & S::zero().le(lag * s.motor_speed);
         let mut held = s.held_angle;
-        let reading = m.resolver.read(s.motor_position, s.motor_speed, &mut held);
+        let ideal = Reading { angle: s.motor_position, position: s.motor_position, speed: s.motor_speed };
+        let reading = if structure.resolver { m.resolver.read(s.motor_position, s.motor_speed, &mut held) } else { ideal };
         let user_torque = inputs[USER].at(t) + m.gear.stiffness * (s.user_position - m.gear.spring_zero);
         let mut set = |q: Q, x: S| out[q as usize] = x;
         set(Q::Command, inputs[COMMAND].at(t));
@@ -386,13 +437,16 @@ impl Wiring for Low {
         set(Q::Tripped, s.tripped);
     }
 
-    fn watch<S: Scalar>(s: &State<S>) -> Vec<Watch<S>> {
-        vec![
+    #[inline(always)]
+    fn watch<S: Scalar>(s: &State<S>) -> [Watch<S>; WATCHED] {
+        [
             Watch { name: "motor_speed", value: s.motor_speed, limit: 1e6 },
             Watch { name: "current_q", value: s.current, limit: 1e7 },
             Watch { name: "user_position", value: s.user_position, limit: 1e9 },
+            Watch { name: "torque_ref", value: s.integral, limit: 1e12 },
         ]
     }
+    #[inline(always)]
     fn tripped<S: Scalar>(s: &State<S>) -> S {
         s.tripped
     }

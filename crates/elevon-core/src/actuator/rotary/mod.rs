@@ -6,6 +6,7 @@ mod faults;
 mod high;
 mod layout;
 mod low;
+mod march;
 mod observe;
 mod signals;
 

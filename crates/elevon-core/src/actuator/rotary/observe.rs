@@ -2,12 +2,15 @@
 
 use super::high::*;
 use super::layout::*;
+use super::march::Moment;
 use super::signals::HighSignal as Q;
 use crate::actuator::Inputs;
 use crate::scalar::{three_phase, Scalar};
+use crate::sensor::resolver::Reading;
 use crate::transmission::friction::Friction;
 use crate::three;
 
+#[inline(always)]
 pub(super) fn high<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
     let mut set = |q: Q, x: S| out[q as usize] = x;
     set(Q::Command, inputs[COMMAND].at(t) + s.command_noise);
@@ -23,7 +26,8 @@ pub(super) fn high<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inpu
     set(Q::WindingTemperature, m.temperature);
     set(Q::EncoderPosition, m.encoder.read(s.user_position));
     let mut held = s.held_angle;
-    let reading = m.resolver.read(s.motor_position, s.motor_speed, &mut held);
+    let ideal = Reading { angle: s.motor_position, position: s.motor_position, speed: s.motor_speed };
+    let reading = if structure.resolver { m.resolver.read(s.motor_position, s.motor_speed, &mut held) } else { ideal };
     set(Q::ResolverPosition, reading.position);
     set(Q::ResolverSpeed, reading.speed);
     electrical(structure, m, inputs, s, t, out);
@@ -32,6 +36,7 @@ pub(super) fn high<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inpu
 }
 
 /// In the operator model the user moves with the motor while the play is taken up, else it rests.
+#[inline(always)]
 fn user_speed<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>) -> S {
     if structure.elastic {
         return s.user_speed;
@@ -42,6 +47,7 @@ fn user_speed<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>) -> S
     S::select(pushing, s.motor_speed * m.gear.per_ratio, S::zero())
 }
 
+#[inline(always)]
 fn electrical<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
     let mut set = |q: Q, x: S| out[q as usize] = x;
     let (sin, cos) = m.star.electrical_angle(s.motor_position).sin_cos();
@@ -64,6 +70,7 @@ fn electrical<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>
 }
 
 /// Phase-to-neutral voltages of an ideal bridge in its present switching state.
+#[inline(always)]
 fn ideal_voltage<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, supply: S, sin: S, cos: S) -> [S; 3] {
     let c = coupling::<S, true>(m, structure, s, sin, cos);
     let terminal = three!(|j| s.legs[j] * S::splat(0.5) * supply);
@@ -72,6 +79,7 @@ fn ideal_voltage<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, s
     three!(|j| terminal[j] - neutral)
 }
 
+#[inline(always)]
 fn mechanical<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
     let (sin, cos) = m.star.electrical_angle(s.motor_position).sin_cos();
     let c = coupling::<S, true>(m, structure, s, sin, cos);
@@ -87,6 +95,7 @@ fn mechanical<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>
     set(Q::TransmissionTorque, if structure.elastic { contact_torque(m, s) } else { loads.user_torque });
 }
 
+#[inline(always)]
 fn energies<S: Scalar>(m: &Model<S>, s: &State<S>, out: &mut [S]) {
     for (q, i) in [
         (Q::EnergySupply, E_SUPPLY),

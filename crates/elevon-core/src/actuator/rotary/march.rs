@@ -1,0 +1,97 @@
+//! The inner loop of the rotary wirings: inputs some steps ahead, chunks of lanes side by side.
+
+use super::layout::{BRAKE, COMMAND, SHAFT, SUPPLY, USER};
+use crate::actuator::{Inputs, MAX_CHUNKS};
+use crate::scalar::Scalar;
+use crate::time::Steps;
+
+/// Steps whose inputs are evaluated together.
+const AHEAD: usize = 8;
+
+/// The inputs at one instant.
+#[derive(Clone, Copy)]
+pub(super) struct Moment<S> {
+    pub t: S,
+    pub command: S,
+    /// A brake cannot push: negative values count as zero.
+    pub brake: S,
+    pub shaft: S,
+    pub user: S,
+    pub supply: S,
+}
+
+impl<S: Scalar> Moment<S> {
+    #[inline(always)]
+    pub(super) fn at(inputs: &Inputs<S>, t: S) -> Self {
+        let brake = inputs[BRAKE].at(t).maximum(S::zero());
+        Self { t, command: inputs[COMMAND].at(t), brake, shaft: inputs[SHAFT].at(t), user: inputs[USER].at(t), supply: inputs[SUPPLY].at(t) }
+    }
+
+    /// The instant of the next step: `steady` inputs but the command keep their values.
+    #[inline(always)]
+    fn move_to(&mut self, inputs: &Inputs<S>, steady: bool, t: S, command: S) {
+        if !steady {
+            self.brake = inputs[BRAKE].at(t).maximum(S::zero());
+            self.shaft = inputs[SHAFT].at(t);
+            self.user = inputs[USER].at(t);
+            self.supply = inputs[SUPPLY].at(t);
+        }
+        self.t = t;
+        self.command = command;
+    }
+
+    fn none() -> Self {
+        let zero = S::zero();
+        Self { t: zero, command: zero, brake: zero, shaft: zero, user: zero, supply: zero }
+    }
+}
+
+/// One step of a wiring, as the inner loop calls it.
+pub(super) trait Stepper<S> {
+    type Model;
+    type Structure;
+    type State: Copy;
+    fn dt(model: &Self::Model) -> S;
+    fn step(model: &Self::Model, structure: &Self::Structure, moment: &Moment<S>, state: &mut Self::State);
+}
+
+#[inline(always)]
+pub(super) fn march<T: Stepper<S>, S: Scalar>(structure: &T::Structure, models: &[T::Model], inputs: &[Inputs<S>], states: &mut [T::State], from: Steps, count: Steps) {
+    // Commands depend on time alone: evaluated some steps ahead, they leave the chain from state to state.
+    let mut commands = [[S::zero(); AHEAD]; MAX_CHUNKS];
+    let mut moments = [Moment::none(); MAX_CHUNKS];
+    let mut steady = [false; MAX_CHUNKS];
+    for ((model, inputs), (moment, steady)) in models.iter().zip(inputs).zip(moments.iter_mut().zip(&mut steady)) {
+        *moment = Moment::at(inputs, S::splat(from as f64) * T::dt(model));
+        *steady = inputs[COMMAND + 1..].iter().all(|source| source.flat());
+    }
+    let mut k = from;
+    while k < from + count {
+        let some = (from + count - k).min(AHEAD as Steps) as usize;
+        for ((model, inputs), commands) in models.iter().zip(inputs).zip(commands.iter_mut()) {
+            for (i, command) in commands[..some].iter_mut().enumerate() {
+                *command = inputs[COMMAND].at(S::splat((k + i as Steps) as f64) * T::dt(model));
+            }
+        }
+        if let ([model], [inputs], [state]) = (models, inputs, &mut *states) {
+            // One chunk: its state may stay in registers.
+            let (mut s, mut moment, steady) = (*state, moments[0], steady[0]);
+            for (i, &command) in commands[0][..some].iter().enumerate() {
+                let t = S::splat((k + i as Steps) as f64) * T::dt(model);
+                moment.move_to(inputs, steady, t, command);
+                T::step(model, structure, &moment, &mut s);
+            }
+            *state = s;
+        } else {
+            // Several chunks side by side hide each other's latencies.
+            for i in 0..some {
+                let number = S::splat((k + i as Steps) as f64);
+                for (c, ((model, inputs), state)) in models.iter().zip(inputs).zip(states.iter_mut()).enumerate().take(MAX_CHUNKS) {
+                    moments[c].move_to(inputs, steady[c], number * T::dt(model), commands[c][i]);
+                    T::step(model, structure, &moments[c], state);
+                }
+            }
+        }
+        k += some as Steps;
+    }
+}

@@ -1,0 +1,324 @@
+"""Parameters of an actuator from bench logs."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.calibrate.balance import Regression, controller_law, torque_balance
+from elevon.calibrate.direct import saturated_speed
+from elevon.calibrate.dynamic import Dynamic, dynamic_stage
+from elevon.calibrate.estimate import Estimate
+from elevon.calibrate.findings import amplitude_findings, plant_findings
+from elevon.calibrate.heldout import HeldOut, held_out
+from elevon.calibrate.kinematics import CommandFit, command_fit
+from elevon.calibrate.log import BenchLog
+from elevon.calibrate.plant import (
+    Torque,
+    controller_estimates,
+    plant_estimates,
+    torque_scale,
+)
+from elevon.calibrate.positions import position_estimates
+from elevon.errors import InputError, Interrupted
+from elevon.parameters.records import record_of
+from elevon.progress import Progress, part
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["Calibration", "calibrate"]
+
+Bools = npt.NDArray[np.bool_]
+_RUN_IN = 1.0  # s at least before a log counts
+_SETTLED = 0.5  # s after the set point has left its limit for the first time
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The answer.
+
+    Attributes
+    ----------
+    actuator : Actuator
+        With the calibrated values.
+    before : Actuator
+        As given.
+    logs : tuple of BenchLog
+        The data.
+    skipped : dict of str to float
+        Seconds left out at the beginning of each log.
+    estimates : tuple of Estimate
+        Everything estimated; those with `in_set` went into `actuator`.
+    followed : mapping of str to float
+        Values that had to follow others.
+    torque : Torque
+        Where the scale of all torques comes from.
+    plant, law : Regression or None
+        The two regressions.
+    commands : tuple of CommandFit
+        Commands reconstructed.
+    dynamic : Dynamic or None
+        Identifiability and the fit of model runs.
+    held_out : tuple of HeldOut
+        Errors on data that were kept from the fit.
+    findings : tuple of str
+        What the user should know, in words.
+    wall_s : float
+        Time it took.
+    """
+
+    actuator: Actuator
+    before: Actuator
+    logs: tuple[BenchLog, ...]
+    skipped: Mapping[str, float]
+    estimates: tuple[Estimate, ...]
+    followed: Mapping[str, float]
+    torque: Torque
+    plant: Regression | None
+    law: Regression | None
+    commands: tuple[CommandFit, ...]
+    dynamic: Dynamic | None
+    held_out: tuple[HeldOut, ...]
+    findings: tuple[str, ...]
+    wall_s: float = field(compare=False)
+
+    def __getitem__(self, path: str) -> Estimate:
+        for item in self.estimates:
+            if item.path == path:
+                return item
+        from elevon.errors import unknown
+
+        raise unknown("estimate", path, [item.path for item in self.estimates])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form."""
+        groups: dict[str, list[dict[str, Any]]] = {}
+        for item in self.estimates:
+            name = "derived" if item.path.startswith("derived.") else item.register
+            groups.setdefault(name, []).append(item.to_dict())
+        return {
+            "status": "ok",
+            "actuator": self.before.name,
+            "logs": [
+                {"name": log.name, "samples": len(log.time), "rate_hz": 1.0 / log.period,
+                 "brake": log.brake.known, "skipped_s": self.skipped[log.name],
+                 "warnings": list(log.warnings)}
+                for log in self.logs
+            ],
+            "parameters": {i.path: i.to_dict() for i in self.estimates},
+            "registers": {name: [i["path"] for i in items] for name, items in groups.items()},
+            "torque_constant": {
+                "value": self.torque.constant, "from_load_cell": self.torque.measured,
+                "determined": "torque constant and inertia apart" if self.torque.measured
+                else "only ratios to the torque constant",
+            },
+            "followed": dict(self.followed),
+            "explained": {
+                "torque_balance": self.plant.explained if self.plant else None,
+                "speed_controller": self.law.explained if self.law else None,
+            },
+            "commands": [item.to_dict() for item in self.commands],
+            "identifiability": self.dynamic.ranking.to_dict() if self.dynamic else None,
+            "simulation_fit": self.dynamic.to_dict() if self.dynamic else None,
+            "held_out": [item.to_dict() for item in self.held_out],
+            "findings": list(self.findings),
+            "wall_s": self.wall_s,
+        }  # fmt: skip
+
+
+def calibrate(
+    logs: Sequence[BenchLog],
+    actuator: Actuator,
+    *,
+    free: Sequence[str] | None = None,
+    fidelity: str = "low",
+    transient: float | None = None,
+    hold_out: bool = True,
+    progress: Progress | None = None,
+) -> Calibration:
+    """Estimate what the logs determine.
+
+    Parameters
+    ----------
+    logs : sequence of BenchLog
+        From `elevon.calibrate.read_logs`.
+    actuator : Actuator
+        Values before; those that are not estimated stay.
+    free : sequence of str, optional
+        Parameter paths to estimate; default: all that the logs determine.
+    fidelity : str
+        Of the model runs: ``low`` or ``high``.
+    transient : float, optional
+        Seconds left out at the beginning of each log; default: until the set point has left its
+        limit for the first time.
+    hold_out : bool
+        Whether to refit without each log in turn (without the end of a single log).
+    progress : callable, optional
+        Told the done fraction; returns False to stop.
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    InputError
+        No log, an unknown path, or a path asked for that the logs do not determine.
+    Interrupted
+        `progress` returned False.
+    """
+    begin = clock.perf_counter()
+    if not logs:
+        raise InputError("calibration needs at least one log")
+    _check(actuator, logs, free, fidelity)
+    skipped = {log.name: _run_in(log, transient) for log in logs}
+    keeps = [log.good & (log.time >= skipped[log.name]) for log in logs]
+    _go(progress, 0.02)
+    positions = position_estimates(logs, actuator)
+    _go(progress, 0.1)
+    plant, law = torque_balance(logs, keeps), controller_law(logs, keeps)
+    _go(progress, 0.25)
+    torque = torque_scale(actuator, plant)
+    found, followed = list(positions), {}
+    if plant is not None:
+        estimates, followed = plant_estimates(actuator, plant, torque)
+        found += estimates
+    if law is not None:
+        found += controller_estimates(actuator, law, torque, [log.name for log in logs])
+    commands = _commands(logs, actuator, found)
+    _go(progress, 0.35)
+    found = _asked(found, free, actuator)
+    dynamic = dynamic_stage(
+        logs, keeps, actuator, found, free, fidelity=fidelity, progress=part(progress, 0.35, 0.8)
+    )
+    if dynamic is not None:
+        found += dynamic.estimates(actuator, [item.path for item in found], free)
+    _missing(free, found, torque)
+    fitted = _with_values(actuator, found, followed, torque, dynamic)
+    kept = held_out(logs, keeps, actuator, fitted, part(progress, 0.8, 1.0)) if hold_out else ()
+    findings = (
+        *plant_findings(logs, plant, torque, found, dynamic, actuator),
+        *amplitude_findings(commands, found),
+    )
+    _go(progress, 1.0)
+    return Calibration(
+        actuator=fitted, before=actuator, logs=tuple(logs), skipped=skipped,
+        estimates=tuple(found), followed=followed, torque=torque, plant=plant, law=law,
+        commands=tuple(commands), dynamic=dynamic, held_out=tuple(kept), findings=findings,
+        wall_s=clock.perf_counter() - begin,
+    )  # fmt: skip
+
+
+def _check(
+    actuator: Actuator, logs: Sequence[BenchLog], free: Sequence[str] | None, fidelity: str
+) -> None:
+    from elevon.simulate.prepare import check_fidelity
+
+    if actuator.wiring != "rotary":
+        raise InputError(
+            f"{actuator.name}: drive logs calibrate the wiring 'rotary', not {actuator.wiring!r}"
+        )
+    check_fidelity(actuator.wiring, fidelity)
+    names = [log.name for log in logs]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"two logs are named {name}; give them different names")
+    for path in free or ():
+        if record_of(actuator.wiring, path, "--free").choices is not None:
+            raise InputError(f"--free {path}: is a choice, not a number")
+
+
+def _run_in(log: BenchLog, transient: float | None) -> float:
+    """Seconds left out: until the set point has left its limit for the first time, 1 s at least."""
+    if transient is not None:
+        if not 0.0 <= transient < log.duration:
+            raise InputError(
+                f"transient of {transient:g} s: {log.name} lasts {log.duration:g} s"
+            )
+        return transient
+    limit = 0.999 * saturated_speed(log)
+    held = np.abs(log.speed_ref) >= limit
+    early = np.flatnonzero(held[: len(held) // 2])
+    first = 0.0
+    if early.size:
+        after = np.flatnonzero(~held[early[0] :])
+        first = float(log.time[early[0] + after[0]]) + _SETTLED if after.size else 0.0
+    return min(max(first, _RUN_IN), 0.5 * log.duration)
+
+
+def _go(progress: Progress | None, fraction: float) -> None:
+    if progress is not None and not progress(fraction):
+        raise Interrupted("calibration stopped")
+
+
+def _commands(
+    logs: Sequence[BenchLog], actuator: Actuator, found: list[Estimate]
+) -> list[CommandFit]:
+    """Commands, and the position gain pooled over them."""
+    from elevon.calibrate.positions import gain_estimate
+
+    value = actuator.parameters.value
+    limit = next((i.value for i in found if i.path == "control.speed_limit"),
+                 value("control.speed_limit"))  # fmt: skip
+    gain = value("control.position_gain")
+    fits = [fit for log in logs if (fit := command_fit(log, gain, limit)) is not None]
+    pooled = gain_estimate(fits, gain)
+    if pooled is not None:
+        found.append(pooled)
+    return fits
+
+
+def _asked(
+    found: list[Estimate], free: Sequence[str] | None, actuator: Actuator
+) -> list[Estimate]:
+    """Keep what was asked for, what no set holds, and only what a set can take."""
+    kept = []
+    for item in found:
+        if item.in_set and free is not None and item.path not in free:
+            continue
+        if item.in_set:
+            record = record_of(actuator.wiring, item.path)
+            low = item.value < record.minimum or (record.minimum_open and item.value == record.minimum)
+            if low or item.value > record.maximum or not np.isfinite(item.std):
+                continue
+        kept.append(item)
+    return kept
+
+
+def _missing(free: Sequence[str] | None, found: Sequence[Estimate], torque: Torque) -> None:
+    known = {item.path for item in found}
+    for path in free or ():
+        if path in known:
+            continue
+        if path == "motor.emf_constant" and not torque.measured:
+            raise InputError(
+                "--free motor.emf_constant: without a load cell the logs tell only the ratio of "
+                "inertia and friction to the torque constant; add --loadcell, or leave it out"
+            )
+        raise InputError(
+            f"--free {path}: nothing in the logs excites it enough; leave it out or add a log "
+            "that does"
+        )
+
+
+def _with_values(
+    actuator: Actuator, found: Sequence[Estimate], followed: Mapping[str, float], torque: Torque,
+    dynamic: Dynamic | None,
+) -> Actuator:  # fmt: skip
+    values: dict[str, str | float] = dict(followed)
+    values |= {item.path: item.value for item in found if item.in_set}
+    if torque.measured and torque.tied and "motor.emf_constant" in values:
+        values["control.torque_constant"] = torque.believed
+    if dynamic is not None and dynamic.drive != actuator.parameters["drive.kind"].value:
+        values["drive.kind"] = dynamic.drive
+    if "friction.dynamic" in values and "friction.static" not in values:
+        old = actuator.parameters.value
+        ratio = old("friction.static") / max(old("friction.dynamic"), 1e-300)
+        values["friction.static"] = max(ratio, 1.0) * float(values["friction.dynamic"])
+    return actuator.with_values(values, source="calibration")

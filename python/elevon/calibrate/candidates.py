@@ -1,0 +1,195 @@
+"""What can be freed: parameters of the model, and quantities of the sensors that no set holds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from elevon.calibrate.direct import DirectEstimate, direct_estimate
+from elevon.calibrate.log import BenchLog
+from elevon.errors import InputError
+from elevon.parameters.records import record_of
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["AUTO", "Candidate", "candidates", "start_values"]
+
+#: What `auto` tries to free in the dynamic fit, in the model's own parameters.
+AUTO = (
+    "friction.dynamic",
+    "friction.viscous",
+    "friction.static",
+    "motor.inertia",
+    "motor.emf_constant",
+    "control.speed_gain",
+    "control.integral_time",
+    "control.derivative_time",
+    "sensor.filter_cutoff",
+)
+_FILTER = (2.0, 5000.0)  # Hz
+_DELAY = 0.02  # s
+_KNOTS = 4  # of an unknown brake's level over a log
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One number that the dynamic fit may free.
+
+    Attributes
+    ----------
+    path : str
+        Parameter path, or ``sensor.current_offset``, ``sensor.speed_offset``,
+        ``sensor.speed_delay``, ``sensor.load_cell_offset``, ``load.brake[LOG][KNOT]``.
+    kind : str
+        ``parameter``, ``output`` (acts on a simulated signal) or ``input`` (acts on the brake).
+    register : str
+        As the core's records, for the report.
+    unit : str
+        SI.
+    log_scale : bool
+        Fitted as a logarithm.
+    low, high : float
+        Bounds.
+    size : float
+        A meaningful change: of the logarithm, or in SI.
+    index : tuple of int
+        Log and knot of an input.
+    """
+
+    path: str
+    kind: str
+    register: str
+    unit: str
+    log_scale: bool
+    low: float
+    high: float
+    size: float
+    index: tuple[int, ...] = ()
+
+    def inner(self, value: float) -> float:
+        """Return the fitted variable of a value."""
+        return math.log(value) if self.log_scale else value
+
+    def outer(self, x: float) -> float:
+        """Return the value of a fitted variable."""
+        return math.exp(x) if self.log_scale else x
+
+
+def candidates(
+    actuator: Actuator, logs: Sequence[BenchLog], free: Sequence[str] | None
+) -> list[Candidate]:
+    """List what may be freed: the user's paths, or those of `AUTO` that the logs could tell.
+
+    Raises
+    ------
+    InputError
+        An unknown path, a choice, or one the model fixes (gear ratio, solver).
+    """
+    from elevon.calibrate.kinematics import KINEMATIC
+
+    if free is None:
+        paths = [path for path in AUTO if _sensible(path, actuator, logs)]
+    else:
+        paths = [path for path in free if path not in KINEMATIC]
+    found = [_parameter(path, actuator) for path in paths]
+    current = max(float(abs(log.current).max()) for log in logs)
+    speed = max(float(abs(log.speed).max()) for log in logs)
+    if not current > 0.0 or not speed > 0.0:
+        raise InputError("the logs hold no motion and no current: nothing can be calibrated")
+    found += [
+        Candidate("sensor.current_offset", "output", "sensor", "A", False, -current, current,
+                  0.01 * current),
+        Candidate("sensor.speed_offset", "output", "sensor", "rad/s", False, -speed, speed,
+                  0.01 * speed),
+        Candidate("sensor.speed_delay", "output", "sensor", "s", False, -_DELAY, _DELAY, 1e-3),
+    ]  # fmt: skip
+    return found + _brakes(logs)
+
+
+def _brakes(logs: Sequence[BenchLog]) -> list[Candidate]:
+    """Offset of the load cell where another log shows the friction alone; unknown brakes."""
+    found = []
+    measured = [log for log in logs if log.brake.measured]
+    if measured and any(log.brake.known == "off" for log in logs):
+        top = max(float(log.brake.level.max()) for log in measured)
+        found.append(
+            Candidate("sensor.load_cell_offset", "input", "sensor", "N m", False,
+                      -top, top, 0.01 * top)
+        )  # fmt: skip
+    for k, log in enumerate(logs):
+        if log.brake.known in {"on", "force"}:
+            found += [
+                Candidate(f"load.brake[{log.name}][{j}]", "input", "load", "N m", False,
+                          0.0, 100.0, 0.1, (k, j))
+                for j in range(_KNOTS)
+            ]  # fmt: skip
+    return found
+
+
+def _sensible(path: str, actuator: Actuator, logs: Sequence[BenchLog]) -> bool:
+    if path == "motor.emf_constant":
+        return any(log.brake.measured for log in logs)
+    if path == "sensor.filter_cutoff":
+        return all(log.current_signal == "current_q_meas" for log in logs)
+    if path in {"control.integral_time", "control.derivative_time"}:
+        return actuator.parameters.value(path) > 0.0
+    return path in actuator.parameters
+
+
+def _parameter(path: str, actuator: Actuator) -> Candidate:
+    record = record_of(actuator.wiring, path, "--free")
+    if record.choices is not None:
+        raise InputError(f"--free {path}: is a choice, not a number")
+    if record.register == "solver" or path == "gear.ratio":
+        raise InputError(f"--free {path}: belongs to the model's making, not to a log")
+    value = actuator.parameters.value(path)
+    if path == "sensor.filter_cutoff":
+        return Candidate(path, "parameter", record.register, record.unit, True, *_FILTER, 0.3)
+    if value > 0.0 and record.minimum >= 0.0:
+        low = max(record.minimum, 1e-3 * value)
+        high = min(record.maximum, 1e3 * value)
+        return Candidate(path, "parameter", record.register, record.unit, True, low, high, 0.1)
+    span = max(1.0, 10.0 * abs(value))
+    low, high = max(record.minimum, value - span), min(record.maximum, value + span)
+    return Candidate(path, "parameter", record.register, record.unit, False, low, high, 0.01 * span)
+
+
+def start_values(actuator: Actuator, logs: Sequence[BenchLog]) -> dict[str, float]:
+    """Return first values in the model's parameters; those that make no sense are left out."""
+    found = direct_estimate(logs)
+    kt = found.torque_constant or 1.5 * actuator.parameters.value("motor.emf_constant")
+    values: dict[str, float] = {}
+    if found.torque_constant is not None:
+        values["motor.emf_constant"] = kt / 1.5
+    if found.dry > 0.0:
+        ratio = actuator.parameters.value("friction.static") / max(
+            actuator.parameters.value("friction.dynamic"), 1e-12
+        )
+        values["friction.dynamic"] = kt * found.dry
+        values["friction.static"] = kt * found.dry * max(ratio, 1.0)
+    if found.viscous > 0.0:
+        values["friction.viscous"] = kt * found.viscous
+    rest = _other_inertia(actuator)
+    if kt * found.inertia > 1.05 * rest:
+        values["motor.inertia"] = kt * found.inertia - rest
+    return values | _controller(actuator, found, kt)
+
+
+def _controller(actuator: Actuator, found: DirectEstimate, kt: float) -> dict[str, float]:
+    if not found.proportional > 0.0:
+        return {}
+    values = {"control.speed_gain": kt * found.proportional}
+    if found.integral > 0.0 and actuator.parameters.value("control.integral_time") > 0.0:
+        values["control.integral_time"] = found.proportional / found.integral
+    if found.derivative > 0.0 and actuator.parameters.value("control.derivative_time") > 0.0:
+        values["control.derivative_time"] = found.derivative / found.proportional
+    return values
+
+
+def _other_inertia(actuator: Actuator) -> float:
+    """Inertia on the fast shaft beside the motor's own."""
+    value = actuator.parameters.value
+    return value("gear.inertia") + value("load.inertia") / value("gear.ratio") ** 2

@@ -1,0 +1,127 @@
+"""First values straight from the signals: torque balance and speed controller by regression.
+
+These start the fit and rank what a log can tell; they carry no interval of their own (noise in the
+derivatives biases them a little).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.calibrate.log import BenchLog
+
+__all__ = ["DirectEstimate", "direct_estimate", "robust_lines", "saturated_speed"]
+
+Floats = npt.NDArray[np.float64]
+_SLOW = 0.05  # of the highest speed: below it the direction of friction is not sure
+_WINDOW = 0.03  # s of the local parabolas that give acceleration
+_TURNS = 30
+
+
+@dataclass(frozen=True)
+class DirectEstimate:
+    """Regression results per ampere (or absolute where the brake's torque is known).
+
+    Attributes
+    ----------
+    inertia, viscous, dry : float
+        Over the torque constant [A s2/rad, A s/rad, A].
+    torque_constant : float or None
+        [N m/A], from logs with a load cell.
+    proportional, integral, derivative : float
+        Speed controller over its torque constant [A s/rad, A/rad, A s2/rad].
+    """
+
+    inertia: float
+    viscous: float
+    dry: float
+    torque_constant: float | None
+    proportional: float
+    integral: float
+    derivative: float
+
+
+def direct_estimate(logs: Sequence[BenchLog]) -> DirectEstimate:
+    """Regress the current on motion, brake and control error over all logs."""
+    plant = _plant(logs)
+    control = _control(logs)
+    brake = plant[3] if len(plant) > 3 else 0.0
+    return DirectEstimate(
+        inertia=float(plant[0]), viscous=float(plant[1]), dry=float(plant[2]),
+        torque_constant=1.0 / float(brake) if brake > 0.0 else None,
+        proportional=float(control[0]), integral=float(control[1]), derivative=float(control[2]),
+    )  # fmt: skip
+
+
+def robust_lines(design: Floats, target: Floats) -> Floats:
+    """Huber regression by reweighting; columns scaled, dependent ones get no weight."""
+    scale = np.linalg.norm(design, axis=0)
+    scaled = design / np.where(scale > 0.0, scale, 1.0)
+    weight = np.ones(len(target))
+    beta = np.zeros(design.shape[1])
+    for _ in range(_TURNS):
+        root = np.sqrt(weight)
+        fresh, *_ = np.linalg.lstsq(scaled * root[:, None], target * root, rcond=1e-9)
+        rest = target - scaled @ fresh
+        spread = 1.4826 * float(np.median(np.abs(rest))) or 1e-300
+        weight = np.minimum(1.0, 1.345 * spread / np.maximum(np.abs(rest), 1e-300))
+        if np.abs(fresh - beta).max() <= 1e-8 * (np.abs(fresh).max() or 1.0):
+            beta = fresh
+            break
+        beta = fresh
+    return np.asarray(beta / np.where(scale > 0.0, scale, 1.0), dtype=np.float64)
+
+
+def _smooth(log: BenchLog, values: Floats, order: int) -> Floats:
+    from scipy.signal import savgol_filter
+
+    width = max(5, round(_WINDOW / log.period) | 1)
+    delta = log.period
+    return np.asarray(savgol_filter(values, width, 2, deriv=order, delta=delta), dtype=np.float64)
+
+
+def _plant(logs: Sequence[BenchLog]) -> Floats:
+    rows, targets = [], []
+    cell = any(log.brake.measured for log in logs)
+    for k, log in enumerate(logs):
+        if log.brake.known in {"on", "force"} and len(logs) > 1:
+            continue  # an unknown resistive torque: its friction is not the actuator's
+        speed = _smooth(log, log.speed, 0)
+        keep = log.good & (np.abs(speed) > _SLOW * np.abs(speed).max())
+        sign = np.sign(speed)
+        columns = [_smooth(log, log.speed, 1), speed, sign]
+        if cell:
+            columns.append(sign * np.interp(log.time, log.brake.time, log.brake.level))
+        columns += [np.full_like(speed, float(j == k)) for j in range(len(logs))]
+        rows.append(np.column_stack(columns)[keep])
+        targets.append(_smooth(log, log.current, 0)[keep])
+    if not rows:
+        return np.zeros(4)
+    return robust_lines(np.vstack(rows), np.concatenate(targets))
+
+
+def _control(logs: Sequence[BenchLog]) -> Floats:
+    rows, targets = [], []
+    for k, log in enumerate(logs):
+        error = log.speed_ref - log.speed
+        inside = np.abs(log.speed_ref) < 0.999 * saturated_speed(log)
+        integral = np.concatenate(
+            ([0.0], np.cumsum(0.5 * (error[1:] + error[:-1]) * np.diff(log.time)))
+        )
+        columns = [_smooth(log, error, 0), integral, _smooth(log, error, 1)]
+        columns += [np.full_like(error, float(j == k)) for j in range(len(logs))]
+        keep = log.good & inside
+        rows.append(np.column_stack(columns)[keep])
+        targets.append(_smooth(log, log.current, 0)[keep])
+    return robust_lines(np.vstack(rows), np.concatenate(targets))
+
+
+def saturated_speed(log: BenchLog) -> float:
+    """Level at which the set point is held flat [rad/s]; infinite where it never is."""
+    top = float(np.abs(log.speed_ref).max())
+    flat = np.abs(log.speed_ref) > top * (1.0 - 1e-4)
+    return top if top > 0.0 and int(flat.sum()) >= 20 else float("inf")

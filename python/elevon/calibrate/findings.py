@@ -1,0 +1,97 @@
+"""What a calibration has to say in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from elevon.calibrate.balance import Regression
+from elevon.calibrate.dynamic import Dynamic
+from elevon.calibrate.estimate import Estimate
+from elevon.calibrate.kinematics import CommandFit
+from elevon.calibrate.log import BenchLog
+from elevon.calibrate.plant import Torque
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["amplitude_findings", "plant_findings"]
+
+_CONVENTION = 0.05  # relative: how near a factor must be to sqrt 2 to be named
+_FACTOR = 0.002  # relative: a smaller amplitude factor is not worth a word
+_POOR = 0.8  # explained share below which a regression is doubtful
+
+
+def plant_findings(
+    logs: Sequence[BenchLog], plant: Regression | None, torque: Torque,
+    found: Sequence[Estimate], dynamic: Dynamic | None, actuator: Actuator,
+) -> list[str]:  # fmt: skip
+    """Sentences on torque scale, brakes, drive and misfit."""
+    says = []
+    if plant is None:
+        says.append("no log moves both ways long enough for a torque balance: friction and inertia "
+                    "come from model runs alone, or stay as they were")  # fmt: skip
+    elif plant.explained < _POOR:
+        says.append(f"the torque balance explains only {100 * plant.explained:.0f} % of the "
+                    "current: something the model lacks moves it")  # fmt: skip
+    if torque.measured:
+        says += _convention(torque, actuator)
+    else:
+        says.append("no load cell: the logs tell inertia, friction and speed gain only as ratios to "
+                    "the torque constant; motor.emf_constant is kept as given and the values scale "
+                    "with it")  # fmt: skip
+    says += [
+        f"{log.name}: the brake acted but its torque was not measured; its friction is not used for "
+        "the actuator's" if len(logs) > 1 else
+        f"{log.name}: the brake acted but its torque was not measured; friction includes it"
+        for log in logs if log.brake.known in {"on", "force"}
+    ]  # fmt: skip
+    if dynamic is not None:
+        own = actuator.parameters["drive.kind"].value
+        if dynamic.drive != own:
+            says.append(f"drive.kind {dynamic.drive!r} explains the logs better than {own!r}")
+        says += [
+            f"{path} absorbs what the {_percent(a, b)} model lacks: model runs want {a:.5g}, "
+            f"the signals themselves say {b:.5g}"
+            for path, a, b in dynamic.absorbed
+        ]
+        says += [f"{path} ended at its bound" for path in dynamic.fit.at_bound]
+        says += [f"{p} is not determined: {why}" for p, why in dynamic.ranking.dropped.items()]
+        if not dynamic.fit.converged:
+            says.append("the fit on model runs stopped before its tolerance was met")
+    return says
+
+
+def _percent(a: float, b: float) -> str:
+    return f"({100.0 * (a / b - 1.0):+.1f} %)"
+
+
+def _convention(torque: Torque, actuator: Actuator) -> list[str]:
+    value = actuator.parameters.value
+    ratio = torque.constant / (1.5 * value("motor.emf_constant") * value("motor.flux_fraction"))
+    for factor, name in ((math.sqrt(2.0), "peak"), (1.0 / math.sqrt(2.0), "rms")):
+        if abs(ratio / factor - 1.0) < _CONVENTION:
+            return [f"the torque constant is {ratio:.3f} times the set's: the logged currents may "
+                    f"be {name} values taken for the other convention"]  # fmt: skip
+    return []
+
+
+def amplitude_findings(
+    commands: Sequence[CommandFit], found: Sequence[Estimate]
+) -> list[str]:
+    """Name a constant amplitude factor between the bench and the model, and where it sits."""
+    says = []
+    gain = next((item for item in found if item.path == "sensor.encoder.gain"), None)
+    if gain is not None and abs(gain.value - 1.0) > max(_FACTOR, 3.0 * gain.std):
+        says.append(f"amplitude factor {gain.value:.4f} between the encoder and the motor over the "
+                    "gear ratio: encoder gain (sensor.encoder.gain) or another gear ratio")  # fmt: skip
+    for fit in commands:
+        if fit.factor is None:
+            continue
+        std = abs(fit.factor) * fit.amplitude_std / max(abs(fit.amplitude), 1e-300)
+        if abs(fit.factor - 1.0) > max(_FACTOR, 3.0 * std):
+            says.append(f"{fit.log}: amplitude factor {fit.factor:.4f} between the command the "
+                        "bench followed and the one noted: the command is scaled, not the "
+                        "actuator")  # fmt: skip
+    return says

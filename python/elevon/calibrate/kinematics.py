@@ -1,0 +1,191 @@
+"""What positions, speeds and set points tell without any torque.
+
+Play, encoder gain and offset from the two positions; speed sensor from the motor's angle; position
+gain and amplitude of the command from set point and encoder; the speed limit where it is held.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.bench.command import reconstruct
+from elevon.bench.covariance import robust_covariance
+from elevon.bench.fit_command import FREE, WaveformFit, best_waveform, fit_waveform
+from elevon.bench.waveforms import evaluate
+from elevon.calibrate.blocks import block_covariance
+from elevon.calibrate.direct import saturated_speed
+from elevon.calibrate.log import BenchLog
+from elevon.errors import InputError
+
+__all__ = ["KINEMATIC", "CommandFit", "command_fit", "speed_limit", "speed_sensor"]
+
+Floats = npt.NDArray[np.float64]
+
+#: Paths that come from positions alone, not from the dynamic fit.
+KINEMATIC = (
+    "play.total",
+    "sensor.encoder.offset",
+    "sensor.encoder.gain",
+    "control.position_gain",
+    "control.speed_limit",
+)
+_SMALL = 0.02  # RMS of the command's misfit over its spread, above which no waveform explains it
+
+
+@dataclass(frozen=True)
+class CommandFit:
+    """Waveform of a log's command with the position gain fitted along.
+
+    Attributes
+    ----------
+    log : str
+        The log.
+    waveform : WaveformFit
+        With the gain of the set.
+    gain, gain_std : float
+        Position gain [1/s].
+    amplitude, amplitude_std : float
+        Of the waveform [rad]; NaN where it has none.
+    factor : float or None
+        Amplitude over the amplitude the operator noted.
+    """
+
+    log: str
+    waveform: WaveformFit
+    gain: float
+    gain_std: float
+    amplitude: float
+    amplitude_std: float
+    factor: float | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain types."""
+        return {
+            "log": self.log, "waveform": self.waveform.kind, "values": dict(self.waveform.values),
+            "std": dict(self.waveform.std), "rms": self.waveform.rms,
+            "position_gain": self.gain, "position_gain_std": self.gain_std,
+            "amplitude_factor": self.factor,
+            "amplitude_factor_std": None if self.factor is None
+            else abs(self.factor) * self.amplitude_std / max(abs(self.amplitude), 1e-300),
+        }  # fmt: skip
+
+
+def command_fit(log: BenchLog, gain: float, limit: float) -> CommandFit | None:
+    """Fit the command's waveform and the position gain of one log.
+
+    Parameters
+    ----------
+    log : BenchLog
+        With the user's position.
+    gain : float
+        Position gain to start from [1/s].
+    limit : float
+        Limit of the speed set point [rad/s].
+
+    Returns
+    -------
+    CommandFit or None
+        None where the position is missing or no waveform explains the set point.
+    """
+    if log.user is None:
+        return None
+    try:
+        trace = reconstruct(log.time, log.speed_ref, log.user, gain=gain, limit=limit)
+        kind = log.note.waveform if log.note else None
+        if kind == "chirp" and log.note is not None:
+            known = {n: v for n, v in log.note.parameters.items() if n in {"sweep_time", "start"}}
+            fit = fit_waveform(trace, "chirp", fixed=known)
+        else:
+            fit = fit_waveform(trace, kind) if kind else best_waveform(trace)
+    except InputError:
+        return None
+    spread = float(np.std(log.user))
+    if not spread > 0.0 or fit.rms > 3.0 * _SMALL * spread:
+        return None
+    return _with_gain(log, fit, gain, limit)
+
+
+def _with_gain(
+    log: BenchLog, fit: WaveformFit, gain: float, limit: float
+) -> CommandFit | None:
+    """Waveform's parameters and the gain together: waveform = set point / gain + position."""
+    from scipy.optimize import least_squares
+
+    names = [n for n in FREE[fit.kind] if math.isfinite(fit.values[n])]
+    inside = log.good & (np.abs(log.speed_ref) < 0.999 * limit)
+    inside &= (log.time >= fit.window[0]) & (log.time <= fit.window[1])
+    assert log.user is not None
+    t, ref, user = log.time[inside], log.speed_ref[inside] / gain, log.user[inside]
+    start = np.array([*(fit.values[n] for n in names), 1.0])
+    scale = np.array([*(max(abs(fit.values[n]), 1e-3) for n in names), 1.0])
+
+    def residual(x: Floats) -> Floats:
+        values = {**fit.values, **dict(zip(names, map(float, x[:-1]), strict=True))}
+        return np.asarray(evaluate(fit.kind, values, t) - ref * x[-1] - user, dtype=np.float64)
+
+    best = least_squares(residual, start, x_scale=scale * 1e-2, jac="3-point", max_nfev=100)
+    if not best.success:
+        return None
+    rest = np.asarray(best.fun)
+    if float(rest.std()) > _SMALL * float(np.std(user)):
+        return None
+    covariance = robust_covariance(np.asarray(best.jac), rest)
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    inverse, inverse_std = float(best.x[-1]), float(std[-1])
+    if not inverse > 0.0:
+        return None
+    at = names.index("amplitude") if "amplitude" in names else None
+    amplitude = math.nan if at is None else abs(float(best.x[at]))
+    noted = log.note.parameters.get("amplitude") if log.note else None
+    factor = amplitude / abs(noted) if noted and at is not None else None
+    return CommandFit(
+        log=log.name, waveform=fit, gain=gain / inverse, gain_std=gain * inverse_std / inverse**2,
+        amplitude=amplitude, amplitude_std=math.nan if at is None else float(std[at]),
+        factor=factor,
+    )  # fmt: skip
+
+
+def speed_sensor(logs: Sequence[BenchLog]) -> dict[str, tuple[float, float]] | None:
+    """Gain and offset of the logged speed against the motor's angle, with deviations.
+
+    The integral of the speed is regressed on the angle and on time: angle = (int w - o t)/g + c.
+    """
+    rows, data, blocks = [], [], []
+    used = [log for log in logs if log.motor is not None and np.ptp(log.motor) > 0.0]
+    for k, log in enumerate(used):
+        assert log.motor is not None
+        turned = np.concatenate(
+            ([0.0], np.cumsum(0.5 * (log.speed[1:] + log.speed[:-1]) * np.diff(log.time)))
+        )
+        starts = [np.full_like(turned, float(j == k)) for j in range(len(used))]
+        # Differences over a block of time: their noise is that of the speed, not its sum.
+        step = max(1, round(0.05 / log.period))
+        columns = np.column_stack((log.motor, log.time, *starts))
+        rows.append(columns[step::step] - columns[:-step:step][: len(columns[step::step])])
+        data.append(turned[step::step] - turned[:-step:step][: len(turned[step::step])])
+        blocks.append(np.arange(len(data[-1])) // 10)
+    if not used:
+        return None
+    design = np.vstack(rows)[:, :2]
+    target = np.concatenate(data)
+    normal = design.T @ design
+    if np.linalg.cond(normal / np.outer(*[np.sqrt(np.diag(normal))] * 2)) > 1e12:
+        return None
+    beta = np.linalg.solve(normal, design.T @ target)
+    rest = target - design @ beta
+    parts = np.split(rest[:, None] * design, np.cumsum([len(d) for d in data])[:-1])
+    covariance, _ = block_covariance(normal, parts, blocks)
+    std = np.sqrt(np.diag(covariance))
+    return {"gain": (float(beta[0]), float(std[0])), "offset": (float(beta[1]), float(std[1]))}
+
+
+def speed_limit(logs: Sequence[BenchLog]) -> float | None:
+    """Level at which the set point is held flat, where any log shows one [rad/s]."""
+    tops = [top for log in logs if math.isfinite(top := saturated_speed(log))]
+    return max(tops) if tops else None

@@ -1,0 +1,164 @@
+"""Play, encoder gain and offset from the two positions alone.
+
+The encoder shows the motor's angle over the ratio, dragged through the play: one equation, no
+friction, inertia or controller in it. All samples count, those inside the gap too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.calibrate.blocks import block_covariance
+from elevon.calibrate.log import BenchLog
+
+__all__ = ["PlayFit", "fit_play", "through_play"]
+
+Floats = npt.NDArray[np.float64]
+_TRAVEL = 3.0  # plays (or counts) of travel both ways that a log must have
+_NAMES = ("play", "offset", "gain", "delay")
+
+
+@dataclass(frozen=True)
+class PlayFit:
+    """What the two positions say, pooled over logs.
+
+    Attributes
+    ----------
+    play, offset, gain, delay : (float, float)
+        Value and standard deviation: total play [rad at the user]; encoder less motor over ratio
+        [rad]; encoder's gain over the motor's; encoder's lag behind the motor's sensor [s].
+    degrees : float
+        Degrees of freedom of the deviations.
+    rms : float
+        Of the residual [rad].
+    logs : tuple of str
+        Logs used.
+    """
+
+    play: tuple[float, float]
+    offset: tuple[float, float]
+    gain: tuple[float, float]
+    delay: tuple[float, float]
+    degrees: float
+    rms: float
+    logs: tuple[str, ...]
+
+
+def through_play(driver: Floats, width: float) -> Floats:
+    """Drag a follower through a total play; it starts in the middle. Shape as `driver`."""
+    half = 0.5 * width
+    out = np.empty_like(driver)
+    state = float(driver[0])
+    for k, x in enumerate(driver.tolist()):
+        state = min(max(state, x - half), x + half)
+        out[k] = state
+    return out
+
+
+def fit_play(logs: Sequence[BenchLog], ratio: float, count: float) -> PlayFit | None:
+    """Fit play, offset, gain and delay to every log that moves both ways.
+
+    Parameters
+    ----------
+    logs : sequence of BenchLog
+        Those without both positions are passed over.
+    ratio : float
+        Gear ratio.
+    count : float
+        One count of the encoder at the user [rad].
+
+    Returns
+    -------
+    PlayFit or None
+        None where no log has both positions and a reversal.
+    """
+    used = [log for log in logs if _usable(log, ratio, count)]
+    if not used:
+        return None
+    from scipy.optimize import least_squares
+
+    drivers = [log.motor / ratio for log in used if log.motor is not None]
+    users = [log.user for log in used if log.user is not None]
+    width, centre = _start(used, drivers, users)
+    keeps = [_after_reversal(x, width) for x in drivers]
+    speeds = [log.speed / ratio for log in used]
+    scale = np.array([count, count, 1e-4, 1e-3])
+
+    def residual(p: Floats) -> Floats:
+        parts = []
+        for x, y, v, keep in zip(drivers, users, speeds, keeps, strict=True):
+            dragged = through_play(x, abs(float(p[0])))
+            moving = np.gradient(dragged) / np.maximum(np.abs(np.gradient(x)), 1e-15)
+            follows = v * np.clip(np.abs(moving), 0.0, 1.0)
+            parts.append(((p[2] * dragged + p[1] - p[3] * follows) - y)[keep])
+        return np.concatenate(parts) / count
+
+    best = least_squares(
+        residual, [width, centre, 1.0, 0.0], x_scale=scale, diff_step=1e-3, loss="soft_l1",
+        f_scale=3.0, max_nfev=30, jac=lambda p: _jacobian(residual, p, scale),
+    )  # fmt: skip
+    covariance, degrees = _covariance(best, used, keeps)
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    value = np.array(best.x)
+    value[0] = abs(value[0])
+    rms = count * float(np.sqrt(np.mean(residual(best.x) ** 2)))
+    pairs = [(float(v), float(s)) for v, s in zip(value, std, strict=True)]
+    return PlayFit(pairs[0], pairs[1], pairs[2], pairs[3], degrees, rms, tuple(x.name for x in used))
+
+
+def _jacobian(residual: object, p: Floats, scale: Floats) -> Floats:
+    """Central differences over steps of the size that matters: the play's kinks average out."""
+    columns = []
+    for k, step in enumerate(0.5 * scale):
+        shift = np.zeros_like(p)
+        shift[k] = step
+        columns.append((residual(p + shift) - residual(p - shift)) / (2.0 * step))  # type: ignore[operator]
+    return np.column_stack(columns)
+
+
+def _usable(log: BenchLog, ratio: float, count: float) -> bool:
+    if log.motor is None or log.user is None:
+        return False
+    speed = np.abs(log.speed).max()
+    both = min(float((log.speed > 0.1 * speed).mean()), float((log.speed < -0.1 * speed).mean()))
+    return both > 0.02 and float(np.ptp(log.motor)) / ratio > _TRAVEL * count
+
+
+def _start(
+    logs: Sequence[BenchLog], drivers: Sequence[Floats], users: Sequence[Floats]
+) -> tuple[float, float]:
+    """Median lag of each direction, well away from reversals: half a play either side of centre."""
+    ahead, behind = [], []
+    for log, x, y in zip(logs, drivers, users, strict=True):
+        fast = 0.3 * np.abs(log.speed).max()
+        lag = y - x
+        ahead.append(np.median(lag[log.speed > fast]))
+        behind.append(np.median(lag[log.speed < -fast]))
+    up, down = float(np.median(ahead)), float(np.median(behind))
+    return max(down - up, 1e-7), 0.5 * (up + down)
+
+
+def _after_reversal(x: Floats, width: float) -> npt.NDArray[np.bool_]:
+    """Samples after the gap has surely been crossed once: before, the start decides the user."""
+    reach = np.maximum.accumulate(x) - np.minimum.accumulate(x)
+    return np.asarray(reach > 1.5 * width, dtype=np.bool_)
+
+
+def _covariance(
+    best: object, logs: Sequence[BenchLog], keeps: Sequence[npt.NDArray[np.bool_]]
+) -> tuple[Floats, float]:
+    """Blocks of half a second: the encoder's rounding repeats itself within a stretch of motion."""
+    jac, fun = np.asarray(best.jac), np.asarray(best.fun)  # type: ignore[attr-defined]
+    weight = 1.0 / np.sqrt(1.0 + (fun / 3.0) ** 2)
+    scores, blocks, at = [], [], 0
+    for log, keep in zip(logs, keeps, strict=True):
+        size = int(keep.sum())
+        part = slice(at, at + size)
+        scores.append(jac[part] * (weight[part] * fun[part])[:, None])
+        blocks.append(np.floor(log.time[keep] / 0.5).astype(np.int64))
+        at += size
+    return block_covariance(jac.T @ (weight[:, None] * jac), scores, blocks)
