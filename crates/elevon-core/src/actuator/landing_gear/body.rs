@@ -6,7 +6,7 @@ use super::signals::{Quantity as Q, ENERGIES};
 use super::unit::{Shown, Unit};
 use crate::actuator::{Inputs, Setup};
 use crate::control::pi_rate::PiRateParameter;
-use crate::inverter::bridge::InverterParameter;
+use crate::inverter::bridge::{BridgeStructure, InverterParameter as Inverter};
 use crate::inverter::six_step::SixStep;
 use crate::inverter::supply::{Link, Supply};
 use crate::motor::star::{MotorParameter, MotorStructure, Star};
@@ -20,6 +20,7 @@ use crate::transmission::lock::LockParameter;
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Structure {
     pub motor: MotorStructure,
+    pub bridge: BridgeStructure,
     /// The friction rig moves the ram.
     pub rig: bool,
     pub accounts: bool,
@@ -35,9 +36,20 @@ impl Structure {
                 static_eccentricity: departs(MotorParameter::EccentricityStatic),
                 dynamic_eccentricity: departs(MotorParameter::EccentricityDynamic),
             },
+            bridge: bridge(setup),
             rig: setup.driven[RIG],
             accounts: setup.recorded.iter().any(|s| ENERGIES.contains(s)),
         }
+    }
+}
+
+fn bridge(setup: &Setup) -> BridgeStructure {
+    let departs = |i: usize| setup.departs(i, 0.0);
+    let switch_faults = (Inverter::OpenAHigh.at()..=Inverter::ShortedCLow.at()).any(departs);
+    BridgeStructure {
+        switch_faults,
+        open_phases: (MotorParameter::OpenA.at()..=MotorParameter::OpenC.at()).any(departs),
+        trips: switch_faults || departs(Inverter::TripCurrent.at()),
     }
 }
 
@@ -103,7 +115,7 @@ impl<S: Scalar> Constants<S> {
             cutoff: modulator.cutoff,
             modulator,
             supply: Supply::derive(view.supply(), dt),
-            supply_scale: at(InverterParameter::SupplyScale.at()),
+            supply_scale: at(Inverter::SupplyScale.at()),
             mechanics: Mechanics::derive(raw, mechanical),
             resistance_factor: S::one() + at(MotorParameter::TemperatureCoefficient.at()) * rise,
             flux_factor: S::one() + at(MotorParameter::FluxTemperatureCoefficient.at()) * rise,
@@ -130,7 +142,7 @@ impl<S: Scalar> Constants<S> {
             driving: zero,
             brake_free: zero,
             released: zero,
-            link: raw[InverterParameter::SupplyVoltage.at()] * self.supply_scale,
+            link: raw[Inverter::SupplyVoltage.at()] * self.supply_scale,
             flow: Link { source: zero, dump: zero },
             bus: zero,
             charge: zero,

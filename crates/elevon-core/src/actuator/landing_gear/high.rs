@@ -3,10 +3,10 @@
 use super::body::{Body, Constants, Structure, E_COPPER, E_INVERTER};
 use super::layout::*;
 use super::signals::{Quantity as Q, ALL};
-use crate::actuator::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring};
+use crate::actuator::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring, WATCHED};
 use crate::control::pi_rate::PiRateParameter;
 use crate::fault::FaultKind;
-use crate::inverter::bridge::{quench, Bridge, BridgeState, Windings};
+use crate::inverter::bridge::{quench, Bridge, BridgeState, BridgeStructure, Windings};
 use crate::inverter::six_step;
 use crate::scalar::Scalar;
 use crate::three;
@@ -51,7 +51,7 @@ struct Part<S> {
 
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
-fn part<S: Scalar>(m: &Model<S>, s: &mut State<S>, legs: [S; 3], k: [S; 3], resistance: [S; 3], dt: S, start: [S; 3]) -> Part<S> {
+fn part<S: Scalar>(m: &Model<S>, structure: &BridgeStructure, s: &mut State<S>, legs: [S; 3], k: [S; 3], resistance: [S; 3], dt: S, start: [S; 3]) -> Part<S> {
     let half = S::splat(0.5);
     let zero = S::zero();
     let half_supply = half * s.body.link;
@@ -59,7 +59,11 @@ fn part<S: Scalar>(m: &Model<S>, s: &mut State<S>, legs: [S; 3], k: [S; 3], resi
     let i = start;
     let emf: [S; 3] = three!(|j| k[j] * speed);
     let windings = Windings { current: i, emf, per_inductance: m.c.star.per_inductance, resistance, open: m.c.star.open };
-    let (state, neutral) = m.bridge.connect(&mut s.bridge, s.legs, legs, half_supply, &windings);
+    let connection = m.bridge.connect(&mut s.bridge, structure, s.legs, legs, half_supply, &windings);
+    let state = connection.legs;
+    let all = state.connected[0] & state.connected[1] & state.connected[2];
+    let plain = m.c.star.neutral(three!(|j| (-resistance[j]).fma(i[j], state.voltage[j] - emf[j])));
+    let neutral = connection.loose.map_or(plain, |loose| S::select(all, plain, loose));
     s.legs = legs;
     let terminal: [S; 3] = three!(|j| S::select(state.connected[j], state.voltage[j], neutral + emf[j]));
     let free: [S; 3] = three!(|j| {
@@ -102,12 +106,12 @@ fn electric<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, so
     let split = gated & on.lt(S::one());
     let first = S::select(split, on * dt, dt);
     let start = s.current;
-    let mut whole = part(m, s, legs, k, resistance, first, start);
+    let mut whole = part(m, &structure.bridge, s, legs, k, resistance, first, start);
     if S::any(split) {
         let blanking = s.bridge;
         let kept = s.legs;
         let off = three!(|j| S::select(split, zero, legs[j]));
-        let rest = part(m, s, off, k, resistance, dt - first, whole.current);
+        let rest = part(m, &structure.bridge, s, off, k, resistance, dt - first, whole.current);
         s.bridge.keep(split, &blanking);
         s.legs = three!(|j| S::select(split, zero, kept[j]));
         let add = |a: S, b: S| S::select(split, a + b, a);
@@ -229,11 +233,8 @@ impl Wiring for High {
         out[Q::EnergyMagnetic as usize] = magnetic;
     }
 
-    fn watch<S: Scalar>(s: &State<S>) -> Vec<Watch<S>> {
-        let currents = s.current[0].abs() + s.current[1].abs() + s.current[2].abs();
-        let mut watched = super::watch(&s.body);
-        watched.push(Watch { name: "current_a", value: currents, limit: 1e6 });
-        watched
+    fn watch<S: Scalar>(s: &State<S>) -> [Watch<S>; WATCHED] {
+        super::watch(&s.body, s.current[0].abs() + s.current[1].abs() + s.current[2].abs())
     }
     fn tripped<S: Scalar>(s: &State<S>) -> S {
         s.body.tripped().maximum(s.bridge.tripped)

@@ -4,7 +4,7 @@
 use super::body::{Body, Constants, Structure, E_COPPER, E_INVERTER};
 use super::layout::*;
 use super::signals::{Quantity as Q, ALL, PHASES};
-use crate::actuator::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring};
+use crate::actuator::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring, WATCHED};
 use crate::control::pi_rate::PiRateParameter;
 use crate::fault::FaultKind;
 use crate::inverter::bridge::InverterParameter;
@@ -201,8 +201,8 @@ impl Wiring for Low {
         out[Q::EnergyMagnetic as usize] = S::splat(0.5) * pair(m, structure, s).inductance * s.current * s.current;
     }
 
-    fn watch<S: Scalar>(s: &State<S>) -> Vec<Watch<S>> {
-        super::watch(&s.body)
+    fn watch<S: Scalar>(s: &State<S>) -> [Watch<S>; WATCHED] {
+        super::watch(&s.body, s.current)
     }
     fn tripped<S: Scalar>(s: &State<S>) -> S {
         s.body.tripped()

@@ -11,7 +11,7 @@ mod mechanics;
 mod signals;
 mod unit;
 
-use crate::actuator::{Tick, Watch};
+use crate::actuator::{Tick, Watch, WATCHED};
 use crate::control::sequence;
 use crate::scalar::Scalar;
 use crate::time::Steps;
@@ -27,10 +27,10 @@ fn control_tick(period: f64, dt: f64) -> Vec<Tick> {
     vec![Tick { period: ((period / dt).round() as Steps).max(1), kind: 0 }]
 }
 
-fn watch<S: Scalar>(body: &body::Body<S>) -> Vec<Watch<S>> {
-    vec![
+fn watch<S: Scalar>(body: &body::Body<S>, current: S) -> [Watch<S>; WATCHED] {
+    [
         Watch { name: "motor_speed", value: body.motion.motor_speed, limit: 1e6 },
-        Watch { name: "nut_position", value: body.motion.nut_position, limit: 1e3 },
+        Watch { name: "current_line", value: current, limit: 1e6 },
         Watch { name: "supply_voltage", value: body.link, limit: 1e5 },
         // Share of the lock's strength in use.
         Watch { name: "lock_force", value: body.lock_use, limit: 1.0 },
