@@ -62,6 +62,13 @@ def _checked(value: Quantity, unit: str, low: float, name: str) -> Quantity:
     return value
 
 
+def _plain_name(value: str) -> str:
+    """Refuse what is no plain file name, or would be taken for a log's companion."""
+    if not _NAME.match(value) or value.endswith(("_loadcell", "_command")):
+        raise ValueError(f"{value!r} is not a plain file name (letters, digits, '-', '_')")
+    return value
+
+
 class PlayStep(_Frozen):
     """Set the play: by the micrometer, as a net play (intrinsic play added), or in total.
 
@@ -228,9 +235,7 @@ class TraceStep(_Frozen):
     @field_validator("name")
     @classmethod
     def _plain(cls, value: str) -> str:
-        if not _NAME.match(value) or value.endswith(("_loadcell", "_command")):
-            raise ValueError(f"{value!r} is not a plain file name (letters, digits, '-', '_')")
-        return value
+        return _plain_name(value)
 
     @field_validator("duration")
     @classmethod
@@ -261,6 +266,11 @@ class Procedure(_Frozen):
     name: StrictStr
     text: StrictStr = ""
     step: tuple[Step, ...]
+
+    @field_validator("name")
+    @classmethod
+    def _plain(cls, value: str) -> str:
+        return _plain_name(value)
 
     @model_validator(mode="after")
     def _traced(self) -> Self:
