@@ -11,12 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.calibrate.balance import Regression, controller_law, torque_balance
+from elevon.calibrate.candidates import tamed
 from elevon.calibrate.direct import saturated_speed
 from elevon.calibrate.dynamic import Dynamic, dynamic_stage
 from elevon.calibrate.estimate import Estimate
 from elevon.calibrate.findings import amplitude_findings, plant_findings
 from elevon.calibrate.heldout import HeldOut, held_out
-from elevon.calibrate.kinematics import CommandFit, command_fit
+from elevon.calibrate.kinematics import KINEMATIC, CommandFit, command_fit
 from elevon.calibrate.log import BenchLog
 from elevon.calibrate.plant import (
     Torque,
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
 __all__ = ["Calibration", "calibrate"]
 
 Bools = npt.NDArray[np.bool_]
+_LOOSEST = 0.25  # relative deviation above which the logs do not determine a value
+_DOUBTFUL = 0.2  # share of the current below which a regression explains nothing
 _RUN_IN = 1.0  # s at least before a log counts
 _SETTLED = 0.5  # s after the set point has left its limit for the first time
 
@@ -193,7 +196,7 @@ def calibrate(
     _go(progress, 0.02)
     positions = position_estimates(logs, actuator)
     _go(progress, 0.1)
-    plant, law = torque_balance(logs, keeps), controller_law(logs, keeps)
+    plant, law = _telling(torque_balance(logs, keeps)), _telling(controller_law(logs, keeps))
     _go(progress, 0.25)
     torque = torque_scale(actuator, plant)
     found = list(positions)
@@ -206,6 +209,8 @@ def calibrate(
     commands = _commands(logs, actuator, found)
     _go(progress, 0.35)
     found = _asked(found, free, actuator)
+    direct = [p for p in free or () if p in KINEMATIC or p == "motor.emf_constant"]
+    _missing(direct, found, torque)
     dynamic = None
     if model_runs or plant is None or law is None:
         dynamic = dynamic_stage(
@@ -222,7 +227,15 @@ def calibrate(
     _missing(free, found, torque)
     fitted = _with_values(actuator, found, followed, torque, dynamic)
     kept = held_out(logs, keeps, actuator, fitted, part(progress, 0.8, 1.0)) if hold_out else ()
+    if "control.derivative_time" in tamed(actuator, _plain(found)):
+        shortened = (
+            "control.derivative_time is shortened in the set: as estimated, speed gain times it "
+            "exceeds the inertia, which this controller without its filter cannot hold",
+        )
+    else:
+        shortened = ()
     findings = (
+        *shortened,
         *plant_findings(logs, plant, torque, dynamic, actuator),
         *amplitude_findings(commands, found),
     )
@@ -243,6 +256,15 @@ def calibrate(
         findings=findings,
         wall_s=clock.perf_counter() - begin,
     )
+
+
+def _telling(regression: Regression | None) -> Regression | None:
+    """Drop a regression that explains nothing: its coefficients are noise."""
+    return regression if regression and regression.explained > _DOUBTFUL else None
+
+
+def _plain(found: Sequence[Estimate]) -> dict[str, str | float]:
+    return {item.path: item.value for item in found if item.in_set}
 
 
 def _check(
@@ -316,6 +338,8 @@ def _asked(found: list[Estimate], free: Sequence[str] | None, actuator: Actuator
             )
             if low or item.value > record.maximum or not np.isfinite(item.std):
                 continue
+            if record.minimum >= 0.0 and item.std > _LOOSEST * abs(item.value):
+                continue
         kept.append(item)
     return kept
 
@@ -353,4 +377,5 @@ def _with_values(
         old = actuator.parameters.value
         ratio = old("friction.static") / max(old("friction.dynamic"), 1e-300)
         values["friction.static"] = max(ratio, 1.0) * float(values["friction.dynamic"])
+    values |= tamed(actuator, values)
     return actuator.with_values(values, source="calibration")

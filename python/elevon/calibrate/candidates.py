@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,7 @@ from elevon.parameters.records import record_of
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["AUTO", "Candidate", "candidates", "start_values"]
+__all__ = ["AUTO", "Candidate", "candidates", "start_values", "tamed"]
 
 #: What `auto` tries to free in the dynamic fit, in the model's own parameters.
 AUTO = (
@@ -31,6 +31,8 @@ AUTO = (
 )
 _FILTER = (2.0, 5000.0)  # Hz
 _DELAY = 0.02  # s
+_WHOLE = 0.95  # of the inertia that speed gain times derivative time may reach
+_FAR = 100.0  # a start further off than this factor is a misfit of the regression
 _KNOTS = 4  # of an unknown brake's level over a log
 
 
@@ -194,7 +196,10 @@ def start_values(actuator: Actuator, logs: Sequence[BenchLog]) -> dict[str, floa
     rest = _other_inertia(actuator)
     if kt * found.inertia > 1.05 * rest:
         values["motor.inertia"] = kt * found.inertia - rest
-    return values | _controller(actuator, found, kt)
+    values |= _controller(actuator, found, kt)
+    old = actuator.parameters.value
+    near = {p: v for p, v in values.items() if 1.0 / _FAR < v / max(old(p), 1e-12) < _FAR}
+    return near | tamed(actuator, near)
 
 
 def _controller(actuator: Actuator, found: DirectEstimate, kt: float) -> dict[str, float]:
@@ -206,6 +211,22 @@ def _controller(actuator: Actuator, found: DirectEstimate, kt: float) -> dict[st
     if found.derivative > 0.0 and actuator.parameters.value("control.derivative_time") > 0.0:
         values["control.derivative_time"] = found.derivative / found.proportional
     return values
+
+
+def tamed(actuator: Actuator, values: Mapping[str, str | float]) -> dict[str, float]:
+    """Return a shorter derivative time where gain times it would exceed the inertia, else nothing.
+
+    The model refuses such a pair: it acts like an inertia larger than the real one.
+    """
+
+    def value(path: str) -> float:
+        return float(values.get(path, actuator.parameters.value(path)))
+
+    inertia = value("motor.inertia") + value("gear.inertia")
+    gain = value("control.speed_gain") * value("control.speed_gain_scale")
+    if gain * value("control.derivative_time") < _WHOLE * inertia:
+        return {}
+    return {"control.derivative_time": _WHOLE * inertia / gain}
 
 
 def _other_inertia(actuator: Actuator) -> float:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.calibrate.candidates import Candidate, candidates, start_values
+from elevon.calibrate.candidates import Candidate, candidates, start_values, tamed
 from elevon.calibrate.estimate import Estimate, quantile
 from elevon.calibrate.fit import (
     DynamicFit,
@@ -232,7 +232,8 @@ def _fixed(
         )
         values.setdefault("friction.static", max(ratio, 1.0) * start["friction.dynamic"])
         values.setdefault("friction.dynamic", start["friction.dynamic"])
-    return {p: v for p, v in values.items() if p not in {"play.total", "sensor.encoder.offset"}}
+    kept = {p: v for p, v in values.items() if p not in {"play.total", "sensor.encoder.offset"}}
+    return kept | tamed(actuator, kept)
 
 
 def _tied(actuator: Actuator) -> bool:

@@ -18,7 +18,7 @@ __all__ = ["DynamicFit", "blocks_of", "fit_dynamic", "refresh_scales", "step_siz
 Floats = npt.NDArray[np.float64]
 _SOFT = 3.0  # deviations beyond which residuals weigh less
 _AGREE = 0.1  # relative difference up to which exact derivatives hold
-_CLOUD = 24  # starts tried where the first values explain too little
+_CLOUD = 32  # starts tried where the first values explain too little
 _EXPLAINED = 0.5  # share of the current's variance the first values must explain
 _STEP = 0.01  # of the meaningful change ... of a logarithm
 
@@ -314,7 +314,7 @@ def _covariance(problem: Problem, free: Sequence[Candidate], x: Floats) -> tuple
     kept: list[Any] = []
     for part, rest, block, mask in zip(jac, residual, blocks, problem.masks, strict=True):
         weight = 1.0 / np.sqrt(1.0 + (rest / _SOFT) ** 2)
-        normal += np.einsum("ncp,nc,ncq->pq", part, weight, part)
+        normal += np.einsum("ncp,nc,ncq->pq", part, weight**3, part)
         scores.append(np.einsum("ncp,nc->np", part, weight * rest)[mask])
         kept.append(block[mask] - block[mask].min())
     return block_covariance(normal, scores, kept)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from elevon.calibrate.blocks import block_covariance
+from elevon.calibrate.blocks import block_covariance, stroke_blocks
 from elevon.calibrate.log import BenchLog
 
 __all__ = ["PlayFit", "fit_play", "through_play"]
@@ -161,7 +161,7 @@ def _after_reversal(x: Floats, width: float) -> npt.NDArray[np.bool_]:
 def _covariance(
     best: object, logs: Sequence[BenchLog], keeps: Sequence[npt.NDArray[np.bool_]]
 ) -> tuple[Floats, float]:
-    """Blocks of half a second: the encoder's rounding repeats itself within a stretch of motion."""
+    """Blocks of whole strokes: the encoder's rounding repeats itself within one."""
     jac, fun = np.asarray(best.jac), np.asarray(best.fun)  # type: ignore[attr-defined]
     weight = 1.0 / np.sqrt(1.0 + (fun / 3.0) ** 2)
     scores, blocks, at = [], [], 0
@@ -169,6 +169,8 @@ def _covariance(
         size = int(keep.sum())
         part = slice(at, at + size)
         scores.append(jac[part] * (weight[part] * fun[part])[:, None])
-        blocks.append(np.floor(log.time[keep] / 0.5).astype(np.int64))
+        blocks.append(
+            stroke_blocks(log.time[keep], log.speed[keep], weight[part] * fun[part], log.period)
+        )
         at += size
-    return block_covariance(jac.T @ (weight[:, None] * jac), scores, blocks)
+    return block_covariance(jac.T @ (weight[:, None] ** 3 * jac), scores, blocks)
