@@ -225,10 +225,12 @@ def calibrate(
     if dynamic is not None:
         found += dynamic.estimates(actuator, [item.path for item in found], free)
     _missing(free, found, torque)
+    if not any(item.in_set for item in found):
+        raise InputError("the logs determine no parameter: nothing in them moves enough")
     fitted = _with_values(actuator, found, followed, torque, dynamic)
     kept = held_out(logs, keeps, actuator, fitted, part(progress, 0.8, 1.0)) if hold_out else ()
     if "control.derivative_time" in tamed(actuator, _plain(found)):
-        shortened = (
+        shortened: tuple[str, ...] = (
             "control.derivative_time is shortened in the set: as estimated, speed gain times it "
             "exceeds the inertia, which this controller without its filter cannot hold",
         )
