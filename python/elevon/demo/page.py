@@ -96,8 +96,8 @@ def _parameters(report: Report, demo: Demo, rows: list[dict[str, Any]]) -> None:
         "Parameters against the hidden truth",
         f"Intervals are meant to hold {100 * LEVEL:.0f} % of the truths. The model behind the "
         "calibration is the low one; the logs come from the high one, with a PWM bridge, encoder "
-        "counts and noise. What the low model lacks shows as a small bias that no interval of the "
-        "noise can cover.",
+        f"counts and noise. Here {sum(row['inside'] for row in rows)} of {len(rows)} are inside: "
+        "what the low model lacks shows as a bias that the intervals do not cover.",
     )
     with new_figure(width=8.5, height=0.34 * len(rows) + 1.3) as (figure, axes):
         _draw_errors(axes, rows)
@@ -127,7 +127,7 @@ def _parameters(report: Report, demo: Demo, rows: list[dict[str, Any]]) -> None:
 
 
 def _percent(row: dict[str, Any]) -> str:
-    if row["before"] in {None, 0.0} and abs(row["truth"]) < 1e-2:
+    if row["path"].endswith("offset") or row["truth"] == 0.0:
         return f"{row['value'] - row['truth']:+.2g} {row['unit']}".replace("-", "\N{MINUS SIGN}")
     error = 100.0 * (row["value"] / row["truth"] - 1.0)
     return f"{error:+.2f} %".replace("-", "\N{MINUS SIGN}")
@@ -223,6 +223,7 @@ def _trace_figure(trace: Trace, before: Trace) -> Figure:
         axes[0][0].set(title="Log and model")
         axes[0][1].set(title="Model less log")
         for axis in axes[0]:
+            axis.margins(y=0.22)  # room for the legend, clear of the lines
             axis.legend(loc="upper right", ncols=2)
         for axis in axes[2]:
             axis.set(xlabel="Time [s]")
