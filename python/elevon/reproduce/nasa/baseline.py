@@ -25,7 +25,8 @@ ACTUATOR = "nasa-ballscrew"
 LOADS = (0.0, -500.0, -4500.0, -8500.0, 500.0, 4500.0, 8500.0)
 """N, positive compressive."""
 RATES = {0.05: 0.06, 0.1: 0.12, 0.0: 0.06}
-"""Peak rate of each amplitude, m/s over m: both ends of the printed range."""
+"""Peak rate of each amplitude, m/s over m: both ends of the printed range. A sweep runs through
+the whole range."""
 SETTLE = 2.0
 """Statistics begin here [s]."""
 RECORD = "command,user_position,current_a,current_b,current_c,winding_temperature,limited@2 kHz"
@@ -102,7 +103,8 @@ def baseline_matrix() -> list[tuple[Profile, float]]:
         amplitudes = (0.0, 0.05, 0.1) if name == "rectangular" else (0.05, 0.1)
         duration = 120.0 if name == "sweep" else 30.0
         for amplitude in amplitudes:
-            profile = Profile(name, amplitude, RATES[amplitude], duration)
+            rate = 0.06 if name == "sweep" else RATES[amplitude]
+            profile = Profile(name, amplitude, rate, duration)
             cases += [(profile, load) for load in LOADS]
     return cases
 
