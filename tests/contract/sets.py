@@ -45,13 +45,48 @@ def places(name: str) -> list[tuple[str, str, dict[str, Any]]]:
     return [(record["kind"], place, record) for record in records for place in record["places"]]
 
 
-def scenario(fault: dict[str, Any] | None = None, duration: float = 0.12) -> Any:
-    """A position swing, 0.03 in SI at 4 Hz, that takes up any play, with a fault if given."""
+def takes_actions(name: str) -> bool:
+    """Is the actuator commanded by actions (a gear), not by waveforms?"""
+    wiring = elevon.Actuator.load(name).wiring
+    return any("gear" in w["modes"] for w in _core.wirings() if w["name"] == wiring)
+
+
+def scenario(name: str, fault: dict[str, Any] | None = None) -> Any:
+    """A short run in which everything moves, with a fault if given.
+
+    A position swing, 0.03 in SI at 4 Hz, that takes up any play; a gear leaves its down-lock and
+    returns to it.
+    """
     data: dict[str, Any] = {
-        "duration": duration,
+        "duration": 0.12,
         "command": {
             "mode": "position",
             "terms": [{"kind": "sine", "amplitude": 0.03, "frequency": "4 Hz"}],
         },
     }
+    if takes_actions(name):
+        data = {
+            "duration": "2.6 s",
+            "command": {"mode": "gear", "steps": [step(0.01, "retract"), step(0.85, "extend")]},
+            "initial": {"nut_position": "267 mm"},
+        }
     return elevon.Scenario.from_dict({**data, "fault": [fault]} if fault else data)
+
+
+def step(time: float, action: str) -> dict[str, Any]:
+    """One action of a sequence."""
+    return {"time": time, "action": action}
+
+
+def still(name: str) -> Any:
+    """Nothing asked, nothing on the shaft."""
+    command = {} if takes_actions(name) else {"mode": "speed", "terms": []}
+    return elevon.Scenario.from_dict({"duration": "0.1 s", "command": command})
+
+
+def forward(name: str) -> Any:
+    """A command in the positive direction."""
+    command: dict[str, Any] = {"mode": "speed", "terms": [{"kind": "constant", "value": 30.0}]}
+    if takes_actions(name):
+        command = {"mode": "gear", "steps": [step(0.01, "extend")]}
+    return elevon.Scenario.from_dict({"duration": "0.5 s", "command": command})

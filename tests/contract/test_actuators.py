@@ -46,7 +46,7 @@ def test_every_signal_can_be_recorded_and_is_finite(name: str, fidelity: str) ->
     chosen = sets.signals(name, fidelity)
     rec = elevon.simulate(
         elevon.Actuator.load(name),
-        sets.scenario(),
+        sets.scenario(name),
         fidelity=fidelity,
         record=[",".join(chosen) + "@1 kHz"],
     )
@@ -60,30 +60,21 @@ def test_every_signal_can_be_recorded_and_is_finite(name: str, fidelity: str) ->
 @pytest.mark.parametrize(("name", "fidelity"), FIDELITIES)
 def test_an_actuator_left_alone_stays_at_rest(name: str, fidelity: str) -> None:
     """No command, no load: no motion. A drive that creeps by itself has a sign wrong."""
-    still = elevon.Scenario.from_dict(
-        {"duration": "0.1 s", "command": {"mode": "speed", "terms": []}}
-    )
     rec = elevon.simulate(
         elevon.Actuator.load(name),
-        still,
+        sets.still(name),
         fidelity=fidelity,
         record=["motor_speed,motor_position@1 kHz"],
     )
-    assert np.max(np.abs(rec["motor_position"].values)) < 1e-3
+    assert np.ptp(rec["motor_position"].values) < 1e-3
 
 
 @pytest.mark.parametrize(("name", "fidelity"), FIDELITIES)
 def test_positive_command_moves_everything_positive(name: str, fidelity: str) -> None:
     """The convention of signs: speed command up -> motor up -> output up."""
-    go = elevon.Scenario.from_dict(
-        {
-            "duration": "0.5 s",
-            "command": {"mode": "speed", "terms": [{"kind": "constant", "value": 30.0}]},
-        }
-    )
     rec = elevon.simulate(
         elevon.Actuator.load(name),
-        go,
+        sets.forward(name),
         fidelity=fidelity,
         record=["motor_speed,motor_position,user_position@1 kHz"],
     )
@@ -97,7 +88,7 @@ def test_a_batch_equals_its_single_runs(name: str) -> None:
     actuator = elevon.Actuator.load(name)
     for fidelity in sets.fidelities(name):
         record = [",".join(sets.signals(name, fidelity)) + "@1 kHz"]
-        runs = [elevon.Run(actuator, sets.scenario(), seed, str(seed)) for seed in range(5)]
+        runs = [elevon.Run(actuator, sets.scenario(name), seed, str(seed)) for seed in range(5)]
         together = elevon.simulate_batch(runs, fidelity=fidelity, record=record)
         for run, many in zip(runs, together, strict=True):
             one = elevon.simulate(

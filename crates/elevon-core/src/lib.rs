@@ -8,6 +8,7 @@ pub mod fault;
 pub mod inverter;
 pub mod motor;
 pub mod noise;
+pub mod piecewise;
 pub mod registry;
 pub mod scalar;
 pub mod sensor;

@@ -1,6 +1,6 @@
 //! The wirings by name, and one entry for each thing a caller may ask of any of them.
 
-use crate::actuator::{ballscrew, rotary, Finding, Port, Wiring};
+use crate::actuator::{ballscrew, landing_gear, rotary, Finding, Port, Wiring};
 use crate::fault::FaultKind;
 use crate::solver::{self, Clock, Monitor, RunOutput, RunSpec, Width};
 use crate::variable::{Group, Signal};
@@ -12,6 +12,8 @@ pub enum Model {
     RotaryLow,
     BallscrewHigh,
     BallscrewLow,
+    LandingGearHigh,
+    LandingGearLow,
 }
 
 /// A kind of actuator and its fidelities.
@@ -34,6 +36,11 @@ pub const KINDS: &[Kind] = &[
         text: "three-phase motor, inverter, ball screw, ram with play and a load side of its own",
         fidelities: &[("high", Model::BallscrewHigh), ("low", Model::BallscrewLow)],
     },
+    Kind {
+        name: "landing_gear",
+        text: "six-step motor, planetary gearbox with release, roller screw, down-lock, leg on a lever, control unit",
+        fidelities: &[("high", Model::LandingGearHigh), ("low", Model::LandingGearLow)],
+    },
 ];
 
 macro_rules! dispatch {
@@ -53,6 +60,14 @@ macro_rules! dispatch {
             }
             Model::BallscrewLow => {
                 type $w = ballscrew::Low;
+                $body
+            }
+            Model::LandingGearHigh => {
+                type $w = landing_gear::High;
+                $body
+            }
+            Model::LandingGearLow => {
+                type $w = landing_gear::Low;
                 $body
             }
         }
@@ -76,6 +91,12 @@ impl Model {
     pub fn initial(self) -> &'static [&'static str] {
         dispatch!(self, W => W::INITIAL)
     }
+    pub fn modes(self) -> &'static [&'static str] {
+        dispatch!(self, W => W::MODES)
+    }
+    pub fn actions(self) -> &'static [&'static str] {
+        dispatch!(self, W => W::ACTIONS)
+    }
     pub fn faults(self) -> Vec<FaultKind> {
         dispatch!(self, W => W::faults())
     }
@@ -92,7 +113,7 @@ impl Model {
     pub fn run_all(self, runs: &[RunSpec], clocks: &[Clock], threads: usize, width: Width, monitor: &Monitor) -> Vec<RunOutput> {
         dispatch!(self, W => solver::run_all::<W>(runs, clocks, threads, width, monitor))
     }
-    /// Low fidelities only: the relays of a switching inverter have no useful derivative.
+    /// Low fidelities without a state machine only: switching has no useful derivative.
     pub fn sensitivities(
         self,
         run: &RunSpec,
@@ -104,7 +125,7 @@ impl Model {
         match self {
             Self::RotaryLow => Some(solver::sensitivities::<rotary::Low>(run, parameters, faults, clocks, monitor)),
             Self::BallscrewLow => Some(solver::sensitivities::<ballscrew::Low>(run, parameters, faults, clocks, monitor)),
-            Self::RotaryHigh | Self::BallscrewHigh => None,
+            Self::RotaryHigh | Self::BallscrewHigh | Self::LandingGearHigh | Self::LandingGearLow => None,
         }
     }
 }

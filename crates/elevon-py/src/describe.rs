@@ -47,6 +47,9 @@ pub fn wirings(py: Python<'_>) -> Dicts<'_> {
     dicts(py, KINDS, |d, kind| {
         d.set_item("name", kind.name)?;
         d.set_item("text", kind.text)?;
+        let model = kind.fidelities[0].1;
+        d.set_item("modes", model.modes().to_vec())?;
+        d.set_item("actions", model.actions().to_vec())?;
         d.set_item("fidelities", kind.fidelities.iter().map(|f| f.0).collect::<Vec<_>>())
     })
 }

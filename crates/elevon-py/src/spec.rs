@@ -130,9 +130,11 @@ impl Resolver {
         let mut parameters = vector(self.model, &array)?;
         if let Some(mode) = d.get_item("command_mode")? {
             let mode: String = mode.extract()?;
-            let choice =
-                ["position", "speed", "torque"].iter().position(|&m| m == mode).ok_or_else(|| bad(format!("command mode {mode:?}")))?;
-            parameters[self.parameter("control.mode")?] = choice as f64;
+            let modes = self.model.modes();
+            let choice = modes.iter().position(|&m| m == mode).ok_or_else(|| bad(format!("command mode {mode:?}; modes: {}", modes.join(", "))))?;
+            if modes.len() > 1 {
+                parameters[self.parameter("control.mode")?] = choice as f64;
+            }
         }
         let inputs = need(d, "inputs")?.cast_into::<PyDict>()?;
         let (ports, driven) = self.ports(&parameters, &inputs)?;

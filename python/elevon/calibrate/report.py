@@ -22,10 +22,16 @@ if TYPE_CHECKING:
 
 __all__ = ["calibration_report", "validation_report"]
 
-_SHOWN = {"encoder_position": (180.0 / math.pi, "deg"), "motor_speed": (30.0 / math.pi, "rpm"),
-          "current_q_meas": (1.0, "A")}  # fmt: skip
-_LABELS = {"encoder_position": "encoder", "motor_speed": "motor speed",
-           "current_q_meas": "torque current"}  # fmt: skip
+_SHOWN = {
+    "encoder_position": (180.0 / math.pi, "deg"),
+    "motor_speed": (30.0 / math.pi, "rpm"),
+    "current_q_meas": (1.0, "A"),
+}
+_LABELS = {
+    "encoder_position": "encoder",
+    "motor_speed": "motor speed",
+    "current_q_meas": "torque current",
+}
 
 
 def calibration_report(
@@ -55,13 +61,14 @@ def calibration_report(
     names = ", ".join(log.name for log in result.logs)
     report = Report(
         f"Calibration of {result.before.name}",
-        f"From {names}. " + (
+        f"From {names}. "
+        + (
             "The load cell gives the torque constant: torques are absolute."
-            if result.torque.measured else
-            "No load cell: torques are known only as ratios to the torque constant."
+            if result.torque.measured
+            else "No load cell: torques are known only as ratios to the torque constant."
         ),
         date=date,
-    )  # fmt: skip
+    )
     report.fact("Parameters estimated", str(sum(i.in_set for i in result.estimates)))
     if result.plant is not None:
         report.fact("Torque balance", f"{100 * result.plant.explained:.2f} %", "of the current")
@@ -96,8 +103,9 @@ def validation_report(
     _agreement(report, None, result)
     checks = [
         Check(f"{e.log}: {_LABELS[e.signal]}, RMS error over range", e.of_range, e.limit, "%")
-        for e in result.errors if e.limit is not None
-    ]  # fmt: skip
+        for e in result.errors
+        if e.limit is not None
+    ]
     if checks:
         report.section("Thresholds of the set").checks(checks)
     if provenance:
@@ -111,17 +119,23 @@ def _parameters(report: Report, result: Calibration, truth: Mapping[str, float])
         f"Intervals hold {100 * LEVEL:.0f} % of the time for coloured residuals. Plant, controller "
         "and sensor are kept apart; what no set has a place for is marked.",
     )
-    columns = ["Parameter", "Before", "After", "Low", "High", "Unit", "Register", "From", "Holds for"]
+    columns = ["Parameter", "Before", "After", "Interval", "Unit", "Register", "From", "Holds for"]
     if truth:
-        columns.insert(3, "Truth")
+        columns.insert(2, "Truth")
     rows = []
     for item in result.estimates:
         row: list[object] = [
-            item.path + ("" if item.in_set else " *"), item.old, item.value, *item.interval,
-            item.unit, item.register, item.method, ", ".join(item.given),
-        ]  # fmt: skip
+            item.path + ("" if item.in_set else " *"),
+            item.old,
+            item.value,
+            f"{item.interval[0]:.5g} to {item.interval[1]:.5g}",
+            item.unit,
+            item.register,
+            item.method,
+            ", ".join(item.given),
+        ]
         if truth:
-            row.insert(3, truth.get(item.path))
+            row.insert(2, truth.get(item.path))
         rows.append(row)
     section.table(Table(columns, rows, "* not part of the set", digits=5))
     with new_figure(width=8.0, height=0.28 * len(rows) + 1.2) as (figure, axes):
@@ -130,7 +144,9 @@ def _parameters(report: Report, result: Calibration, truth: Mapping[str, float])
 
 
 def _draw_intervals(axes: Any, result: Calibration, truth: Mapping[str, float]) -> None:
-    shown = [i for i in result.estimates if i.in_set and i.old and i.value and i.old * i.value > 0.0]
+    shown = [
+        i for i in result.estimates if i.in_set and i.old and i.value and i.old * i.value > 0.0
+    ]
     for row, item in enumerate(reversed(shown)):
         assert item.old is not None
         low, high = (end / item.old for end in item.interval)
@@ -139,8 +155,11 @@ def _draw_intervals(axes: Any, result: Calibration, truth: Mapping[str, float]) 
         if item.path in truth:
             axes.plot(truth[item.path] / item.old, row, "x", color=COLOURS["red"], ms=7)
     axes.axvline(1.0, color=COLOURS["grey"], lw=0.8)
-    axes.set(yticks=range(len(shown)), yticklabels=[i.path for i in reversed(shown)],
-             xlabel="New value over old (cross: truth)" if truth else "New value over old")  # fmt: skip
+    axes.set(
+        yticks=range(len(shown)),
+        yticklabels=[i.path for i in reversed(shown)],
+        xlabel="New value over old (cross: truth)" if truth else "New value over old",
+    )
 
 
 def _ranking(report: Report, result: Calibration) -> None:
@@ -156,29 +175,54 @@ def _ranking(report: Report, result: Calibration) -> None:
     rows = [[k + 1, float(s)] for k, s in enumerate(ranking.singular_values)]
     section.table(Table(["", "Singular value"], rows, digits=4))
     section.table(
-        Table(["Candidate", "Predicted deviation"], sorted(ranking.predicted.items()),
-              "Relative for positive parameters, SI for offsets and delays.", digits=3)
-    )  # fmt: skip
+        Table(
+            ["Candidate", "Predicted deviation"],
+            sorted(ranking.predicted.items()),
+            "Relative for positive parameters, SI for offsets and delays.",
+            digits=3,
+        )
+    )
     pairs = [f"{a} and {b}: correlation {c:+.3f}" for a, b, c in ranking.pairs]
     section.points(pairs or ["No pair is correlated by more than 0.95."])
-    section.points([f"{p} left out: {why}" for p, why in ranking.dropped.items()] or
-                   ["No candidate had to be left out."])  # fmt: skip
+    section.points(
+        [f"{p} left out: {why}" for p, why in ranking.dropped.items()]
+        or ["No candidate had to be left out."]
+    )
 
 
 def _held_out(report: Report, result: Calibration) -> None:
     if not result.held_out:
         return
-    rows = [[h.log, h.span, h.speed * 30.0 / math.pi, h.speed_all * 30.0 / math.pi, h.current,
-             h.current_all] for h in result.held_out]  # fmt: skip
+    rows = [
+        [
+            h.log,
+            h.span,
+            h.speed * 30.0 / math.pi,
+            h.speed_all * 30.0 / math.pi,
+            h.current,
+            h.current_all,
+        ]
+        for h in result.held_out
+    ]
     report.section(
         "Held-out logs",
         "Each log predicted with values fitted without it: errors near those with all logs mean "
         "that nothing was fitted that only one log shows.",
     ).table(
-        Table(["Log", "Kept back", "Speed, without it [rpm]", "with it [rpm]",
-               "Current, without it [A]", "with it [A]"], rows, "RMS errors of the model runs.",
-              digits=3)
-    )  # fmt: skip
+        Table(
+            [
+                "Log",
+                "Kept back",
+                "Speed, without it [rpm]",
+                "with it [rpm]",
+                "Current, without it [A]",
+                "with it [A]",
+            ],
+            rows,
+            "RMS errors of the model runs.",
+            digits=3,
+        )
+    )
 
 
 def _agreement(report: Report, before: Validation | None, after: Validation) -> None:
@@ -188,13 +232,29 @@ def _agreement(report: Report, before: Validation | None, after: Validation) -> 
         "its range.",
     )
     old = {(e.log, e.signal): e for e in before.errors} if before else {}
-    columns = ["Log", "Signal", "Unit", "RMS", "Max", "RMS/RMS [%]", "RMS/range [%]",
-               "Max/range [%]"]  # fmt: skip
+    columns = [
+        "Log",
+        "Signal",
+        "Unit",
+        "RMS",
+        "Max",
+        "RMS/RMS [%]",
+        "RMS/range [%]",
+        "Max/range [%]",
+    ]
     rows = []
     for e in after.errors:
         factor, unit = _SHOWN[e.signal]
-        row: list[object] = [e.log, _LABELS[e.signal], unit, factor * e.rms, factor * e.largest,
-                             e.of_rms, e.of_range, e.largest_of_range]  # fmt: skip
+        row: list[object] = [
+            e.log,
+            _LABELS[e.signal],
+            unit,
+            factor * e.rms,
+            factor * e.largest,
+            e.of_rms,
+            e.of_range,
+            e.largest_of_range,
+        ]
         if before:
             row.append(factor * old[e.log, e.signal].rms)
         rows.append(row)

@@ -17,7 +17,6 @@ from elevon.progress import Progress
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.recording import Recording
 
 __all__ = ["SIGNALS", "SignalError", "Validation", "validate"]
 
@@ -69,12 +68,17 @@ class SignalError:
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain types."""
         return {
-            "log": self.log, "signal": self.signal, "unit": self.unit, "rms": self.rms,
-            "max": self.largest, "rms_percent_of_rms": self.of_rms,
+            "log": self.log,
+            "signal": self.signal,
+            "unit": self.unit,
+            "rms": self.rms,
+            "max": self.largest,
+            "rms_percent_of_rms": self.of_rms,
             "rms_percent_of_range": self.of_range,
             "max_percent_of_range": self.largest_of_range,
-            "limit_percent_of_range": self.limit, "passed": self.passed,
-        }  # fmt: skip
+            "limit_percent_of_range": self.limit,
+            "passed": self.passed,
+        }
 
 
 @dataclass(frozen=True)
@@ -126,10 +130,13 @@ class Validation:
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
         return {
-            "status": self.status, "actuator": self.actuator, "fidelity": self.fidelity,
-            "transient_s": self.transient, "signals": [e.to_dict() for e in self.errors],
+            "status": self.status,
+            "actuator": self.actuator,
+            "fidelity": self.fidelity,
+            "transient_s": self.transient,
+            "signals": [e.to_dict() for e in self.errors],
             "commands": dict(self.commands),
-        }  # fmt: skip
+        }
 
 
 def validate(
@@ -184,9 +191,7 @@ def validate(
     return Validation(actuator.name, fidelity, given, tuple(errors), commands, tuple(traces))
 
 
-def _trace(
-    log: BenchLog, actuator: Actuator, fidelity: str, transient: float
-) -> tuple[Trace, str]:
+def _trace(log: BenchLog, actuator: Actuator, fidelity: str, transient: float) -> tuple[Trace, str]:
     from elevon.scenario import Scenario
     from elevon.simulate import simulate
 
@@ -204,15 +209,30 @@ def _trace(
     scenario = Scenario.from_dict(
         {
             "duration": log.duration,
-            "command": {"mode": "position", "terms": [
-                {"kind": "table", "times": log.time.tolist(), "values": command.tolist()}]},
-            "load": {"brake": {"terms": [
-                {"kind": "table", "times": log.brake.time.tolist(),
-                 "values": log.brake.level.tolist()}]}},
-            "initial": {"motor_position": shift, "motor_speed": float(log.speed[0]),
-                        "user_position": _start(log, offset, middle)},
+            "command": {
+                "mode": "position",
+                "terms": [
+                    {"kind": "table", "times": log.time.tolist(), "values": command.tolist()}
+                ],
+            },
+            "load": {
+                "brake": {
+                    "terms": [
+                        {
+                            "kind": "table",
+                            "times": log.brake.time.tolist(),
+                            "values": log.brake.level.tolist(),
+                        }
+                    ]
+                }
+            },
+            "initial": {
+                "motor_position": shift,
+                "motor_speed": float(log.speed[0]),
+                "user_position": _start(log, offset, middle),
+            },
         }
-    )  # fmt: skip
+    )
     model = actuator
     feedback = str(actuator.parameters["control.position_feedback"].value)
     if feedback == "user" and offset != 0.0:
@@ -220,10 +240,12 @@ def _trace(
     rate = f"{1.0 / log.period:.9g} Hz"
     recording = simulate(model, scenario, fidelity=fidelity, record=_record(model, fidelity, rate))
     clock = recording["motor_speed"].time
-    simulated = {
-        name: np.interp(log.time, clock, recording[name].values) for name in SIGNALS
+    simulated = {name: np.interp(log.time, clock, recording[name].values) for name in SIGNALS}
+    measured = {
+        "encoder_position": log.user,
+        "motor_speed": log.speed,
+        "current_q_meas": log.current,
     }
-    measured = {"encoder_position": log.user, "motor_speed": log.speed, "current_q_meas": log.current}
     used = log.good & (log.time >= transient)
     return Trace(log.name, log.time, measured, simulated, used), how
 
@@ -233,7 +255,7 @@ def _record(actuator: Actuator, fidelity: str, rate: str) -> str:
     from elevon.simulate import solver_step
 
     step = solver_step(actuator, fidelity)
-    steps = 1.0 / (float(rate.split()[0]) * step)
+    steps = 1.0 / (float(rate.split(maxsplit=1)[0]) * step)
     whole = abs(steps - round(steps)) < 1e-6 * steps and round(steps) >= 1
     return f"{','.join(SIGNALS)}@{f'{1.0 / (round(steps) * step):.12g} Hz' if whole else 'every'}"
 
@@ -277,11 +299,15 @@ def _errors(trace: Trace, limits: Mapping[str, float]) -> list[SignalError]:
         spread, reach = float(np.std(data)), float(np.ptp(data))
         found.append(
             SignalError(
-                trace.log, name, unit, rms, largest,
+                trace.log,
+                name,
+                unit,
+                rms,
+                largest,
                 100.0 * rms / spread if spread > 0.0 else float("nan"),
                 100.0 * rms / reach if reach > 0.0 else float("nan"),
                 100.0 * largest / reach if reach > 0.0 else float("nan"),
                 limits.get(name),
             )
-        )  # fmt: skip
+        )
     return found

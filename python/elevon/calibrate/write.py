@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from elevon.calibrate.estimate import LEVEL
+from elevon.calibrate.estimate import LEVEL, Estimate
 from elevon.files import write_text
 from elevon.parameters import Parameter
 from elevon.parameters.records import record_of
 from elevon.parameters.write import updated_set
 
 if TYPE_CHECKING:
+    from elevon.actuator import Actuator
     from elevon.calibrate.calibration import Calibration
     from elevon.calibrate.validation import Validation
 
-__all__ = ["calibrated_parameters", "set_text", "thresholds", "write_calibration"]
+__all__ = ["calibrated_parameters", "set_text", "thresholds", "write_calibration", "write_values"]
 
 _MARGIN = 2.0  # a threshold over the largest error seen on the logs it comes from
 
@@ -31,13 +33,20 @@ def calibrated_parameters(result: Calibration) -> list[Parameter]:
     for path, entry in result.actuator.parameters.items():
         old = result.before.parameters[path]
         item = known.get(path)
-        if item is None and entry.value == old.value:
+        if item is None and entry.value == old.value and old.confidence != "override":
             continue
         wiring = result.actuator.wiring
         unit = old.unit or _unit(wiring, path)
+        if item is None and entry.value == old.value:
+            # Changed before the calibration: the base on disk does not have it.
+            source_before = f"ASSUMED: {old.source}"
+            changes.append(Parameter(path, entry.value, unit, source_before, "", "assumed"))
+            continue
         if item is None:
             note = _followed(path)
-            changes.append(Parameter(path, entry.value, unit, source, note, "calibrated", old.value))
+            changes.append(
+                Parameter(path, entry.value, unit, source, note, "calibrated", old.value)
+            )
             continue
         given = f"; holds for {', '.join(item.given)} as given" if item.given else ""
         note = f"{item.note}{'; ' if item.note else ''}{100 * LEVEL:.0f} % interval{given}"
@@ -75,9 +84,7 @@ def _up(value: float) -> float:
     return float(f"{math.ceil(value / unit) * unit:.6g}")
 
 
-def set_text(
-    result: Calibration, *, name: str, base: str, validation: Validation | None
-) -> str:
+def set_text(result: Calibration, *, name: str, base: str, validation: Validation | None) -> str:
     """Return the TOML text of the calibrated set."""
     import tomlkit
 
@@ -119,8 +126,37 @@ def write_calibration(
     """
     target = Path(path).expanduser()
     name = _name(target.stem)
-    text = set_text(result, name=name, base=_base(result, target), validation=validation)
+    text = set_text(result, name=name, base=_base(result.before, target), validation=validation)
     return write_text(target, text, force=force)
+
+
+def write_values(
+    path: str | os.PathLike[str],
+    before: Actuator,
+    estimates: Sequence[Estimate],
+    source: str,
+    *,
+    force: bool = False,
+) -> Path:
+    """Write a set that changes the estimated values alone, with their intervals."""
+    import tomlkit
+
+    target = Path(path).expanduser()
+    head = tomlkit.document()
+    head.add("name", tomlkit.item(_name(target.stem)))
+    head.add("base", tomlkit.item(_base(before, target)))
+    changes = []
+    for item in estimates:
+        if item.in_set:
+            unit = before.parameters[item.path].unit or _unit(before.wiring, item.path)
+            note = f"{item.note}; {100 * LEVEL:.0f} % interval"
+            origin = f"calibrated from {source}"
+            changes.append(
+                Parameter(
+                    item.path, item.value, unit, origin, note, "calibrated", item.old, item.interval
+                )
+            )
+    return write_text(target, updated_set(tomlkit.dumps(head), changes), force=force)
 
 
 def _name(stem: str) -> str:
@@ -128,11 +164,11 @@ def _name(stem: str) -> str:
     return kept if kept and kept[0].isalnum() else f"set-{kept.strip('-._')}"
 
 
-def _base(result: Calibration, target: Path) -> str:
+def _base(before: Actuator, target: Path) -> str:
     """Name of a set of the package, else the way from the new file to the old one."""
     from elevon.parameters.find import find_set
 
-    path, name = result.before.path, result.before.name
+    path, name = before.path, before.name
     if path is None:
         return name
     try:

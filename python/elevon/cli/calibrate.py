@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from elevon.cli.calibrate_drops import is_drop_table, run_drops
 from elevon.cli.common import ForceOption, JsonOption, SetOption, check_outputs, read_actuator
 from elevon.cli.output import print_json, print_table, progress_bar, say
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
+    from elevon.actuator import Actuator
     from elevon.calibrate.calibration import Calibration
     from elevon.calibrate.log import BenchLog
     from elevon.calibrate.validation import Validation
@@ -64,7 +66,10 @@ def one_each(
 
 
 def read(
-    logs: list[Path], loadcell: list[Path] | None, command: list[Path] | None, column_map: Path | None
+    logs: list[Path],
+    loadcell: list[Path] | None,
+    command: list[Path] | None,
+    column_map: Path | None,
 ) -> list[BenchLog]:
     """Import logs with their companions; warnings of the import go to stderr."""
     from elevon.calibrate.log import read_logs
@@ -110,12 +115,18 @@ def calibrate(
     if out is not None and out.suffix.lower() != ".toml":
         raise InputError(f"--out {out}: a set is a TOML file; end the name in .toml")
     model = read_actuator(actuator, settings)
+    if len(logs) == 1 and is_drop_table(logs[0]):
+        return _drops(logs[0], model, out, as_json=json, force=force)
     data = read(logs, loadcell, command, column_map)
     with progress_bar("calibrating") as advance:
         result = run(
-            data, model, free=_paths(free), fidelity=fidelity, transient=transient,
+            data,
+            model,
+            free=_paths(free),
+            fidelity=fidelity,
+            transient=transient,
             progress=lambda f: advance(0.9 * f),
-        )  # fmt: skip
+        )
         before, after = _agreement(data, result, transient)
         advance(1.0)
     if out is not None:
@@ -124,6 +135,25 @@ def calibrate(
         page = _page(result, before, after, date)
         say(f"report: {page.save(report, force=force)}")
     _print(result, before, after, out, as_json=json)
+    return 0
+
+
+def _drops(path: Path, model: Actuator, out: Path | None, *, as_json: bool, force: bool) -> int:
+    """A table of hung weights: stiffness and dead zone."""
+    from elevon.calibrate.write import write_values
+
+    result, facts = run_drops(path, model)
+    if out is not None:
+        say(f"set: {write_values(out, model, result.estimates, path.name, force=force)}")
+    if as_json:
+        print_json(result.to_dict() | facts | {"out": None if out is None else str(out)})
+        return 0
+    rows = [
+        (i.path, f"{i.value:.5g}", f"{i.interval[0]:.5g}", f"{i.interval[1]:.5g}", i.unit)
+        for i in result.estimates
+    ]
+    print_table(("parameter", "value", "low", "high", "unit"), rows)
+    say(f"{len(facts['slips'])} slips mended; {facts['assumed']}")
     return 0
 
 
@@ -175,9 +205,13 @@ def _provenance() -> dict[str, object]:
 
 
 def _print(
-    result: Calibration, before: Validation | None, after: Validation | None, out: Path | None,
-    *, as_json: bool,
-) -> None:  # fmt: skip
+    result: Calibration,
+    before: Validation | None,
+    after: Validation | None,
+    out: Path | None,
+    *,
+    as_json: bool,
+) -> None:
     if as_json:
         values = result.to_dict() | {
             "out": None if out is None else str(out),
@@ -189,10 +223,20 @@ def _print(
         print_json(values)
         return
     rows = [
-        (i.path, "" if i.old is None else f"{i.old:.5g}", f"{i.value:.5g}",
-         f"{i.interval[0]:.5g}", f"{i.interval[1]:.5g}", i.unit, i.register, ", ".join(i.given))
+        (
+            i.path,
+            "" if i.old is None else f"{i.old:.5g}",
+            f"{i.value:.5g}",
+            f"{i.interval[0]:.5g}",
+            f"{i.interval[1]:.5g}",
+            i.unit,
+            i.register,
+            ", ".join(i.given),
+        )
         for i in result.estimates
-    ]  # fmt: skip
-    print_table(("parameter", "before", "after", "low", "high", "unit", "register", "holds for"), rows)
+    ]
+    print_table(
+        ("parameter", "before", "after", "low", "high", "unit", "register", "holds for"), rows
+    )
     for text in result.findings:
         say(text)

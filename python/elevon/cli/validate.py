@@ -56,11 +56,19 @@ def validate(
         print_json(result.to_dict())
     else:
         rows = [
-            (e.log, e.signal, f"{e.rms:.4g}", f"{e.largest:.4g}", e.unit, f"{e.of_rms:.3g}",
-             f"{e.of_range:.3g}", "" if e.limit is None else f"{e.limit:.3g}",
-             "" if e.passed is None else "pass" if e.passed else "FAIL")
+            (
+                e.log,
+                e.signal,
+                f"{e.rms:.4g}",
+                f"{e.largest:.4g}",
+                e.unit,
+                f"{e.of_rms:.3g}",
+                f"{e.of_range:.3g}",
+                "" if e.limit is None else f"{e.limit:.3g}",
+                "" if e.passed is None else "pass" if e.passed else "FAIL",
+            )
             for e in result.errors
-        ]  # fmt: skip
+        ]
         print_table(
             ("log", "signal", "RMS", "max", "unit", "% of RMS", "% of range", "limit %", ""), rows
         )

@@ -1,9 +1,10 @@
 """Scenarios: what is asked of an actuator, what acts on it, and what breaks."""
 
 from elevon.scenario.compile import CompiledScenario, compile_scenario
-from elevon.scenario.scenario import Command, Load, Scenario, Term, Terms
+from elevon.scenario.scenario import Action, Command, Load, Scenario, Term, Terms
 
 __all__ = [
+    "Action",
     "Command",
     "CompiledScenario",
     "Load",

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 from elevon.errors import InputError, unknown
 from elevon.faults import check_together
-from elevon.scenario.scenario import Scenario, Term
+from elevon.scenario.scenario import Action, Scenario, Term
 from elevon.scenario.waveforms import TABLE, check_values, unit_of, wave_records
 from elevon.units import check_kind, parse_quantity, to_si
 
@@ -25,7 +25,7 @@ class CompiledScenario:
     inputs : mapping
         Port to list of terms.
     command_mode, command_unit : str
-        position, speed or torque, and the SI unit of the command.
+        position, speed, torque or gear, and the SI unit of the command.
     faults : list of dict
         Resolved faults, SI.
     initial : mapping
@@ -76,13 +76,16 @@ def compile_scenario(scenario: Scenario, wiring: str, fidelity: str) -> Compiled
         A unit of the wrong kind, an unknown signal, a fault the actuator cannot have, ...; the
         message names the place in the scenario.
     """
-    units = _port_units(scenario, wiring)
+    mode = _mode(scenario, wiring)
+    units = _port_units(mode, wiring)
     inputs = {
         port: [
             _term(term, units[port], f"{place}.terms[{index}]") for index, term in enumerate(terms)
         ]
-        for port, place, terms in _ports(scenario)
+        for port, place, terms in _ports(scenario, units)
     }
+    if scenario.command.steps:
+        inputs["command"] = [_sequence(scenario.command.steps, wiring)]
     check_together(scenario.fault)
     faults = [
         fault.resolved(wiring, fidelity, f"fault[{index}]")
@@ -90,7 +93,7 @@ def compile_scenario(scenario: Scenario, wiring: str, fidelity: str) -> Compiled
     ]
     return CompiledScenario(
         inputs=inputs,
-        command_mode=scenario.command.mode,
+        command_mode=mode,
         command_unit=units["command"],
         faults=faults,
         initial=_initial(scenario, wiring, fidelity),
@@ -98,21 +101,80 @@ def compile_scenario(scenario: Scenario, wiring: str, fidelity: str) -> Compiled
     )
 
 
-def _ports(scenario: Scenario) -> Iterator[tuple[str, str, tuple[Term, ...]]]:
-    yield "command", "command", scenario.command.terms
-    yield "brake", "load.brake", scenario.loads.brake.terms
-    yield "shaft", "load.shaft", scenario.loads.shaft.terms
-    yield "user", "load.user", scenario.loads.user.terms
-    yield "supply", "supply", scenario.supply.terms
+def _mode(scenario: Scenario, wiring: str) -> str:
+    """Return what the command asks for; when nothing is said, the first thing the wiring takes."""
+    modes: list[str] = _wiring(wiring)["modes"]
+    command = scenario.command
+    mode = command.mode if "mode" in command.model_fields_set else modes[0]
+    if mode not in modes:
+        raise InputError(f"command: the {wiring} wiring has no mode {mode!r}; {_listed(modes)}")
+    return mode
 
 
-def _port_units(scenario: Scenario, wiring: str) -> dict[str, str]:
+def _wiring(name: str) -> Mapping[str, Any]:
+    from elevon import _core
+
+    return next(item for item in _core.wirings() if item["name"] == name)
+
+
+def _listed(modes: list[str]) -> str:
+    return f"mode{'s' if len(modes) > 1 else ''}: {', '.join(modes)}"
+
+
+def _ports(
+    scenario: Scenario, known: Mapping[str, str]
+) -> Iterator[tuple[str, str, tuple[Term, ...]]]:
+    """Yield every port with what drives it; a port the wiring lacks must not be driven."""
+    loads = scenario.loads
+    ports = {
+        "command": ("command", scenario.command),
+        "brake": ("load.brake", loads.brake),
+        "shaft": ("load.shaft", loads.shaft),
+        "user": ("load.user", loads.user),
+        "weight_on_wheels": ("load.weight_on_wheels", loads.weight_on_wheels),
+        "rig_speed": ("load.rig_speed", loads.rig_speed),
+        "supply": ("supply", scenario.supply),
+    }
+    for port, (place, source) in ports.items():
+        if port in known:
+            yield port, place, source.terms
+        elif source.terms:
+            raise InputError(f"{place}: the actuator has no such input; {', '.join(known)}")
+
+
+def _port_units(mode: str, wiring: str) -> dict[str, str]:
     """Return the unit of every port; that of the command goes with its mode."""
     from elevon import _core
 
     units = {port["name"]: port["unit"] for port in _core.ports(wiring)}
-    command = {"position": units["command"], "speed": "rad/s", "torque": "N m"}
-    return {**units, "command": command[scenario.command.mode]}
+    command = {"position": units["command"], "speed": "rad/s", "torque": "N m", "gear": "1"}
+    return {**units, "command": command[mode]}
+
+
+def _sequence(steps: Sequence[Action], wiring: str) -> dict[str, Any]:
+    """Return a sequence of actions as a held table of their numbers."""
+    actions: list[str] = _wiring(wiring)["actions"]
+    times, values = [0.0], [0.0]
+    for index, step in enumerate(steps):
+        place = f"command.steps[{index}]"
+        time = parse_quantity(step.time, "s", f"{place}: time")
+        if step.action not in actions:
+            raise unknown("action", step.action, actions, place)
+        if time < times[-1] or (time == times[-1] and index > 0):
+            raise InputError(f"{place}: time = {time:g} s is not after {times[-1]:g} s")
+        if time == 0.0:
+            times, values = [], []
+        times.append(time)
+        values.append(float(actions.index(step.action)))
+    record = wave_records()[TABLE]
+    given = {**{p.name: p.default or 0.0 for p in record.parameters}, "hold": 1.0}
+    return {
+        "kind": TABLE,
+        "enabled": True,
+        "parameters": list(given.values()),
+        "times": times,
+        "values": values,
+    }
 
 
 def _term(term: Term, own: str, place: str) -> dict[str, Any]:
@@ -137,7 +199,7 @@ def _term(term: Term, own: str, place: str) -> dict[str, Any]:
 
 def _value(given: bool | float | str, name: str, unit: str, place: str) -> float:
     if isinstance(given, bool):
-        if name != "repeat":
+        if name not in ("repeat", "hold"):
             raise InputError(f"{place}: {name} = {str(given).lower()} is not a number")
         return float(given)
     return parse_quantity(given, unit, f"{place}: {name}")

@@ -27,7 +27,7 @@ from elevon.scenario.waveforms import TABLE, wave_records
 from elevon.series import check_series, read_series
 from elevon.units import parse_quantity
 
-__all__ = ["Command", "Load", "Scenario", "Term", "Terms"]
+__all__ = ["Action", "Command", "Load", "Scenario", "Term", "Terms"]
 
 Quantity = StrictInt | StrictFloat | StrictStr
 
@@ -109,10 +109,34 @@ class Terms(_Frozen):
     terms: tuple[Term, ...] = ()
 
 
-class Command(Terms):
-    """What is asked: the user's position, the motor's speed, or the motor's torque."""
+class Action(_Frozen):
+    """One action of a command sequence, held until the next: ``extend``, ``retract``, ..."""
 
-    mode: Literal["position", "speed", "torque"] = "position"
+    time: Quantity
+    action: StrictStr
+
+
+class Command(Terms):
+    """What is asked: the user's position, the motor's speed or torque, or a sequence of actions.
+
+    Attributes
+    ----------
+    mode : str
+        ``gear`` where the actuator has a control unit of its own that takes actions.
+    steps : tuple of Action
+        Mode ``gear`` only, in place of waveforms; times rising.
+    """
+
+    mode: Literal["position", "speed", "torque", "gear"] = "position"
+    steps: tuple[Action, ...] = ()
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Self:
+        if self.mode == "gear" and self.terms:
+            raise ValueError("mode 'gear' takes 'steps' (time and action), not 'terms'")
+        if self.mode != "gear" and self.steps:
+            raise ValueError(f"'steps' belong to mode 'gear', not to mode {self.mode!r}")
+        return self
 
 
 class Load(_Frozen):
@@ -126,11 +150,17 @@ class Load(_Frozen):
         N m on the fast shaft, positive when it opposes positive motion.
     user : Terms
         N m (N for linear actuators) on the user side, positive when it opposes positive motion.
+    weight_on_wheels : Terms
+        1 while the aircraft stands on its wheels (landing gear).
+    rig_speed : Terms
+        m/s that a test rig imposes on the ram in place of the leg (landing gear).
     """
 
     brake: Terms = Terms()
     shaft: Terms = Terms()
     user: Terms = Terms()
+    weight_on_wheels: Terms = Terms()
+    rig_speed: Terms = Terms()
 
 
 def _flat(given: Any) -> Any:

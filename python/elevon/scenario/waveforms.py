@@ -84,8 +84,8 @@ def check_values(record: WaveRecord, values: Mapping[str, float], place: str) ->
             raise InputError(f"{place}: {name} = {value:g} {parameter.unit} must be positive")
         if duration and value < 0.0:
             raise InputError(f"{place}: {name} = {value:g} {parameter.unit} must not be negative")
-        if name == "repeat" and value not in (0.0, 1.0):
-            raise InputError(f"{place}: repeat must be true or false")
+        if name in ("repeat", "hold") and value not in (0.0, 1.0):
+            raise InputError(f"{place}: {name} must be true or false")
         if name == "duty" and not 0.0 <= value <= 1.0:
             raise InputError(f"{place}: duty = {value:g} must be from 0 to 1")
     if "end" in values and values["end"] <= values["start"]:

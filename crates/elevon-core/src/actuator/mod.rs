@@ -1,6 +1,7 @@
 //! Wirings: how components make an actuator. A wiring reads like the paper's block diagram.
 
 pub mod ballscrew;
+pub mod landing_gear;
 pub mod rotary;
 pub mod servo;
 mod wiring;

@@ -87,6 +87,10 @@ pub trait Wiring: Sized + Send + Sync + 'static {
     const PORTS: &'static [Port];
     /// Signals whose initial value a scenario may set.
     const INITIAL: &'static [&'static str];
+    /// What a command may ask for.
+    const MODES: &'static [&'static str] = &["position", "speed", "torque"];
+    /// Names of the values of a command that is a sequence of actions (mode `gear`).
+    const ACTIONS: &'static [&'static str] = &[];
 
     fn groups() -> &'static [Group];
     fn signals() -> &'static [Signal];
@@ -145,5 +149,9 @@ pub trait Wiring: Sized + Send + Sync + 'static {
     /// Positive once the drive of a lane has tripped.
     fn tripped<S: Scalar>(_state: &Self::State<S>) -> S {
         S::zero()
+    }
+    /// Why it has.
+    fn trip_reason<S: Scalar>(_model: &Self::Model<S>, _state: &Self::State<S>, _lane: usize) -> Option<String> {
+        None
     }
 }

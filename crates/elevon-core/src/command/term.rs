@@ -240,6 +240,9 @@ impl Term {
         if next > last {
             return scaled(Line::constant(values[last], NEVER));
         }
+        if self.parameters[3] != 0.0 {
+            return scaled(Line::constant(values[next - 1], times[next]));
+        }
         scaled(Line::through(times[next - 1], values[next - 1], times[next], values[next]))
     }
 }

@@ -122,8 +122,8 @@ pub fn catalogue() -> &'static [WaveRecord] {
         WaveRecord {
             wave: Wave::Table,
             kind: "table",
-            text: "points (time, value), linear between them; needs times and values",
-            parameters: &[START, p("repeat", "1", Some(0.0), "1: starts again after its last point, 0: holds its last value"), p("gain", "1", Some(1.0), "factor on the values")],
+            text: "points (time, value), linear between them or held; needs times and values",
+            parameters: &[START, p("repeat", "1", Some(0.0), "1: starts again after its last point, 0: holds its last value"), p("gain", "1", Some(1.0), "factor on the values"), p("hold", "1", Some(0.0), "1: each value holds until the next point, 0: linear between them")],
         },
     ];
     CATALOGUE

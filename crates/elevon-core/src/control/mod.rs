@@ -1,4 +1,6 @@
-//! Controllers: objects of their own, stepped at their own sample time, sample and hold between.
+//! Control electronics: position and speed loops, the current controller, a landing gear's control unit.
 
 pub mod current_dq;
+pub mod pi_rate;
 pub mod position_speed;
+pub mod sequence;

@@ -119,7 +119,7 @@ impl Profile {
                 let term = Term {
                     wave: crate::command::Wave::Table,
                     enabled: true,
-                    parameters: vec![0.0, 0.0, 1.0],
+                    parameters: vec![0.0, 0.0, 1.0, 0.0],
                     times: times.clone(),
                     values: values.clone(),
                 };

@@ -246,6 +246,13 @@ impl<S: Scalar> BridgeState<S> {
     pub fn rest() -> Self {
         Self { blanking: [S::zero(); 3], tripped: S::zero() }
     }
+
+    /// After the second part of a step: blanking counts whole steps, and lanes without a second part keep the first.
+    #[inline(always)]
+    pub fn keep(&mut self, second: S::Mask, first: &Self) {
+        self.blanking = first.blanking;
+        self.tripped = S::select(second, self.tripped, first.tripped);
+    }
 }
 
 /// A passive leg's current stops at zero; what is left over is taken from the phases that still carry, so that the

@@ -1,4 +1,6 @@
-//! Power electronics: relays, the six-switch bridge.
+//! Power electronics: relays, six-step modulation, the six-switch bridge, the supply.
 
 pub mod bridge;
 pub mod hysteresis;
+pub mod six_step;
+pub mod supply;

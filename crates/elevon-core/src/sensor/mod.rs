@@ -3,4 +3,6 @@
 pub mod current;
 pub mod encoder;
 pub mod filter;
+pub mod hall;
+pub mod proximity;
 pub mod resolver;

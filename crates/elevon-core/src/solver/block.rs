@@ -399,7 +399,8 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
                 self.status[lane] = Status::Overheated { time, temperature: heat.temperature.lane(i) };
                 self.stopped[lane] = Some(k);
             } else if self.status[lane] == Status::Ok && tripped.lane(i) > 0.0 {
-                self.status[lane] = Status::Tripped { time };
+                let reason = W::trip_reason(&self.models[chunk], &self.states[chunk], i).unwrap_or_default();
+                self.status[lane] = Status::Tripped { time, reason };
             }
         }
     }

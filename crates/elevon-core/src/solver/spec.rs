@@ -35,6 +35,7 @@ pub enum Status {
     /// The drive tripped at this time; the run went on without it.
     Tripped {
         time: f64,
+        reason: String,
     },
     /// The winding passed its limit at this time: the drive opened its bridge, the run ended.
     Overheated {

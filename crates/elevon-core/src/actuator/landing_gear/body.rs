@@ -1,0 +1,337 @@
+//! What both fidelities share: motor constants, sensors, supply, mechanics and control units, and their state.
+
+use super::layout::*;
+use super::mechanics::{Acting, Mechanics, Motion};
+use super::signals::{Quantity as Q, ENERGIES};
+use super::unit::{Shown, Unit};
+use crate::actuator::{Inputs, Setup};
+use crate::control::pi_rate::PiRateParameter;
+use crate::inverter::bridge::{BridgeStructure, InverterParameter as Inverter};
+use crate::inverter::six_step::SixStep;
+use crate::inverter::supply::{Link, Supply};
+use crate::motor::star::{MotorParameter, MotorStructure, Star};
+use crate::scalar::{three_phase, Scalar};
+use crate::sensor::hall::{Hall, HallState};
+use crate::sensor::proximity::ProximityParameter;
+use crate::three;
+use crate::transmission::lock::LockParameter;
+
+/// Everything that decides which code runs; equal over a lane block.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Structure {
+    pub motor: MotorStructure,
+    pub bridge: BridgeStructure,
+    /// The friction rig moves the ram.
+    pub rig: bool,
+    pub accounts: bool,
+}
+
+impl Structure {
+    pub fn read(setup: &Setup) -> Self {
+        let departs = |p: MotorParameter| setup.departs(p.at(), 0.0);
+        Self {
+            motor: MotorStructure {
+                trapezoidal: setup.raw[MotorParameter::EmfShape.at()] == 1.0,
+                shorted_loop: false,
+                static_eccentricity: departs(MotorParameter::EccentricityStatic),
+                dynamic_eccentricity: departs(MotorParameter::EccentricityDynamic),
+            },
+            bridge: bridge(setup),
+            rig: setup.driven[RIG],
+            accounts: setup.recorded.iter().any(|s| ENERGIES.contains(s)),
+        }
+    }
+}
+
+fn bridge(setup: &Setup) -> BridgeStructure {
+    let departs = |i: usize| setup.departs(i, 0.0);
+    let switch_faults = (Inverter::OpenAHigh.at()..=Inverter::ShortedCLow.at()).any(departs);
+    BridgeStructure {
+        switch_faults,
+        open_phases: (MotorParameter::OpenA.at()..=MotorParameter::OpenC.at()).any(departs),
+        trips: switch_faults || departs(Inverter::TripCurrent.at()),
+    }
+}
+
+/// Constants of a run.
+#[derive(Clone, Debug)]
+pub struct Constants<S> {
+    pub dt: S,
+    pub star: Star<S>,
+    pub hall: Hall<S>,
+    pub modulator: SixStep<S>,
+    pub supply: Supply<S>,
+    supply_scale: S,
+    pub mechanics: Mechanics<S>,
+    pub cutoff: S,
+    resistance_factor: S,
+    flux_factor: S,
+    temperature: S,
+    per_control_period: S,
+    cell_noise: S,
+    /// Parameters of each lane as plain numbers, for the control unit.
+    raw: Vec<Vec<f64>>,
+}
+
+/// All that changes during a run, except the currents.
+#[derive(Clone, Debug)]
+pub struct Body<S> {
+    pub motion: Motion<S>,
+    pub hall: HallState<S>,
+    units: Vec<Unit>,
+    pub demand: S,
+    pub driving: S,
+    pub brake_free: S,
+    pub released: S,
+    pub link: S,
+    pub flow: Link<S>,
+    pub bus: S,
+    charge: S,
+    /// Sum and largest magnitude of the line current since the last tick, and what they were then.
+    line: [S; 2],
+    shown_line: [S; 2],
+    cell_noise: S,
+    /// Share of the lock's strength in use, at the last tick.
+    pub lock_use: S,
+    pub energy: [S; 5],
+}
+
+pub const E_SUPPLY: usize = 0;
+pub const E_SOURCE: usize = 1;
+pub const E_DUMP: usize = 2;
+pub const E_COPPER: usize = 3;
+pub const E_INVERTER: usize = 4;
+
+impl<S: Scalar> Constants<S> {
+    pub fn derive(raw: &[S], structure: &Structure, dt: S, mechanical: S) -> Self {
+        let view = Raw(raw);
+        let at = |i: usize| raw[i];
+        let rise = at(MotorParameter::WindingTemperature.at()) - at(MotorParameter::ReferenceTemperature.at());
+        let modulator = SixStep::derive(view.six_step());
+        Self {
+            dt,
+            star: Star::derive(view.motor(), &structure.motor, dt),
+            hall: Hall::derive(view.hall(), at(MotorParameter::PolePairs.at())),
+            cutoff: modulator.cutoff,
+            modulator,
+            supply: Supply::derive(view.supply(), dt),
+            supply_scale: at(Inverter::SupplyScale.at()),
+            mechanics: Mechanics::derive(raw, mechanical),
+            resistance_factor: S::one() + at(MotorParameter::TemperatureCoefficient.at()) * rise,
+            flux_factor: S::one() + at(MotorParameter::FluxTemperatureCoefficient.at()) * rise,
+            temperature: at(MotorParameter::WindingTemperature.at()),
+            per_control_period: S::one() / at(PiRateParameter::Period.at()),
+            cell_noise: at(CellParameter::Noise.at()),
+            raw: (0..S::LANES).map(|lane| raw.iter().map(|x| x.lane(lane)).collect()).collect(),
+        }
+    }
+
+    /// `initial` is the nut position and the motor speed; without one the gear is retracted and at rest.
+    pub fn start(&self, raw: &[S], initial: &[S]) -> Body<S> {
+        let or = |i: usize, other: S| S::select(initial[i].equals(initial[i]), initial[i], other);
+        let nut = or(0, S::splat(0.5) * raw[ProximityParameter::Position0.at()]);
+        let locked = S::indicator(raw[LockParameter::EngageTravel.at()].le(nut - self.mechanics.lever.stroke));
+        let motion = self.mechanics.start(nut, locked, or(1, S::zero()));
+        let units: Vec<Unit> = (0..S::LANES).map(|lane| Unit::start(&self.raw[lane], nut.lane(lane))).collect();
+        let zero = S::zero();
+        let mut body = Body {
+            motion,
+            hall: self.hall.start(self.star.electrical_angle(motion.motor_position)),
+            units,
+            demand: zero,
+            driving: zero,
+            brake_free: zero,
+            released: zero,
+            link: raw[Inverter::SupplyVoltage.at()] * self.supply_scale,
+            flow: Link { source: zero, dump: zero },
+            bus: zero,
+            charge: zero,
+            line: [zero; 2],
+            shown_line: [zero; 2],
+            cell_noise: zero,
+            lock_use: zero,
+            energy: [zero; 5],
+        };
+        body.obey();
+        body
+    }
+
+    pub fn source(&self, inputs: &Inputs<S>, t: S) -> S {
+        inputs[SUPPLY].at(t) * self.supply_scale
+    }
+
+    /// The control units' tick.
+    pub fn tick(&self, s: &mut Body<S>, inputs: &Inputs<S>, t: S, noise: &mut dyn FnMut(u64) -> S) {
+        let command = inputs[COMMAND].at(t);
+        let wheels = inputs[WHEELS].at(t);
+        let speed = self.hall.speed(&s.hall, t);
+        let counted = s.hall.count * self.hall.pitch * self.mechanics.travel;
+        let bus = s.charge * self.per_control_period;
+        if S::any(t.equals(S::zero())) {
+            // The link starts at the source's own voltage.
+            s.link = self.source(inputs, t);
+        }
+        for lane in 0..S::LANES {
+            let shown = Shown {
+                time: t.lane(lane),
+                command: command.lane(lane),
+                on_wheels: wheels.lane(lane),
+                supply: s.link.lane(lane),
+                bus: bus.lane(lane),
+                speed: speed.lane(lane),
+                ram: s.motion.nut_position.lane(lane).min(self.mechanics.lever.stroke.lane(lane)),
+                locked: s.motion.locked.lane(lane),
+                counted: counted.lane(lane),
+                hall_errors: s.hall.errors.lane(lane),
+            };
+            s.units[lane].tick(&self.raw[lane], &shown);
+        }
+        s.charge = S::zero();
+        s.shown_line = [s.line[0] * self.dt * self.per_control_period, s.line[1]];
+        s.line = [S::zero(); 2];
+        s.lock_use = s.motion.locked * self.mechanics.end_load(inputs[USER].at(t)).abs() * self.mechanics.lock.per_strength;
+        s.obey();
+        if S::any(S::zero().lt(self.cell_noise)) {
+            s.cell_noise = self.cell_noise * noise(0);
+        }
+    }
+
+    /// Coefficients k_j of the phases at the present angle, and the angle.
+    #[inline(always)]
+    pub fn coupling(&self, structure: &Structure, motor_position: S) -> ([S; 3], S) {
+        let angle = self.star.electrical_angle(motor_position);
+        let plain = structure.motor.trapezoidal && !structure.motor.static_eccentricity;
+        let (sin, cos) = if plain { (S::zero(), S::one()) } else { angle.sin_cos() };
+        let shape = if structure.motor.trapezoidal { self.star.trapezoid(angle) } else { three_phase(sin, cos).0 };
+        let mut gap = [self.flux_factor; 3];
+        if structure.motor.static_eccentricity {
+            let fixed = self.star.static_gap(sin, cos);
+            gap = three!(|j| gap[j] * fixed[j]);
+        }
+        if structure.motor.dynamic_eccentricity {
+            let turning = self.star.dynamic_gap(motor_position);
+            gap = three!(|j| gap[j] * turning[j]);
+        }
+        (self.star.coefficients(shape, gap), angle)
+    }
+
+    #[inline(always)]
+    pub fn resistance(&self) -> [S; 3] {
+        three!(|j| self.star.resistance[j] * self.resistance_factor)
+    }
+
+    #[inline(always)]
+    pub fn acting(&self, s: &Body<S>, inputs: &Inputs<S>, motor_torque: S, t: S) -> Acting<S> {
+        Acting { motor_torque, user: inputs[USER].at(t), brake_free: s.brake_free, released: s.released, rig_speed: inputs[RIG].at(t) }
+    }
+
+    /// The link after a step in which the bridge drew `bus` from it.
+    #[inline(always)]
+    pub fn feed(&self, s: &mut Body<S>, source: S, bus: S, accounts: bool) {
+        let flow = self.supply.currents(source, s.link);
+        if accounts {
+            let e = &mut s.energy;
+            e[E_SUPPLY] = e[E_SUPPLY] + self.dt * source * flow.source;
+            e[E_SOURCE] = e[E_SOURCE] + self.dt * (source - s.link) * flow.source;
+            e[E_DUMP] = e[E_DUMP] + self.dt * s.link * flow.dump;
+        }
+        s.link = self.supply.charge(s.link, &flow, bus);
+        s.charge = self.dt.fma(bus, s.charge);
+        s.bus = bus;
+        s.flow = flow;
+    }
+
+    /// Keeps account of the line current of a step.
+    #[inline(always)]
+    pub fn meter(s: &mut Body<S>, line: S) {
+        s.line = [s.line[0] + line, s.line[1].maximum(line.abs())];
+    }
+
+    pub fn trip_reason(&self, s: &Body<S>, lane: usize) -> Option<String> {
+        s.units[lane].reason()
+    }
+
+    /// All signals but those of currents and phases.
+    pub fn observe(&self, structure: &Structure, inputs: &Inputs<S>, s: &Body<S>, torque: S, t: S, out: &mut [S]) {
+        let mut set = |q: Q, x: S| out[q as usize] = x;
+        let m = &self.mechanics;
+        let user = inputs[USER].at(t);
+        let unit = |f: &dyn Fn(&Unit) -> f64| S::from_fn(|lane| f(&s.units[lane]));
+        let flag = |f: &dyn Fn(&Unit) -> bool| S::from_fn(|lane| f64::from(u8::from(f(&s.units[lane]))));
+        set(Q::Command, inputs[COMMAND].at(t));
+        set(Q::State, unit(&|u| f64::from(u.sequence.phase as u8)));
+        set(Q::CommandRefused, unit(&|u| f64::from(u.sequence.refused)));
+        set(Q::FaultCode, unit(&|u| f64::from(u.sequence.fault)));
+        set(Q::SpeedRef, unit(&|u| u.speed.reference));
+        set(Q::SpeedMeas, unit(&|u| u.speed_meas));
+        set(Q::Proximity0, flag(&|u| u.switches.shown[0]));
+        set(Q::Proximity25, flag(&|u| u.switches.shown[1]));
+        set(Q::Proximity75, flag(&|u| u.switches.shown[2]));
+        set(Q::Proximity100, flag(&|u| u.switches.shown[3]));
+        set(Q::MotorPosition, s.motion.motor_position);
+        set(Q::MotorSpeed, s.motion.motor_speed);
+        set(Q::NutPosition, s.motion.nut_position);
+        let ram = m.ram(&s.motion, user);
+        set(Q::UserPosition, ram);
+        let moving = S::splat(0.5).lt(s.motion.carrying);
+        set(Q::UserSpeed, S::select(moving, s.motion.nut_speed, S::zero()));
+        set(Q::VoltageRef, s.demand);
+        set(Q::Duty, self.duty(s));
+        set(Q::CurrentBus, s.bus);
+        set(Q::CurrentSource, s.flow.source);
+        set(Q::SupplyVoltage, s.link);
+        set(Q::CurrentMean, s.shown_line[0]);
+        set(Q::CurrentPeak, s.shown_line[1]);
+        set(Q::HallA, s.hall.code[0]);
+        set(Q::HallB, s.hall.code[1]);
+        set(Q::HallC, s.hall.code[2]);
+        set(Q::MotorTorque, torque);
+        set(Q::DetentTorque, m.detent_torque(s.motion.motor_position));
+        set(Q::BrakeTorque, m.brake_torque(s.brake_free));
+        set(Q::BrakeReleased, s.brake_free);
+        let forces = m.forces(&s.motion, user, structure.rig);
+        set(Q::FrictionForce, m.friction_force(&s.motion, s.released));
+        let locked = S::splat(0.5).lt(s.motion.locked);
+        set(Q::LoadForce, S::select(locked, m.end_load(user), forces.load));
+        set(Q::LockForce, S::select(locked, m.end_load(user), forces.spring));
+        set(Q::Efficiency, m.efficiency(&forces, s.released));
+        set(Q::Locked, s.motion.locked);
+        set(Q::Released, s.released);
+        let swing = m.lever.angle(ram.minimum(m.lever.stroke)) - m.lever.angle(S::zero());
+        set(Q::LeverAngle, swing);
+        set(Q::LeverArm, S::one() / forces.arm.per_square.sqrt());
+        set(Q::Inertia, m.inertia(&s.motion, &forces.arm));
+        set(Q::LoadCell, s.motion.rig_force + s.cell_noise);
+        set(Q::WindingTemperature, self.temperature);
+        for (i, x) in s.energy.iter().enumerate() {
+            out[Q::EnergySupply as usize + i] = *x;
+        }
+        for (i, x) in s.motion.energy.iter().enumerate() {
+            out[Q::EnergyMotor as usize + i] = *x;
+        }
+        out[Q::EnergyKinetic as usize] = m.kinetic_energy(&s.motion, s.released);
+        out[Q::EnergyCapacitor as usize] = S::splat(0.5) * self.supply.capacitance * s.link * s.link;
+    }
+
+    #[inline(always)]
+    pub fn duty(&self, s: &Body<S>) -> S {
+        (s.demand.abs() / s.link.maximum(S::splat(1e-6))).minimum(S::one())
+    }
+}
+
+impl<S: Scalar> Body<S> {
+    /// Takes over what the control units order.
+    fn obey(&mut self) {
+        let units = &self.units;
+        let flag = |f: &dyn Fn(&Unit) -> bool| S::from_fn(|lane| f64::from(u8::from(f(&units[lane]))));
+        self.demand = S::from_fn(|lane| units[lane].demand);
+        self.driving = flag(&|u| u.driving);
+        self.brake_free = flag(&|u| u.coil.free);
+        self.released = flag(&|u| u.sequence.released);
+    }
+
+    /// Positive where the control unit gave up.
+    pub fn tripped(&self) -> S {
+        S::from_fn(|lane| f64::from(u8::from(self.units[lane].sequence.fault > 0 || self.units[lane].sequence.turned_down.is_some())))
+    }
+}

@@ -1,0 +1,245 @@
+//! High fidelity: three phases, a bridge whose legs are chopped to ZERO, diodes; speeds on a coarser step.
+
+use super::body::{Body, Constants, Structure, E_COPPER, E_INVERTER};
+use super::layout::*;
+use super::signals::{Quantity as Q, ALL};
+use crate::actuator::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring, WATCHED};
+use crate::control::pi_rate::PiRateParameter;
+use crate::fault::FaultKind;
+use crate::inverter::bridge::{quench, Bridge, BridgeState, BridgeStructure, Windings};
+use crate::inverter::six_step;
+use crate::scalar::Scalar;
+use crate::three;
+use crate::time::Steps;
+use crate::variable::{Group, Signal};
+
+/// The landing-gear actuator at high fidelity.
+pub struct High;
+
+#[derive(Clone, Debug)]
+pub struct Model<S> {
+    c: Constants<S>,
+    bridge: Bridge<S>,
+    per_torque_steps: S,
+    mechanical: Steps,
+}
+
+#[derive(Clone, Debug)]
+pub struct State<S> {
+    body: Body<S>,
+    current: [S; 3],
+    legs: [S; 3],
+    bridge: BridgeState<S>,
+    /// Carrier count until which the legs stay off after the current cut-off.
+    cut: S,
+    /// Sum of the torque since the last mechanical step.
+    torque: S,
+    voltage: [S; 3],
+}
+
+/// A part of an electrical step with the legs as they are.
+#[derive(Clone, Copy)]
+struct Part<S> {
+    current: [S; 3],
+    voltage: [S; 3],
+    /// Times the part's length: charge from the upper rail, angular momentum, losses.
+    charge: S,
+    impulse: S,
+    copper: S,
+    inverter: S,
+}
+
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+fn part<S: Scalar>(m: &Model<S>, structure: &BridgeStructure, s: &mut State<S>, legs: [S; 3], k: [S; 3], resistance: [S; 3], dt: S, start: [S; 3]) -> Part<S> {
+    let half = S::splat(0.5);
+    let zero = S::zero();
+    let half_supply = half * s.body.link;
+    let speed = s.body.motion.motor_speed;
+    let i = start;
+    let emf: [S; 3] = three!(|j| k[j] * speed);
+    let windings = Windings { current: i, emf, per_inductance: m.c.star.per_inductance, resistance, open: m.c.star.open };
+    let connection = m.bridge.connect(&mut s.bridge, structure, s.legs, legs, half_supply, &windings);
+    let state = connection.legs;
+    let all = state.connected[0] & state.connected[1] & state.connected[2];
+    let plain = m.c.star.neutral(three!(|j| (-resistance[j]).fma(i[j], state.voltage[j] - emf[j])));
+    let neutral = connection.loose.map_or(plain, |loose| S::select(all, plain, loose));
+    s.legs = legs;
+    let terminal: [S; 3] = three!(|j| S::select(state.connected[j], state.voltage[j], neutral + emf[j]));
+    let free: [S; 3] = three!(|j| {
+        let slope = (terminal[j] - neutral - emf[j] - resistance[j] * i[j]) * m.c.star.per_inductance[j];
+        dt.fma(slope, i[j])
+    });
+    let current = quench(&state, i, free);
+    // A phase that stopped conducting within the part conducted for a share of it.
+    let tiny = S::splat(1e-30);
+    let middle: [S; 3] = three!(|j| {
+        let whole = free[j] - i[j];
+        let share = S::select(whole.abs().lt(tiny), S::one(), ((current[j] - i[j]) / S::select(whole.abs().lt(tiny), S::one(), whole)).clamp(zero, S::one()));
+        half * (i[j] + current[j]) * share
+    });
+    let mut out = Part { current, voltage: three!(|j| terminal[j] - neutral), charge: zero, impulse: zero, copper: zero, inverter: zero };
+    for j in 0..3 {
+        out.charge = out.charge + S::select(zero.lt(state.rail[j]), dt * middle[j], zero);
+        out.impulse = out.impulse + dt * k[j] * middle[j];
+        out.copper = out.copper + dt * resistance[j] * middle[j] * middle[j];
+        out.inverter = out.inverter + dt * (state.rail[j] - terminal[j]) * middle[j];
+    }
+    out
+}
+
+#[inline(always)]
+fn electric<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, source: S, t: S) {
+    let zero = S::zero();
+    let dt = m.c.dt;
+    let (k, _) = m.c.coupling(structure, s.body.motion.motor_position);
+    let resistance = m.c.resistance();
+    let carrier = m.c.modulator.carrier(t);
+    let duty = m.c.duty(&s.body);
+    s.cut = m.c.modulator.cut(s.cut, carrier, s.current);
+    let live = S::splat(0.5).lt(s.body.driving) & s.cut.le(carrier);
+    let on = S::select(live, m.c.modulator.on_fraction(carrier, dt, duty), zero);
+    let wanted = six_step::demand(s.body.hall.code);
+    let sign = s.body.demand.sign();
+    let gated = zero.lt(on);
+    let legs: [S; 3] = three!(|j| S::select(gated, wanted[j] * sign, zero));
+    let split = gated & on.lt(S::one());
+    let first = S::select(split, on * dt, dt);
+    let start = s.current;
+    let mut whole = part(m, &structure.bridge, s, legs, k, resistance, first, start);
+    if S::any(split) {
+        let blanking = s.bridge;
+        let kept = s.legs;
+        let off = three!(|j| S::select(split, zero, legs[j]));
+        let rest = part(m, &structure.bridge, s, off, k, resistance, dt - first, whole.current);
+        s.bridge.keep(split, &blanking);
+        s.legs = three!(|j| S::select(split, zero, kept[j]));
+        let add = |a: S, b: S| S::select(split, a + b, a);
+        whole.current = three!(|j| S::select(split, rest.current[j], whole.current[j]));
+        whole.voltage = three!(|j| S::select(split, rest.voltage[j], whole.voltage[j]));
+        whole.charge = add(whole.charge, rest.charge);
+        whole.impulse = add(whole.impulse, rest.impulse);
+        whole.copper = add(whole.copper, rest.copper);
+        whole.inverter = add(whole.inverter, rest.inverter);
+    }
+    s.current = whole.current;
+    s.voltage = whole.voltage;
+    s.torque = s.torque + whole.impulse;
+    let size = S::splat(0.5) * (s.current[0].abs() + s.current[1].abs() + s.current[2].abs());
+    Constants::meter(&mut s.body, whole.impulse.signed(size));
+    if structure.accounts {
+        s.body.energy[E_COPPER] = s.body.energy[E_COPPER] + whole.copper;
+        s.body.energy[E_INVERTER] = s.body.energy[E_INVERTER] + whole.inverter;
+    }
+    m.c.feed(&mut s.body, source, whole.charge / dt, structure.accounts);
+}
+
+#[inline(always)]
+fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &mut State<S>, k: Steps) {
+    let t = S::splat(k as f64) * m.c.dt;
+    let source = m.c.source(inputs, t);
+    electric(m, structure, s, source, t);
+    let before = s.body.motion.motor_position;
+    m.c.mechanics.drift(&mut s.body.motion, m.c.dt);
+    let angle = m.c.star.electrical_angle(s.body.motion.motor_position);
+    let advance = (s.body.motion.motor_position - before) * m.c.star.pole_pairs;
+    m.c.hall.observe(&mut s.body.hall, angle, advance, t + m.c.dt, m.c.dt);
+    if (k + 1) % m.mechanical == 0 {
+        let torque = m.c.star.saturate(s.torque * m.per_torque_steps);
+        let acting = m.c.acting(&s.body, inputs, torque, t);
+        m.c.mechanics.kick(&mut s.body.motion, &acting, structure.rig);
+        s.torque = S::zero();
+    }
+}
+
+impl Wiring for High {
+    type Structure = Structure;
+    type Model<S: Scalar> = Model<S>;
+    type State<S: Scalar> = State<S>;
+
+    const PORTS: &'static [Port] = PORTS;
+    const INITIAL: &'static [&'static str] = super::INITIAL;
+    const MODES: &'static [&'static str] = super::MODES;
+    const ACTIONS: &'static [&'static str] = super::ACTIONS;
+
+    fn groups() -> &'static [Group] {
+        GROUPS
+    }
+    fn signals() -> &'static [Signal] {
+        ALL
+    }
+    fn faults() -> Vec<FaultKind> {
+        super::faults::catalogue()
+    }
+    fn step(raw: &[f64]) -> f64 {
+        raw[SolverParameter::Step.at()]
+    }
+    fn fault_grid(raw: &[f64]) -> f64 {
+        raw[SolverParameter::FaultGrid.at()]
+    }
+    fn structure(setup: &Setup) -> Structure {
+        Structure::read(setup)
+    }
+    fn ticks(raw: &[f64], _structure: &Structure) -> Vec<Tick> {
+        super::control_tick(raw[PiRateParameter::Period.at()], raw[SolverParameter::Step.at()])
+    }
+    fn check(raw: &[f64]) -> Vec<Finding> {
+        super::checks::high(raw)
+    }
+
+    fn derive<S: Scalar>(raw: &[S], structure: &Structure) -> Model<S> {
+        let dt = raw[SolverParameter::Step.at()];
+        let mechanical = raw[SolverParameter::MechanicalStep.at()];
+        Model {
+            c: Constants::derive(raw, structure, dt, mechanical),
+            bridge: Bridge::derive(Raw(raw).inverter(), dt.lane(0)),
+            per_torque_steps: S::one() / mechanical,
+            mechanical: ((mechanical.lane(0) / dt.lane(0)).round() as Steps).max(1),
+        }
+    }
+
+    fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
+        let zero = S::zero();
+        State { body: model.c.start(raw, initial), current: [zero; 3], legs: [zero; 3], bridge: BridgeState::rest(), cut: zero, torque: zero, voltage: [zero; 3] }
+    }
+
+    fn tick<S: Scalar>(_kind: u8, _structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &mut State<S>, t: S, noise: &mut dyn FnMut(u64) -> S) {
+        m.c.tick(&mut s.body, inputs, t, noise);
+    }
+
+    #[inline(always)]
+    fn advance<S: Scalar>(structure: &Structure, models: &[Model<S>], inputs: &[Inputs<S>], states: &mut [State<S>], from: Steps, count: Steps) {
+        for k in from..from + count {
+            for ((model, inputs), state) in models.iter().zip(inputs).zip(states.iter_mut()) {
+                step(model, structure, inputs, state, k);
+            }
+        }
+    }
+
+    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
+        let (k, _) = m.c.coupling(structure, s.body.motion.motor_position);
+        let torque = m.c.star.saturate(m.c.star.torque(k, s.current));
+        m.c.observe(structure, inputs, &s.body, torque, t, out);
+        let half = S::splat(0.5);
+        let size = half * (s.current[0].abs() + s.current[1].abs() + s.current[2].abs());
+        out[Q::CurrentLine as usize] = torque.signed(size);
+        let mut magnetic = S::zero();
+        for j in 0..3 {
+            out[Q::CurrentA as usize + j] = s.current[j];
+            out[Q::VoltageA as usize + j] = s.voltage[j];
+            out[Q::EmfA as usize + j] = k[j] * s.body.motion.motor_speed;
+            magnetic = magnetic + half * s.current[j] * s.current[j] / m.c.star.per_inductance[j];
+        }
+        out[Q::EnergyMagnetic as usize] = magnetic;
+    }
+
+    fn watch<S: Scalar>(s: &State<S>) -> [Watch<S>; WATCHED] {
+        super::watch(&s.body, s.current[0].abs() + s.current[1].abs() + s.current[2].abs())
+    }
+    fn tripped<S: Scalar>(s: &State<S>) -> S {
+        s.body.tripped().maximum(s.bridge.tripped)
+    }
+    fn trip_reason<S: Scalar>(m: &Model<S>, s: &State<S>, lane: usize) -> Option<String> {
+        m.c.trip_reason(&s.body, lane)
+    }
+}

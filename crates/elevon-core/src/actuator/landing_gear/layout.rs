@@ -1,0 +1,147 @@
+//! The parameters of the landing-gear actuator: the groups of its components, and where each begins.
+
+use crate::actuator::Port;
+use crate::control::pi_rate::{PiRateParameter, PI_RATE};
+use crate::control::sequence::{SequenceParameter, SEQUENCE};
+use crate::inverter::bridge::{InverterParameter, INVERTER};
+use crate::inverter::six_step::{SixStepParameter, SIX_STEP};
+use crate::inverter::supply::{SupplyParameter, SUPPLY as LINK};
+use crate::motor::star::{MotorParameter, MOTOR};
+use crate::sensor::hall::{HallParameter, HALL};
+use crate::sensor::proximity::{ProximityParameter, PROXIMITY};
+use crate::transmission::brake::{BrakeParameter, BRAKE};
+use crate::transmission::lever::{LegParameter, LeverParameter, LEG, LEVER};
+use crate::transmission::lock::{LockParameter, LOCK};
+use crate::transmission::planetary::{PlanetaryParameter, ReleaseParameter, PLANETARY, RELEASE};
+use crate::transmission::roller_screw::{ScrewParameter, SCREW};
+use crate::transmission::train_friction::{TrainFrictionParameter, TRAIN_FRICTION};
+use crate::variable::{offset, Group};
+use crate::variables;
+
+variables! {
+    /// The shaft of the motor.
+    ShaftParameter, SHAFT {
+        DetentTorque => "detent_torque", "T_mc", "N m", NonNegative, Plant, Some(0.0), "amplitude of the detent torque";
+        DetentPeriods => "detent_periods", "n", "1", AtLeast(1.0), Plant, Some(1.0), "periods of the detent torque per turn";
+        BearingTorque => "bearing_torque", "-", "N m", NonNegative, Plant, Some(0.0), "dry friction of worn bearings; healthy 0";
+    }
+}
+
+/// Knots of the load curve.
+pub const LOADS: usize = 9;
+
+variables! {
+    /// Load of the leg on the ram at load factor 1, at nine even positions of the stroke; it pushes towards extension.
+    LoadCurveParameter, LOAD_CURVE {
+        Factor => "factor", "N_z", "1", NonNegative, Load, Some(1.0), "load factor on the load curve";
+        Force0 => "force_0", "F_ext", "N", Any, Load, None, "load at the retracted end";
+        Force1 => "force_1", "F_ext", "N", Any, Load, None, "load at 1/8 of the stroke";
+        Force2 => "force_2", "F_ext", "N", Any, Load, None, "load at 2/8 of the stroke";
+        Force3 => "force_3", "F_ext", "N", Any, Load, None, "load at 3/8 of the stroke";
+        Force4 => "force_4", "F_ext", "N", Any, Load, None, "load at 4/8 of the stroke";
+        Force5 => "force_5", "F_ext", "N", Any, Load, None, "load at 5/8 of the stroke";
+        Force6 => "force_6", "F_ext", "N", Any, Load, None, "load at 6/8 of the stroke";
+        Force7 => "force_7", "F_ext", "N", Any, Load, None, "load at 7/8 of the stroke";
+        Force8 => "force_8", "F_ext", "N", Any, Load, None, "load at the extended end";
+    }
+}
+
+variables! {
+    /// The load cell of the friction rig.
+    CellParameter, CELL {
+        Noise => "load_cell_noise", "-", "N", NonNegative, Sensor, Some(0.0), "standard deviation of the load cell's noise, held over a control period";
+    }
+}
+
+variables! {
+    /// The low fidelity.
+    LowParameter, LOW {
+        Step => "step", "dt_low", "s", Positive, Solver, Some(2e-5), "solver step of the low fidelity";
+        Commutation => "commutation_factor", "c", "1", NonNegative, Plant, Some(1.1), "mean torque loss of the commutations as a resistance c p |w| L";
+    }
+}
+
+variables! {
+    /// The fixed-step solver of the high fidelity.
+    SolverParameter, SOLVER {
+        Step => "step", "dt", "s", Positive, Solver, Some(1e-6), "solver step of the electrical part";
+        MechanicalStep => "mechanical_step", "-", "s", Positive, Solver, Some(1e-5), "step of speeds, friction and lock: a whole number of electrical steps";
+        FaultGrid => "fault_grid", "-", "s", Positive, Solver, Some(1e-3), "smooth fault profiles are held over this time";
+    }
+}
+
+const fn group(prefix: &'static str, variables: &'static [crate::variable::Variable]) -> Group {
+    Group { prefix, variables }
+}
+
+pub const GROUPS: &[Group] = &[
+    group("motor", MOTOR),
+    group("motor", SHAFT),
+    group("inverter", INVERTER),
+    group("inverter", SIX_STEP),
+    group("supply", LINK),
+    group("gear", PLANETARY),
+    group("screw", SCREW),
+    group("lever", LEVER),
+    group("leg", LEG),
+    group("load", LOAD_CURVE),
+    group("friction", TRAIN_FRICTION),
+    group("brake", BRAKE),
+    group("lock", LOCK),
+    group("release", RELEASE),
+    group("control", PI_RATE),
+    group("control", SEQUENCE),
+    group("proximity", PROXIMITY),
+    group("hall", HALL),
+    group("sensor", CELL),
+    group("low", LOW),
+    group("solver", SOLVER),
+];
+
+/// A view of the parameter vector by component.
+#[derive(Clone, Copy)]
+pub struct Raw<'a, S>(pub &'a [S]);
+
+/// Index in the whole parameter vector.
+pub trait At {
+    fn at(self) -> usize;
+}
+
+macro_rules! views {
+    ($($name:ident $index:literal $id:ident),*) => {
+        impl<'a, S> Raw<'a, S> {
+            $(pub fn $name(self) -> &'a [S] {
+                const AT: usize = offset(GROUPS, $index);
+                &self.0[AT..AT + GROUPS[$index].variables.len()]
+            })*
+        }
+        $(impl At for $id {
+            fn at(self) -> usize {
+                const AT: usize = offset(GROUPS, $index);
+                AT + self as usize
+            }
+        })*
+    };
+}
+
+views!(
+    motor 0 MotorParameter, shaft 1 ShaftParameter, inverter 2 InverterParameter, six_step 3 SixStepParameter,
+    supply 4 SupplyParameter, gear 5 PlanetaryParameter, screw 6 ScrewParameter, lever 7 LeverParameter, leg 8 LegParameter,
+    load 9 LoadCurveParameter, friction 10 TrainFrictionParameter, brake 11 BrakeParameter, lock 12 LockParameter,
+    release 13 ReleaseParameter, pi_rate 14 PiRateParameter, sequence 15 SequenceParameter, proximity 16 ProximityParameter,
+    hall 17 HallParameter, cell 18 CellParameter, low 19 LowParameter, solver 20 SolverParameter
+);
+
+pub const PORTS: &[Port] = &[
+    Port { name: "command", unit: "1", text: "0 stop, 1 extend, 2 retract, 3 free fall, held until the next one", parameter: "" },
+    Port { name: "user", unit: "N", text: "signed load on the ram besides the leg's, positive opposes extension", parameter: "" },
+    Port { name: "supply", unit: "V", text: "voltage of the source", parameter: "inverter.supply_voltage" },
+    Port { name: "weight_on_wheels", unit: "1", text: "1: the aircraft stands on its wheels", parameter: "" },
+    Port { name: "rig_speed", unit: "m/s", text: "speed that the friction rig imposes on the ram, in place of the leg", parameter: "" },
+];
+
+pub const COMMAND: usize = 0;
+pub const USER: usize = 1;
+pub const SUPPLY: usize = 2;
+pub const WHEELS: usize = 3;
+pub const RIG: usize = 4;

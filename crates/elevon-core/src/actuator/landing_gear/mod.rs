@@ -1,0 +1,38 @@
+//! The landing-gear actuator (Pisa): control unit, six-step bridge, star motor with Hall sensors, planetary gearbox with
+//! free-fall release, roller screw, down-lock, leg on a lever.
+
+mod body;
+mod checks;
+mod faults;
+mod high;
+mod layout;
+mod low;
+mod mechanics;
+mod signals;
+mod unit;
+
+use crate::actuator::{Tick, Watch, WATCHED};
+use crate::control::sequence;
+use crate::scalar::Scalar;
+use crate::time::Steps;
+
+pub use high::High;
+pub use low::Low;
+
+const INITIAL: &[&str] = &["nut_position", "motor_speed"];
+const MODES: &[&str] = &["gear"];
+const ACTIONS: &[&str] = sequence::COMMANDS;
+
+fn control_tick(period: f64, dt: f64) -> Vec<Tick> {
+    vec![Tick { period: ((period / dt).round() as Steps).max(1), kind: 0 }]
+}
+
+fn watch<S: Scalar>(body: &body::Body<S>, current: S) -> [Watch<S>; WATCHED] {
+    [
+        Watch { name: "motor_speed", value: body.motion.motor_speed, limit: 1e6 },
+        Watch { name: "current_line", value: current, limit: 1e6 },
+        Watch { name: "supply_voltage", value: body.link, limit: 1e5 },
+        // Share of the lock's strength in use.
+        Watch { name: "lock_force", value: body.lock_use, limit: 1.0 },
+    ]
+}

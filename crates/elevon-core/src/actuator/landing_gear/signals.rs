@@ -1,0 +1,81 @@
+//! What a run of the landing-gear actuator can record; both fidelities share the names.
+
+use crate::signals;
+
+signals! {
+    /// Signals of both fidelities; the low one leaves out the phases (`PHASES`).
+    Quantity, ALL {
+        Command => "command", "-", "1", "0 stop, 1 extend, 2 retract, 3 free fall";
+        State => "state", "-", "1", "0 retracted, 1 extending, 2 locked, 3 retracting, 4 stopped, 5 released, 6 fault";
+        CommandRefused => "command_refused", "-", "1", "why the last command was refused: 1 released, 2 fault, 3 undervoltage, 4 overvoltage, 5 weight on wheels, 6 locked; 0 accepted";
+        FaultCode => "fault_code", "-", "1", "1 motion, 2 lock not released, 3 lock not engaged, 4 stalled, 5 overspeed, 6 overcurrent, 7 hall, 8 proximity; 0 none";
+        UserPosition => "user_position", "x_a", "m", "position of the ram";
+        UserSpeed => "user_speed", "v_a", "m/s", "speed of the ram";
+        NutPosition => "nut_position", "x_n", "m", "position of the nut, from retracted; beyond the stroke it works the lock";
+        MotorPosition => "motor_position", "theta_m", "rad", "motor angle";
+        MotorSpeed => "motor_speed", "omega_m", "rad/s", "motor speed";
+        SpeedRef => "speed_ref", "omega_ref", "rad/s", "speed reference behind the rate limiter";
+        SpeedMeas => "speed_meas", "-", "rad/s", "speed from the Hall edges";
+        VoltageRef => "voltage_ref", "V_dem", "V", "demanded voltage";
+        Duty => "duty", "d", "1", "demand over link voltage";
+        CurrentBus => "current_bus", "i_bus", "A", "current drawn from the link";
+        CurrentSource => "current_source", "i_s", "A", "current of the source";
+        SupplyVoltage => "supply_voltage", "V_dc", "V", "link voltage";
+        CurrentLine => "current_line", "i", "A", "current of the conducting pair, positive gives torque towards extension (half the sum of the magnitudes)";
+        CurrentMean => "current_mean", "-", "A", "mean of current_line over the last control period";
+        CurrentPeak => "current_peak", "-", "A", "largest current of the pair over the last control period";
+        HallA => "hall_a", "-", "1", "Hall sensor a";
+        HallB => "hall_b", "-", "1", "Hall sensor b";
+        HallC => "hall_c", "-", "1", "Hall sensor c";
+        MotorTorque => "motor_torque", "T_m", "N m", "electromagnetic torque";
+        DetentTorque => "detent_torque", "T_mc", "N m", "detent torque";
+        BrakeTorque => "brake_torque", "T_br", "N m", "torque the brake can oppose";
+        BrakeReleased => "brake_released", "-", "1", "1 while the brake is open";
+        FrictionForce => "friction_force", "F_f", "N", "kinetic friction of the tables at the present speed and position, without the efficiencies";
+        LoadForce => "load_force", "F", "N", "load on the ram, positive towards extension";
+        LockForce => "lock_force", "-", "N", "force in the locked segments, else of the sleeve spring on the nut";
+        Efficiency => "efficiency", "eta", "1", "efficiency of the train in its present state";
+        Locked => "locked", "-", "1", "1 while the down-lock is engaged";
+        Released => "released", "-", "1", "1 once the free-fall release is open";
+        Proximity0 => "proximity_0", "-", "1", "switch at 0 %";
+        Proximity25 => "proximity_25", "-", "1", "switch at 25 %";
+        Proximity75 => "proximity_75", "-", "1", "switch at 75 %";
+        Proximity100 => "proximity_100", "-", "1", "switch on the lock sleeve";
+        LeverAngle => "lever_angle", "alpha_c", "rad", "swing of the leg from retracted";
+        LeverArm => "lever_arm", "h_a", "m", "effective lever arm dx_a/dalpha";
+        Inertia => "equivalent_inertia", "J_tot", "kg m2", "inertia of everything connected, at the motor";
+        LoadCell => "load_cell", "F_LC", "N", "force of the friction rig on the ram, with the cell's noise";
+        WindingTemperature => "winding_temperature", "T_w", "K", "winding temperature";
+        EnergySupply => "energy_supply", "-", "J", "energy given by the source";
+        EnergySource => "energy_source", "-", "J", "lost in the source's resistance and limiter";
+        EnergyDump => "energy_dump", "-", "J", "lost in the dump resistor";
+        EnergyCopper => "energy_copper", "-", "J", "copper losses";
+        EnergyInverter => "energy_inverter", "-", "J", "losses in switches and diodes";
+        EnergyMotor => "energy_motor", "-", "J", "work of the motor torque";
+        EnergyLoad => "energy_load", "-", "J", "work against the load";
+        EnergyLock => "energy_lock", "-", "J", "work against the lock's spring";
+        EnergyDetent => "energy_detent", "-", "J", "work against the detent";
+        EnergyFriction => "energy_friction", "-", "J", "work against the friction of the tables, jams and bearings";
+        EnergyEfficiency => "energy_efficiency", "-", "J", "lost by the efficiencies of gear and screw";
+        EnergyBrake => "energy_brake", "-", "J", "work against the brake";
+        EnergyGovernor => "energy_governor", "-", "J", "work against the governor";
+        EnergyImpact => "energy_impact", "-", "J", "kinetic energy lost at the stops and when the nut leaves or picks up the ram";
+        EnergyKinetic => "energy_kinetic", "-", "J", "kinetic energy";
+        EnergyCapacitor => "energy_capacitor", "-", "J", "energy of the link capacitor";
+        EnergyMagnetic => "energy_magnetic", "-", "J", "magnetic energy of the windings";
+        CurrentA => "current_a", "i_a", "A", "phase current a";
+        CurrentB => "current_b", "i_b", "A", "phase current b";
+        CurrentC => "current_c", "i_c", "A", "phase current c";
+        VoltageA => "voltage_a", "v_a", "V", "phase-to-neutral voltage a";
+        VoltageB => "voltage_b", "v_b", "V", "phase-to-neutral voltage b";
+        VoltageC => "voltage_c", "v_c", "V", "phase-to-neutral voltage c";
+        EmfA => "emf_a", "e_a", "V", "EMF of phase a";
+        EmfB => "emf_b", "e_b", "V", "EMF of phase b";
+        EmfC => "emf_c", "e_c", "V", "EMF of phase c";
+    }
+}
+
+/// First of the signals that only the high fidelity has.
+pub const PHASES: usize = Quantity::CurrentA as usize;
+/// First and last energy.
+pub const ENERGIES: std::ops::Range<usize> = Quantity::EnergySupply as usize..PHASES;

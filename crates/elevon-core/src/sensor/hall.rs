@@ -1,0 +1,135 @@
+//! Three Hall sensors, each high over half an electrical turn, with their edges between the six sectors; speed and
+//! count from the edges.
+
+use crate::scalar::Scalar;
+use crate::three;
+use crate::variables;
+
+variables! {
+    /// The Hall sensors.
+    HallParameter, HALL {
+        Offset => "offset", "-", "rad", Between(-1.0, 1.0), Sensor, Some(0.0), "electrical angle by which all sensors are early";
+        OffsetA => "offset_a", "-", "rad", Between(-1.0, 1.0), Sensor, Some(0.0), "electrical angle by which sensor a alone is early";
+        OffsetB => "offset_b", "-", "rad", Between(-1.0, 1.0), Sensor, Some(0.0), "electrical angle by which sensor b alone is early";
+        OffsetC => "offset_c", "-", "rad", Between(-1.0, 1.0), Sensor, Some(0.0), "electrical angle by which sensor c alone is early";
+        StuckHighA => "stuck_high_a", "-", "1", Unit, Sensor, Some(0.0), "1: sensor a always reads high";
+        StuckHighB => "stuck_high_b", "-", "1", Unit, Sensor, Some(0.0), "1: sensor b always reads high";
+        StuckHighC => "stuck_high_c", "-", "1", Unit, Sensor, Some(0.0), "1: sensor c always reads high";
+        StuckLowA => "stuck_low_a", "-", "1", Unit, Sensor, Some(0.0), "1: sensor a always reads low";
+        StuckLowB => "stuck_low_b", "-", "1", Unit, Sensor, Some(0.0), "1: sensor b always reads low";
+        StuckLowC => "stuck_low_c", "-", "1", Unit, Sensor, Some(0.0), "1: sensor c always reads low";
+        PowerOff => "power_off", "-", "1", Unit, Sensor, Some(0.0), "1 while the sensors have no power: all read low";
+        Timeout => "timeout", "-", "s", Positive, Sensor, None, "without an edge for this long the speed reads zero";
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Hall<S> {
+    offset: S,
+    own: [S; 3],
+    high: [S; 3],
+    low: [S; 3],
+    power_off: S,
+    timeout: S,
+    /// Shaft angle between two edges.
+    pub pitch: S,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct HallState<S> {
+    pub code: [S; 3],
+    last_edge: S,
+    speed: S,
+    direction: S,
+    /// Edges since the start, signed.
+    pub count: S,
+    /// Invalid codes and jumps of more than a sector since the start.
+    pub errors: S,
+}
+
+const PER_TURN: f64 = 1.0 / std::f64::consts::TAU;
+
+impl<S: Scalar> Hall<S> {
+    pub fn derive(raw: &[S], pole_pairs: S) -> Self {
+        use HallParameter as P;
+        let g = |p: P| raw[p as usize];
+        let from = |p: P| three!(|j| raw[p as usize + j]);
+        Self {
+            offset: g(P::Offset),
+            own: from(P::OffsetA),
+            high: from(P::StuckHighA),
+            low: from(P::StuckLowA),
+            power_off: g(P::PowerOff),
+            timeout: g(P::Timeout),
+            pitch: S::splat(std::f64::consts::FRAC_PI_3) / pole_pairs,
+        }
+    }
+
+    /// What the sensors read (1 high, 0 low) at an electrical angle.
+    #[inline(always)]
+    pub fn code(&self, angle: S) -> [S; 3] {
+        let half = S::splat(0.5);
+        let common = angle + self.offset;
+        let dead = half.lt(self.power_off);
+        three!(|j| {
+            let turns = (common + self.own[j]) * S::splat(PER_TURN) - S::splat(1.0 / 12.0 + j as f64 / 3.0);
+            let high = (turns - turns.floor()).lt(half) | half.lt(self.high[j]);
+            S::select(high & self.low[j].le(half) & !dead, S::one(), S::zero())
+        })
+    }
+
+    pub fn start(&self, angle: S) -> HallState<S> {
+        let zero = S::zero();
+        HallState { code: self.code(angle), last_edge: S::splat(-1e9), speed: zero, direction: zero, count: zero, errors: zero }
+    }
+
+    /// Takes the code after a step of `dt` that ended at time `t` and at `angle`, having advanced by `advance`.
+    #[inline(always)]
+    pub fn observe(&self, s: &mut HallState<S>, angle: S, advance: S, t: S, dt: S) {
+        let code = self.code(angle);
+        let same = code[0].equals(s.code[0]) & code[1].equals(s.code[1]) & code[2].equals(s.code[2]);
+        if S::any(!same) {
+            self.edge(s, code, same, angle, advance, t, dt);
+        }
+    }
+
+    /// Two codes are vectors 60 degrees apart when one sector follows the other, and shorter than one when invalid.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    fn edge(&self, s: &mut HallState<S>, code: [S; 3], same: S::Mask, angle: S, advance: S, t: S, dt: S) {
+        let zero = S::zero();
+        let ((x0, y0), (x1, y1)) = (vector(s.code), vector(code));
+        let neighbours = S::splat(0.25).lt(x0 * x1 + y0 * y1);
+        let step = !same & neighbours;
+        let direction = (x0 * y1 - y0 * x1).sign();
+        // When the edge passed, within the step.
+        let place = (angle + self.offset) * S::splat(6.0 * PER_TURN) - S::splat(0.5);
+        let beyond = place - place.floor();
+        let travelled = S::select(zero.lt(advance), beyond, S::one() - beyond);
+        let share = (travelled / (advance.abs() * S::splat(6.0 * PER_TURN)).maximum(S::splat(1e-300))).minimum(S::one());
+        let edge = t - share * dt;
+        let since = (edge - s.last_edge).maximum(S::splat(1e-9));
+        let steady = direction.equals(s.direction);
+        let speed = S::select(steady, direction * self.pitch / since, zero);
+        s.speed = S::select(step, speed, s.speed);
+        s.direction = S::select(step, direction, s.direction);
+        s.count = s.count + S::select(step, direction, zero);
+        s.errors = s.errors + S::select(!same & !neighbours, S::one(), zero);
+        s.last_edge = S::select(!same, edge, s.last_edge);
+        s.code = three!(|j| S::select(same, s.code[j], code[j]));
+    }
+
+    /// Speed shown at time `t`: the last interval's, never more than the time since the last edge allows.
+    #[inline(always)]
+    pub fn speed(&self, s: &HallState<S>, t: S) -> S {
+        let since = (t - s.last_edge).maximum(S::splat(1e-9));
+        let bounded = s.speed.clamp_abs(self.pitch / since);
+        S::select(self.timeout.lt(since), S::zero(), bounded)
+    }
+}
+
+#[inline(always)]
+fn vector<S: Scalar>(code: [S; 3]) -> (S, S) {
+    let half = S::splat(0.5);
+    (code[0] - half * (code[1] + code[2]), S::splat(0.866_025_403_784_438_6) * (code[1] - code[2]))
+}

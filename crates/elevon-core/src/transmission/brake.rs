@@ -1,0 +1,59 @@
+//! Spring-applied electromagnetic brake on the motor shaft, with the delays of its coil.
+
+use crate::scalar::Scalar;
+use crate::variables;
+
+variables! {
+    /// The brake.
+    BrakeParameter, BRAKE {
+        Torque => "torque", "T_br", "N m", NonNegative, Plant, None, "resistive torque of the set brake";
+        ReleaseDelay => "release_delay", "-", "s", NonNegative, Plant, None, "from power on to free";
+        EngageDelay => "engage_delay", "-", "s", NonNegative, Plant, None, "from power off to set";
+        Drag => "drag", "-", "N m", NonNegative, Plant, Some(0.0), "torque left when released; healthy 0";
+        Powered => "powered", "-", "1", Choice(&["by_drive", "always"]), Plant, Some(0.0), "always: the bench holds the brake open whatever the drive does (modified free-fall test)";
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Brake<S> {
+    torque: S,
+    drag: S,
+}
+
+impl<S: Scalar> Brake<S> {
+    pub fn derive(raw: &[S]) -> Self {
+        Self { torque: raw[BrakeParameter::Torque as usize], drag: raw[BrakeParameter::Drag as usize] }
+    }
+
+    /// Resistive torque; `free` is 1 while the coil holds the spring back. Dragging never exceeds the spring.
+    #[inline(always)]
+    pub fn torque(&self, free: S) -> S {
+        S::select(S::splat(0.5).lt(free), self.drag.minimum(self.torque), self.torque)
+    }
+}
+
+/// The coil of one brake: it follows its power after a delay.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Coil {
+    pub free: bool,
+    waiting: f64,
+}
+
+impl Coil {
+    pub fn new(free: bool) -> Self {
+        Self { free, waiting: 0.0 }
+    }
+
+    /// After a tick of `dt` with the coil powered or not.
+    pub fn step(&mut self, powered: bool, release_delay: f64, engage_delay: f64, dt: f64) {
+        if powered == self.free {
+            self.waiting = 0.0;
+            return;
+        }
+        self.waiting += dt;
+        let delay = if powered { release_delay } else { engage_delay };
+        if self.waiting > delay * (1.0 - 1e-9) {
+            *self = Self { free: powered, waiting: 0.0 };
+        }
+    }
+}
