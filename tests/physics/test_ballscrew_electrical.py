@@ -190,6 +190,6 @@ def test_unbalance_weighs_as_its_half_ring() -> None:
 @pytest.mark.parametrize("other", ["open_phase@motor.phase_b=1", "open_switch@inverter.a_high=1"])
 def test_a_resistor_at_a_floating_terminal_is_refused(other: str) -> None:
     """Not modelled: said so, instead of a wrong answer."""
-    with pytest.raises(elevon.InputError, match="motor.tap_level"):
+    with pytest.raises(elevon.InputError, match=r"motor\.tap_level"):
         run({}, duration=1e-3, record="current_a@1 kHz",
             scenario={"fault": [tap(0.25), other]}, name=NAME)  # fmt: skip

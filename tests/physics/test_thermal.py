@@ -71,7 +71,11 @@ def test_resistance_follows_the_winding_and_flux_the_surface() -> None:
     cold = 1.5 * 0.9 * rec["current_q"].values ** 2
     expected = cold * (1 + 0.00393 * (winding - 293.15))
     assert rec["heat_copper"].values[2:] == pytest.approx(expected[2:], rel=1e-4)
-    hot = {"motor.winding_temperature": 393.15, "thermal.ambient": 393.15, "thermal.model": "quasi_static"}
+    hot = {
+        "motor.winding_temperature": 393.15,
+        "thermal.ambient": 393.15,
+        "thermal.model": "quasi_static",
+    }
     torque = [
         run(
             STIFF | more,

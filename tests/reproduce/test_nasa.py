@@ -21,7 +21,9 @@ def actuator(values: dict[str, Any] | None = None) -> Any:
     return elevon.Actuator.load("nasa-ballscrew").with_values(values or {})
 
 
-def statistics(fault: str | None = None, load: float = 4500.0, **profile: Any) -> tuple[float, float]:
+def statistics(
+    fault: str | None = None, load: float = 4500.0, **profile: Any
+) -> tuple[float, float]:
     """RMS current and RMS tracking error of a loaded sine after its first two seconds."""
     data = profile_scenario(Profile("sinusoidal", 0.05, 0.06, SHORT), load)
     scenario = elevon.Scenario.from_dict({**data, **({"fault": [fault]} if fault else {})})
@@ -107,7 +109,9 @@ def test_the_limit_of_the_voltage_is_where_the_motor_stops_following() -> None:
                 "load": {"user": {"terms": [{"kind": "constant", "value": 4500.0}]}},
             }
         )  # fmt: skip
-        reached[share] = elevon.simulate(weak, scenario, record="ram_speed@1 kHz").final["ram_speed"]
+        reached[share] = elevon.simulate(weak, scenario, record="ram_speed@1 kHz").final[
+            "ram_speed"
+        ]
     assert reached[0.85] == pytest.approx(0.85 * rate, rel=0.02)
     # Hysteresis relays reach a little beyond the circle of a linear modulator.
     assert reached[1.3] < 1.15 * rate
@@ -144,7 +148,9 @@ def test_wrong_profiles_are_refused() -> None:
         Capability.of(elevon.Actuator.load("torino-rotary"))
 
 
-@pytest.mark.parametrize("name", ["rectangular", "trapezoidal", "sinusoidal", "triangular", "sweep"])
+@pytest.mark.parametrize(
+    "name", ["rectangular", "trapezoidal", "sinusoidal", "triangular", "sweep"]
+)
 def test_profiles_are_what_they_say(name: str) -> None:
     """Start at mid-stroke (a jump jumps), reach the amplitude, keep the rate."""
     profile = Profile(name, 0.05, 0.06, 12.0)
@@ -172,3 +178,19 @@ def test_orders_find_lines_of_known_size() -> None:
     assert found[1] == pytest.approx(0.3, rel=0.05)
     assert found[2] == pytest.approx(0.1, rel=0.1)
     assert found[0] < 0.02
+
+
+@pytest.mark.parametrize(
+    "term",
+    [
+        {"kind": "sine", "amplitude": "120 mm", "frequency": "0.1 Hz"},
+        {"kind": "step", "final": "-116 mm"},
+        {"kind": "table", "times": [0.0, 1.0], "values": [0.0, 0.2]},
+    ],
+    ids=lambda term: str(term["kind"]),
+)
+def test_stroke_beyond_the_end_stops_is_refused(term: dict[str, Any]) -> None:
+    """The range and the stop are named."""
+    scenario = elevon.Scenario.from_dict({"duration": 0.01, "command": {"terms": [term]}})
+    with pytest.raises(elevon.InputError, match=r"stop\.(lower|upper)"):
+        elevon.simulate(actuator(), scenario, record="command@1 kHz")

@@ -127,6 +127,7 @@ def check_folder(out: Path | None, force: bool) -> None:
 
 
 def write(out: Path, report: Report, rows: list[dict[str, Any]], force: bool) -> None:
+    """Write the report and the rows."""
     import csv
     import io
 
@@ -141,6 +142,7 @@ def write(out: Path, report: Report, rows: list[dict[str, Any]], force: bool) ->
 
 
 def print_checks(values: dict[str, Any]) -> None:
+    """Print the checks as a table."""
     rows = [
         [
             check["name"],
@@ -154,6 +156,7 @@ def print_checks(values: dict[str, Any]) -> None:
 
 
 def exit_code(values: dict[str, Any]) -> int:
+    """Return 0 when every check passed, else 1."""
     return 0 if values["status"] == "pass" else 1
 
 

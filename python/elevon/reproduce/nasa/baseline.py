@@ -277,15 +277,15 @@ def _order_checks(rows: Sequence[BaselineRow]) -> list[Check]:
         if row.profile.amplitude > 0.0
     }
     mirrored = [
-        abs(found[name, a, load] / found[name, a, -load] - 1.0)
-        for name, a, load in found
+        abs(current / found[name, a, -load] - 1.0)
+        for (name, a, load), current in found.items()
         if load > 0.0 and (name, a, -load) in found
     ]
     falls = 0
-    for name, a, load in found:
+    for (name, a, load), current in found.items():
         larger = {500.0: 4500.0, 4500.0: 8500.0}.get(abs(load))
         if larger is not None:
-            falls += found[name, a, np.copysign(larger, load)] <= found[name, a, load]
+            falls += found[name, a, float(np.copysign(larger, load))] <= current
     return [
         Check("rms current, compressive against tensile", 100.0 * max(mirrored), 6.0, "%"),
         Check("loads whose increase does not raise the current", falls, 0.0),

@@ -91,7 +91,7 @@ class Capability:
         )
 
     def current(self, load: float, rate: float = 0.0) -> float:
-        """Return the quadrature current [A] that moves steadily at `rate` [m/s] against `load` [N]."""
+        """Return the quadrature current [A] of steady motion at `rate` [m/s] against `load` [N]."""
         force = (abs(load) + self.load_friction) * self.travel_per_radian / self.efficiency
         drag = self.viscous * rate / self.travel_per_radian
         return (force + self.friction + drag) / (1.5 * self.emf)

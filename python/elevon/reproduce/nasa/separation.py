@@ -163,7 +163,8 @@ def reproduce_separation(
         span = part(progress, index / len(cases), (index + 1) / len(cases))
         names = list(faults) if load == "loaded" else [n for n in faults if n == GAP]
         if names:
-            found = _features_of(actuators, shape, load, {n: faults[n] for n in names}, seed, span)
+            found = _features_of(actuators, shape, load, {n: faults[n] for n in names},
+                                 seed=seed, progress=span)  # fmt: skip
             rows += [_compare(name, shape, load, found["healthy"], found[name]) for name in names]
         if GAP in names:
             peaks = [np.mean([f[PEAK] for f in found[name]]) for name in (GAP, "healthy")]
@@ -192,6 +193,7 @@ def _features_of(
     shape: str,
     load: str,
     faults: Mapping[str, str],
+    *,
     seed: int,
     progress: Progress | None,
 ) -> dict[str, list[dict[str, float]]]:
