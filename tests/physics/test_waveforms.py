@@ -42,6 +42,36 @@ def chirp(amplitude: float, first: float, last: float, sweep: float, phase: floa
     return formula
 
 
+def period_sweep(
+    amplitude: float, first: float, last: float, sweep: float, bias: float, start: float
+) -> Formula:
+    """Cycle by cycle: the k-th lasts until its linear chirp from 1/T_k to 1/T_(k+1), with T on the
+    straight line from `first` to `last`, has turned once; T_(k+1) found by bisection."""
+    slope = (last - first) / sweep
+    begins, periods = [0.0], [first]
+    while begins[-1] < sweep:
+        now = periods[-1]
+        low, high = 0.2 * now, 5.0 * now
+        for _ in range(200):
+            length = 0.5 * (low + high)
+            following = now + slope * length
+            turned = 0.5 * length * (1.0 / now + 1.0 / following) if following > 0.0 else np.inf
+            low, high = (length, high) if turned < 1.0 else (low, length)
+        begins.append(begins[-1] + length)
+        periods.append(now + slope * length)
+
+    def formula(t: np.ndarray) -> np.ndarray:
+        k = np.clip(np.searchsorted(begins, t - start, side="right") - 1, 0, len(begins) - 2)
+        begin, end = np.array(begins)[k], np.array(begins)[k + 1]
+        f0, f1 = 1.0 / np.array(periods)[k], 1.0 / np.array(periods)[k + 1]
+        tau = t - start - begin
+        return bias + amplitude * np.sin(
+            2 * math.pi * (f0 * tau + 0.5 * (f1 - f0) * tau**2 / (end - begin))
+        )
+
+    return formula
+
+
 def trapezoid(low: float, high: float, corners: list[float], start: float) -> Formula:
     """Interpolation through the corners of one period, repeated."""
     x = np.concatenate([[0.0], np.cumsum(corners)])
@@ -87,6 +117,18 @@ CASES: dict[str, tuple[dict[str, object], Formula]] = {
             phase="20 deg",
         ),
         between(0.0, 1.5, chirp(0.2, 1.0, 15.0, 1.5, math.radians(20))),
+    ),
+    "period_sweep": (
+        term(
+            "period_sweep",
+            amplitude=0.2,
+            start_period="0.4 s",
+            end_period="0.1 s",
+            sweep_time="1.4 s",
+            bias=0.05,
+            start="0.1 s",
+        ),
+        between(0.1, 1.5, period_sweep(0.2, 0.4, 0.1, 1.4, 0.05, 0.1)),
     ),
     "triangle": (
         term(

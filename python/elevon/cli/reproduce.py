@@ -49,7 +49,7 @@ def torino_backlash(
     from elevon.reproduce.backlash import reproduce_backlash
     from elevon.reproduce.backlash.page import backlash_report, summary_figure
 
-    _check_folder(out, force)
+    check_folder(out, force)
     if picture is not None:
         from elevon.files import check_output
 
@@ -58,7 +58,7 @@ def torino_backlash(
         result = reproduce_backlash(seed=seed, progress=advance)
     values = result.to_dict()
     if out is not None:
-        _write(out, backlash_report(result, date=date), values["rows"], force)
+        write(out, backlash_report(result, date=date), values["rows"], force)
     if picture is not None:
         from elevon.report.figures import save_figure
 
@@ -74,8 +74,8 @@ def torino_backlash(
             [[str(number), *row] for number, row in enumerate(rows, 1)],
             title="total play at the user side [deg]",
         )
-        _print_checks(values)
-    return _exit_code(values)
+        print_checks(values)
+    return exit_code(values)
 
 
 @app.command("torino-compliance")
@@ -91,11 +91,11 @@ def torino_compliance(
     from elevon.reproduce.compliance import reproduce_compliance
     from elevon.reproduce.compliance.page import compliance_report
 
-    _check_folder(out, force)
+    check_folder(out, force)
     result = reproduce_compliance(seed=seed)
     values = result.to_dict()
     if out is not None:
-        _write(out, compliance_report(result, date=date, seed=seed), values["rows"], force)
+        write(out, compliance_report(result, date=date, seed=seed), values["rows"], force)
     if as_json:
         print_json(values)
     else:
@@ -113,8 +113,8 @@ def torino_compliance(
                 ["rows swapped", ", ".join(map(str, values["rows_swapped"]))],
             ],
         )
-        _print_checks(values)
-    return _exit_code(values)
+        print_checks(values)
+    return exit_code(values)
 
 
 @app.command("low-fidelity")
@@ -142,11 +142,11 @@ def low_fidelity(
             for row in values["rows"]
         ]
         print_table(["case", *(name.replace("_", " ") for name in columns)], rows)
-        _print_checks(values)
-    return _exit_code(values)
+        print_checks(values)
+    return exit_code(values)
 
 
-def _check_folder(out: Path | None, force: bool) -> None:
+def check_folder(out: Path | None, force: bool) -> None:
     """Refuse an output that cannot be written before the work, not after it."""
     if out is not None:
         from elevon.files import check_output
@@ -155,7 +155,8 @@ def _check_folder(out: Path | None, force: bool) -> None:
             check_output(out / name, force=force)
 
 
-def _write(out: Path, report: Report, rows: list[dict[str, Any]], force: bool) -> None:
+def write(out: Path, report: Report, rows: list[dict[str, Any]], force: bool) -> None:
+    """Write the report and the rows."""
     import csv
     import io
 
@@ -169,7 +170,8 @@ def _write(out: Path, report: Report, rows: list[dict[str, Any]], force: bool) -
     say(f"report: {report.save(out / 'report.html', force=force)}")
 
 
-def _print_checks(values: dict[str, Any]) -> None:
+def print_checks(values: dict[str, Any]) -> None:
+    """Print the checks as a table."""
     rows = [
         [
             check["name"],
@@ -182,5 +184,10 @@ def _print_checks(values: dict[str, Any]) -> None:
     print_table(["check", "found", "limit", ""], rows)
 
 
-def _exit_code(values: dict[str, Any]) -> int:
+def exit_code(values: dict[str, Any]) -> int:
+    """Return 0 when every check passed, else 1."""
     return 0 if values["status"] == "pass" else 1
+
+
+# Commands in modules of their own; they need what stands above.
+from elevon.cli import reproduce_nasa as _nasa  # noqa: E402, F401

@@ -64,7 +64,7 @@ def unit_of(parameter: WaveParameter, own: str) -> str:
 
 #: Names of instants: any of them may be anywhere on the time axis.
 _INSTANTS = frozenset({"start", "end", "time"})
-_POSITIVE = frozenset({"period", "sweep_time"})
+_POSITIVE = frozenset({"period", "sweep_time", "start_period", "end_period"})
 
 
 def check_values(record: WaveRecord, values: Mapping[str, float], place: str) -> None:

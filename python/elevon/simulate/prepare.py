@@ -14,6 +14,7 @@ from elevon.parameters import records
 from elevon.record_plan import ClockPlan, record_plan
 from elevon.scenario import Scenario, compile_scenario
 from elevon.scenario.compile import signal_records
+from elevon.simulate.stroke import check_stroke
 
 __all__ = [
     "Prepared",
@@ -99,6 +100,7 @@ def prepare(run: Run, fidelity: str, record: Record) -> Prepared:
         raise InputError("\n".join(str(finding["message"]) for finding in findings))
     step = solver_step(actuator, fidelity)
     compiled = compile_scenario(run.scenario, actuator.wiring, fidelity)
+    check_stroke(compiled, actuator)
     known = signal_records(actuator.wiring, fidelity)
     plan = record_plan(record, {name: item["unit"] for name, item in known.items()}, step)
     if compiled.duration < step:

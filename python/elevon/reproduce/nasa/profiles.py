@@ -1,0 +1,152 @@
+"""The stand's motion profiles and loads as scenarios."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from elevon.errors import InputError, unknown
+
+__all__ = ["LOAD_KINDS", "PROFILES", "LoadKind", "Profile", "profile_scenario"]
+
+LoadKind = Literal["constant", "step", "spring"]
+LOAD_KINDS: tuple[LoadKind, ...] = ("constant", "step", "spring")
+
+HOLD = 1.0
+"""Time a trapezoid stands at each end [s]."""
+
+PROFILES = {
+    "rectangular": False,
+    "trapezoidal": True,
+    "sinusoidal": True,
+    "triangular": True,
+    "sweep": False,
+}
+"""Name of each profile, and whether its rate is asked of the actuator (ramped): a jump or a
+sweep may ask for more than it can give, a ramp may not."""
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """One motion about mid-stroke.
+
+    Attributes
+    ----------
+    name : str
+        One of `PROFILES`.
+    amplitude : float
+        m, peak value.
+    rate : float
+        m/s, peak; of a sweep that of its first cycle, whose end has twice this rate.
+    duration : float
+        s.
+    """
+
+    name: str
+    amplitude: float
+    rate: float
+    duration: float
+
+    def __post_init__(self) -> None:
+        """Refuse what is no profile."""
+        if self.name not in PROFILES:
+            raise unknown("profile", self.name, PROFILES)
+        if self.amplitude < 0.0 or self.rate <= 0.0 or self.duration <= 0.0:
+            raise InputError(
+                f"profile {self.name}: amplitude {self.amplitude:g} m must not be negative; rate "
+                f"{self.rate:g} m/s and duration {self.duration:g} s must be positive"
+            )
+
+    @property
+    def ramped(self) -> bool:
+        """Whether the rate is asked of the actuator."""
+        return PROFILES[self.name]
+
+    @property
+    def peak_rate(self) -> float:
+        """Largest commanded rate, m/s; infinite for jumps."""
+        if self.amplitude == 0.0:
+            return 0.0
+        if self.name == "rectangular":
+            return math.inf
+        return 2.0 * self.rate if self.name == "sweep" else self.rate
+
+    @property
+    def peak_acceleration(self) -> float:
+        """Largest commanded acceleration between corners, m/s2."""
+        if self.name in ("sinusoidal", "sweep") and self.amplitude > 0.0:
+            return self.peak_rate**2 / self.amplitude
+        return 0.0
+
+    def term(self) -> dict[str, Any]:
+        """Return the waveform; every profile starts at mid-stroke."""
+        a, v = self.amplitude, self.rate
+        if a == 0.0:
+            return {"kind": "constant", "value": 0.0}
+        if self.name == "rectangular":
+            return {"kind": "rectangle", "low": -a, "high": a, "period": 4.0 * a / v}
+        if self.name == "trapezoidal":
+            ramp = 2.0 * a / v
+            # Entered in the middle of its rise.
+            return {
+                "kind": "trapezoid", "low": -a, "high": a, "rise": ramp, "fall": ramp,
+                "hold_high": HOLD, "hold_low": HOLD, "start": -0.5 * ramp,
+            }  # fmt: skip
+        if self.name == "sinusoidal":
+            return {"kind": "sine", "amplitude": a, "frequency": v / (2.0 * math.pi * a)}
+        if self.name == "triangular":
+            return {"kind": "triangle", "amplitude": a, "frequency": v / (4.0 * a)}
+        period = 2.0 * math.pi * a / v
+        return {
+            "kind": "period_sweep", "amplitude": a, "start_period": period,
+            "end_period": 0.5 * period, "sweep_time": self.duration,
+        }  # fmt: skip
+
+
+def profile_scenario(
+    profile: Profile, load: float = 0.0, kind: LoadKind = "constant", opposing: float = 0.0
+) -> dict[str, Any]:
+    """Return the scenario of a profile under a load.
+
+    Parameters
+    ----------
+    profile : Profile
+        The motion.
+    load : float
+        N, positive compressive (opposes extension), negative tensile.
+    kind : str
+        ``constant``; ``step``: from nothing at half time; ``spring``: proportional to the
+        position, `load` at the profile's amplitude.
+    opposing : float
+        N, resists motion of either direction.
+
+    Returns
+    -------
+    dict
+        In the form of a scenario file, SI.
+
+    Raises
+    ------
+    InputError
+        A load kind that is none, or a spring without amplitude.
+    """
+    if kind not in LOAD_KINDS:
+        raise unknown("load kind", kind, LOAD_KINDS)
+    data: dict[str, Any] = {
+        "duration": profile.duration,
+        "command": {"mode": "position", "terms": [profile.term()]},
+    }
+    loads: dict[str, Any] = {}
+    if kind == "spring" and load != 0.0:
+        if profile.amplitude == 0.0:
+            raise InputError(f"profile {profile.name}: a spring load needs an amplitude above 0 mm")
+        data["parameters"] = {"load.stiffness": abs(load) / profile.amplitude}
+    elif kind == "step":
+        step = {"kind": "step", "final": load, "time": 0.5 * profile.duration}
+        loads["user"] = {"terms": [step]}
+    elif load != 0.0:
+        loads["user"] = {"terms": [{"kind": "constant", "value": load}]}
+    if opposing:
+        loads["brake"] = {"terms": [{"kind": "constant", "value": opposing}]}
+    return {**data, "load": loads} if loads else data

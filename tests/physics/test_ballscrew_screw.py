@@ -1,0 +1,172 @@
+"""Screw, spall and load side of the ballscrew actuator against closed forms."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import elevon
+from tests.physics.rig import constant, run, term
+
+NAME = "nasa-ballscrew"
+LEAD = 0.010 / (2 * math.pi)
+#: The motor is turned by torques on its shaft; nothing rubs but what a test adds.
+FREE = {
+    "drive.kind": "off", "friction.static": 0.0, "friction.dynamic": 0.0, "friction.viscous": 0.0,
+    "screw.preload": 0.0, "load.friction": 0.0, "load.damping": 0.0, "thermal.model": "off",
+    "play.model": "operator", "play.total": 0.0,
+}  # fmt: skip
+ROTOR = 102e-4 + 3.2e-4 + 60.0 * LEAD**2
+
+
+def eta_of(mu: float, aiding: bool = False) -> float:
+    """Inclined plane with the lead angle of 10 mm on 32 mm."""
+    t = 0.010 / (math.pi * 0.032)
+    return (1 - mu / t) / (1 + mu * t) if aiding else (1 - mu * t) / (1 + mu / t)
+
+
+def mu_of(eta: float, aiding: bool = False) -> float:
+    """The friction coefficient behind an efficiency."""
+    t = 0.010 / (math.pi * 0.032)
+    return (1 - eta) * t / (1 + eta * t * t) if aiding else (1 - eta) * t / (eta + t * t)
+
+
+def free(values: dict[str, Any], load: float, speed: float, duration: float = 0.02) -> Any:
+    """The shaft turns at `speed` against `load` N at the ram, undriven."""
+    return run(
+        FREE | values,
+        duration=duration,
+        record="motor_speed,motor_position,friction_torque,screw_efficiency,"
+        "screw_efficiency_aiding,spall_torque,ram_position@50 kHz",
+        scenario={
+            "load": {"user": {"terms": [constant(load)]}},
+            "initial": {"motor_speed": speed},
+        },
+        name=NAME,
+    )
+
+
+@pytest.mark.parametrize(("load", "speed"), [(4000.0, 30.0), (-4000.0, 30.0), (4000.0, -30.0)])
+def test_deceleration_follows_the_efficiencies(load: float, speed: float) -> None:
+    """F r / eta opposes, F r eta' aids; the rest accelerates rotor, screw and mass."""
+    rec = free({}, load, speed, 0.01)
+    opposes = load * speed > 0
+    torque = -load * LEAD * (1 / 0.9 if opposes else 0.889)
+    expected = speed + torque / ROTOR * 0.01
+    assert rec.final["motor_speed"] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("blocked", [1, 2, 3, 4])
+def test_blocked_circuits_lower_the_efficiency(blocked: int) -> None:
+    """mu grows by b/n of the way to sliding; the table of docs/theory/ballscrew.md."""
+    fault = {"kind": "return_jam", "place": "screw.return_channel", "severity": blocked}
+    rec = run(FREE, duration=1e-3, record="screw_efficiency,screw_efficiency_aiding@1 kHz",
+              scenario={"fault": [fault]}, name=NAME)  # fmt: skip
+    for aiding, name in ((False, "screw_efficiency"), (True, "screw_efficiency_aiding")):
+        healthy = mu_of(0.889 if aiding else 0.9, aiding)
+        expected = eta_of(healthy + blocked / 4 * (0.10 - healthy), aiding)
+        assert rec.final[name] == pytest.approx(expected, rel=1e-12)
+
+
+def test_preload_rubs_by_its_two_halves() -> None:
+    """T = F_pr r (1/eta - eta'), 0.155 N m for 437.5 N, on a shaft without load."""
+    rec = free({"screw.preload": 437.5, "friction.static": 1e-9}, 0.0, 30.0)
+    expected = 437.5 * LEAD * (1 / 0.9 - 0.889)
+    assert rec["friction_torque"].values == pytest.approx(expected, rel=1e-9)
+
+
+def test_starved_grease_drags_less_and_rubs_more() -> None:
+    """Viscous torque times (1 - s); the efficiency falls as the film thins."""
+    values = {"friction.viscous": 0.002}
+    lost = free(values | {"screw.lubricant_lost": 0.5}, 0.0, 40.0)
+    assert lost["friction_torque"].values[0] == pytest.approx(0.5 * 0.002 * 40.0, rel=1e-9)
+    share = (math.exp(-1.5) - math.exp(-3)) / (1 - math.exp(-3))
+    mu = mu_of(0.9)
+    assert lost.final["screw_efficiency"] == pytest.approx(eta_of(mu + share * (0.05 - mu)))
+
+
+def spalled(length: float, load: float, place: str = "groove", **more: Any) -> Any:
+    """Slow turning over a spall, undriven, the load held by a torque on the shaft."""
+    return free({f"screw.spall_{place}": length, "motor.inertia": 1e6} | more, load, 20.0, 1.0)
+
+
+@pytest.mark.parametrize(("place", "passes"), [("groove", 8.552), ("nut", 6.448), ("ball", 4.940)])
+def test_spall_strikes_at_the_ball_passes(place: str, passes: float) -> None:
+    """The strongest line about the first pass stands at the passes per turn of the geometry."""
+    rec = spalled(2e-3, 4500.0, place)
+    angle, torque = rec["motor_position"].values, rec["spall_torque"].values
+    lines = np.arange(0.6 * passes, 1.5 * passes, 0.01)
+    size = [abs(np.mean(torque * np.hanning(angle.size) * np.exp(-1j * k * angle))) for k in lines]
+    assert lines[int(np.argmax(size))] == pytest.approx(passes, abs=0.03)
+
+
+def test_spall_torque_is_conservative_and_grows_with_size_and_load() -> None:
+    """A passage gives back what it takes; deeper chord and more force, more torque."""
+    peak = {}
+    for length, load in ((1e-3, 4500.0), (2e-3, 4500.0), (2e-3, 8500.0)):
+        rec = spalled(length, load)
+        torque = rec["spall_torque"].values
+        assert abs(np.mean(torque)) < 0.02 * np.max(np.abs(torque))
+        peak[length, load] = float(np.max(np.abs(torque)))
+    # E ~ w^2 while the chord is shallower than the spall, and its slope ~ 1/w.
+    assert peak[2e-3, 4500.0] / peak[1e-3, 4500.0] == pytest.approx(2.0, rel=0.05)
+    assert peak[2e-3, 8500.0] / peak[2e-3, 4500.0] == pytest.approx(8500 / 4500, rel=1e-3)
+
+
+def test_groove_spall_is_felt_only_under_the_nut() -> None:
+    """25 mm either side of its position."""
+    rec = spalled(2e-3, 4500.0, **{"screw.spall_position": "0.04"})
+    felt = np.abs(rec["spall_torque"].values) > 0
+    assert not np.any(felt[rec["ram_position"].values < 0.015])
+    assert np.any(felt[rec["ram_position"].values > 0.0155])
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"screw.blocked_circuits": 1.5}, ["screw.blocked_circuits", "1 or 2"]),
+        ({"screw.blocked_circuits": 5}, ["screw.blocked_circuits", "4"]),
+        ({"screw.ball_diameter": "40 mm"}, ["screw.ball_diameter", "0.04", "0.032"]),
+        ({"screw.efficiency_aiding": 0.95}, ["screw.efficiency_aiding", "0.95", "0.9"]),
+        ({"screw.lead": 0.0}, ["screw.lead"]),
+        ({"load.mass": 0.0}, ["load.mass"]),
+        ({"stop.upper": "-120 mm"}, ["stop.lower", "stop.upper", " m"]),
+    ],
+)
+def test_impossible_screws_are_refused(values: dict[str, Any], words: list[str]) -> None:
+    """Path, value and limit are in the message."""
+    with pytest.raises(elevon.InputError) as caught:
+        run(values, duration=1e-3, record="user_position@1 kHz", name=NAME)
+    for word in words:
+        assert word in str(caught.value)
+
+
+@pytest.mark.parametrize(("severity", "words"), [(1.5, "1 or 2"), (5, "of the 4")])
+def test_a_jam_blocks_whole_circuits_that_exist(severity: float, words: str) -> None:
+    """Refused with the two nearest whole numbers, or the number there is."""
+    fault = {"kind": "return_jam", "place": "screw.return_channel", "severity": severity}
+    with pytest.raises(elevon.InputError, match=words):
+        run({}, duration=1e-3, record="user_position@1 kHz", scenario={"fault": [fault]}, name=NAME)
+
+
+def test_gap_of_the_adapter_is_lost_motion_at_the_load() -> None:
+    """The load lags the ram by half the gap on either side, plus the joint's deflection."""
+    fault = {"kind": "adapter_gap", "place": "adapter", "severity": "1 mm"}
+    rec = run(
+        {},
+        duration=2.0,
+        command=[term("triangle", amplitude="20 mm", frequency="1 Hz")],
+        record="ram_position,user_position,joint_force@5 kHz",
+        scenario={"fault": [fault]},
+        name=NAME,
+    )
+    late = rec["ram_position"].time > 1.0
+    lag = (rec["ram_position"].values - rec["user_position"].values)[late]
+    pressed = rec["joint_force"].values[late]
+    beyond = np.abs(lag) - 0.51e-3
+    assert np.max(beyond) == pytest.approx(np.max(np.abs(pressed)) / 5e7, abs=2e-5)
+    # A steady stroke presses with guide friction and damping alone.
+    assert np.median(np.abs(lag)) == pytest.approx(0.51e-3, abs=5e-6)
