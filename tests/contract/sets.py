@@ -66,7 +66,7 @@ def scenario(name: str, fault: dict[str, Any] | None = None) -> Any:
     }
     if takes_actions(name):
         data = {
-            "duration": "2.6 s",
+            "duration": "3.2 s",
             "command": {"mode": "gear", "steps": [step(0.01, "retract"), step(0.85, "extend")]},
             "initial": {"nut_position": "267 mm"},
         }
