@@ -13,7 +13,12 @@ const POLL: Duration = Duration::from_millis(100);
 
 /// Runs `work` on a thread of its own and reports its progress about ten times a second. A callback that returns
 /// False, or raises (Ctrl-C), stops the work; an exception goes on to the caller.
-fn polled<T: Send>(py: Python<'_>, total: u64, progress: Option<&Bound<'_, PyAny>>, work: impl FnOnce(&Monitor) -> T + Send) -> PyResult<T> {
+fn polled<T: Send>(
+    py: Python<'_>,
+    total: u64,
+    progress: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(&Monitor) -> T + Send,
+) -> PyResult<T> {
     let monitor = Monitor::default();
     let callback = progress.map(|p| p.clone().unbind());
     let (result, raised) = py.detach(|| {
@@ -70,7 +75,7 @@ fn status(d: &Bound<'_, PyDict>, output: &RunOutput) -> PyResult<()> {
     let (name, message) = match &output.status {
         Status::Ok => ("ok", String::new()),
         Status::Tripped { time, reason } if reason.is_empty() => ("tripped", format!("the drive tripped at {time} s")),
-        Status::Tripped { time, reason } => ("tripped", format!("at {time} s: {reason}")),
+        Status::Tripped { time, reason } => ("tripped", format!("at {:.6} s: {reason}", time)),
         Status::Diverged { time, signal } => {
             d.set_item("diverged_signal", *signal)?;
             ("diverged", format!("{signal} diverged at {time} s"))
@@ -82,7 +87,15 @@ fn status(d: &Bound<'_, PyDict>, output: &RunOutput) -> PyResult<()> {
 }
 
 /// A result as a dictionary. `width` numbers stand for each value (1, or 1 + derivatives).
-fn result<'py>(py: Python<'py>, dt: f64, clocks: &[Clock], names: &[String], signals: &[&'static str], width: usize, output: RunOutput) -> PyResult<Bound<'py, PyDict>> {
+fn result<'py>(
+    py: Python<'py>,
+    dt: f64,
+    clocks: &[Clock],
+    names: &[String],
+    signals: &[&'static str],
+    width: usize,
+    output: RunOutput,
+) -> PyResult<Bound<'py, PyDict>> {
     let d = PyDict::new(py);
     status(&d, &output)?;
     d.set_item("time", output.time)?;
@@ -114,11 +127,21 @@ fn read_runs(resolver: &Resolver, runs: &Bound<'_, PyList>) -> PyResult<Vec<RunS
 #[pyfunction]
 #[pyo3(signature = (wiring, fidelity, runs, record, threads=0, lanes="auto", progress=None))]
 #[allow(clippy::too_many_arguments)]
-pub fn simulate<'py>(py: Python<'py>, wiring: &str, fidelity: &str, runs: &Bound<'py, PyList>, record: &Bound<'py, PyList>, threads: usize, lanes: &str, progress: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyList>> {
+pub fn simulate<'py>(
+    py: Python<'py>,
+    wiring: &str,
+    fidelity: &str,
+    runs: &Bound<'py, PyList>,
+    record: &Bound<'py, PyList>,
+    threads: usize,
+    lanes: &str,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyList>> {
     let resolver = Resolver::new(wiring, fidelity)?;
     let specs = read_runs(&resolver, runs)?;
     let (clocks, names) = resolver.clocks(record)?;
-    let width = Width::by_name(lanes).ok_or_else(|| bad(format!("lanes {lanes:?} are not known here, or this processor cannot run them")))?;
+    let width =
+        Width::by_name(lanes).ok_or_else(|| bad(format!("lanes {lanes:?} are not known here, or this processor cannot run them")))?;
     let model = resolver.model;
     let steps: Vec<f64> = specs.iter().map(|r| model.step(&r.parameters)).collect();
     let total = specs.iter().zip(&steps).map(|(r, dt)| (r.duration / dt).round() as u64).sum();
@@ -136,7 +159,16 @@ pub fn simulate<'py>(py: Python<'py>, wiring: &str, fidelity: &str, runs: &Bound
 #[pyfunction]
 #[pyo3(signature = (wiring, fidelity, run, record, parameters, faults, progress=None))]
 #[allow(clippy::too_many_arguments)]
-pub fn sensitivities<'py>(py: Python<'py>, wiring: &str, fidelity: &str, run: &Bound<'py, PyDict>, record: &Bound<'py, PyList>, parameters: Vec<String>, faults: Vec<usize>, progress: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyList>> {
+pub fn sensitivities<'py>(
+    py: Python<'py>,
+    wiring: &str,
+    fidelity: &str,
+    run: &Bound<'py, PyDict>,
+    record: &Bound<'py, PyList>,
+    parameters: Vec<String>,
+    faults: Vec<usize>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyList>> {
     let resolver = Resolver::new(wiring, fidelity)?;
     let spec = resolver.run(run)?;
     let (clocks, names) = resolver.clocks(record)?;
@@ -150,7 +182,9 @@ pub fn sensitivities<'py>(py: Python<'py>, wiring: &str, fidelity: &str, run: &B
     let passes = chosen.div_ceil(8) as u64;
     let total = (spec.duration / dt).round() as u64 * passes;
     let outputs = polled(py, total, progress, |monitor| model.sensitivities(&spec, &wanted, &faults, &clocks, monitor))?;
-    let outputs = outputs.ok_or_else(|| bad("sensitivities need the low fidelity of an actuator without a state machine: switching has no useful derivative"))?;
+    let outputs = outputs.ok_or_else(|| {
+        bad("sensitivities need the low fidelity of an actuator without a state machine: switching has no useful derivative")
+    })?;
     let signals: Vec<&'static str> = model.signals().iter().map(|s| s.name).collect();
     let list = PyList::empty(py);
     for (i, output) in outputs.into_iter().enumerate() {

@@ -190,9 +190,7 @@ def pisa_hydraulic(
     return _answer(values, columns, as_json, "ram speed in mid-stroke")
 
 
-def _answer(
-    values: dict[str, Any], columns: tuple[str, ...], as_json: bool, title: str
-) -> int:
+def _answer(values: dict[str, Any], columns: tuple[str, ...], as_json: bool, title: str) -> int:
     """Print a result as one JSON object, or its rows and checks as tables."""
     if as_json:
         print_json(values)

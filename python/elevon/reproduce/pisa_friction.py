@@ -187,9 +187,7 @@ def _friction_rows(
     speed = 1e3 * test.speed
     put = _table(actuator, f"{kind}_{test.way}", test.speed)
     rows = [
-        FrictionRow(
-            f"friction_{kind}", test.way, speed, None, put, float(resisting.mean()), "N"
-        )
+        FrictionRow(f"friction_{kind}", test.way, speed, None, put, float(resisting.mean()), "N")
     ]
     if not test.released:
         return rows
@@ -217,9 +215,7 @@ def _table(actuator: Actuator, name: str, speed: float) -> float:
     return float(np.interp(speed, knots, [value(f"friction.{name}_{k}") for k in range(1, 9)]))
 
 
-def _efficiency_rows(
-    actuator: Actuator, seed: int, progress: Progress | None
-) -> list[FrictionRow]:
+def _efficiency_rows(actuator: Actuator, seed: int, progress: Progress | None) -> list[FrictionRow]:
     """Efficiency of the screw from retractions under load, less the friction of the unloaded one.
 
     Current, speed and the known load curve are all that is used of a run.

@@ -62,7 +62,9 @@ def functional_report(result: FunctionalResult, *, date: str | None = None) -> R
         part = report.section(title[0].upper() + title[1:])
         part.figure(_stroke_figure(row), f"Position, motor speed and line current, {title}.")
     report.section("Checks").checks(result.checks)
-    report.provenance(provenance("elevon reproduce pisa-functional --out DIR", **_run_facts(result)))
+    report.provenance(
+        provenance("elevon reproduce pisa-functional --out DIR", **_run_facts(result))
+    )
     return report
 
 
@@ -163,13 +165,14 @@ def hydraulic_report(result: HydraulicResult, *, date: str | None = None) -> Rep
     columns = ["Temperature [C]", "Load factor", "Direction", "Hydraulic [mm/s]",
                "Electromechanical [mm/s]"]  # fmt: skip
     rows = [
-        [r.temperature_c, r.nz, r.direction, r.hydraulic_mm_s, r.electric_mm_s]
-        for r in result.rows
+        [r.temperature_c, r.nz, r.direction, r.hydraulic_mm_s, r.electric_mm_s] for r in result.rows
     ]
     section = report.section("Speeds")
     section.figure(_hydraulic_figure(result), "Speed over load factor, one line a temperature.")
     formats = [".0f", ".1f", "", ".1f", ".1f"]
-    section.table(Table(columns, rows, "Extension aids the load, retraction lifts it.", formats=formats))
+    section.table(
+        Table(columns, rows, "Extension aids the load, retraction lifts it.", formats=formats)
+    )
     report.section("Checks").checks(result.checks)
     report.provenance(provenance("elevon reproduce pisa-hydraulic --out DIR"))
     return report
