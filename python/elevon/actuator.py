@@ -31,6 +31,8 @@ class Actuator:
         What runs when no scenario is given.
     path : Path or None
         The file it was loaded from.
+    validation : mapping or None
+        Thresholds of `elevon validate`: ``transient`` [s] and ``limits``.
 
     Examples
     --------
@@ -45,6 +47,7 @@ class Actuator:
     references: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
     default_scenario: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
     path: Path | None = field(default=None, compare=False, repr=False)
+    validation: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
 
     @classmethod
     def load(cls, reference: str | os.PathLike[str]) -> Actuator:
@@ -66,6 +69,7 @@ class Actuator:
             references=found.references,
             default_scenario=found.scenario,
             path=found.path,
+            validation=found.validation,
         )
 
     def with_values(

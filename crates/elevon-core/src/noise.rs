@@ -83,7 +83,9 @@ mod tests {
     #[test]
     fn channels_and_ticks_are_uncorrelated() {
         let n = 100_000_u64;
-        for (a, b) in [(Key::new(1, 0, 0), Key::new(1, 0, 1)), (Key::new(1, 0, 0), Key::new(1, 1, 0)), (Key::new(1, 0, 0), Key::new(2, 0, 0))] {
+        for (a, b) in
+            [(Key::new(1, 0, 0), Key::new(1, 0, 1)), (Key::new(1, 0, 0), Key::new(1, 1, 0)), (Key::new(1, 0, 0), Key::new(2, 0, 0))]
+        {
             let cross: f64 = (0..n).map(|t| a.gaussian(t) * b.gaussian(t)).sum();
             let lag: f64 = (0..n).map(|t| a.gaussian(t) * a.gaussian(t + 1)).sum();
             assert!(cross.abs() < 5.0 * (n as f64).sqrt());

@@ -1,6 +1,6 @@
 //! The wirings by name, and one entry for each thing a caller may ask of any of them.
 
-use crate::actuator::{landing_gear, rotary, Finding, Port, Wiring};
+use crate::actuator::{ballscrew, landing_gear, rotary, Finding, Port, Wiring};
 use crate::fault::FaultKind;
 use crate::solver::{self, Clock, Monitor, RunOutput, RunSpec, Width};
 use crate::variable::{Group, Signal};
@@ -10,6 +10,8 @@ use crate::variable::{Group, Signal};
 pub enum Model {
     RotaryHigh,
     RotaryLow,
+    BallscrewHigh,
+    BallscrewLow,
     LandingGearHigh,
     LandingGearLow,
 }
@@ -30,6 +32,11 @@ pub const KINDS: &[Kind] = &[
         fidelities: &[("high", Model::RotaryHigh), ("low", Model::RotaryLow)],
     },
     Kind {
+        name: "ballscrew",
+        text: "three-phase motor, inverter, ball screw, ram with play and a load side of its own",
+        fidelities: &[("high", Model::BallscrewHigh), ("low", Model::BallscrewLow)],
+    },
+    Kind {
         name: "landing_gear",
         text: "six-step motor, planetary gearbox with release, roller screw, down-lock, leg on a lever, control unit",
         fidelities: &[("high", Model::LandingGearHigh), ("low", Model::LandingGearLow)],
@@ -45,6 +52,14 @@ macro_rules! dispatch {
             }
             Model::RotaryLow => {
                 type $w = rotary::Low;
+                $body
+            }
+            Model::BallscrewHigh => {
+                type $w = ballscrew::High;
+                $body
+            }
+            Model::BallscrewLow => {
+                type $w = ballscrew::Low;
                 $body
             }
             Model::LandingGearHigh => {
@@ -88,6 +103,10 @@ impl Model {
     pub fn check(self, raw: &[f64]) -> Vec<Finding> {
         dispatch!(self, W => W::check(raw))
     }
+    /// Findings on the parameters with every fault at its whole severity.
+    pub fn check_faulted(self, raw: &[f64]) -> Vec<Finding> {
+        dispatch!(self, W => W::check_faulted(raw))
+    }
     pub fn step(self, raw: &[f64]) -> f64 {
         dispatch!(self, W => W::step(raw))
     }
@@ -95,10 +114,18 @@ impl Model {
         dispatch!(self, W => solver::run_all::<W>(runs, clocks, threads, width, monitor))
     }
     /// Low fidelities without a state machine only: switching has no useful derivative.
-    pub fn sensitivities(self, run: &RunSpec, parameters: &[usize], faults: &[usize], clocks: &[Clock], monitor: &Monitor) -> Option<Vec<RunOutput>> {
+    pub fn sensitivities(
+        self,
+        run: &RunSpec,
+        parameters: &[usize],
+        faults: &[usize],
+        clocks: &[Clock],
+        monitor: &Monitor,
+    ) -> Option<Vec<RunOutput>> {
         match self {
             Self::RotaryLow => Some(solver::sensitivities::<rotary::Low>(run, parameters, faults, clocks, monitor)),
-            Self::RotaryHigh | Self::LandingGearHigh | Self::LandingGearLow => None,
+            Self::BallscrewLow => Some(solver::sensitivities::<ballscrew::Low>(run, parameters, faults, clocks, monitor)),
+            Self::RotaryHigh | Self::BallscrewHigh | Self::LandingGearHigh | Self::LandingGearLow => None,
         }
     }
 }

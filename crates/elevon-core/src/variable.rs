@@ -115,6 +115,61 @@ pub struct Signal {
     pub text: &'static str,
 }
 
+/// What a form of a component changes in one of its records. Empty texts leave the record's.
+#[derive(Clone, Copy, Debug)]
+pub struct Relabel {
+    pub index: usize,
+    pub name: &'static str,
+    pub unit: &'static str,
+    pub text: &'static str,
+}
+
+/// A copy of a table of parameters with other names, units or texts.
+pub const fn relabelled<const N: usize>(table: &[Variable], changes: &[Relabel]) -> [Variable; N] {
+    let mut all = [table[0]; N];
+    let mut i = 0;
+    while i < N {
+        all[i] = table[i];
+        i += 1;
+    }
+    let mut i = 0;
+    while i < changes.len() {
+        let change = changes[i];
+        let old = all[change.index];
+        all[change.index] =
+            Variable { path: or(change.name, old.path), unit: or(change.unit, old.unit), text: or(change.text, old.text), ..old };
+        i += 1;
+    }
+    all
+}
+
+/// A copy of a table of signals with other names, units or texts, and further signals behind them.
+pub const fn extended<const N: usize>(table: &[Signal], changes: &[Relabel], further: &[Signal]) -> [Signal; N] {
+    let mut all = [table[0]; N];
+    let mut i = 0;
+    while i < N {
+        all[i] = if i < table.len() { table[i] } else { further[i - table.len()] };
+        i += 1;
+    }
+    let mut i = 0;
+    while i < changes.len() {
+        let change = changes[i];
+        let old = all[change.index];
+        all[change.index] =
+            Signal { name: or(change.name, old.name), unit: or(change.unit, old.unit), text: or(change.text, old.text), ..old };
+        i += 1;
+    }
+    all
+}
+
+const fn or(given: &'static str, other: &'static str) -> &'static str {
+    if given.is_empty() {
+        other
+    } else {
+        given
+    }
+}
+
 /// Declares an enum of parameters and the table of their records, in one place.
 #[macro_export]
 macro_rules! variables {
@@ -143,6 +198,8 @@ macro_rules! signals {
         $($variant:ident => $name:literal, $symbol:literal, $unit:literal, $text:literal;)*
     }) => {
         $(#[$meta])*
+        // Phases b and c are reached by counting from a: not every name is written out.
+        #[allow(dead_code)]
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(usize)]
         pub enum $id { $($variant),* }

@@ -109,7 +109,8 @@ fn attribute<'py>(d: &Bound<'py, PyDict>, a: &Attribute) -> PyResult<()> {
 
 #[pyfunction]
 pub fn faults<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
-    let low: Vec<(&str, &str)> = model(wiring, "low").map(|m| m.faults().iter().map(|f| (f.kind, f.places[0].name)).collect()).unwrap_or_default();
+    let low: Vec<(&str, &str)> =
+        model(wiring, "low").map(|m| m.faults().iter().map(|f| (f.kind, f.places[0].name)).collect()).unwrap_or_default();
     dicts(py, model(wiring, "high")?.faults(), |d, f| {
         let (minimum, maximum, open) = f.range.bounds();
         d.set_item("kind", f.kind)?;

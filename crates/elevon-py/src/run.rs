@@ -76,6 +76,9 @@ fn status(d: &Bound<'_, PyDict>, output: &RunOutput) -> PyResult<()> {
         Status::Ok => ("ok", String::new()),
         Status::Tripped { time, reason } if reason.is_empty() => ("tripped", format!("the drive tripped at {time} s")),
         Status::Tripped { time, reason } => ("tripped", format!("at {:.6} s: {reason}", time)),
+        Status::Overheated { time, temperature } => {
+            ("tripped", format!("the winding passed thermal.trip at {time} s, {temperature:.2} K: the drive opened its bridge"))
+        }
         Status::Diverged { time, signal } => {
             d.set_item("diverged_signal", *signal)?;
             ("diverged", format!("{signal} diverged at {time} s"))
@@ -108,7 +111,7 @@ fn result<'py>(
     d.set_item("final", last)?;
     let kept = PyDict::new(py);
     for (((clock, name), values), columns) in clocks.iter().zip(names).zip(output.clocks).zip(output.columns) {
-        let rows = if columns == 0 { 0 } else { values.len() / columns };
+        let rows = values.len().checked_div(columns).unwrap_or(0);
         let time: Vec<f64> = (0..rows).map(|i| (i as u64 * clock.period) as f64 * dt).collect();
         let entry = PyDict::new(py);
         entry.set_item("time", PyArray1::from_vec(py, time))?;

@@ -2,7 +2,7 @@
 //! core never sees a name or a length it does not expect.
 
 use elevon_core::command::{catalogue, SourcePlan, Term, Wave};
-use elevon_core::fault::{FaultKind, FaultSpec, Profile, Write};
+use elevon_core::fault::{whole, FaultKind, FaultSpec, Profile, Write};
 use elevon_core::registry::Model;
 use elevon_core::solver::{Clock, RunSpec};
 use numpy::PyReadonlyArray1;
@@ -29,7 +29,8 @@ pub fn paths(model: Model) -> HashMap<String, usize> {
 
 pub fn vector(model: Model, given: &PyReadonlyArray1<'_, f64>) -> PyResult<Vec<f64>> {
     let raw = given.as_slice()?.to_vec();
-    let variables: Vec<_> = model.groups().iter().flat_map(|g| (0..g.variables.len()).map(move |i| (g.path(i), g.variables[i].range))).collect();
+    let variables: Vec<_> =
+        model.groups().iter().flat_map(|g| (0..g.variables.len()).map(move |i| (g.path(i), g.variables[i].range))).collect();
     if raw.len() != variables.len() {
         return Err(bad(format!("{} parameters given, {} expected", raw.len(), variables.len())));
     }
@@ -74,13 +75,16 @@ fn fault(model: &[FaultKind], places: &HashMap<String, usize>, d: &Bound<'_, PyD
     let name: String = need(d, "place")?.extract()?;
     let found = model.iter().filter(|f| f.kind == kind).find_map(|f| f.places.iter().find(|p| p.name == name).map(|p| (f, p)));
     let (record, place) = found.ok_or_else(|| bad(format!("no fault {kind}@{name} at this fidelity")))?;
-    let index = |path: &str| places.get(path).copied().ok_or_else(|| bad(format!("fault {kind}@{name} needs {path:?}, which the actuator lacks")));
+    let index =
+        |path: &str| places.get(path).copied().ok_or_else(|| bad(format!("fault {kind}@{name} needs {path:?}, which the actuator lacks")));
     let writes = place.targets.iter().map(|t| Ok(Write { index: index(t.path)?, op: t.op })).collect::<PyResult<Vec<_>>>()?;
     let given: HashMap<String, f64> = need(d, "attributes")?.extract()?;
     let mut settings = Vec::new();
     let mut period = 0.0;
     for attribute in record.attributes {
-        let Some(value) = given.get(attribute.name).copied().or(attribute.default) else { continue };
+        let Some(value) = given.get(attribute.name).copied().or(attribute.default) else {
+            continue;
+        };
         if attribute.path.is_empty() {
             period = value;
             continue;
@@ -97,7 +101,8 @@ fn fault(model: &[FaultKind], places: &HashMap<String, usize>, d: &Bound<'_, PyD
     let profile = need(d, "profile")?.cast_into::<PyDict>()?;
     let shape: String = need(&profile, "kind")?.extract()?;
     let numbers: Vec<f64> = need(&profile, "parameters")?.extract()?;
-    let profile = Profile::new(&shape, &numbers, points(&profile, "times")?, points(&profile, "values")?).ok_or_else(|| bad(format!("profile {shape:?} with {} parameters", numbers.len())))?;
+    let profile = Profile::new(&shape, &numbers, points(&profile, "times")?, points(&profile, "values")?)
+        .ok_or_else(|| bad(format!("profile {shape:?} with {} parameters", numbers.len())))?;
     Ok(FaultSpec { severity, profile, writes, settings, period })
 }
 
@@ -140,6 +145,9 @@ impl Resolver {
         }
         let faults = need(d, "faults")?.cast_into::<PyList>()?;
         let faults = faults.iter().map(|f| fault(&self.faults, &self.places, &f.cast_into::<PyDict>()?)).collect::<PyResult<Vec<_>>>()?;
+        if let Some(finding) = self.model.check_faulted(&whole(&parameters, &faults)).into_iter().next() {
+            return Err(bad(format!("the faults at their whole severity: {}", finding.message)));
+        }
         let duration: f64 = need(d, "duration")?.extract()?;
         if !(duration > 0.0 && duration.is_finite()) {
             return Err(bad(format!("duration: {duration} s")));
@@ -188,7 +196,10 @@ impl Resolver {
                 return Err(bad("period_steps: 0"));
             }
             let wanted: Vec<String> = need(&d, "signals")?.extract()?;
-            let signals = wanted.iter().map(|n| self.signals.get(n.as_str()).copied().ok_or_else(|| bad(format!("no signal {n:?}")))).collect::<PyResult<Vec<_>>>()?;
+            let signals = wanted
+                .iter()
+                .map(|n| self.signals.get(n.as_str()).copied().ok_or_else(|| bad(format!("no signal {n:?}"))))
+                .collect::<PyResult<Vec<_>>>()?;
             clocks.push(Clock { period, signals });
             names.push(need(&d, "clock")?.extract()?);
         }

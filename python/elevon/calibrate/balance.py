@@ -17,15 +17,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from elevon.calibrate.blocks import block_covariance, block_length
+from elevon.calibrate.blocks import block_covariance, stroke_blocks
 from elevon.calibrate.direct import saturated_speed
 from elevon.calibrate.log import BenchLog
 
-__all__ = ["Regression", "controller_law", "torque_balance"]
+__all__ = ["Regression", "controller_law", "robust_regression", "torque_balance"]
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 _SLOW = 0.05  # of the highest speed: below it friction may stick
+_CLEARER = 0.2  # of the highest speed: the same, asked more strictly
 _CLEAR = 0.01  # s around a reversal and a slow sample that are left out too
 _NOISE = 0.01  # of the acceleration's RMS that its noise may be
 _WIDEST = 0.02  # s, deviation of the smoothing kernel at most
@@ -93,11 +94,10 @@ def torque_balance(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
     Returns
     -------
     Regression or None
-        Coefficients ``inertia``, ``viscous``, ``dry``, ``brake`` (with a load cell), ``offset``
-        (of the current), ``lag`` [s]; None without enough motion both ways.
+        Coefficients ``inertia``, ``viscous``, ``dry``, ``brake`` (with a load cell), ``cell`` (its
+        offset, where another log shows the friction alone), ``offset`` (of the current), ``lag``
+        [s]; None without enough motion both ways.
     """
-    from scipy.optimize import minimize_scalar
-
     clean = [k for k, log in enumerate(logs) if log.brake.known in {"off", "torque"}]
     chosen = clean or list(range(len(logs)))
     used = [logs[k] for k in chosen]
@@ -106,25 +106,108 @@ def torque_balance(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
     masks = [_moving(logs[k], m, keeps[k]) for k, m in zip(chosen, motions, strict=True)]
     if sum(int(m.sum()) for m in masks) < 200 or not _both_ways(motions, masks):
         return None
-    raw = [_balance_columns(log, m, cell) for log, m in zip(used, motions, strict=True)]
-    names = ("inertia", "viscous", "dry", *(("brake",) if cell else ()), "offset")
+    both = cell and any(log.brake.known == "off" for log in used)
+    names = (
+        "inertia",
+        "viscous",
+        "dry",
+        *(("brake",) if cell else ()),
+        *(("cell",) if both else ()),
+        "offset",
+        "lag",
+    )
+    problem = _Balance(used, motions, masks, cell, both)
+    answer = problem.solve()
+    design = np.column_stack((answer.design, problem.slope(answer)))
+    times = [(log.time[m], log.speed[m], log.period) for log, m in zip(used, masks, strict=True)]
+    value = np.append(answer.beta, answer.lag)
+    found = _answer(names, value, design, answer.rest, answer.weight, times=times)
+    if not np.isfinite(found.covariance).all():
+        return found
+    covariance = found.covariance
+    for other in problem.variants(answer):
+        gap = np.append(other.beta, other.lag) - value
+        covariance = covariance + np.outer(gap, gap)
+    return replace(found, covariance=covariance)
 
-    def solve(lag: float) -> tuple[Floats, Floats, Floats, Floats]:
-        rows = [_lagged(x, lag, log.period)[m] for x, log, m in zip(raw, used, masks, strict=True)]
-        data = np.concatenate([mo.current[m] for mo, m in zip(motions, masks, strict=True)])
-        return _huber(np.vstack(rows), data)
 
-    found = minimize_scalar(
-        lambda lag: _robust_cost(solve(lag)[1]), bounds=_LAGS, method="bounded",
-        options={"xatol": 1e-5},
-    )  # fmt: skip
-    lag = float(found.x)
-    beta, rest, weight, design = solve(lag)
-    slope = (solve(lag + 2e-4)[3] - solve(lag - 2e-4)[3]) @ beta / 4e-4
-    times = [(log.time[m], log.period) for log, m in zip(used, masks, strict=True)]
-    full = np.column_stack((design, slope))
-    value = np.append(beta, lag)
-    return _answer((*names, "lag"), value, full, rest, weight, times)
+@dataclass(frozen=True)
+class _Solved:
+    """Coefficients at the best lag, and what they stand on."""
+
+    beta: Floats
+    lag: float
+    rest: Floats
+    weight: Floats
+    design: Floats
+
+
+@dataclass(frozen=True)
+class _Balance:
+    """The torque balance of several logs, ready to be solved in more than one way."""
+
+    logs: Sequence[BenchLog]
+    motions: Sequence[_Motion]
+    masks: Sequence[Bools]
+    cell: bool
+    both: bool
+
+    def at(
+        self,
+        lag: float,
+        *,
+        delay: bool = False,
+        drift: float = 0.0,
+        masks: Sequence[Bools] | None = None,
+    ) -> _Solved:
+        """Solve at one lag of the current: a first-order one, or a pure delay."""
+        masks = masks or self.masks
+        rows, data = [], []
+        for log, motion, mask in zip(self.logs, self.motions, masks, strict=True):
+            columns = _balance_columns(log, motion, self.cell, self.both, drift=drift)
+            moved = (
+                _delayed(columns, lag, log.period) if delay else _lagged(columns, lag, log.period)
+            )
+            rows.append(moved[mask])
+            data.append(motion.current[mask])
+        solved = robust_regression(np.vstack(rows), np.concatenate(data))
+        return _Solved(solved[0], lag, *solved[1:])
+
+    def solve(self, *, delay: bool = False) -> _Solved:
+        """Find the lag of least robust cost."""
+        from scipy.optimize import minimize_scalar
+
+        found = minimize_scalar(
+            lambda lag: _robust_cost(self.at(lag, delay=delay).rest),
+            bounds=_LAGS,
+            method="bounded",
+            options={"xatol": 1e-5},
+        )
+        return self.at(float(found.x), delay=delay)
+
+    def slope(self, answer: _Solved) -> Floats:
+        """Derivative of the prediction by the lag, shape (n,)."""
+        step = 2e-4
+        up, down = self.at(answer.lag + step), self.at(answer.lag - step)
+        return np.asarray((up.design - down.design) @ answer.beta / (2.0 * step), dtype=np.float64)
+
+    def variants(self, answer: _Solved) -> list[_Solved]:
+        """Solve again under choices that no log can settle; their spread is uncertainty.
+
+        The shape of the current's lag; how near to a reversal the friction already has its level;
+        the speed of the load cell's clock.
+        """
+        clear = [
+            mask & (np.abs(motion.speed) > _CLEARER * np.abs(motion.speed).max())
+            for mask, motion in zip(self.masks, self.motions, strict=True)
+        ]
+        found = [self.solve(delay=True)]
+        if all(mask.sum() > 100 for mask in clear):
+            found.append(self.at(answer.lag, masks=clear))
+        drift = max((log.brake.drift_std for log in self.logs if log.brake.measured), default=0.0)
+        if drift > 0.0:
+            found.append(self.at(answer.lag, drift=drift))
+        return found
 
 
 def controller_law(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regression | None:
@@ -149,21 +232,26 @@ def controller_law(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
         starts = [np.full(len(target), float(j == k)) for j in range(len(logs))]
         rows.append(np.column_stack((*columns, *starts))[good])
         data.append(target[good])
-        times.append((log.time[good], log.period))
+        times.append((log.time[good], log.speed[good], log.period))
         inside.append(int(good.sum()))
     if sum(inside) < 200:
         return None
     present = [k for k, count in enumerate(inside) if count]
-    names = ("proportional", "integral", "derivative", "smoothing",
-             *(f"start[{k}]" for k in present))  # fmt: skip
+    names = (
+        "proportional",
+        "integral",
+        "derivative",
+        "smoothing",
+        *(f"start[{k}]" for k in present),
+    )
     design = np.vstack(rows)[:, [0, 1, 2, 3, *(4 + k for k in present)]]
     size = np.linalg.norm(design, axis=0)
     if not np.all(size > 0.0) or np.linalg.matrix_rank(design / size) < design.shape[1]:
         return None
     target = np.concatenate(data)
-    full = _answer(names, *_in_order(_huber(design, target)), times)
+    full = _answer(names, *_in_order(robust_regression(design, target)), times=times)
     rest = [0, 1, 2, *range(4, design.shape[1])]
-    plain = _huber(design[:, rest], target)[0]
+    plain = robust_regression(design[:, rest], target)[0]
     gap = np.zeros(len(names))
     gap[rest] = full.value[rest] - plain
     return replace(full, covariance=full.covariance + np.outer(gap, gap) / 3.0)
@@ -192,18 +280,21 @@ def _answer(
     design: Floats,
     rest: Floats,
     weight: Floats,
-    times: Sequence[tuple[Floats, float]],
+    *,
+    times: Sequence[tuple[Floats, Floats, float]],
 ) -> Regression:
     scores, blocks, at = [], [], 0
-    for time, period in times:
+    for time, speed, period in times:
         part = slice(at, at + len(time))
         at += len(time)
         if not len(time):
             continue
         clipped = rest[part] * weight[part]
         scores.append(design[part] * clipped[:, None])
-        blocks.append(np.floor((time - time[0]) / block_length(clipped, period)).astype(np.int64))
-    normal = design.T @ (weight[:, None] * design)
+        blocks.append(stroke_blocks(time, speed, clipped, period))
+    # Huber's score stands still for outliers: they carry no information.
+    inner = weight >= 1.0
+    normal = design[inner].T @ design[inner]
     covariance, degrees = block_covariance(normal, scores, blocks)
     # Columns beyond the linear ones (the lag's) move nothing at the solution.
     linear = len(value) - int("lag" in names)
@@ -282,12 +373,17 @@ def _both_ways(motions: Sequence[_Motion], masks: Sequence[Bools]) -> bool:
     return bool(min(np.mean(speed > 0.0), np.mean(speed < 0.0)) > 0.02)
 
 
-def _balance_columns(log: BenchLog, motion: _Motion, cell: bool) -> Floats:
+def _balance_columns(
+    log: BenchLog, motion: _Motion, cell: bool, both: bool, *, drift: float = 0.0
+) -> Floats:
     sign = np.sign(motion.speed)
     columns = [motion.acceleration, motion.speed, sign]
     if cell:
-        level = np.interp(log.time, log.brake.time, log.brake.level) if log.brake.measured else 0.0
+        at = log.brake.time * (1.0 + drift)
+        level = np.interp(log.time, at, log.brake.level) if log.brake.measured else 0.0
         columns.append(sign * level)
+    if both:
+        columns.append(-sign * float(log.brake.measured))
     return np.column_stack((*columns, np.ones_like(sign)))
 
 
@@ -299,8 +395,7 @@ def _lagged(columns: Floats, lag: float, period: float) -> Floats:
     if abs(lag) < 1e-7:
         return columns
     if lag < 0.0:
-        at = np.arange(len(columns)) * period
-        return np.column_stack([np.interp(at - lag, at, c) for c in columns.T])
+        return _delayed(columns, lag, period)
     from scipy.signal import lfilter
 
     decay = float(np.exp(-period / lag))
@@ -311,11 +406,17 @@ def _lagged(columns: Floats, lag: float, period: float) -> Floats:
     return np.asarray(out, dtype=np.float64)
 
 
+def _delayed(columns: Floats, lag: float, period: float) -> Floats:
+    """Shift columns later by a lag."""
+    at = np.arange(len(columns)) * period
+    return np.column_stack([np.interp(at - lag, at, c) for c in columns.T])
+
+
 def _integral(time: Floats, values: Floats) -> Floats:
     return np.concatenate(([0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(time))))
 
 
-def _huber(design: Floats, data: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+def robust_regression(design: Floats, data: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Robust regression: coefficients, residuals, weights, design."""
     scale = np.linalg.norm(design, axis=0)
     scale[scale == 0.0] = 1.0

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["block_covariance", "block_length"]
+__all__ = ["block_covariance", "block_length", "stroke_blocks"]
 
 Floats = npt.NDArray[np.float64]
 _SHORTEST = 0.25  # s
@@ -36,6 +36,28 @@ def block_length(residual: Floats, period: float) -> float:
     time = period * (0.5 + float(np.sum(correlation[1:last])))
     longest = period * len(centred) / _FEWEST
     return float(min(max(_SHORTEST, _MEMORY * time), longest))
+
+
+def stroke_blocks(
+    time: Floats, speed: Floats, residual: Floats, period: float
+) -> npt.NDArray[np.int64]:
+    """Number the blocks of samples, shape (n,): whole strokes from one reversal to the next.
+
+    What the model lacks repeats itself within a stroke, so a stroke is the least that counts as
+    one observation. Short strokes are put together until the residual's memory fits in; long ones
+    are cut so that a log has at least eight blocks.
+    """
+    shortest = block_length(residual, period)
+    longest = max(period * len(time) / _FEWEST, shortest)
+    turns = np.concatenate(([True], np.sign(speed[1:]) != np.sign(speed[:-1])))
+    number, begin = 0, float(time[0])
+    out = np.empty(len(time), dtype=np.int64)
+    for k, (instant, turn) in enumerate(zip(time.tolist(), turns.tolist(), strict=True)):
+        age = instant - begin
+        if (turn and age >= shortest) or age >= longest:
+            number, begin = number + 1, instant
+        out[k] = number
+    return out
 
 
 def block_covariance(

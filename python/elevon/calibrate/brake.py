@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +20,7 @@ Floats = npt.NDArray[np.float64]
 Known = Literal["torque", "force", "on", "off"]
 _MOVING = 0.1  # of the highest speed: slower than that a resistive torque is not at its level
 _SMOOTHING = 0.25  # s: the brake's level changes slowly, the cell's noise does not
+_RESONATOR = 0.005 / math.sqrt(3.0)  # a ceramic resonator keeps within 0.5 %
 _SIGNED = 0.5  # of the mean size: a reaction torque turns with the motion
 
 
@@ -28,15 +31,18 @@ class Brake:
     Attributes
     ----------
     known : str
-        ``torque``: level on the fast shaft [N m]; ``force``: level [N], arm unknown; ``on``: nothing
-        but that it acted; ``off``.
+        ``torque``: level on the fast shaft [N m]; ``force``: level [N], arm unknown; ``on``:
+        nothing but that it acted; ``off``.
     time, level : ndarray, shape (m,)
         Seconds from the log's first sample, and the size of the resistive torque or force.
+    drift_std : float
+        Relative deviation of the load cell's clock.
     """
 
     known: Known
     time: Floats
     level: Floats
+    drift_std: float = 0.0
 
     @property
     def measured(self) -> bool:
@@ -74,15 +80,20 @@ def brake_of(
             at = np.asarray(channel.time, dtype=np.float64) - start
             level = _level(at, np.asarray(channel.values, dtype=np.float64), time, speed)
             if level is not None:
-                return Brake("torque" if known == "torque" else "force", *level)
+                kind: Known = "torque" if known == "torque" else "force"
+                return Brake(kind, *level, _drift(synchronised))
     if note is not None and note.brake:
         return Brake("on", off.time, off.level)
     return off
 
 
-def _level(
-    at: Floats, value: Floats, time: Floats, speed: Floats
-) -> tuple[Floats, Floats] | None:
+def _drift(synchronised: Mapping[str, Any]) -> float:
+    """What the synchronisation left open of the clock's speed; a resonator's, if everything."""
+    std = synchronised.get("drift_std")
+    return _RESONATOR if std is None else min(float(std), _RESONATOR)
+
+
+def _level(at: Floats, value: Floats, time: Floats, speed: Floats) -> tuple[Floats, Floats] | None:
     """Size of a resistive torque, from samples where the shaft moves; (time, level)."""
     from scipy.ndimage import uniform_filter1d
 

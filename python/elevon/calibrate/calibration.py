@@ -11,12 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.calibrate.balance import Regression, controller_law, torque_balance
+from elevon.calibrate.candidates import tamed
 from elevon.calibrate.direct import saturated_speed
 from elevon.calibrate.dynamic import Dynamic, dynamic_stage
 from elevon.calibrate.estimate import Estimate
 from elevon.calibrate.findings import amplitude_findings, plant_findings
 from elevon.calibrate.heldout import HeldOut, held_out
-from elevon.calibrate.kinematics import CommandFit, command_fit
+from elevon.calibrate.kinematics import KINEMATIC, CommandFit, command_fit
 from elevon.calibrate.log import BenchLog
 from elevon.calibrate.plant import (
     Torque,
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
 __all__ = ["Calibration", "calibrate"]
 
 Bools = npt.NDArray[np.bool_]
+_LOOSEST = 0.25  # relative deviation above which the logs do not determine a value
+_DOUBTFUL = 0.2  # share of the current below which a regression explains nothing
 _RUN_IN = 1.0  # s at least before a log counts
 _SETTLED = 0.5  # s after the set point has left its limit for the first time
 
@@ -106,16 +109,23 @@ class Calibration:
             "status": "ok",
             "actuator": self.before.name,
             "logs": [
-                {"name": log.name, "samples": len(log.time), "rate_hz": 1.0 / log.period,
-                 "brake": log.brake.known, "skipped_s": self.skipped[log.name],
-                 "warnings": list(log.warnings)}
+                {
+                    "name": log.name,
+                    "samples": len(log.time),
+                    "rate_hz": 1.0 / log.period,
+                    "brake": log.brake.known,
+                    "skipped_s": self.skipped[log.name],
+                    "warnings": list(log.warnings),
+                }
                 for log in self.logs
             ],
             "parameters": {i.path: i.to_dict() for i in self.estimates},
             "registers": {name: [i["path"] for i in items] for name, items in groups.items()},
             "torque_constant": {
-                "value": self.torque.constant, "from_load_cell": self.torque.measured,
-                "determined": "torque constant and inertia apart" if self.torque.measured
+                "value": self.torque.constant,
+                "from_load_cell": self.torque.measured,
+                "determined": "torque constant and inertia apart"
+                if self.torque.measured
                 else "only ratios to the torque constant",
             },
             "followed": dict(self.followed),
@@ -129,7 +139,7 @@ class Calibration:
             "held_out": [item.to_dict() for item in self.held_out],
             "findings": list(self.findings),
             "wall_s": self.wall_s,
-        }  # fmt: skip
+        }
 
 
 def calibrate(
@@ -140,6 +150,7 @@ def calibrate(
     fidelity: str = "low",
     transient: float | None = None,
     hold_out: bool = True,
+    model_runs: bool = True,
     progress: Progress | None = None,
 ) -> Calibration:
     """Estimate what the logs determine.
@@ -159,6 +170,9 @@ def calibrate(
         limit for the first time.
     hold_out : bool
         Whether to refit without each log in turn (without the end of a single log).
+    model_runs : bool
+        Whether to rank and fit on model runs too: for what the regressions cannot see, and to name
+        what absorbs the model's misfit.
     progress : callable, optional
         Told the done fraction; returns False to stop.
 
@@ -182,10 +196,11 @@ def calibrate(
     _go(progress, 0.02)
     positions = position_estimates(logs, actuator)
     _go(progress, 0.1)
-    plant, law = torque_balance(logs, keeps), controller_law(logs, keeps)
+    plant, law = _telling(torque_balance(logs, keeps)), _telling(controller_law(logs, keeps))
     _go(progress, 0.25)
     torque = torque_scale(actuator, plant)
-    found, followed = list(positions), {}
+    found = list(positions)
+    followed: dict[str, float] = {}
     if plant is not None:
         estimates, followed = plant_estimates(actuator, plant, torque)
         found += estimates
@@ -194,25 +209,62 @@ def calibrate(
     commands = _commands(logs, actuator, found)
     _go(progress, 0.35)
     found = _asked(found, free, actuator)
-    dynamic = dynamic_stage(
-        logs, keeps, actuator, found, free, fidelity=fidelity, progress=part(progress, 0.35, 0.8)
-    )
+    direct = [p for p in free or () if p in KINEMATIC or p == "motor.emf_constant"]
+    _missing(direct, found, torque)
+    dynamic = None
+    if model_runs or plant is None or law is None:
+        dynamic = dynamic_stage(
+            logs,
+            keeps,
+            actuator,
+            found,
+            free,
+            fidelity=fidelity,
+            progress=part(progress, 0.35, 0.8),
+        )
     if dynamic is not None:
         found += dynamic.estimates(actuator, [item.path for item in found], free)
     _missing(free, found, torque)
     fitted = _with_values(actuator, found, followed, torque, dynamic)
     kept = held_out(logs, keeps, actuator, fitted, part(progress, 0.8, 1.0)) if hold_out else ()
+    if "control.derivative_time" in tamed(actuator, _plain(found)):
+        shortened = (
+            "control.derivative_time is shortened in the set: as estimated, speed gain times it "
+            "exceeds the inertia, which this controller without its filter cannot hold",
+        )
+    else:
+        shortened = ()
     findings = (
-        *plant_findings(logs, plant, torque, found, dynamic, actuator),
+        *shortened,
+        *plant_findings(logs, plant, torque, dynamic, actuator),
         *amplitude_findings(commands, found),
     )
     _go(progress, 1.0)
     return Calibration(
-        actuator=fitted, before=actuator, logs=tuple(logs), skipped=skipped,
-        estimates=tuple(found), followed=followed, torque=torque, plant=plant, law=law,
-        commands=tuple(commands), dynamic=dynamic, held_out=tuple(kept), findings=findings,
+        actuator=fitted,
+        before=actuator,
+        logs=tuple(logs),
+        skipped=skipped,
+        estimates=tuple(found),
+        followed=followed,
+        torque=torque,
+        plant=plant,
+        law=law,
+        commands=tuple(commands),
+        dynamic=dynamic,
+        held_out=tuple(kept),
+        findings=findings,
         wall_s=clock.perf_counter() - begin,
-    )  # fmt: skip
+    )
+
+
+def _telling(regression: Regression | None) -> Regression | None:
+    """Drop a regression that explains nothing: its coefficients are noise."""
+    return regression if regression and regression.explained > _DOUBTFUL else None
+
+
+def _plain(found: Sequence[Estimate]) -> dict[str, str | float]:
+    return {item.path: item.value for item in found if item.in_set}
 
 
 def _check(
@@ -238,9 +290,7 @@ def _run_in(log: BenchLog, transient: float | None) -> float:
     """Seconds left out: until the set point has left its limit for the first time, 1 s at least."""
     if transient is not None:
         if not 0.0 <= transient < log.duration:
-            raise InputError(
-                f"transient of {transient:g} s: {log.name} lasts {log.duration:g} s"
-            )
+            raise InputError(f"transient of {transient:g} s: {log.name} lasts {log.duration:g} s")
         return transient
     limit = 0.999 * saturated_speed(log)
     held = np.abs(log.speed_ref) >= limit
@@ -264,8 +314,9 @@ def _commands(
     from elevon.calibrate.positions import gain_estimate
 
     value = actuator.parameters.value
-    limit = next((i.value for i in found if i.path == "control.speed_limit"),
-                 value("control.speed_limit"))  # fmt: skip
+    limit = next(
+        (i.value for i in found if i.path == "control.speed_limit"), value("control.speed_limit")
+    )
     gain = value("control.position_gain")
     fits = [fit for log in logs if (fit := command_fit(log, gain, limit)) is not None]
     pooled = gain_estimate(fits, gain)
@@ -274,9 +325,7 @@ def _commands(
     return fits
 
 
-def _asked(
-    found: list[Estimate], free: Sequence[str] | None, actuator: Actuator
-) -> list[Estimate]:
+def _asked(found: list[Estimate], free: Sequence[str] | None, actuator: Actuator) -> list[Estimate]:
     """Keep what was asked for, what no set holds, and only what a set can take."""
     kept = []
     for item in found:
@@ -284,8 +333,12 @@ def _asked(
             continue
         if item.in_set:
             record = record_of(actuator.wiring, item.path)
-            low = item.value < record.minimum or (record.minimum_open and item.value == record.minimum)
+            low = item.value < record.minimum or (
+                record.minimum_open and item.value == record.minimum
+            )
             if low or item.value > record.maximum or not np.isfinite(item.std):
+                continue
+            if record.minimum >= 0.0 and item.std > _LOOSEST * abs(item.value):
                 continue
         kept.append(item)
     return kept
@@ -308,9 +361,12 @@ def _missing(free: Sequence[str] | None, found: Sequence[Estimate], torque: Torq
 
 
 def _with_values(
-    actuator: Actuator, found: Sequence[Estimate], followed: Mapping[str, float], torque: Torque,
+    actuator: Actuator,
+    found: Sequence[Estimate],
+    followed: Mapping[str, float],
+    torque: Torque,
     dynamic: Dynamic | None,
-) -> Actuator:  # fmt: skip
+) -> Actuator:
     values: dict[str, str | float] = dict(followed)
     values |= {item.path: item.value for item in found if item.in_set}
     if torque.measured and torque.tied and "motor.emf_constant" in values:
@@ -321,4 +377,5 @@ def _with_values(
         old = actuator.parameters.value
         ratio = old("friction.static") / max(old("friction.dynamic"), 1e-300)
         values["friction.static"] = max(ratio, 1.0) * float(values["friction.dynamic"])
+    values |= tamed(actuator, values)
     return actuator.with_values(values, source="calibration")

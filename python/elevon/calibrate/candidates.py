@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,7 @@ from elevon.parameters.records import record_of
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["AUTO", "Candidate", "candidates", "start_values"]
+__all__ = ["AUTO", "Candidate", "candidates", "start_values", "tamed"]
 
 #: What `auto` tries to free in the dynamic fit, in the model's own parameters.
 AUTO = (
@@ -31,6 +31,8 @@ AUTO = (
 )
 _FILTER = (2.0, 5000.0)  # Hz
 _DELAY = 0.02  # s
+_WHOLE = 0.95  # of the inertia that speed gain times derivative time may reach
+_FAR = 100.0  # a start further off than this factor is a misfit of the regression
 _KNOTS = 4  # of an unknown brake's level over a log
 
 
@@ -100,12 +102,21 @@ def candidates(
     if not current > 0.0 or not speed > 0.0:
         raise InputError("the logs hold no motion and no current: nothing can be calibrated")
     found += [
-        Candidate("sensor.current_offset", "output", "sensor", "A", False, -current, current,
-                  0.01 * current),
-        Candidate("sensor.speed_offset", "output", "sensor", "rad/s", False, -speed, speed,
-                  0.01 * speed),
+        Candidate(
+            "sensor.current_offset",
+            "output",
+            "sensor",
+            "A",
+            False,
+            -current,
+            current,
+            0.01 * current,
+        ),
+        Candidate(
+            "sensor.speed_offset", "output", "sensor", "rad/s", False, -speed, speed, 0.01 * speed
+        ),
         Candidate("sensor.speed_delay", "output", "sensor", "s", False, -_DELAY, _DELAY, 1e-3),
-    ]  # fmt: skip
+    ]
     return found + _brakes(logs)
 
 
@@ -116,16 +127,26 @@ def _brakes(logs: Sequence[BenchLog]) -> list[Candidate]:
     if measured and any(log.brake.known == "off" for log in logs):
         top = max(float(log.brake.level.max()) for log in measured)
         found.append(
-            Candidate("sensor.load_cell_offset", "input", "sensor", "N m", False,
-                      -top, top, 0.01 * top)
-        )  # fmt: skip
+            Candidate(
+                "sensor.load_cell_offset", "input", "sensor", "N m", False, -top, top, 0.01 * top
+            )
+        )
     for k, log in enumerate(logs):
         if log.brake.known in {"on", "force"}:
             found += [
-                Candidate(f"load.brake[{log.name}][{j}]", "input", "load", "N m", False,
-                          0.0, 100.0, 0.1, (k, j))
+                Candidate(
+                    f"load.brake[{log.name}][{j}]",
+                    "input",
+                    "load",
+                    "N m",
+                    False,
+                    0.0,
+                    100.0,
+                    0.1,
+                    (k, j),
+                )
                 for j in range(_KNOTS)
-            ]  # fmt: skip
+            ]
     return found
 
 
@@ -175,7 +196,10 @@ def start_values(actuator: Actuator, logs: Sequence[BenchLog]) -> dict[str, floa
     rest = _other_inertia(actuator)
     if kt * found.inertia > 1.05 * rest:
         values["motor.inertia"] = kt * found.inertia - rest
-    return values | _controller(actuator, found, kt)
+    values |= _controller(actuator, found, kt)
+    old = actuator.parameters.value
+    near = {p: v for p, v in values.items() if 1.0 / _FAR < v / max(old(p), 1e-12) < _FAR}
+    return near | tamed(actuator, near)
 
 
 def _controller(actuator: Actuator, found: DirectEstimate, kt: float) -> dict[str, float]:
@@ -187,6 +211,22 @@ def _controller(actuator: Actuator, found: DirectEstimate, kt: float) -> dict[st
     if found.derivative > 0.0 and actuator.parameters.value("control.derivative_time") > 0.0:
         values["control.derivative_time"] = found.derivative / found.proportional
     return values
+
+
+def tamed(actuator: Actuator, values: Mapping[str, str | float]) -> dict[str, float]:
+    """Return a shorter derivative time where gain times it would exceed the inertia, else nothing.
+
+    The model refuses such a pair: it acts like an inertia larger than the real one.
+    """
+
+    def value(path: str) -> float:
+        return float(values.get(path, actuator.parameters.value(path)))
+
+    inertia = value("motor.inertia") + value("gear.inertia")
+    gain = value("control.speed_gain") * value("control.speed_gain_scale")
+    if gain * value("control.derivative_time") < _WHOLE * inertia:
+        return {}
+    return {"control.derivative_time": _WHOLE * inertia / gain}
 
 
 def _other_inertia(actuator: Actuator) -> float:

@@ -51,10 +51,14 @@ def direct_estimate(logs: Sequence[BenchLog]) -> DirectEstimate:
     control = _control(logs)
     brake = plant[3] if len(plant) > 3 else 0.0
     return DirectEstimate(
-        inertia=float(plant[0]), viscous=float(plant[1]), dry=float(plant[2]),
+        inertia=float(plant[0]),
+        viscous=float(plant[1]),
+        dry=float(plant[2]),
         torque_constant=1.0 / float(brake) if brake > 0.0 else None,
-        proportional=float(control[0]), integral=float(control[1]), derivative=float(control[2]),
-    )  # fmt: skip
+        proportional=float(control[0]),
+        integral=float(control[1]),
+        derivative=float(control[2]),
+    )
 
 
 def robust_lines(design: Floats, target: Floats) -> Floats:
@@ -62,10 +66,11 @@ def robust_lines(design: Floats, target: Floats) -> Floats:
     scale = np.linalg.norm(design, axis=0)
     scaled = design / np.where(scale > 0.0, scale, 1.0)
     weight = np.ones(len(target))
-    beta = np.zeros(design.shape[1])
+    beta: Floats = np.zeros(design.shape[1])
     for _ in range(_TURNS):
         root = np.sqrt(weight)
-        fresh, *_ = np.linalg.lstsq(scaled * root[:, None], target * root, rcond=1e-9)
+        solved, *_ = np.linalg.lstsq(scaled * root[:, None], target * root, rcond=1e-9)
+        fresh = np.asarray(solved, dtype=np.float64)
         rest = target - scaled @ fresh
         spread = 1.4826 * float(np.median(np.abs(rest))) or 1e-300
         weight = np.minimum(1.0, 1.345 * spread / np.maximum(np.abs(rest), 1e-300))

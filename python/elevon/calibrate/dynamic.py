@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.calibrate.candidates import Candidate, candidates, start_values
+from elevon.calibrate.candidates import Candidate, candidates, start_values, tamed
 from elevon.calibrate.estimate import Estimate, quantile
 from elevon.calibrate.fit import (
     DynamicFit,
@@ -66,13 +66,17 @@ class Dynamic:
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain types."""
         return {
-            "drive": self.drive, "values": self.fit.values, "cost": self.fit.cost,
-            "converged": self.fit.converged, "at_bound": list(self.fit.at_bound),
-            "exact_derivatives": list(self.fit.exact), "evaluations": self.fit.evaluations,
+            "drive": self.drive,
+            "values": self.fit.values,
+            "cost": self.fit.cost,
+            "converged": self.fit.converged,
+            "at_bound": list(self.fit.at_bound),
+            "exact_derivatives": list(self.fit.exact),
+            "evaluations": self.fit.evaluations,
             "runs": self.runs,
             "absorbed": [{"path": p, "simulation": a, "direct": b} for p, a, b in self.absorbed],
             "rms": [{"log": n, "speed": s, "current": c} for n, s, c in self.rms],
-        }  # fmt: skip
+        }
 
     def estimates(
         self, actuator: Actuator, known: Sequence[str], free: Sequence[str] | None
@@ -89,13 +93,19 @@ class Dynamic:
             in_set = item.kind == "parameter"
             found.append(
                 Estimate(
-                    item.path, value, value * float(s) if item.log_scale else float(s), ends,
-                    item.unit, item.register,
+                    item.path,
+                    value,
+                    value * float(s) if item.log_scale else float(s),
+                    ends,
+                    item.unit,
+                    item.register,
                     actuator.parameters.value(item.path) if in_set else None,
-                    "simulation", (), "ended at its bound" if item.path in self.fit.at_bound else "",
+                    "simulation",
+                    (),
+                    "ended at its bound" if item.path in self.fit.at_bound else "",
                     in_set,
                 )
-            )  # fmt: skip
+            )
         return [item for item in found if np.isfinite(item.std)]
 
 
@@ -129,7 +139,7 @@ def dynamic_stage(
     chosen = candidates(actuator, logs, free)
     start = start_values(actuator, logs)
     start |= {item.path: item.value for item in known if item.value != 0.0}
-    problem = _best_drive(logs, keeps, actuator, chosen, start, fidelity, check)
+    problem = _best_drive(logs, keeps, actuator, chosen, start, fidelity=fidelity, check=check)
     x = _point(chosen, start, problem.actuator)
     refresh_scales(problem, values_of(chosen, x))
     state[0] = 0.1
@@ -143,11 +153,22 @@ def dynamic_stage(
         if not check():
             raise Interrupted("calibration stopped")
 
-    fit = fit_dynamic(problem, [chosen[k] for k in kept], x[kept], most=_MOST, advance=advance)
+    fit = fit_dynamic(
+        problem,
+        [chosen[k] for k in kept],
+        x[kept],
+        most=_MOST,
+        finite=[part[:, :, kept] for part in jac],
+        advance=advance,
+    )
     return Dynamic(
-        ranking=ranking, fit=fit, drive=str(problem.actuator.parameters["drive.kind"].value),
-        absorbed=_absorbed(fit, known), rms=_rms(problem, fit), runs=problem.runs,
-    )  # fmt: skip
+        ranking=ranking,
+        fit=fit,
+        drive=str(problem.actuator.parameters["drive.kind"].value),
+        absorbed=_absorbed(fit, known),
+        rms=_rms(problem, fit),
+        runs=problem.runs,
+    )
 
 
 def _point(
@@ -166,9 +187,15 @@ def _point(
 
 
 def _best_drive(
-    logs: Sequence[BenchLog], keeps: Sequence[Bools], actuator: Actuator,
-    free: Sequence[Candidate], start: dict[str, float], fidelity: str, check: Any,
-) -> Problem:  # fmt: skip
+    logs: Sequence[BenchLog],
+    keeps: Sequence[Bools],
+    actuator: Actuator,
+    free: Sequence[Candidate],
+    start: dict[str, float],
+    *,
+    fidelity: str,
+    check: Any,
+) -> Problem:
     """The set's drive, or the carrier PWM of a real one, whichever explains the logs better."""
     own = str(actuator.parameters["drive.kind"].value)
     kinds = [own, *(kind for kind in ("pwm",) if kind != own)]
@@ -176,9 +203,13 @@ def _best_drive(
     for kind in kinds:
         changed = actuator.with_values({**_fixed(start, actuator, free), "drive.kind": kind})
         problem = Problem(
-            changed, logs, fidelity, check, _tied(actuator),
+            changed,
+            logs,
+            fidelity,
+            check,
+            _tied(actuator),
             masks=[keep.copy() for keep in keeps],
-        )  # fmt: skip
+        )
         values = values_of(free, _point(free, start, changed))
         rest = problem.residual(problem.simulate([values])[0])
         cost = sum(float(np.sum(np.minimum(np.abs(r), 10.0))) for r in rest)
@@ -201,7 +232,8 @@ def _fixed(
         )
         values.setdefault("friction.static", max(ratio, 1.0) * start["friction.dynamic"])
         values.setdefault("friction.dynamic", start["friction.dynamic"])
-    return {p: v for p, v in values.items() if p not in {"play.total", "sensor.encoder.offset"}}
+    kept = {p: v for p, v in values.items() if p not in {"play.total", "sensor.encoder.offset"}}
+    return kept | tamed(actuator, kept)
 
 
 def _tied(actuator: Actuator) -> bool:
@@ -209,9 +241,7 @@ def _tied(actuator: Actuator) -> bool:
     return abs(value("control.torque_constant") / (1.5 * value("motor.emf_constant")) - 1.0) < 0.01
 
 
-def _absorbed(
-    fit: DynamicFit, known: Sequence[Estimate]
-) -> tuple[tuple[str, float, float], ...]:
+def _absorbed(fit: DynamicFit, known: Sequence[Estimate]) -> tuple[tuple[str, float, float], ...]:
     direct = {item.path: item for item in known}
     std = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     found = []

@@ -56,11 +56,20 @@ class Estimate:
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain types."""
         return {
-            "path": self.path, "value": self.value, "unit": self.unit, "std": self.std,
-            "low": self.interval[0], "high": self.interval[1], "level": LEVEL, "old": self.old,
-            "register": self.register, "method": self.method, "given": list(self.given),
-            "note": self.note, "in_set": self.in_set,
-        }  # fmt: skip
+            "path": self.path,
+            "value": self.value,
+            "unit": self.unit,
+            "std": self.std,
+            "low": self.interval[0],
+            "high": self.interval[1],
+            "level": LEVEL,
+            "old": self.old,
+            "register": self.register,
+            "method": self.method,
+            "given": list(self.given),
+            "note": self.note,
+            "in_set": self.in_set,
+        }
 
 
 def quantile(degrees: float) -> float:

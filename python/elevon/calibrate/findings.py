@@ -24,35 +24,46 @@ _POOR = 0.8  # explained share below which a regression is doubtful
 
 
 def plant_findings(
-    logs: Sequence[BenchLog], plant: Regression | None, torque: Torque,
-    found: Sequence[Estimate], dynamic: Dynamic | None, actuator: Actuator,
-) -> list[str]:  # fmt: skip
+    logs: Sequence[BenchLog],
+    plant: Regression | None,
+    torque: Torque,
+    dynamic: Dynamic | None,
+    actuator: Actuator,
+) -> list[str]:
     """Sentences on torque scale, brakes, drive and misfit."""
     says = []
     if plant is None:
-        says.append("no log moves both ways long enough for a torque balance: friction and inertia "
-                    "come from model runs alone, or stay as they were")  # fmt: skip
+        says.append(
+            "no log moves both ways long enough for a torque balance: friction and inertia "
+            "come from model runs alone, or stay as they were"
+        )
     elif plant.explained < _POOR:
-        says.append(f"the torque balance explains only {100 * plant.explained:.0f} % of the "
-                    "current: something the model lacks moves it")  # fmt: skip
+        says.append(
+            f"the torque balance explains only {100 * plant.explained:.0f} % of the "
+            "current: something the model lacks moves it"
+        )
     if torque.measured:
         says += _convention(torque, actuator)
     else:
-        says.append("no load cell: the logs tell inertia, friction and speed gain only as ratios to "
-                    "the torque constant; motor.emf_constant is kept as given and the values scale "
-                    "with it")  # fmt: skip
+        says.append(
+            "no load cell: the logs tell inertia, friction and speed gain only as ratios to "
+            "the torque constant; motor.emf_constant is kept as given and the values scale "
+            "with it"
+        )
     says += [
-        f"{log.name}: the brake acted but its torque was not measured; its friction is not used for "
-        "the actuator's" if len(logs) > 1 else
-        f"{log.name}: the brake acted but its torque was not measured; friction includes it"
-        for log in logs if log.brake.known in {"on", "force"}
-    ]  # fmt: skip
+        f"{log.name}: the brake acted but its torque was not measured; its friction is not taken "
+        "for the actuator's"
+        if len(logs) > 1
+        else f"{log.name}: the brake acted but its torque was not measured; friction includes it"
+        for log in logs
+        if log.brake.known in {"on", "force"}
+    ]
     if dynamic is not None:
         own = actuator.parameters["drive.kind"].value
         if dynamic.drive != own:
             says.append(f"drive.kind {dynamic.drive!r} explains the logs better than {own!r}")
         says += [
-            f"{path} absorbs what the {_percent(a, b)} model lacks: model runs want {a:.5g}, "
+            f"{path} absorbs what the model lacks ({_percent(a, b)}): model runs want {a:.5g}, "
             f"the signals themselves say {b:.5g}"
             for path, a, b in dynamic.absorbed
         ]
@@ -64,7 +75,7 @@ def plant_findings(
 
 
 def _percent(a: float, b: float) -> str:
-    return f"({100.0 * (a / b - 1.0):+.1f} %)"
+    return f"{100.0 * (a / b - 1.0):+.1f} %"
 
 
 def _convention(torque: Torque, actuator: Actuator) -> list[str]:
@@ -72,26 +83,30 @@ def _convention(torque: Torque, actuator: Actuator) -> list[str]:
     ratio = torque.constant / (1.5 * value("motor.emf_constant") * value("motor.flux_fraction"))
     for factor, name in ((math.sqrt(2.0), "peak"), (1.0 / math.sqrt(2.0), "rms")):
         if abs(ratio / factor - 1.0) < _CONVENTION:
-            return [f"the torque constant is {ratio:.3f} times the set's: the logged currents may "
-                    f"be {name} values taken for the other convention"]  # fmt: skip
+            return [
+                f"the torque constant is {ratio:.3f} times the set's: the logged currents may "
+                f"be {name} values taken for the other convention"
+            ]
     return []
 
 
-def amplitude_findings(
-    commands: Sequence[CommandFit], found: Sequence[Estimate]
-) -> list[str]:
+def amplitude_findings(commands: Sequence[CommandFit], found: Sequence[Estimate]) -> list[str]:
     """Name a constant amplitude factor between the bench and the model, and where it sits."""
     says = []
     gain = next((item for item in found if item.path == "sensor.encoder.gain"), None)
     if gain is not None and abs(gain.value - 1.0) > max(_FACTOR, 3.0 * gain.std):
-        says.append(f"amplitude factor {gain.value:.4f} between the encoder and the motor over the "
-                    "gear ratio: encoder gain (sensor.encoder.gain) or another gear ratio")  # fmt: skip
+        says.append(
+            f"amplitude factor {gain.value:.4f} between the encoder and the motor over the "
+            "gear ratio: encoder gain (sensor.encoder.gain) or another gear ratio"
+        )
     for fit in commands:
         if fit.factor is None:
             continue
         std = abs(fit.factor) * fit.amplitude_std / max(abs(fit.amplitude), 1e-300)
         if abs(fit.factor - 1.0) > max(_FACTOR, 3.0 * std):
-            says.append(f"{fit.log}: amplitude factor {fit.factor:.4f} between the command the "
-                        "bench followed and the one noted: the command is scaled, not the "
-                        "actuator")  # fmt: skip
+            says.append(
+                f"{fit.log}: amplitude factor {fit.factor:.4f} between the command the "
+                "bench followed and the one noted: the command is scaled, not the "
+                "actuator"
+            )
     return says

@@ -18,7 +18,7 @@ __all__ = ["DynamicFit", "blocks_of", "fit_dynamic", "refresh_scales", "step_siz
 Floats = npt.NDArray[np.float64]
 _SOFT = 3.0  # deviations beyond which residuals weigh less
 _AGREE = 0.1  # relative difference up to which exact derivatives hold
-_CLOUD = 24  # starts tried where the first values explain too little
+_CLOUD = 32  # starts tried where the first values explain too little
 _EXPLAINED = 0.5  # share of the current's variance the first values must explain
 _STEP = 0.01  # of the meaningful change ... of a logarithm
 
@@ -101,6 +101,7 @@ def fit_dynamic(
     x0: Floats,
     *,
     most: int = 25,
+    finite: Sequence[Floats] | None = None,
     advance: Callable[[float], object] = lambda _f: None,
 ) -> DynamicFit:
     """Fit the free candidates from a start.
@@ -115,6 +116,8 @@ def fit_dynamic(
         Start.
     most : int
         Evaluations of the optimiser at most.
+    finite : sequence of ndarray, optional
+        Central differences at the start, one (n, 2, p) a log, where the caller has them.
     advance : callable
         Told the done fraction.
 
@@ -128,8 +131,9 @@ def fit_dynamic(
     low = np.array([_bound(item, item.low) for item in free])
     high = np.array([_bound(item, item.high) for item in free])
     start = np.clip(x0, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
-    start = _global_start(problem, free, start, low, high)
-    exact = _exact_columns(problem, free, start)
+    moved = _global_start(problem, free, start, low, high)
+    exact = _exact_columns(problem, free, moved, finite if moved is start else None)
+    start = moved
     calls = 0
 
     def residual(x: Floats) -> Floats:
@@ -145,23 +149,39 @@ def fit_dynamic(
         return np.vstack([part.reshape(-1, len(free)) for part in parts])
 
     best = least_squares(
-        residual, start, jac=jacobian, bounds=(low, high), loss="soft_l1", f_scale=_SOFT,
-        x_scale=np.array([item.size for item in free]), max_nfev=most, ftol=1e-7, xtol=1e-7,
+        residual,
+        start,
+        jac=jacobian,
+        bounds=(low, high),
+        loss="soft_l1",
+        f_scale=_SOFT,
+        x_scale=np.array([item.size for item in free]),
+        max_nfev=most,
+        ftol=1e-7,
+        xtol=1e-7,
         gtol=1e-9,
-    )  # fmt: skip
+    )
     x = np.asarray(best.x, dtype=np.float64)
     covariance, degrees = _covariance(problem, free, x)
     close = 1e-3 * np.array([item.size for item in free])
-    ends = [item.path for item, v, a, b, e in zip(free, x, low, high, close, strict=True)
-            if v - a < e or b - v < e]  # fmt: skip
+    ends = [
+        item.path
+        for item, v, a, b, e in zip(free, x, low, high, close, strict=True)
+        if v - a < e or b - v < e
+    ]
     count = 2 * sum(int(mask.sum()) for mask in problem.masks)
     advance(1.0)
     return DynamicFit(
-        free=tuple(free), x=x, covariance=covariance, degrees=degrees,
+        free=tuple(free),
+        x=x,
+        covariance=covariance,
+        degrees=degrees,
         cost=2.0 * float(best.cost) / max(count, 1),
-        exact=tuple(free[k].path for k in exact), evaluations=int(best.nfev),
-        converged=bool(best.success), at_bound=tuple(ends),
-    )  # fmt: skip
+        exact=tuple(free[k].path for k in exact),
+        evaluations=int(best.nfev),
+        converged=bool(best.success),
+        at_bound=tuple(ends),
+    )
 
 
 def _bound(item: Candidate, value: float) -> float:
@@ -171,7 +191,9 @@ def _bound(item: Candidate, value: float) -> float:
 def _explains(problem: Problem, values: dict[str, float]) -> float:
     """Share of the current's variance that a point explains, over all logs."""
     rest = total = 0.0
-    for run, log, mask in zip(problem.simulate([values])[0], problem.logs, problem.masks, strict=True):
+    for run, log, mask in zip(
+        problem.simulate([values])[0], problem.logs, problem.masks, strict=True
+    ):
         if run is None:
             return -np.inf
         rest += float(np.sum((run.current - log.current)[mask] ** 2))
@@ -193,21 +215,26 @@ def _global_start(
     points = np.vstack((start, points))
     runs = problem.simulate([values_of(free, p) for p in points])
     costs = [
-        sum(float(np.sum(2.0 * (np.sqrt(1.0 + r**2 / _SOFT**2) - 1.0)))
-            for r in problem.residual(item))
+        sum(
+            float(np.sum(2.0 * (np.sqrt(1.0 + r**2 / _SOFT**2) - 1.0)))
+            for r in problem.residual(item)
+        )
         for item in runs
-    ]  # fmt: skip
+    ]
     return np.asarray(points[int(np.argmin(costs))], dtype=np.float64)
 
 
-def _exact_columns(problem: Problem, free: Sequence[Candidate], x: Floats) -> tuple[int, ...]:
+def _exact_columns(
+    problem: Problem, free: Sequence[Candidate], x: Floats, finite: Sequence[Floats] | None
+) -> tuple[int, ...]:
     """Candidates whose exact derivatives agree with differences over the switching instants."""
     if problem.fidelity != "low":
         return ()
     chosen = [k for k, item in enumerate(free) if item.kind == "parameter"]
     if not chosen:
         return ()
-    finite = problem.jacobian(free, x, step_sizes(free))
+    if finite is None:
+        finite = problem.jacobian(free, x, step_sizes(free))
     dual = _exact(problem, free, x, chosen)
     held = []
     for j, k in enumerate(chosen):
@@ -233,7 +260,9 @@ def _exact(
         by = problem.exact(index, values, asked)
         part = np.empty((len(log.time), 2, len(paths)))
         for j, path in enumerate(paths):
-            column = by[path] + (1.5 * by[tied] if path == "motor.emf_constant" and tied in by else 0)
+            column = by[path] + (
+                1.5 * by[tied] if path == "motor.emf_constant" and tied in by else 0
+            )
             inner = values[path] if free[chosen[j]].log_scale else 1.0
             part[:, :, j] = column * inner / np.array(scale)
         part[~mask] = 0.0
@@ -285,7 +314,7 @@ def _covariance(problem: Problem, free: Sequence[Candidate], x: Floats) -> tuple
     kept: list[Any] = []
     for part, rest, block, mask in zip(jac, residual, blocks, problem.masks, strict=True):
         weight = 1.0 / np.sqrt(1.0 + (rest / _SOFT) ** 2)
-        normal += np.einsum("ncp,nc,ncq->pq", part, weight, part)
+        normal += np.einsum("ncp,nc,ncq->pq", part, weight**3, part)
         scores.append(np.einsum("ncp,nc->np", part, weight * rest)[mask])
         kept.append(block[mask] - block[mask].min())
     return block_covariance(normal, scores, kept)

@@ -51,10 +51,13 @@ class HeldOut:
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain types."""
         return {
-            "log": self.log, "span": self.span, "speed_rms": self.speed,
-            "current_rms": self.current, "speed_rms_all_data": self.speed_all,
+            "log": self.log,
+            "span": self.span,
+            "speed_rms": self.speed,
+            "current_rms": self.current,
+            "speed_rms_all_data": self.speed_all,
             "current_rms_all_data": self.current_all,
-        }  # fmt: skip
+        }
 
 
 def held_out(
@@ -75,16 +78,22 @@ def held_out(
         else:
             late = log.time > (1.0 - _LAST) * log.duration
             train, test, span = [keeps[0] & ~late], keeps[0] & late, "last quarter"
-        row = _one(logs, train, k, test, span, before, fitted)
+        row = _one(logs, train, k, test, span=span, before=before, fitted=fitted)
         if row is not None:
             found.append(row)
     return tuple(found)
 
 
 def _one(
-    logs: Sequence[BenchLog], train: Sequence[Bools], k: int, test: Bools, span: str,
-    before: Actuator, fitted: Actuator,
-) -> HeldOut | None:  # fmt: skip
+    logs: Sequence[BenchLog],
+    train: Sequence[Bools],
+    k: int,
+    test: Bools,
+    *,
+    span: str,
+    before: Actuator,
+    fitted: Actuator,
+) -> HeldOut | None:
     rest = [j for j in range(len(logs)) if train[j].any()]
     some, masks = [logs[j] for j in rest], [train[j] for j in rest]
     plant, law = torque_balance(some, masks), controller_law(some, masks)
@@ -107,7 +116,9 @@ def _one(
     for (run,) in runs:
         if run is None:
             return None
-        pairs.append((_rms(run.speed - logs[k].speed, test), _rms(run.current - logs[k].current, test)))
+        pairs.append(
+            (_rms(run.speed - logs[k].speed, test), _rms(run.current - logs[k].current, test))
+        )
     (speed, current), (speed_all, current_all) = pairs
     return HeldOut(logs[k].name, span, speed, current, speed_all, current_all)
 

@@ -19,6 +19,7 @@ Floats = npt.NDArray[np.float64]
 _CORRELATED = 0.95
 _LOOSEST = 0.25  # relative deviation (or of the size of an offset's meaning) still worth freeing
 _HOPELESS = 1.0  # the same, above which a parameter asked for is refused
+_SAME = 0.999  # correlation at which two parameters are one
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,9 @@ def choose(
         if worst is None or not loose[worst] > _LOOSEST:
             break
         index = kept[worst]
-        dropped[free[index].path] = _reason([free[k] for k in kept], covariance, worst, loose[worst])
+        dropped[free[index].path] = _reason(
+            [free[k] for k in kept], covariance, worst, loose[worst]
+        )
         kept.remove(index)
     _refuse(free, kept, jac, residual, blocks)
     chosen = [free[k] for k in kept]
@@ -144,9 +147,19 @@ def _refuse(
     items = [free[k] for k in kept]
     loose = _looseness(items, covariance)
     for j, item in enumerate(items):
-        if loose[j] > _HOPELESS:
+        if loose[j] > _HOPELESS or _twin(covariance, j) > _SAME:
             why = _reason(items, covariance, j, loose[j])
             raise InputError(f"--free {item.path}: the logs cannot determine it: {why}")
+
+
+def _twin(covariance: Floats, j: int) -> float:
+    """Largest correlation with any other parameter."""
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    if not np.isfinite(std).all() or not std.all():
+        return 1.0
+    correlation = np.abs(covariance[j] / (std[j] * std))
+    correlation[j] = 0.0
+    return float(correlation.max())
 
 
 def _looseness(free: Sequence[Candidate], covariance: Floats) -> Floats:

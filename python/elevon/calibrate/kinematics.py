@@ -67,13 +67,18 @@ class CommandFit:
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain types."""
         return {
-            "log": self.log, "waveform": self.waveform.kind, "values": dict(self.waveform.values),
-            "std": dict(self.waveform.std), "rms": self.waveform.rms,
-            "position_gain": self.gain, "position_gain_std": self.gain_std,
+            "log": self.log,
+            "waveform": self.waveform.kind,
+            "values": dict(self.waveform.values),
+            "std": dict(self.waveform.std),
+            "rms": self.waveform.rms,
+            "position_gain": self.gain,
+            "position_gain_std": self.gain_std,
             "amplitude_factor": self.factor,
-            "amplitude_factor_std": None if self.factor is None
+            "amplitude_factor_std": None
+            if self.factor is None
             else abs(self.factor) * self.amplitude_std / max(abs(self.amplitude), 1e-300),
-        }  # fmt: skip
+        }
 
 
 def command_fit(log: BenchLog, gain: float, limit: float) -> CommandFit | None:
@@ -111,9 +116,7 @@ def command_fit(log: BenchLog, gain: float, limit: float) -> CommandFit | None:
     return _with_gain(log, fit, gain, limit)
 
 
-def _with_gain(
-    log: BenchLog, fit: WaveformFit, gain: float, limit: float
-) -> CommandFit | None:
+def _with_gain(log: BenchLog, fit: WaveformFit, gain: float, limit: float) -> CommandFit | None:
     """Waveform's parameters and the gain together: waveform = set point / gain + position."""
     from scipy.optimize import least_squares
 
@@ -145,10 +148,14 @@ def _with_gain(
     noted = log.note.parameters.get("amplitude") if log.note else None
     factor = amplitude / abs(noted) if noted and at is not None else None
     return CommandFit(
-        log=log.name, waveform=fit, gain=gain / inverse, gain_std=gain * inverse_std / inverse**2,
-        amplitude=amplitude, amplitude_std=math.nan if at is None else float(std[at]),
+        log=log.name,
+        waveform=fit,
+        gain=gain / inverse,
+        gain_std=gain * inverse_std / inverse**2,
+        amplitude=amplitude,
+        amplitude_std=math.nan if at is None else float(std[at]),
         factor=factor,
-    )  # fmt: skip
+    )
 
 
 def speed_sensor(logs: Sequence[BenchLog]) -> dict[str, tuple[float, float]] | None:

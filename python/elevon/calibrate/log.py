@@ -125,10 +125,14 @@ def read_logs(
         note = commands[k] if k < len(commands) else None
         imported.append(
             import_log(
-                path, column_map=column_map, loadcell=cell, command=note,
-                gear_ratio=gear_ratio, sidecars=sidecars,
+                path,
+                column_map=column_map,
+                loadcell=cell,
+                command=note,
+                gear_ratio=gear_ratio,
+                sidecars=sidecars,
             )
-        )  # fmt: skip
+        )
     same_rate(imported)
     return [bench_log(item) for item in imported]
 
@@ -154,21 +158,27 @@ def bench_log(imported: ImportedLog) -> BenchLog:
         raise InputError(f"{name}: {len(time)} samples; calibration needs {_LEAST_SAMPLES}")
     needed_signals = ("speed_ref", "motor_speed", current_signal)
     columns = [np.array(recording[s].values, dtype=np.float64) for s in needed_signals]
-    good = np.isfinite(np.column_stack(columns)).all(axis=1)
+    good = np.asarray(np.isfinite(np.column_stack(columns)).all(axis=1), dtype=np.bool_)
     if good.sum() < _LEAST_SAMPLES:
         raise InputError(f"{name}: {int(good.sum())} samples are complete; {_LEAST_SAMPLES} needed")
     ref, speed, current = (_filled(time, column) for column in columns)
     target = _optional(recording, time, ("current_ref",))
     return BenchLog(
-        name=name, start=start, time=time, speed_ref=ref, speed=speed, current=current,
+        name=name,
+        start=start,
+        time=time,
+        speed_ref=ref,
+        speed=speed,
+        current=current,
         current_signal=current_signal,
         current_target=current if target is None else target,
         motor=_optional(recording, time, ("resolver_position", "motor_position")),
         user=_optional(recording, time, ("encoder_position", "user_position")),
         brake=brake_of(recording, imported.note, time, start, speed),
-        note=imported.note, good=good,
+        note=imported.note,
+        good=good,
         warnings=tuple(f"{f.place}: {f.text}" for f in report.findings if f.level == "warning"),
-    )  # fmt: skip
+    )
 
 
 def _filled(time: Floats, values: Floats) -> Floats:

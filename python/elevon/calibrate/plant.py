@@ -78,59 +78,124 @@ def plant_estimates(
     found: list[Estimate] = []
 
     def add(
-        path: str, unit: str, function: Callable[[Floats], float], note: str = "",
-        *, given: tuple[str, ...] = given, register: str = "plant", in_set: bool = True,
+        path: str,
+        unit: str,
+        function: Callable[[Floats], float],
+        note: str = "",
+        *,
+        given: tuple[str, ...] = given,
+        register: str = "plant",
+        in_set: bool = True,
         floor: float = -np.inf,
-    ) -> float:  # fmt: skip
+    ) -> float:
         number, std = _delta(plant, function)
         half = quantile(plant.degrees) * std
         low, high = max(number - half, floor), number + half
         old = value(path) if in_set else None
         found.append(
-            Estimate(path, number, std, (low, high), unit, register, old, "direct", given, note,
-                     in_set)
-        )  # fmt: skip
+            Estimate(
+                path, number, std, (low, high), unit, register, old, "direct", given, note, in_set
+            )
+        )
         return number
 
     scale = _scale(plant, torque)
     if torque.measured:
-        add("motor.emf_constant", "V s/rad", lambda b: scale(b) / 1.5 / value("motor.flux_fraction"),
-            "from the load cell: torque constant over 1.5", given=())  # fmt: skip
+        add(
+            "motor.emf_constant",
+            "V s/rad",
+            lambda b: scale(b) / 1.5 / value("motor.flux_fraction"),
+            "from the load cell: torque constant over 1.5",
+            given=(),
+        )
         add("derived.torque_constant", "N m/A", scale, "per peak ampere", given=(), in_set=False)
-    total = add("derived.inertia", "kg m2", lambda b: scale(b) * b[0],
-                "all inertia on the fast shaft", in_set=False)  # fmt: skip
-    add("derived.inertia_per_torque", "A s2/rad", lambda b: float(b[0]),
-        "inertia over torque constant: what the current alone tells", given=(), in_set=False)  # fmt: skip
+    total = add(
+        "derived.inertia",
+        "kg m2",
+        lambda b: scale(b) * b[0],
+        "all inertia on the fast shaft",
+        in_set=False,
+    )
+    add(
+        "derived.inertia_per_torque",
+        "A s2/rad",
+        lambda b: float(b[0]),
+        "inertia over torque constant: what the current alone tells",
+        given=(),
+        in_set=False,
+    )
     follow = _inertia(add, actuator, scale, total, rest)
     add("friction.dynamic", "N m", lambda b: scale(b) * b[2], floor=0.0)
     add("friction.viscous", "N m s/rad", lambda b: scale(b) * b[1], floor=0.0)
     offset = plant.names.index("offset")
-    add("sensor.current_offset", "A", lambda b: float(b[offset]),
-        "or a constant load: the current alone cannot tell them apart", given=(),
-        register="sensor", in_set=False)  # fmt: skip
+    add(
+        "sensor.current_offset",
+        "A",
+        lambda b: float(b[offset]),
+        "or a constant load: the current alone cannot tell them apart",
+        given=(),
+        register="sensor",
+        in_set=False,
+    )
+    if "cell" in plant.names:
+        cell = plant.names.index("cell")
+        add(
+            "sensor.load_cell_offset",
+            "N m",
+            lambda b: scale(b) * float(b[cell]),
+            "of the brake torque the load cell shows",
+            register="sensor",
+            in_set=False,
+        )
     lag = len(plant.names) - 1
-    add("sensor.current_lag", "s", lambda b: float(b[lag]),
-        "of the logged current behind the motion", given=(), register="sensor", in_set=False)  # fmt: skip
+    add(
+        "sensor.current_lag",
+        "s",
+        lambda b: float(b[lag]),
+        "of the logged current behind the motion",
+        given=(),
+        register="sensor",
+        in_set=False,
+    )
     if plant["lag"] > _SEEN * plant.std("lag"):
-        add("sensor.filter_cutoff", "Hz", lambda b: 1.0 / (2.0 * np.pi * b[lag]),
-            "first-order filter of this lag", given=(), register="sensor", floor=0.0)  # fmt: skip
+        add(
+            "sensor.filter_cutoff",
+            "Hz",
+            lambda b: 1.0 / (2.0 * np.pi * b[lag]),
+            "first-order filter of this lag",
+            given=(),
+            register="sensor",
+            floor=0.0,
+        )
     return found, follow
 
 
 def _inertia(
-    add: Callable[..., float], actuator: Actuator, scale: Callable[[Floats], float],
-    total: float, rest: float,
-) -> dict[str, float]:  # fmt: skip
+    add: Callable[..., float],
+    actuator: Actuator,
+    scale: Callable[[Floats], float],
+    total: float,
+    rest: float,
+) -> dict[str, float]:
     """The motor's own inertia carries the sum, unless the others alone exceed it."""
     value = actuator.parameters.value
     if total > 1.05 * rest:
-        add("motor.inertia", "kg m2", lambda b: scale(b) * b[0] - rest,
+        add(
+            "motor.inertia",
+            "kg m2",
+            lambda b: scale(b) * b[0] - rest,
             "only its sum with gear.inertia (and the load's) is determined: the others are kept",
-            floor=0.0)  # fmt: skip
+            floor=0.0,
+        )
         return {}
     share = value("motor.inertia") / (value("motor.inertia") + rest)
-    add("motor.inertia", "kg m2", lambda b: share * scale(b) * b[0],
-        "the sum is less than the other inertias alone: all are scaled alike", floor=0.0)  # fmt: skip
+    add(
+        "motor.inertia",
+        "kg m2",
+        lambda b: share * scale(b) * b[0],
+        "the sum is less than the other inertias alone: all are scaled alike",
+        floor=0.0,
+    )
     factor = total / (value("motor.inertia") + rest)
     return {path: factor * value(path) for path in ("gear.inertia", "load.inertia")}
 
@@ -142,9 +207,7 @@ def _scale(plant: Regression, torque: Torque) -> Callable[[Floats], float]:
     return lambda b: 1.0 / float(b[at])
 
 
-def _delta(
-    regression: Regression, function: Callable[[Floats], float]
-) -> tuple[float, float]:
+def _delta(regression: Regression, function: Callable[[Floats], float]) -> tuple[float, float]:
     """Value and deviation of a function of the coefficients."""
     beta = regression.value
     std = np.sqrt(np.maximum(np.diag(regression.covariance), 0.0))
@@ -183,13 +246,34 @@ def controller_estimates(
         half = quantile(law.degrees) * std
         unit = record_of(actuator.wiring, path).unit
         found.append(
-            Estimate(path, number, std, (max(number - half, 0.0), number + half), unit,
-                     "controller", value(path), "direct", condition, note)
-        )  # fmt: skip
+            Estimate(
+                path,
+                number,
+                std,
+                (max(number - half, 0.0), number + half),
+                unit,
+                "controller",
+                value(path),
+                "direct",
+                condition,
+                note,
+            )
+        )
     gains_std = float(np.hypot(gains_std, extra * gains))
     half = quantile(law.degrees) * gains_std
     found.append(
-        Estimate("derived.integral_gain", gains, gains_std, (gains - half, gains + half), "N m/rad",
-                 "controller", None, "direct", given, "speed gain over integral time", False)
-    )  # fmt: skip
+        Estimate(
+            "derived.integral_gain",
+            gains,
+            gains_std,
+            (gains - half, gains + half),
+            "N m/rad",
+            "controller",
+            None,
+            "direct",
+            given,
+            "speed gain over integral time",
+            False,
+        )
+    )
     return found

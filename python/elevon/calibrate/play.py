@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from elevon.calibrate.blocks import block_covariance
+from elevon.calibrate.blocks import block_covariance, stroke_blocks
 from elevon.calibrate.log import BenchLog
 
 __all__ = ["PlayFit", "fit_play", "through_play"]
@@ -97,17 +97,27 @@ def fit_play(logs: Sequence[BenchLog], ratio: float, count: float) -> PlayFit | 
             parts.append(((p[2] * dragged + p[1] - p[3] * follows) - y)[keep])
         return np.concatenate(parts) / count
 
+    def jacobian(p: Floats) -> Floats:
+        return _jacobian(residual, p, scale)
+
     best = least_squares(
-        residual, [width, centre, 1.0, 0.0], x_scale=scale, diff_step=1e-3, loss="soft_l1",
-        f_scale=3.0, max_nfev=30, jac=lambda p: _jacobian(residual, p, scale),
-    )  # fmt: skip
+        residual,
+        [width, centre, 1.0, 0.0],
+        x_scale=scale,
+        loss="soft_l1",
+        f_scale=3.0,
+        max_nfev=30,
+        jac=jacobian,
+    )
     covariance, degrees = _covariance(best, used, keeps)
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     value = np.array(best.x)
     value[0] = abs(value[0])
     rms = count * float(np.sqrt(np.mean(residual(best.x) ** 2)))
     pairs = [(float(v), float(s)) for v, s in zip(value, std, strict=True)]
-    return PlayFit(pairs[0], pairs[1], pairs[2], pairs[3], degrees, rms, tuple(x.name for x in used))
+    return PlayFit(
+        pairs[0], pairs[1], pairs[2], pairs[3], degrees, rms, tuple(x.name for x in used)
+    )
 
 
 def _jacobian(residual: object, p: Floats, scale: Floats) -> Floats:
@@ -151,7 +161,7 @@ def _after_reversal(x: Floats, width: float) -> npt.NDArray[np.bool_]:
 def _covariance(
     best: object, logs: Sequence[BenchLog], keeps: Sequence[npt.NDArray[np.bool_]]
 ) -> tuple[Floats, float]:
-    """Blocks of half a second: the encoder's rounding repeats itself within a stretch of motion."""
+    """Blocks of whole strokes: the encoder's rounding repeats itself within one."""
     jac, fun = np.asarray(best.jac), np.asarray(best.fun)  # type: ignore[attr-defined]
     weight = 1.0 / np.sqrt(1.0 + (fun / 3.0) ** 2)
     scores, blocks, at = [], [], 0
@@ -159,6 +169,8 @@ def _covariance(
         size = int(keep.sum())
         part = slice(at, at + size)
         scores.append(jac[part] * (weight[part] * fun[part])[:, None])
-        blocks.append(np.floor(log.time[keep] / 0.5).astype(np.int64))
+        blocks.append(
+            stroke_blocks(log.time[keep], log.speed[keep], weight[part] * fun[part], log.period)
+        )
         at += size
-    return block_covariance(jac.T @ (weight[:, None] * jac), scores, blocks)
+    return block_covariance(jac.T @ (weight[:, None] ** 3 * jac), scores, blocks)

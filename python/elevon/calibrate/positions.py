@@ -33,16 +33,33 @@ def position_estimates(logs: Sequence[BenchLog], actuator: Actuator) -> list[Est
         for name, unit in (("gain", "1"), ("offset", "rad/s")):
             number, std = sensor[name]
             found.append(
-                _made(f"sensor.speed_{name}", number, std, math.inf, unit, "sensor", None,
-                      "of the logged speed against the motor's angle")
-            )  # fmt: skip
+                _made(
+                    f"sensor.speed_{name}",
+                    number,
+                    std,
+                    math.inf,
+                    unit=unit,
+                    register="sensor",
+                    old=None,
+                    note="of the logged speed against the motor's angle",
+                )
+            )
     limit = speed_limit(logs)
     if limit is not None and abs(limit / value("control.speed_limit") - 1.0) > _OTHER:
         found.append(
-            Estimate("control.speed_limit", limit, 1e-4 * limit,
-                     (limit * (1 - 2e-4), limit * (1 + 2e-4)), "rad/s", "controller",
-                     value("control.speed_limit"), "direct", (), "held flat in the log")
-        )  # fmt: skip
+            Estimate(
+                "control.speed_limit",
+                limit,
+                1e-4 * limit,
+                (limit * (1 - 2e-4), limit * (1 + 2e-4)),
+                "rad/s",
+                "controller",
+                value("control.speed_limit"),
+                "direct",
+                (),
+                "held flat in the log",
+            )
+        )
     return found
 
 
@@ -61,31 +78,83 @@ def _play(play: PlayFit, count: float, actuator: Actuator) -> list[Estimate]:
     offset_std = math.hypot(play.offset[1], count / math.sqrt(12.0))
     resolver = value("sensor.resolver.offset") / value("gear.ratio")
     rows = [
-        _made("play.total", total, play.play[1], play.degrees, "rad", "plant", value("play.total"),
-              "total, at the user", in_set=total >= 0.0),
-        _made("sensor.encoder.offset", offset + resolver, offset_std, math.inf, "rad", "sensor",
-              value("sensor.encoder.offset"),
-              "encoder less motor over ratio, the play centred; only this difference is determined"),
-        _made("sensor.encoder_delay", play.delay[0], play.delay[1], play.degrees, "s", "sensor",
-              None, "of the encoder behind the motor's sensor"),
-    ]  # fmt: skip
+        _made(
+            "play.total",
+            total,
+            play.play[1],
+            play.degrees,
+            unit="rad",
+            register="plant",
+            old=value("play.total"),
+            note="total, at the user",
+            in_set=total >= 0.0,
+        ),
+        _made(
+            "sensor.encoder.offset",
+            offset + resolver,
+            offset_std,
+            math.inf,
+            unit="rad",
+            register="sensor",
+            old=value("sensor.encoder.offset"),
+            note="encoder less motor over ratio, the play centred: only the difference is known",
+        ),
+        _made(
+            "sensor.encoder_delay",
+            play.delay[0],
+            play.delay[1],
+            play.degrees,
+            unit="s",
+            register="sensor",
+            old=None,
+            note="of the encoder behind the motor's sensor",
+        ),
+    ]
     gain, std = play.gain
     seen = abs(gain - 1.0) > max(3.0 * std, 1e-4)
     rows.append(
-        _made("sensor.encoder.gain", gain, std, play.degrees, "1", "sensor",
-              value("sensor.encoder.gain"), "encoder over motor and ratio", in_set=seen)
-    )  # fmt: skip
+        _made(
+            "sensor.encoder.gain",
+            gain,
+            std,
+            play.degrees,
+            unit="1",
+            register="sensor",
+            old=value("sensor.encoder.gain"),
+            note="encoder over motor and ratio",
+            in_set=seen,
+        )
+    )
     return rows
 
 
 def _made(
-    path: str, number: float, std: float, degrees: float, unit: str, register: str,
-    old: float | None, note: str, *, in_set: bool | None = None,
-) -> Estimate:  # fmt: skip
+    path: str,
+    number: float,
+    std: float,
+    degrees: float,
+    *,
+    unit: str,
+    register: str,
+    old: float | None,
+    note: str,
+    in_set: bool | None = None,
+) -> Estimate:
     half = quantile(degrees) * std
     inside = old is not None if in_set is None else in_set
-    return Estimate(path, number, std, (number - half, number + half), unit, register, old,
-                    "direct", (), note, inside)  # fmt: skip
+    return Estimate(
+        path,
+        number,
+        std,
+        (number - half, number + half),
+        unit,
+        register,
+        old,
+        "direct",
+        (),
+        note,
+        inside,
+    )
 
 
 def gain_estimate(fits: Sequence[CommandFit], old: float) -> Estimate | None:
@@ -99,5 +168,13 @@ def gain_estimate(fits: Sequence[CommandFit], old: float) -> Estimate | None:
     chi = sum(w * (fit.gain - gain) ** 2 for w, fit in zip(weight, good, strict=True))
     spread = max(1.0, chi / max(len(good) - 1, 1))
     std = math.sqrt(spread / total)
-    return _made("control.position_gain", gain, std, max(len(good) - 1.0, 2.0), "1/s", "controller",
-                 old, f"from the command's waveform in {', '.join(f.log for f in good)}")  # fmt: skip
+    return _made(
+        "control.position_gain",
+        gain,
+        std,
+        max(len(good) - 1.0, 2.0),
+        unit="1/s",
+        register="controller",
+        old=old,
+        note=f"from the command's waveform in {', '.join(f.log for f in good)}",
+    )

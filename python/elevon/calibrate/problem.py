@@ -156,15 +156,22 @@ class Problem:
         self.runs += len(cores)
         try:
             results = _core.simulate(
-                self.actuator.wiring, self.fidelity, cores, self._plan, _threads(), "auto",
+                self.actuator.wiring,
+                self.fidelity,
+                cores,
+                self._plan,
+                _threads(),
+                "auto",
                 lambda _fraction: self.check(),
-            )  # fmt: skip
+            )
         except ValueError as error:
             raise InputError(str(error)) from error
         if any(item["status"] == "interrupted" for item in results):
             raise Interrupted("calibration stopped")
-        shaped = [self._read(results[i], i % len(self.logs), points[i // len(self.logs)])
-                  for i in range(len(results))]  # fmt: skip
+        shaped = [
+            self._read(results[i], i % len(self.logs), points[i // len(self.logs)])
+            for i in range(len(results))
+        ]
         width = len(self.logs)
         return [shaped[i : i + width] for i in range(0, len(shaped), width)]
 
@@ -228,9 +235,14 @@ class Problem:
 
         core = self.core(index, values)
         passes = _core.sensitivities(
-            self.actuator.wiring, self.fidelity, core, self._plan, list(paths), [],
+            self.actuator.wiring,
+            self.fidelity,
+            core,
+            self._plan,
+            list(paths),
+            [],
             lambda _fraction: self.check(),
-        )  # fmt: skip
+        )
         found = {}
         for number, item in enumerate(passes):
             chosen = paths[8 * number : 8 * number + 8]

@@ -18,7 +18,7 @@ from elevon.units import parse_quantity
 
 __all__ = ["SetFile", "load_set"]
 
-_HEADER_KEYS = ("name", "title", "wiring", "base", "references", "scenario")
+_HEADER_KEYS = ("name", "title", "wiring", "base", "references", "scenario", "validation")
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,8 @@ class SetFile:
         Key to citation, those of the base included.
     scenario : mapping or None
         What runs when no scenario is given.
+    validation : mapping or None
+        ``transient`` [s] and ``limits``: signal to largest RMS error in percent of its range.
     """
 
     name: str
@@ -46,6 +48,7 @@ class SetFile:
     path: Path
     references: Mapping[str, str]
     scenario: Mapping[str, Any] | None
+    validation: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -100,7 +103,13 @@ def load_set(reference: str | os.PathLike[str]) -> SetFile:
         path=path,
         references=references,
         scenario=scenario,
+        validation=_thresholds(layers),
     )
+
+
+def _thresholds(layers: list[_Layer]) -> Mapping[str, Any] | None:
+    found = next((layer.header.validation for layer in layers if layer.header.validation), None)
+    return None if found is None else found.model_dump()
 
 
 def _chain(path: Path) -> Iterator[_Layer]:

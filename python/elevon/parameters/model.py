@@ -14,7 +14,7 @@ from pydantic import (
     field_validator,
 )
 
-__all__ = ["Entry", "Header", "Reference"]
+__all__ = ["Entry", "Header", "Reference", "Thresholds"]
 
 Number = StrictInt | StrictFloat
 
@@ -51,6 +51,16 @@ class Entry(_Strict):
         return source
 
 
+class Thresholds(_Strict):
+    """What a set promises of its own agreement with a log."""
+
+    transient: Number = Field(10.0, ge=0.0, description="Seconds left out at a log's beginning")
+    limits: dict[str, Number] = Field(
+        default_factory=dict,
+        description="Signal to the largest RMS error, in percent of the signal's range",
+    )
+
+
 class Header(_Strict):
     """The keys of a set file that are not parameters."""
 
@@ -62,3 +72,4 @@ class Header(_Strict):
     base: StrictStr | None = Field(None, description="Set name or file this one overrides")
     references: tuple[Reference, ...] = ()
     scenario: dict[str, Any] | None = Field(None, description="What runs when none is given")
+    validation: Thresholds | None = Field(None, description="Thresholds of `elevon validate`")

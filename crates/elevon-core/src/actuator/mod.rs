@@ -1,7 +1,9 @@
 //! Wirings: how components make an actuator. A wiring reads like the paper's block diagram.
 
+pub mod ballscrew;
 pub mod landing_gear;
 pub mod rotary;
+pub mod servo;
 mod wiring;
 
-pub use wiring::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring, MAX_CHUNKS, WATCHED};
+pub use wiring::{Finding, Inputs, Overheat, Port, Setup, Tick, Watch, Wiring, MAX_CHUNKS, WATCHED};

@@ -70,6 +70,15 @@ pub struct Watch<S> {
     pub limit: f64,
 }
 
+/// Temperature of a winding.
+#[derive(Clone, Copy, Debug)]
+pub struct Overheat<S> {
+    /// Positive once it has passed the trip.
+    pub over: S,
+    /// K.
+    pub temperature: S,
+}
+
 pub trait Wiring: Sized + Send + Sync + 'static {
     type Structure: Clone + Eq + Hash + Debug + Send + Sync;
     type Model<S: Scalar>: Clone + Send + Sync;
@@ -94,19 +103,49 @@ pub trait Wiring: Sized + Send + Sync + 'static {
     fn structure(setup: &Setup) -> Self::Structure;
     fn ticks(raw: &[f64], structure: &Self::Structure) -> Vec<Tick>;
     fn check(raw: &[f64]) -> Vec<Finding>;
+    /// What cannot be once all faults of a run have their whole severity.
+    fn check_faulted(_raw: &[f64]) -> Vec<Finding> {
+        Vec::new()
+    }
 
     fn derive<S: Scalar>(raw: &[S], structure: &Self::Structure) -> Self::Model<S>;
     /// State at the start; `initial` holds the values given for `INITIAL`, NaN where none was.
     fn start<S: Scalar>(model: &Self::Model<S>, raw: &[S], initial: &[S]) -> Self::State<S>;
     /// After a fault changed parameters.
     fn refresh<S: Scalar>(_raw: &[S], _state: &mut Self::State<S>) {}
-    fn tick<S: Scalar>(kind: u8, structure: &Self::Structure, model: &Self::Model<S>, inputs: &Inputs<S>, state: &mut Self::State<S>, t: S, noise: &mut dyn FnMut(u64) -> S);
+    fn tick<S: Scalar>(
+        kind: u8,
+        structure: &Self::Structure,
+        model: &Self::Model<S>,
+        inputs: &Inputs<S>,
+        state: &mut Self::State<S>,
+        t: S,
+        noise: &mut dyn FnMut(u64) -> S,
+    );
     /// `count` steps from step `from`, all chunks of the block side by side.
-    fn advance<S: Scalar>(structure: &Self::Structure, models: &[Self::Model<S>], inputs: &[Inputs<S>], states: &mut [Self::State<S>], from: Steps, count: Steps);
+    fn advance<S: Scalar>(
+        structure: &Self::Structure,
+        models: &[Self::Model<S>],
+        inputs: &[Inputs<S>],
+        states: &mut [Self::State<S>],
+        from: Steps,
+        count: Steps,
+    );
     /// All signals, in the order of `signals()`.
-    fn observe<S: Scalar>(structure: &Self::Structure, model: &Self::Model<S>, inputs: &Inputs<S>, state: &Self::State<S>, t: S, out: &mut [S]);
+    fn observe<S: Scalar>(
+        structure: &Self::Structure,
+        model: &Self::Model<S>,
+        inputs: &Inputs<S>,
+        state: &Self::State<S>,
+        t: S,
+        out: &mut [S],
+    );
     /// Quantities whose leaving of their limit means divergence.
     fn watch<S: Scalar>(state: &Self::State<S>) -> [Watch<S>; WATCHED];
+    /// The winding and whether it has passed its limit, which ends a run; none where nothing heats.
+    fn overheated<S: Scalar>(_state: &Self::State<S>) -> Option<Overheat<S>> {
+        None
+    }
     /// Positive once the drive of a lane has tripped.
     fn tripped<S: Scalar>(_state: &Self::State<S>) -> S {
         S::zero()

@@ -103,7 +103,13 @@ impl SourceLanes {
             })
             .collect();
         let flat = count == 0 && (0..S::LANES).all(|i| self.lines[first + i][2] == 0.0);
-        Source { flat, at: lane(&|i| self.lines[i][0]), value: lane(&|i| self.lines[i][1]), slope: lane(&|i| self.lines[i][2]), oscillators }
+        Source {
+            flat,
+            at: lane(&|i| self.lines[i][0]),
+            value: lane(&|i| self.lines[i][1]),
+            slope: lane(&|i| self.lines[i][2]),
+            oscillators,
+        }
     }
 }
 

@@ -35,6 +35,33 @@ pub struct Oscillation {
     pub until: f64,
 }
 
+/// One cycle of a period sweep: a linear chirp from 1/T_k to 1/T_(k+1). Requiring the period at a cycle's start to be
+/// T_k = T_0 + q t_k gives T_k = T_0 rho^k in closed form (docs/theory/ballscrew.md, "Profiles").
+struct Cycle {
+    begin: f64,
+    period: f64,
+    length: f64,
+    sweep: f64,
+}
+
+impl Cycle {
+    /// The cycle at time `t` of a sweep with the parameters `p`.
+    fn find(p: &[f64], t: f64) -> Self {
+        let (first, slope) = (p[1], (p[2] - p[1]) / p[3]);
+        if slope == 0.0 {
+            let k = (t / first).floor();
+            return Self { begin: k * first, period: first, length: first, sweep: 0.0 };
+        }
+        let rho = slope + (1.0 + slope * slope).sqrt();
+        let k = (libm::log(1.0 + slope * t / first) / libm::log(rho)).floor();
+        let power = libm::pow(rho, k);
+        let (period, length) = (first * power, (rho - 1.0) / slope * first * power);
+        let begin = first * (power - 1.0) / slope;
+        let sweep = std::f64::consts::PI * (1.0 / (rho * period) - 1.0 / period) / length;
+        Self { begin, period, length, sweep }
+    }
+}
+
 const NEVER: f64 = f64::INFINITY;
 
 impl Line {
@@ -52,7 +79,7 @@ impl Line {
 
 impl Term {
     pub fn oscillates(&self) -> bool {
-        self.enabled && matches!(self.wave, Wave::Sine | Wave::Chirp)
+        self.enabled && matches!(self.wave, Wave::Sine | Wave::Chirp | Wave::PeriodSweep)
     }
 
     /// The straight-line part at time `t` (for oscillating terms: the bias and the held values).
@@ -68,6 +95,7 @@ impl Term {
             Wave::Ramp => Line::constant(p[0] + p[1] * (p[3] - p[2]), NEVER),
             Wave::Sine => self.sine_line(t),
             Wave::Chirp => self.chirp_line(t),
+            Wave::PeriodSweep => self.period_sweep_line(t),
             Wave::Triangle => self.triangle(t),
             Wave::Trapezoid => self.trapezoid(t),
             Wave::Rectangle => self.rectangle(t),
@@ -92,7 +120,31 @@ impl Term {
                 let sweep = std::f64::consts::PI * (p[2] - p[1]) / p[3];
                 Oscillation { at, amplitude: p[0], phase: p[4], rate: TAU * p[1], sweep, until: at + p[3] }
             }
+            Wave::PeriodSweep if t < p[5] => silent(p[5]),
+            Wave::PeriodSweep => {
+                let sweep = ((t - p[5]) / p[3]).floor();
+                if sweep >= 1.0 && p[6] == 0.0 {
+                    return silent(NEVER);
+                }
+                let origin = p[5] + sweep * p[3];
+                let cycle = Cycle::find(p, t - origin);
+                let until = (origin + cycle.begin + cycle.length).min(origin + p[3]);
+                Oscillation { at: origin + cycle.begin, amplitude: p[0], phase: 0.0, rate: TAU / cycle.period, sweep: cycle.sweep, until }
+            }
             _ => silent(NEVER),
+        }
+    }
+
+    fn period_sweep_line(&self, t: f64) -> Line {
+        let p = &self.parameters;
+        if t < p[5] {
+            Line::constant(p[4], p[5])
+        } else if p[6] == 0.0 && t >= p[5] + p[3] {
+            let cycle = Cycle::find(p, p[3]);
+            let tau = p[3] - cycle.begin;
+            Line::constant(p[4] + p[0] * libm::sin((cycle.sweep * tau + TAU / cycle.period) * tau), NEVER)
+        } else {
+            Line::constant(p[4], self.oscillation(t).until)
         }
     }
 

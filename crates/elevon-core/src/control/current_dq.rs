@@ -3,8 +3,8 @@
 //! v_q = R i_q + L di_q/dt + p omega L i_d + k omega, v_d = R i_d + L di_d/dt - p omega L i_q.
 
 use crate::scalar::{three_phase, Scalar};
-use crate::variables;
 use crate::three;
+use crate::variables;
 
 variables! {
     /// The current controller and its carrier.

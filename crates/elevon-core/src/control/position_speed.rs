@@ -9,6 +9,7 @@ variables! {
         Mode => "mode", "-", "1", Choice(&["position", "speed", "torque"]), Controller, Some(0.0), "what the command is: a position, a speed (bypasses the position loop) or a torque (bypasses both loops)";
         PositionGain => "position_gain", "G", "1/s", NonNegative, Controller, None, "user position error to fast-shaft speed reference";
         PositionGainScale => "position_gain_scale", "-", "1", NonNegative, Controller, Some(1.0), "healthy 1; drift of the position gain";
+        SpeedFeedforward => "speed_feedforward", "g_ff", "1", Between(0.0, 1.5), Controller, Some(0.0), "share of the commanded speed (difference of the command over one tick) added to the speed reference";
         SpeedGain => "speed_gain", "K_p", "N m s/rad", NonNegative, Controller, None, "proportional gain of the speed PID, on all branches";
         SpeedGainScale => "speed_gain_scale", "-", "1", NonNegative, Controller, Some(1.0), "healthy 1; drift of the speed gain";
         IntegralTime => "integral_time", "T_i", "s", NonNegative, Controller, Some(0.0), "K_i = K_p / T_i; 0: no integral action";
@@ -45,6 +46,7 @@ pub struct ControlStructure {
     /// 0 off, 1 below, 2 above.
     pub hold_on_error: u8,
     pub back_calculation: bool,
+    pub feedforward: bool,
     pub conditional: bool,
     /// 0 user, 1 encoder, 2 resolver.
     pub feedback: u8,
@@ -64,6 +66,7 @@ impl ControlStructure {
             hold_at_rest: on(P::AntiWindupRest),
             hold_on_error: raw[P::AntiWindupError as usize] as u8,
             back_calculation: on(P::BackCalculation),
+            feedforward: on(P::SpeedFeedforward),
             conditional: on(P::ConditionalIntegration),
             feedback: raw[P::PositionFeedback as usize] as u8,
         }
@@ -83,6 +86,8 @@ pub struct PositionSpeed<S> {
     per_torque_constant: S,
     threshold: S,
     back_step: S,
+    /// Command difference of one tick to speed reference.
+    feedforward: S,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -93,10 +98,13 @@ pub struct PositionSpeedState<S> {
     pub rested: S,
     pub speed_ref: S,
     pub torque_ref: S,
+    /// Command of the previous tick; NaN before the first.
+    command: S,
 }
 
 impl<S: Scalar> PositionSpeed<S> {
-    pub fn derive(raw: &[S], ts: f64) -> Self {
+    /// `ratio` is the motor's angle over the commanded coordinate.
+    pub fn derive(raw: &[S], ts: f64, ratio: S) -> Self {
         use ControlParameter as P;
         let g = |p: P| raw[p as usize];
         let gain = g(P::SpeedGain) * g(P::SpeedGainScale);
@@ -115,6 +123,7 @@ impl<S: Scalar> PositionSpeed<S> {
             per_torque_constant: S::one() / g(P::TorqueConstant),
             threshold: g(P::AntiWindupThreshold),
             back_step: g(P::BackCalculation) * dt,
+            feedforward: g(P::SpeedFeedforward) * ratio / dt,
         }
     }
 
@@ -123,6 +132,12 @@ impl<S: Scalar> PositionSpeed<S> {
     pub fn step(&self, structure: &ControlStructure, s: &mut PositionSpeedState<S>, command: S, position: S, speed: S) -> S {
         let position_error = command - position;
         let demanded = match structure.mode {
+            Mode::Position if structure.feedforward => {
+                let moved = command - s.command;
+                s.command = command;
+                let known = moved.equals(moved);
+                self.position_gain.fma(position_error, S::select(known, self.feedforward * moved, S::zero()))
+            }
             Mode::Position => self.position_gain * position_error,
             Mode::Speed => command,
             Mode::Torque => {
@@ -141,6 +156,11 @@ impl<S: Scalar> PositionSpeed<S> {
         s.torque_ref = torque.clamp_abs(self.torque_limit);
         self.integrate(structure, s, error, torque, position_error, speed);
         s.torque_ref * self.per_torque_constant
+    }
+
+    /// 1 while the speed or the torque reference stands at its limit.
+    pub fn limited(&self, s: &PositionSpeedState<S>) -> S {
+        S::indicator(self.speed_limit.le(s.speed_ref.abs()) | self.torque_limit.le(s.torque_ref.abs()))
     }
 
     #[inline(always)]
@@ -170,6 +190,6 @@ impl<S: Scalar> PositionSpeed<S> {
 impl<S: Scalar> PositionSpeedState<S> {
     pub fn rest() -> Self {
         let zero = S::zero();
-        Self { integral: zero, filtered_error: zero, rested: zero, speed_ref: zero, torque_ref: zero }
+        Self { integral: zero, filtered_error: zero, rested: zero, speed_ref: zero, torque_ref: zero, command: S::splat(f64::NAN) }
     }
 }

@@ -7,4 +7,4 @@ mod schedule;
 
 pub use catalogue::{Attribute, FaultKind, Op, Place, Target};
 pub use profile::{profiles, Profile, ProfileRecord};
-pub use schedule::{FaultLanes, FaultSpec, Write};
+pub use schedule::{whole, FaultLanes, FaultSpec, Write};

@@ -6,12 +6,28 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub enum Profile {
     Constant,
-    Step { time: f64 },
-    Ramp { start: f64, end: f64 },
+    Step {
+        time: f64,
+    },
+    Ramp {
+        start: f64,
+        end: f64,
+    },
     /// Grows as exp(t / tau) from nothing at `start` to the whole severity at `end`.
-    Exponential { start: f64, end: f64, time_constant: f64 },
-    Intermittent { start: f64, period: f64, duty: f64 },
-    Table { times: Arc<[f64]>, values: Arc<[f64]> },
+    Exponential {
+        start: f64,
+        end: f64,
+        time_constant: f64,
+    },
+    Intermittent {
+        start: f64,
+        period: f64,
+        duty: f64,
+    },
+    Table {
+        times: Arc<[f64]>,
+        values: Arc<[f64]>,
+    },
 }
 
 /// A kind of profile and its parameters (name, unit, default, text).
@@ -26,19 +42,39 @@ pub struct ProfileRecord {
 pub fn profiles() -> &'static [ProfileRecord] {
     &[
         ProfileRecord { kind: "constant", text: "the severity, always", parameters: &[] },
-        ProfileRecord { kind: "step", text: "nothing, then the severity from a time on", parameters: &[("time", "s", None, "time of the step")] },
-        ProfileRecord { kind: "ramp", text: "grows linearly from nothing to the severity", parameters: &[("start", "s", Some(0.0), "begin of the growth"), ("end", "s", None, "end of the growth")] },
+        ProfileRecord {
+            kind: "step",
+            text: "nothing, then the severity from a time on",
+            parameters: &[("time", "s", None, "time of the step")],
+        },
+        ProfileRecord {
+            kind: "ramp",
+            text: "grows linearly from nothing to the severity",
+            parameters: &[("start", "s", Some(0.0), "begin of the growth"), ("end", "s", None, "end of the growth")],
+        },
         ProfileRecord {
             kind: "exponential",
             text: "grows exponentially from nothing to the severity",
-            parameters: &[("start", "s", Some(0.0), "begin of the growth"), ("end", "s", None, "time at which the severity is reached"), ("time_constant", "s", None, "time in which the growth rate becomes e-fold")],
+            parameters: &[
+                ("start", "s", Some(0.0), "begin of the growth"),
+                ("end", "s", None, "time at which the severity is reached"),
+                ("time_constant", "s", None, "time in which the growth rate becomes e-fold"),
+            ],
         },
         ProfileRecord {
             kind: "intermittent",
             text: "the severity during the duty part of each period",
-            parameters: &[("start", "s", Some(0.0), "begin of the first period"), ("period", "s", None, "period"), ("duty", "1", Some(0.5), "part of the period with the fault present")],
+            parameters: &[
+                ("start", "s", Some(0.0), "begin of the first period"),
+                ("period", "s", None, "period"),
+                ("duty", "1", Some(0.5), "part of the period with the fault present"),
+            ],
         },
-        ProfileRecord { kind: "table", text: "fractions of the severity at times, linear between; needs times and values", parameters: &[] },
+        ProfileRecord {
+            kind: "table",
+            text: "fractions of the severity at times, linear between; needs times and values",
+            parameters: &[],
+        },
     ]
 }
 
@@ -80,7 +116,13 @@ impl Profile {
                 }
             }
             Self::Table { times, values } => {
-                let term = Term { wave: crate::command::Wave::Table, enabled: true, parameters: vec![0.0, 0.0, 1.0, 0.0], times: times.clone(), values: values.clone() };
+                let term = Term {
+                    wave: crate::command::Wave::Table,
+                    enabled: true,
+                    parameters: vec![0.0, 0.0, 1.0, 0.0],
+                    times: times.clone(),
+                    values: values.clone(),
+                };
                 let line = term.line(t);
                 (line.value + line.slope * (t - line.at), if line.slope == 0.0 { line.until } else { t })
             }

@@ -126,6 +126,21 @@ impl FaultLanes {
     }
 }
 
+/// Parameters with every fault at its whole severity.
+pub fn whole(raw: &[f64], faults: &[FaultSpec]) -> Vec<f64> {
+    let mut all = raw.to_vec();
+    for fault in faults {
+        for &(index, value) in &fault.settings {
+            all[index] = value;
+        }
+        let held = Held { label: fault.severity, factor: 1.0, pulse: fault.severity > 0.0 };
+        for write in &fault.writes {
+            all[write.index] = changed(all[write.index], fault.severity, write.op, held);
+        }
+    }
+    all
+}
+
 fn changed<S: Scalar>(x: S, s: S, op: Op, held: Held) -> S {
     match op {
         Op::Lose => x * (S::one() - s),

@@ -5,8 +5,8 @@
 //! connected phases only. A shorted switch whose partner is gated shoots through: the drive trips.
 
 use crate::scalar::Scalar;
-use crate::variables;
 use crate::three;
+use crate::variables;
 
 variables! {
     /// The bridge and its supply.
@@ -137,7 +137,15 @@ impl<S: Scalar> Bridge<S> {
     /// Legs from the commands (+1 high, -1 low, 0 off) and the windings; `None` when every leg is held by a switch,
     /// as it is most of the time, then with the terminal voltages and rails alone.
     #[inline(always)]
-    pub fn connect(&self, s: &mut BridgeState<S>, structure: &BridgeStructure, old: [S; 3], new: [S; 3], half_supply: S, w: &Windings<S>) -> Connection<S> {
+    pub fn connect(
+        &self,
+        s: &mut BridgeState<S>,
+        structure: &BridgeStructure,
+        old: [S; 3],
+        new: [S; 3],
+        half_supply: S,
+        w: &Windings<S>,
+    ) -> Connection<S> {
         let tiny = S::splat(0.5);
         let mut gates = self.gates(s, old, new);
         if structure.switch_faults {
@@ -262,6 +270,8 @@ pub fn quench<S: Scalar>(legs: &Legs<S>, old: [S; 3], new: [S; 3]) -> [S; 3] {
     }
     let count = carrying[0] + carrying[1] + carrying[2];
     let residue = current[0] + current[1] + current[2];
-    let share = S::select(count.equals(zero), zero, residue / count.maximum(S::one()));
+    // With all three carrying nothing was cut and the rounding of the sum is left alone.
+    let whole = count.equals(zero) | count.equals(S::splat(3.0));
+    let share = S::select(whole, zero, residue / count.maximum(S::one()));
     three!(|j| current[j] - carrying[j] * share)
 }

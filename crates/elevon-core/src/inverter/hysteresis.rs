@@ -12,6 +12,17 @@ pub fn relays<S: Scalar>(half_band: S, legs: [S; 3], error: [S; 3]) -> [S; 3] {
     })
 }
 
+/// References of a six-step drive per ampere: 1 on [30, 150), -1 on [210, 330) degrees of each phase angle, else 0,
+/// from the sines of the three angles.
+#[inline(always)]
+pub fn six_step<S: Scalar>(sines: [S; 3]) -> [S; 3] {
+    let half = S::splat(0.5);
+    three!(|j| {
+        let low = S::select(sines[j].lt(-half), -S::one(), S::zero());
+        S::select(half.le(sines[j]), S::one(), low)
+    })
+}
+
 /// Leg transitions between two sets of commands added to `count`; most steps have none.
 #[inline(always)]
 pub fn count_transitions<S: Scalar>(count: S, old: [S; 3], new: [S; 3]) -> S {

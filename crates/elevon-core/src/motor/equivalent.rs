@@ -5,14 +5,14 @@
 //! k_T = sum k_j sin a_j, R_q = 2/3 sum R_j sin^2 a_j, L_q likewise, v_q = R_q i + L_q di/dt + 2/3 k_T omega.
 
 use crate::scalar::Scalar;
-use crate::variables;
 use crate::three;
+use crate::variables;
 
 variables! {
     /// The few numbers that only the low fidelity has.
     LowParameter, LOW {
         Step => "step", "dt", "s", Positive, Solver, Some(5e-4), "solver step of the low fidelity";
-        VoltageRatio => "voltage_ratio", "-", "1", Positive, Plant, Some(0.636_619_772_367_581_4), "largest phase voltage, peak, over the DC link: 2/pi in six-step, 1/sqrt 3 for a linear PWM";
+        VoltageRatio => "voltage_ratio", "-", "1", Positive, Plant, Some(std::f64::consts::FRAC_2_PI), "largest phase voltage, peak, over the DC link: 2/pi in six-step, 1/sqrt 3 for a linear PWM";
         BandRatio => "band_ratio", "-", "1", Between(0.0, 2.0), Plant, Some(0.5), "mean current error the relays allow before they act, in half bands";
     }
 }
@@ -55,7 +55,7 @@ pub fn imposed_shape<S: Scalar>(sines: [S; 3], open: [S; 3]) -> [S; 3] {
 /// diagonal Pade form of order 3 (error x^7 / 100800, x = R dt / L).
 #[derive(Clone, Copy, Debug)]
 pub struct Circuit<S> {
-    per_resistance: S,
+    pub per_resistance: S,
     /// exp(-x).
     decay: S,
     /// R / (1 - exp(-x)).

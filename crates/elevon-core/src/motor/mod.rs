@@ -2,3 +2,6 @@
 
 pub mod equivalent;
 pub mod star;
+pub mod tap;
+pub mod thermal;
+pub mod unbalance;

@@ -2,8 +2,8 @@
 //! their healthy form (T2; reference sheet 1.5).
 
 use crate::scalar::Scalar;
-use crate::variables;
 use crate::three;
+use crate::variables;
 
 variables! {
     /// The motor.
@@ -122,6 +122,13 @@ impl<S: Scalar> Star<S> {
             loop_per_inductance: three!(|j| S::select(has_loop[j], one / (guarded[j] * guarded[j] * g(P::Inductance)), zero)),
             loop_turns: three!(|j| shorted[j] * k),
         }
+    }
+
+    /// Adds a dynamic eccentricity.
+    pub fn lean(&mut self, (eccentricity, phase): (S, S)) {
+        let (sin, cos) = phase.sin_cos();
+        self.dynamic_cos = self.dynamic_cos + eccentricity * cos;
+        self.dynamic_sin = self.dynamic_sin + eccentricity * sin;
     }
 
     #[inline(always)]

@@ -37,6 +37,8 @@ impl<const N: usize> Sub for Dual<N> {
         Self { value: self.value - o.value, slope: std::array::from_fn(|i| self.slope[i] - o.slope[i]) }
     }
 }
+// The product and quotient rules mix the operators.
+#[allow(clippy::suspicious_arithmetic_impl)]
 impl<const N: usize> Mul for Dual<N> {
     type Output = Self;
     #[inline(always)]
@@ -45,6 +47,7 @@ impl<const N: usize> Mul for Dual<N> {
         Self { value: self.value * o.value, slope }
     }
 }
+#[allow(clippy::suspicious_arithmetic_impl)]
 impl<const N: usize> Div for Dual<N> {
     type Output = Self;
     #[inline(always)]

@@ -187,14 +187,46 @@ macro_rules! vector_type {
 }
 
 vector_type!(
-    Avx2x4, Avx2Mask, 4, 32, __m256d, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd,
-    _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd, _mm256_sqrt_pd, _mm256_fmadd_pd, with_avx2,
-    __m256i, _mm256_castpd_si256, signs_avx2, _mm256_xor_pd
+    Avx2x4,
+    Avx2Mask,
+    4,
+    32,
+    __m256d,
+    _mm256_add_pd,
+    _mm256_sub_pd,
+    _mm256_mul_pd,
+    _mm256_div_pd,
+    _mm256_set1_pd,
+    _mm256_loadu_pd,
+    _mm256_storeu_pd,
+    _mm256_sqrt_pd,
+    _mm256_fmadd_pd,
+    with_avx2,
+    __m256i,
+    _mm256_castpd_si256,
+    signs_avx2,
+    _mm256_xor_pd
 );
 vector_type!(
-    Avx512x8, Avx512Mask, 8, 64, __m512d, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd,
-    _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd, _mm512_sqrt_pd, _mm512_fmadd_pd, with_avx512,
-    __m512i, _mm512_castpd_si512, signs_avx512, _mm512_xor_pd
+    Avx512x8,
+    Avx512Mask,
+    8,
+    64,
+    __m512d,
+    _mm512_add_pd,
+    _mm512_sub_pd,
+    _mm512_mul_pd,
+    _mm512_div_pd,
+    _mm512_set1_pd,
+    _mm512_loadu_pd,
+    _mm512_storeu_pd,
+    _mm512_sqrt_pd,
+    _mm512_fmadd_pd,
+    with_avx512,
+    __m512i,
+    _mm512_castpd_si512,
+    signs_avx512,
+    _mm512_xor_pd
 );
 
 #[derive(Clone, Copy, Debug)]

@@ -1,8 +1,8 @@
 //! Phase current sensors: gain, offset, noise, quantisation.
 
 use crate::scalar::Scalar;
-use crate::variables;
 use crate::three;
+use crate::variables;
 
 variables! {
     /// The three phase current sensors and the acquisition filter.
@@ -17,6 +17,7 @@ variables! {
         NoiseSampleTime => "current.noise_sample_time", "-", "s", Positive, Sensor, Some(5e-5), "the noise is held over this time, which sets its band";
         Bits => "current.bits", "-", "1", Between(0.0, 32.0), Sensor, Some(0.0), "resolution over twice the range; 0: not quantised";
         FullScale => "current.full_scale", "-", "A", Positive, Sensor, Some(40.0), "largest current the quantised sensor shows";
+        Bandwidth => "current.bandwidth", "-", "Hz", NonNegative, Sensor, Some(0.0), "first-order filter of the current that the drive controls; 0: none";
         FilterCutoff => "filter_cutoff", "f_c", "Hz", Positive, Sensor, Some(100.0), "cut-off of the first-order filters of the logged d and q quantities";
     }
 }

@@ -23,11 +23,12 @@ pub struct Encoder<S> {
 }
 
 impl<S: Scalar> Encoder<S> {
-    pub fn derive(raw: &[S]) -> Self {
+    /// `turn` is the user travel over which the pulses are counted: 2 pi rad, or 1 m of a linear scale.
+    pub fn derive(raw: &[S], turn: f64) -> Self {
         use EncoderParameter as P;
         let g = |p: P| raw[p as usize];
         let counts = g(P::Pulses) * g(P::Edges) * g(P::WheelRatio);
-        let tau = S::splat(std::f64::consts::TAU);
+        let tau = S::splat(turn);
         let kept = S::one() - g(P::MissingCounts);
         Self { per_count: counts / tau * kept, count: g(P::Gain) * tau / counts, offset: g(P::Offset) }
     }

@@ -69,7 +69,7 @@ fn shape<W: Wiring>(run: &RunSpec, recorded: &[usize]) -> Shape<W::Structure> {
 
 fn run_block<W: Wiring, S: Scalar>(runs: &[&RunSpec], clocks: &[Clock], recorded: &[usize], monitor: &Monitor) -> Vec<RunOutput> {
     let mut padded = runs.to_vec();
-    while padded.len() % S::LANES != 0 {
+    while !padded.len().is_multiple_of(S::LANES) {
         padded.push(runs[runs.len() - 1]);
     }
     Block::<W, S, Plain>::new(&padded, runs.len(), Plain(&padded), clocks, recorded).run(monitor)
@@ -186,7 +186,13 @@ const SLOTS: usize = 8;
 
 /// One run with exact derivatives: each value is followed by its derivatives with respect to the chosen
 /// parameters, then to the severities of the chosen faults.
-pub fn sensitivities<W: Wiring>(run: &RunSpec, parameters: &[usize], faults: &[usize], clocks: &[Clock], monitor: &Monitor) -> Vec<RunOutput> {
+pub fn sensitivities<W: Wiring>(
+    run: &RunSpec,
+    parameters: &[usize],
+    faults: &[usize],
+    clocks: &[Clock],
+    monitor: &Monitor,
+) -> Vec<RunOutput> {
     let recorded = recorded(clocks);
     let mut chosen: Vec<(bool, usize)> = parameters.iter().map(|&p| (true, p)).collect();
     chosen.extend(faults.iter().map(|&f| (false, f)));

@@ -2,7 +2,7 @@
 
 use super::batch::Monitor;
 use super::spec::{Clock, RunOutput, RunSpec, Status};
-use crate::actuator::{Inputs, Setup, Tick, Watch, Wiring};
+use crate::actuator::{Inputs, Overheat, Setup, Tick, Watch, Wiring};
 use crate::command::SourceLanes;
 use crate::fault::FaultLanes;
 use crate::noise::Key;
@@ -193,11 +193,25 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         let faults = FaultLanes::new(runs.iter().map(|r| r.faults.clone()).collect(), grid);
         let sources = (0..W::PORTS.len()).map(|p| SourceLanes::new(runs.iter().map(|r| r.ports[p].clone()).collect())).collect();
         let ticks = W::ticks(&first.parameters, &structure);
-        let kept = (0..real).map(|r| clocks.iter().map(|c| Vec::with_capacity((steps / c.period + 1) as usize * (c.signals.len() + faults.count(r)))).collect()).collect();
+        let kept = (0..real)
+            .map(|r| {
+                clocks.iter().map(|c| Vec::with_capacity((steps / c.period + 1) as usize * (c.signals.len() + faults.count(r)))).collect()
+            })
+            .collect();
         let mut block = Self {
             tick_due: vec![0; ticks.len()],
             clock_due: vec![0; clocks.len()],
-            runs, real, lift, clocks, dt, steps, healthy, faults, sources, ticks, kept,
+            runs,
+            real,
+            lift,
+            clocks,
+            dt,
+            steps,
+            healthy,
+            faults,
+            sources,
+            ticks,
+            kept,
             models: Vec::new(),
             states: Vec::new(),
             inputs: vec![Vec::new(); chunks],
@@ -347,7 +361,14 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
 
     fn observe(&self, chunk: usize, k: Steps, out: &mut [S]) {
         let t = k as f64 * self.dt;
-        S::vectorize(Observe::<W, S> { structure: &self.structure, model: &self.models[chunk], inputs: &self.inputs[chunk], state: &self.states[chunk], t, out });
+        S::vectorize(Observe::<W, S> {
+            structure: &self.structure,
+            model: &self.models[chunk],
+            inputs: &self.inputs[chunk],
+            state: &self.states[chunk],
+            t,
+            out,
+        });
     }
 
     /// Marks lanes that diverged or tripped; false when no lane is left.
@@ -356,21 +377,26 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         for chunk in 0..self.states.len() {
             let watched = W::watch(&self.states[chunk]);
             let tripped = W::tripped(&self.states[chunk]);
-            self.mark(chunk, time, k, &watched, tripped);
+            let heat = W::overheated(&self.states[chunk]);
+            self.mark(chunk, time, k, &watched, tripped, heat);
         }
         self.stopped[..self.real].iter().any(|s| s.is_none())
     }
 
     /// Marks the lanes of a chunk that just diverged or tripped.
-    fn mark(&mut self, chunk: usize, time: f64, k: Steps, watched: &[Watch<S>], tripped: S) {
+    fn mark(&mut self, chunk: usize, time: f64, k: Steps, watched: &[Watch<S>], tripped: S, heat: Option<Overheat<S>>) {
         for i in 0..S::LANES {
             let lane = chunk * S::LANES + i;
             if self.stopped[lane].is_some() {
                 continue;
             }
-            let beyond = watched.iter().find(|w| !(w.value.lane(i).abs() <= w.limit));
+            // Not a number is beyond every limit.
+            let beyond = watched.iter().find(|w| w.value.lane(i).is_nan() || w.value.lane(i).abs() > w.limit);
             if let Some(watch) = beyond {
                 self.status[lane] = Status::Diverged { time, signal: watch.name };
+                self.stopped[lane] = Some(k);
+            } else if let Some(heat) = heat.filter(|h| h.over.lane(i) > 0.0) {
+                self.status[lane] = Status::Overheated { time, temperature: heat.temperature.lane(i) };
                 self.stopped[lane] = Some(k);
             } else if self.status[lane] == Status::Ok && tripped.lane(i) > 0.0 {
                 let reason = W::trip_reason(&self.models[chunk], &self.states[chunk], i).unwrap_or_default();

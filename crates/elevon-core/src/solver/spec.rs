@@ -33,9 +33,20 @@ pub struct Clock {
 pub enum Status {
     Ok,
     /// The drive tripped at this time; the run went on without it.
-    Tripped { time: f64, reason: String },
+    Tripped {
+        time: f64,
+        reason: String,
+    },
+    /// The winding passed its limit at this time: the drive opened its bridge, the run ended.
+    Overheated {
+        time: f64,
+        temperature: f64,
+    },
     /// A signal left all bounds at this time.
-    Diverged { time: f64, signal: &'static str },
+    Diverged {
+        time: f64,
+        signal: &'static str,
+    },
     Interrupted,
 }
 

@@ -44,6 +44,16 @@ impl<S: Scalar> Friction<S> {
         }
     }
 
+    /// Adds the friction of a preloaded screw, which sticks as much above its dynamic value as the rest; `viscous` scales
+    /// the lubricant's drag.
+    pub fn preloaded(&mut self, torque: S, viscous: S, fixed: S, moving: S) {
+        let dry = S::zero().lt(moving);
+        let stick = S::select(dry, fixed / S::select(dry, moving, S::one()), S::one());
+        self.static_limit = self.static_limit + torque * stick;
+        self.dynamic = self.dynamic + torque;
+        self.viscous = self.viscous * viscous;
+    }
+
     /// C(w) w.
     #[inline(always)]
     pub fn viscous_torque(&self, speed: S) -> S {

@@ -27,6 +27,8 @@ variables! {
         Inertia => "inertia", "J_u", "kg m2", NonNegative, Load, Some(0.0), "inertia on the user side";
         Stiffness => "stiffness", "K_s", "N m/rad", NonNegative, Load, Some(0.0), "spring on the user side, torque proportional to the user position";
         SpringZero => "spring_zero", "-", "rad", Any, Load, Some(0.0), "user position at which the spring is relaxed";
+        Damping => "damping", "c_L", "N m s/rad", NonNegative, Load, Some(0.0), "viscous damping on the user side";
+        Friction => "friction", "F_L", "N m", NonNegative, Load, Some(0.0), "dry friction on the user side";
     }
 }
 
@@ -44,13 +46,13 @@ pub struct Gear<S> {
 }
 
 impl<S: Scalar> Gear<S> {
-    pub fn derive(gear: &[S], stop: &[S], load: &[S]) -> Self {
-        let ratio = gear[GearParameter::Ratio as usize];
+    /// `ratio` is the motor's angle over the user's coordinate, `screw` the efficiencies of what follows the gear.
+    pub fn derive(ratio: S, gear: &[S], stop: &[S], load: &[S], screw: [S; 2]) -> Self {
         Self {
             ratio,
             per_ratio: S::one() / ratio,
-            opposing: S::one() / gear[GearParameter::Efficiency as usize] - S::one(),
-            aiding: S::one() - gear[GearParameter::EfficiencyAiding as usize],
+            opposing: S::one() / (gear[GearParameter::Efficiency as usize] * screw[0]) - S::one(),
+            aiding: S::one() - gear[GearParameter::EfficiencyAiding as usize] * screw[1],
             upper: stop[StopParameter::Upper as usize] * ratio,
             lower: stop[StopParameter::Lower as usize] * ratio,
             stiffness: load[LoadParameter::Stiffness as usize],

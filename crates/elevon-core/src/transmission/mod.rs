@@ -8,4 +8,5 @@ pub mod lock;
 pub mod planetary;
 pub mod play;
 pub mod roller_screw;
+pub mod screw;
 pub mod train_friction;

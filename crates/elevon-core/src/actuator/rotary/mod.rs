@@ -1,14 +1,44 @@
-//! The rotary actuator (Torino): command, control electronics, inverter, star motor, gearbox with friction and
-//! play, sensors.
+//! The rotary actuator (Torino): a geared servo whose output turns.
 
-mod checks;
-mod faults;
-mod high;
-mod layout;
-mod low;
-mod march;
-mod observe;
-mod signals;
+use super::servo::{faults, layout, signals, Form};
+use super::{Finding, Port};
+use crate::fault::FaultKind;
+use crate::scalar::Scalar;
+use crate::transmission::gear::GearParameter;
+use crate::transmission::screw::Screw;
+use crate::variable::{Group, Signal};
+use layout::At;
 
-pub use high::High;
-pub use low::Low;
+pub struct Rotary;
+
+impl Form for Rotary {
+    const LINEAR: bool = false;
+    const GROUPS: &'static [Group] = layout::GROUPS;
+    const PORTS: &'static [Port] = layout::PORTS;
+    const HIGH: &'static [Signal] = signals::HIGH;
+    const LOW: &'static [Signal] = signals::LOW;
+
+    fn faults() -> Vec<FaultKind> {
+        faults::catalogue(faults::ROTARY)
+    }
+    fn ratio<S: Scalar>(raw: &[S]) -> S {
+        raw[GearParameter::Ratio.at()]
+    }
+    fn screw_inertia<S: Scalar>(_raw: &[S]) -> S {
+        S::zero()
+    }
+    fn screw<S: Scalar>(_raw: &[S]) -> Screw<S> {
+        Screw::none()
+    }
+    fn worn(_departs: &dyn Fn(usize, f64) -> bool) -> (bool, bool) {
+        (false, false)
+    }
+    fn check(_raw: &[f64]) -> Vec<Finding> {
+        Vec::new()
+    }
+}
+
+/// The rotary actuator at high fidelity.
+pub type High = super::servo::High<Rotary>;
+/// The rotary actuator at low fidelity.
+pub type Low = super::servo::Low<Rotary>;

@@ -1,30 +1,68 @@
-//! The fault catalogue of the rotary actuator.
+//! The fault catalogue of a servo.
 
-use crate::fault::{Attribute, FaultKind, Op, Place, Target};
+use crate::fault::{Attribute, FaultKind};
 use crate::variable::Range;
 
+#[macro_export]
 macro_rules! targets {
     ($($path:literal $op:ident),*) => {{
-        const TARGETS: &[Target] = &[$(Target { path: $path, op: Op::$op }),*];
+        const TARGETS: &[$crate::fault::Target] = &[$($crate::fault::Target { path: $path, op: $crate::fault::Op::$op }),*];
         TARGETS
     }};
 }
+#[macro_export]
 macro_rules! places {
     ($($name:literal: $path:literal $op:ident),* $(,)?) => {{
-        const PLACES: &[Place] = &[$(Place { name: $name, targets: targets!($path $op) }),*];
+        const PLACES: &[$crate::fault::Place] = &[$($crate::fault::Place { name: $name, targets: $crate::targets!($path $op) }),*];
         PLACES
     }};
 }
 
-const fn attribute(name: &'static str, unit: &'static str, path: &'static str, text: &'static str) -> Attribute {
+pub const fn attribute(name: &'static str, unit: &'static str, path: &'static str, text: &'static str) -> Attribute {
     Attribute { name, unit, default: None, path, flag: "", text }
 }
+
+/// What differs between a turning and a travelling output.
+#[derive(Clone, Copy, Debug)]
+pub struct Side {
+    coordinate: &'static str,
+    /// Largest play that a fault may add.
+    play: f64,
+    jam: &'static [Attribute],
+}
+
+const fn jam_position(unit: &'static str) -> Attribute {
+    Attribute {
+        name: "position",
+        unit,
+        default: None,
+        path: "friction.jam_position",
+        flag: "friction.jam_anywhere",
+        text: "user position at which it seizes when first reached; not given: at once",
+    }
+}
+
+pub const ROTARY: Side = Side { coordinate: "rad", play: 1.0, jam: &[jam_position("rad")] };
+pub const LINEAR: Side = Side { coordinate: "m", play: 5e-3, jam: &[jam_position("m")] };
 
 /// Faults of a star motor and its inverter.
 pub fn electrical() -> Vec<FaultKind> {
     const PHASE: &[Attribute] = &[attribute("phase", "rad", "motor.eccentricity_static_phase", "electrical phase angle of the narrow gap")];
-    const PHASE_DYNAMIC: &[Attribute] = &[attribute("phase", "rad", "motor.eccentricity_dynamic_phase", "mechanical phase angle of the narrow gap")];
-    const CONTACT: &[Attribute] = &[attribute("contact_resistance", "ohm", "motor.short_contact_resistance", "resistance of the short itself (loop model)")];
+    const PHASE_DYNAMIC: &[Attribute] =
+        &[attribute("phase", "rad", "motor.eccentricity_dynamic_phase", "mechanical phase angle of the narrow gap")];
+    const REFERENCE: &[Attribute] = &[Attribute {
+        default: Some(25.0),
+        ..attribute("reference", "ohm", "motor.tap_reference", "resistance that stands for a level of one half")
+    }];
+    const UNBALANCE: &[Attribute] = &[
+        attribute("phase", "rad", "motor.unbalance_phase", "mechanical angle of the excess mass"),
+        Attribute {
+            default: Some(1.0),
+            ..attribute("gap_share", "1", "motor.unbalance_gap_share", "dynamic eccentricity per share of excess inertia")
+        },
+    ];
+    const CONTACT: &[Attribute] =
+        &[attribute("contact_resistance", "ohm", "motor.short_contact_resistance", "resistance of the short itself (loop model)")];
     vec![
         FaultKind {
             kind: "short", unit: "1", range: Range::Between(0.0, 0.95), low: true, attributes: CONTACT,
@@ -43,6 +81,18 @@ pub fn electrical() -> Vec<FaultKind> {
             places: places!("motor": "motor.eccentricity_dynamic" Add),
             effect: "fraction of the air gap; the modulation turns with the shaft (law ASSUMED: the paper names the fault only)",
             source: "N 4.3",
+        },
+        FaultKind {
+            kind: "resistor_short", unit: "1", range: Range::Between(0.0, 0.5), low: false, attributes: REFERENCE,
+            places: places!("motor.phase_a": "motor.tap_level_a" Add, "motor.phase_b": "motor.tap_level_b" Add, "motor.phase_c": "motor.tap_level_c" Add),
+            effect: "level f of a resistor ref (1 - f)/f from a terminal to the centre tap: it draws V/R whatever the speed and leaves the winding alone",
+            source: "N 4.3 (seeded winding short)",
+        },
+        FaultKind {
+            kind: "unbalance", unit: "kg m2", range: Range::Between(0.0, 2e-3), low: true, attributes: UNBALANCE,
+            places: places!("motor.rotor": "motor.unbalance_inertia" Add),
+            effect: "excess inertia of a mass on one side of the rotor: inertia, gravity torque once a turn, dynamic eccentricity",
+            source: "N 4.4 (mass imbalance)",
         },
         FaultKind {
             kind: "open_phase", unit: "1", range: Range::Unit, low: true, attributes: &[],
@@ -98,41 +148,76 @@ pub fn electrical() -> Vec<FaultKind> {
 }
 
 /// Faults of controller and position sensors.
-pub fn control_and_sensors() -> Vec<FaultKind> {
-    const PERIOD: &[Attribute] = &[Attribute { name: "period", unit: "s", default: Some(0.1), path: "", flag: "", text: "period of the interruptions" }];
+pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
+    const PERIOD: &[Attribute] =
+        &[Attribute { name: "period", unit: "s", default: Some(0.1), path: "", flag: "", text: "period of the interruptions" }];
     vec![
         FaultKind {
-            kind: "gain_drift", unit: "1", range: Range::Between(-1.0, 10.0), low: true, attributes: &[],
+            kind: "gain_drift",
+            unit: "1",
+            range: Range::Between(-1.0, 10.0),
+            low: true,
+            attributes: &[],
             places: places!("control.position": "control.position_gain_scale" Grow, "control.speed": "control.speed_gain_scale" Grow),
             effect: "relative drift of a loop gain: -0.2 means gain x 0.8",
             source: "T1 (proportional gain drift)",
         },
         FaultKind {
-            kind: "dropout", unit: "1", range: Range::Between(0.0, 1.0), low: true, attributes: PERIOD,
+            kind: "dropout",
+            unit: "1",
+            range: Range::Between(0.0, 1.0),
+            low: true,
+            attributes: PERIOD,
             places: places!("sensor.resolver": "sensor.resolver.power_off" Pulse),
             effect: "duty of the resolver's power lost: while off the drive sees a shaft at rest, then the position jumps back",
             source: "N 4.5",
         },
         FaultKind {
-            kind: "mismatch", unit: "1", range: Range::Between(0.0, 0.99), low: true, attributes: &[],
+            kind: "mismatch",
+            unit: "1",
+            range: Range::Between(0.0, 0.99),
+            low: true,
+            attributes: &[],
             places: places!("sensor.resolver": "sensor.resolver.mismatch" Add),
             effect: "amplitude lost by one resolver channel: atan2(g sin, cos), an angle error at twice the shaft frequency",
             source: "N 4.5",
         },
         FaultKind {
-            kind: "offset", unit: "rad", range: Range::Any, low: true, attributes: &[],
-            places: places!("sensor.resolver": "sensor.resolver.offset" Add, "sensor.encoder": "sensor.encoder.offset" Add),
-            effect: "offset of a position sensor; on the resolver it also misplaces the commutation",
+            kind: "offset",
+            unit: "rad",
+            range: Range::Any,
+            low: true,
+            attributes: &[],
+            places: places!("sensor.resolver": "sensor.resolver.offset" Add),
+            effect: "offset of the motor's position; it misplaces the commutation where the resolver gives its angle",
             source: "T3 Table 1.1 (position sensor)",
         },
         FaultKind {
-            kind: "gain", unit: "1", range: Range::Between(-1.0, 10.0), low: true, attributes: &[],
+            kind: "offset",
+            unit: side.coordinate,
+            range: Range::Any,
+            low: true,
+            attributes: &[],
+            places: places!("sensor.encoder": "sensor.encoder.offset" Add),
+            effect: "offset of the shown user position",
+            source: "T3 Table 1.1 (position sensor)",
+        },
+        FaultKind {
+            kind: "gain",
+            unit: "1",
+            range: Range::Between(-1.0, 10.0),
+            low: true,
+            attributes: &[],
             places: places!("sensor.resolver": "sensor.resolver.gain" Grow, "sensor.encoder": "sensor.encoder.gain" Grow),
             effect: "relative gain error of a position sensor",
             source: "T3 Table 1.1 (position sensor)",
         },
         FaultKind {
-            kind: "missing_counts", unit: "1", range: Range::Unit, low: true, attributes: &[],
+            kind: "missing_counts",
+            unit: "1",
+            range: Range::Unit,
+            low: true,
+            attributes: &[],
             places: places!("sensor.encoder": "sensor.encoder.missing_counts" Add),
             effect: "fraction of the encoder's counts lost, spread evenly: the shown travel is too short",
             source: "N 4.5",
@@ -141,32 +226,44 @@ pub fn control_and_sensors() -> Vec<FaultKind> {
 }
 
 /// Faults of a transmission with friction and play.
-pub fn mechanical() -> Vec<FaultKind> {
-    const JAM: &[Attribute] = &[Attribute {
-        name: "position", unit: "rad", default: None, path: "friction.jam_position", flag: "friction.jam_anywhere",
-        text: "user position at which it seizes when first reached; not given: at once",
-    }];
+pub fn mechanical(side: Side) -> Vec<FaultKind> {
     vec![
         FaultKind {
-            kind: "friction", unit: "1", range: Range::Between(0.0, 100.0), low: true, attributes: &[],
+            kind: "friction",
+            unit: "1",
+            range: Range::Between(0.0, 100.0),
+            low: true,
+            attributes: &[],
             places: places!("transmission": "friction.dry_scale" Grow),
             effect: "fraction added to the dry friction, static and dynamic: the moving current rises",
             source: "T2 (friction fault)",
         },
         FaultKind {
-            kind: "lubrication", unit: "1", range: Range::Between(-1.0, 1000.0), low: true, attributes: &[],
+            kind: "lubrication",
+            unit: "1",
+            range: Range::Between(-1.0, 1000.0),
+            low: true,
+            attributes: &[],
             places: places!("transmission": "friction.viscous_scale" Grow),
             effect: "fraction added to the viscous friction (negative: thinner lubricant)",
             source: "N 4.1",
         },
         FaultKind {
-            kind: "play", unit: "rad", range: Range::Between(0.0, 1.0), low: true, attributes: &[],
+            kind: "play",
+            unit: side.coordinate,
+            range: Range::Between(0.0, side.play),
+            low: true,
+            attributes: &[],
             places: places!("transmission": "play.extra" Add),
             effect: "total play added at the output: flat tops of the user position widen",
             source: "T1 eq. 3",
         },
         FaultKind {
-            kind: "jam", unit: "N m", range: Range::NonNegative, low: true, attributes: JAM,
+            kind: "jam",
+            unit: "N m",
+            range: Range::NonNegative,
+            low: true,
+            attributes: side.jam,
             places: places!("transmission": "friction.jam_torque" Add),
             effect: "seizure torque on the fast shaft, resistive",
             source: "N 4.2",
@@ -174,9 +271,9 @@ pub fn mechanical() -> Vec<FaultKind> {
     ]
 }
 
-pub fn catalogue() -> Vec<FaultKind> {
+pub fn catalogue(side: Side) -> Vec<FaultKind> {
     let mut all = electrical();
-    all.extend(mechanical());
-    all.extend(control_and_sensors());
+    all.extend(mechanical(side));
+    all.extend(control_and_sensors(side));
     all
 }

@@ -1,4 +1,4 @@
-//! The inner loop of the rotary wirings: inputs some steps ahead, chunks of lanes side by side.
+//! The inner loop of the servos: inputs some steps ahead, chunks of lanes side by side.
 
 use super::layout::{BRAKE, COMMAND, SHAFT, SUPPLY, USER};
 use crate::actuator::{Inputs, MAX_CHUNKS};
@@ -24,7 +24,14 @@ impl<S: Scalar> Moment<S> {
     #[inline(always)]
     pub(super) fn at(inputs: &Inputs<S>, t: S) -> Self {
         let brake = inputs[BRAKE].at(t).maximum(S::zero());
-        Self { t, command: inputs[COMMAND].at(t), brake, shaft: inputs[SHAFT].at(t), user: inputs[USER].at(t), supply: inputs[SUPPLY].at(t) }
+        Self {
+            t,
+            command: inputs[COMMAND].at(t),
+            brake,
+            shaft: inputs[SHAFT].at(t),
+            user: inputs[USER].at(t),
+            supply: inputs[SUPPLY].at(t),
+        }
     }
 
     /// The instant of the next step: `steady` inputs but the command keep their values.
@@ -56,7 +63,14 @@ pub(super) trait Stepper<S> {
 }
 
 #[inline(always)]
-pub(super) fn march<T: Stepper<S>, S: Scalar>(structure: &T::Structure, models: &[T::Model], inputs: &[Inputs<S>], states: &mut [T::State], from: Steps, count: Steps) {
+pub(super) fn march<T: Stepper<S>, S: Scalar>(
+    structure: &T::Structure,
+    models: &[T::Model],
+    inputs: &[Inputs<S>],
+    states: &mut [T::State],
+    from: Steps,
+    count: Steps,
+) {
     // Commands depend on time alone: evaluated some steps ahead, they leave the chain from state to state.
     let mut commands = [[S::zero(); AHEAD]; MAX_CHUNKS];
     let mut moments = [Moment::none(); MAX_CHUNKS];

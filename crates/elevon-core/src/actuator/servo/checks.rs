@@ -1,5 +1,6 @@
 //! Findings that need several parameters at once: steps too large for a pole, gains that cannot be stable.
 
+use super::form::Form;
 use super::layout::*;
 use crate::actuator::Finding;
 use crate::control::current_dq::PwmParameter;
@@ -7,12 +8,16 @@ use crate::control::position_speed::ControlParameter as Control;
 use crate::inverter::bridge::InverterParameter as Inverter;
 use crate::motor::equivalent::LowParameter;
 use crate::motor::star::MotorParameter as Motor;
+use crate::motor::tap::TapParameter as Tap;
+use crate::motor::thermal::ThermalParameter as Thermal;
+use crate::motor::unbalance::UnbalanceParameter;
 use crate::sensor::current::CurrentSensorParameter;
+use crate::sensor::resolver::ResolverParameter;
 use crate::transmission::friction::FrictionParameter;
 use crate::transmission::gear::{GearParameter, LoadParameter, StopParameter};
 use crate::transmission::play::PlayParameter;
 
-fn finding(path: &str, value: f64, limit: f64, message: String) -> Finding {
+pub fn finding(path: &str, value: f64, limit: f64, message: String) -> Finding {
     Finding { path: path.to_string(), value, limit, message }
 }
 
@@ -36,14 +41,71 @@ fn derivative_inertia(out: &mut Vec<Finding>, raw: &[f64], inertia: f64) {
     }
 }
 
-fn common(out: &mut Vec<Finding>, raw: &[f64]) {
+fn common<F: Form>(out: &mut Vec<Finding>, raw: &[f64]) {
+    out.extend(F::check(raw));
+    thermal(out, raw);
     let (fsj, fdj) = (raw[FrictionParameter::Static.at()], raw[FrictionParameter::Dynamic.at()]);
     if fdj > fsj {
         out.push(finding("friction.dynamic", fdj, fsj, format!("friction.dynamic: {fdj} N m exceeds friction.static, {fsj} N m")));
     }
+    let unit = if F::LINEAR { "m" } else { "rad" };
     let (lower, upper) = (raw[StopParameter::Lower.at()], raw[StopParameter::Upper.at()]);
     if lower >= upper {
-        out.push(finding("stop.lower", lower, upper, format!("stop.lower: {lower} rad is not below stop.upper, {upper} rad")));
+        out.push(finding("stop.lower", lower, upper, format!("stop.lower: {lower} {unit} is not below stop.upper, {upper} {unit}")));
+    }
+}
+
+/// Temperatures that no motor can have.
+fn thermal(out: &mut Vec<Finding>, raw: &[f64]) {
+    if raw[Thermal::Model.at()] == 0.0 {
+        return;
+    }
+    let [convection, emissivity] = [Thermal::Convection, Thermal::Emissivity].map(|p| raw[p.at()]);
+    if convection == 0.0 && emissivity == 0.0 {
+        out.push(finding(
+            "thermal.convection",
+            0.0,
+            0.0,
+            "thermal.convection: 0 W/(m2 K) with thermal.emissivity 0 leaves the heat no way out; one of them must be above 0".into(),
+        ));
+    }
+    let names = ["thermal.ambient", "thermal.warning", "thermal.trip"];
+    let values = [Thermal::Ambient, Thermal::Warning, Thermal::Trip].map(|p| raw[p.at()]);
+    for i in 1..3 {
+        if values[i] <= values[i - 1] {
+            let message = format!("{}: {} K must be above {}, {} K", names[i], values[i], names[i - 1], values[i - 1]);
+            out.push(finding(names[i], values[i], values[i - 1], message));
+        }
+    }
+    let start = raw[Motor::WindingTemperature.at()];
+    if start >= values[2] {
+        out.push(finding(
+            "motor.winding_temperature",
+            start,
+            values[2],
+            format!("motor.winding_temperature: {start} K is not below thermal.trip, {} K", values[2]),
+        ));
+    }
+}
+
+/// What holds of the parameters with every fault of a run at its whole severity.
+pub fn faulted<F: Form>(raw: &[f64]) -> Vec<Finding> {
+    let mut out = F::check(raw);
+    tapped(&mut out, raw);
+    out
+}
+
+/// A resistor at the centre tap needs legs that always hold their terminals.
+fn tapped(out: &mut Vec<Finding>, raw: &[f64]) {
+    let Some(level) = [Tap::LevelA, Tap::LevelB, Tap::LevelC].map(|p| raw[p.at()]).into_iter().find(|&f| f > 0.0) else {
+        return;
+    };
+    let base = Inverter::SupplyVoltage.at();
+    let detailed = Inverter::DETAIL.clone().any(|i| raw[base + i] != 0.0) || (0..3).any(|j| raw[Motor::OpenA.at() + j] != 0.0);
+    let drops = raw[DriveParameter::FeedbackLoss.at()] == 1.0 && raw[ResolverParameter::PowerOff.at()] != 0.0;
+    if detailed || drops || raw[DriveParameter::Kind.at()] == 2.0 {
+        let message = format!("motor.tap_level: {level} cannot go with an open phase, a drive that is off, or the details of the bridge (inverter.on_resistance, diode_drop, dead_time, trip_current, open or shorted switches): a floating terminal at a resistor is not modelled; at most 0");
+        out.push(finding("motor.tap_level", level, 0.0, message));
     }
 }
 
@@ -55,41 +117,57 @@ fn whole_multiple(out: &mut Vec<Finding>, raw: &[f64], index: usize, path: &str)
     }
 }
 
-pub fn high(raw: &[f64]) -> Vec<Finding> {
+pub fn high<F: Form>(raw: &[f64]) -> Vec<Finding> {
     let mut out = Vec::new();
-    common(&mut out, raw);
+    common::<F>(&mut out, raw);
+    tapped(&mut out, raw);
     let dt = raw[SolverParameter::Step.at()];
     let (r, l) = (raw[Motor::Resistance.at()], raw[Motor::Inductance.at()]);
     let turns = (0..3).map(|j| raw[Motor::TurnsA.at() + j]).fold(1.0, f64::min);
     step_limit(&mut out, dt, turns * l / r, "electrical pole R / L of motor.winding_resistance and motor.winding_inductance");
     shorted_loops(&mut out, raw, dt);
     relay_band(&mut out, raw, dt, turns * turns * l);
-    let rotor = raw[Motor::Inertia.at()] + raw[GearParameter::Inertia.at()];
+    let rotor = raw[Motor::Inertia.at()] + raw[GearParameter::Inertia.at()] + F::screw_inertia(raw) + raw[UnbalanceParameter::Inertia.at()];
     let user = raw[LoadParameter::Inertia.at()];
-    let ratio = raw[GearParameter::Ratio.at()];
+    let ratio = F::ratio(raw);
     let elastic = raw[PlayParameter::Model.at()] == 1.0;
     let inertia = if elastic { rotor } else { rotor + user / (ratio * ratio) };
     derivative_inertia(&mut out, raw, inertia);
     let td = raw[Control::DerivativeTime.at()];
     if td > 0.0 && raw[Control::SampleTime.at()] == 0.0 {
-        step_limit(&mut out, dt, td / raw[Control::DerivativeFilter.at()], "derivative filter's pole N / T_d of control.derivative_filter and control.derivative_time");
+        step_limit(
+            &mut out,
+            dt,
+            td / raw[Control::DerivativeFilter.at()],
+            "derivative filter's pole N / T_d of control.derivative_filter and control.derivative_time",
+        );
     }
     let viscous = raw[FrictionParameter::Viscous.at()] * raw[FrictionParameter::ViscousScale.at()];
     if viscous > 0.0 {
         step_limit(&mut out, dt, inertia / viscous, "viscous pole C / J of friction.viscous");
     }
     if elastic {
-        contact(&mut out, raw, dt, rotor * ratio * ratio, user);
+        contact::<F>(&mut out, raw, dt, rotor * ratio * ratio, user);
+    }
+    if raw[DriveParameter::Commutation.at()] == 1.0 && raw[DriveParameter::Kind.at()] == 1.0 {
+        out.push(finding(
+            "drive.commutation",
+            1.0,
+            0.0,
+            "drive.commutation: six_step needs drive.kind = hysteresis; a carrier-PWM drive controls sinusoidal currents".into(),
+        ));
     }
     for (index, path) in [
         (Control::SampleTime.at(), "control.sample_time"),
         (Control::NoiseSampleTime.at(), "control.noise_sample_time"),
         (CurrentSensorParameter::NoiseSampleTime.at(), "sensor.current.noise_sample_time"),
         (PwmParameter::SampleTime.at(), "pwm.sample_time"),
+        (Thermal::SampleTime.at(), "thermal.sample_time"),
     ] {
         let used = match path {
             "control.noise_sample_time" => raw[Control::NoiseDeviation.at()] > 0.0,
             "sensor.current.noise_sample_time" => raw[CurrentSensorParameter::NoiseDeviation.at()] > 0.0,
+            "thermal.sample_time" => raw[Thermal::Model.at()] != 0.0,
             "pwm.sample_time" => raw[DriveParameter::Kind.at()] == 1.0,
             _ => true,
         };
@@ -118,14 +196,20 @@ fn shorted_loops(out: &mut Vec<Finding>, raw: &[f64], dt: f64) {
 fn relay_band(out: &mut Vec<Finding>, raw: &[f64], dt: f64, inductance: f64) {
     if raw[DriveParameter::Kind.at()] == 0.0 {
         let slew = raw[Inverter::SupplyVoltage.at()] * (2.0 / 3.0) / inductance;
-        step_limit(out, dt, raw[Inverter::HysteresisBand.at()] / slew, "relays: the current would cross inverter.hysteresis_band in one step");
+        step_limit(
+            out,
+            dt,
+            raw[Inverter::HysteresisBand.at()] / slew,
+            "relays: the current would cross inverter.hysteresis_band in one step",
+        );
     }
 }
 
 /// Two masses on the contact spring: semi-implicit needs dt below 2 / omega, explicit Euler below C / K.
-fn contact(out: &mut Vec<Finding>, raw: &[f64], dt: f64, motor: f64, user: f64) {
+fn contact<F: Form>(out: &mut Vec<Finding>, raw: &[f64], dt: f64, motor: f64, user: f64) {
     if user <= 0.0 {
-        out.push(finding("load.inertia", user, 0.0, "load.inertia: the elastic play needs a second mass, a user inertia above 0 kg m2".into()));
+        let (path, unit) = if F::LINEAR { ("load.mass", "kg") } else { ("load.inertia", "kg m2") };
+        out.push(finding(path, user, 0.0, format!("{path}: the elastic play needs a second mass, above 0 {unit}")));
         return;
     }
     let (k, c) = (raw[PlayParameter::Stiffness.at()], raw[PlayParameter::Damping.at()]);
@@ -137,18 +221,27 @@ fn contact(out: &mut Vec<Finding>, raw: &[f64], dt: f64, motor: f64, user: f64) 
     step_limit(out, dt, limit.min(damped), "contact stiffness play.stiffness and damping play.damping");
 }
 
-pub fn low(raw: &[f64]) -> Vec<Finding> {
+pub fn low<F: Form>(raw: &[f64]) -> Vec<Finding> {
     let mut out = Vec::new();
-    common(&mut out, raw);
-    let ratio = raw[GearParameter::Ratio.at()];
-    let inertia = raw[Motor::Inertia.at()] + raw[GearParameter::Inertia.at()] + raw[LoadParameter::Inertia.at()] / (ratio * ratio);
+    common::<F>(&mut out, raw);
+    let ratio = F::ratio(raw);
+    let inertia = raw[Motor::Inertia.at()]
+        + raw[GearParameter::Inertia.at()]
+        + F::screw_inertia(raw)
+        + raw[UnbalanceParameter::Inertia.at()]
+        + raw[LoadParameter::Inertia.at()] / (ratio * ratio);
     derivative_inertia(&mut out, raw, inertia);
     let dt = raw[LowParameter::Step.at()];
     let gain = raw[Control::SpeedGain.at()] * raw[Control::SpeedGainScale.at()];
     let effective = inertia + gain * raw[Control::DerivativeTime.at()];
     let pole = (gain + raw[FrictionParameter::Viscous.at()]) / effective;
     if dt * pole > 1.0 {
-        out.push(finding("low.step", dt, 1.0 / pole, format!("low.step: {dt:e} s is too large for the speed loop's pole K_p / J; at most {:.3e} s", 1.0 / pole)));
+        out.push(finding(
+            "low.step",
+            dt,
+            1.0 / pole,
+            format!("low.step: {dt:e} s is too large for the speed loop's pole K_p / J; at most {:.3e} s", 1.0 / pole),
+        ));
     }
     out
 }

@@ -1,4 +1,4 @@
-//! What a run of the rotary actuator can record.
+//! What a run of a servo can record; a form may rename and extend.
 
 use crate::signals;
 
@@ -39,6 +39,19 @@ signals! {
         TransmissionTorque => "transmission_torque", "T_t", "N m", "torque through the play at the user (elastic model)";
         SupplyVoltage => "supply_voltage", "V_dc", "V", "DC link voltage";
         WindingTemperature => "winding_temperature", "T_w", "K", "winding temperature";
+        SurfaceTemperature => "surface_temperature", "T_s", "K", "temperature of the motor's surface";
+        HeatCopper => "heat_copper", "P", "W", "copper heat of the phases, mean of the network's last tick";
+        HeatLoop => "heat_loop", "-", "W", "copper heat of shorted turns, mean of the network's last tick";
+        HeatAir => "heat_air", "-", "W", "heat given to the air, mean of the network's last tick";
+        ThermalWarning => "thermal_warning", "-", "1", "1 while the winding is above its warning temperature";
+        Limited => "limited", "-", "1", "1 while the speed or the torque reference stands at its limit";
+        LegCurrentA => "leg_current_a", "-", "A", "current of leg a, with that of a resistor to the centre tap";
+        LegCurrentB => "leg_current_b", "-", "A", "current of leg b, with that of a resistor to the centre tap";
+        LegCurrentC => "leg_current_c", "-", "A", "current of leg c, with that of a resistor to the centre tap";
+        TapCurrentA => "tap_current_a", "-", "A", "current from terminal a to the centre tap";
+        TapCurrentB => "tap_current_b", "-", "A", "current from terminal b to the centre tap";
+        TapCurrentC => "tap_current_c", "-", "A", "current from terminal c to the centre tap";
+        UnbalanceTorque => "unbalance_torque", "T_u", "N m", "gravity torque of the rotor's excess mass";
         EncoderPosition => "encoder_position", "-", "rad", "user position the encoder shows";
         ResolverPosition => "resolver_position", "-", "rad", "motor angle the resolver shows";
         ResolverSpeed => "resolver_speed", "-", "rad/s", "motor speed the resolver shows";
@@ -53,6 +66,9 @@ signals! {
         EnergyImpact => "energy_impact", "-", "J", "kinetic energy lost at the end stops and in the contact";
         EnergyKinetic => "energy_kinetic", "-", "J", "kinetic energy";
         EnergyMagnetic => "energy_magnetic", "-", "J", "magnetic energy of the windings";
+        EnergyTap => "energy_tap", "-", "J", "heat of resistors at the centre tap";
+        EnergyHeatStored => "energy_heat_stored", "-", "J", "heat in winding and housing above that of the start";
+        EnergyAir => "energy_air", "-", "J", "heat given to the air";
     }
 }
 
@@ -77,9 +93,17 @@ signals! {
         LoadTorque => "load_torque", "T_load", "N m", "signed load referred to the fast shaft";
         SupplyVoltage => "supply_voltage", "V_dc", "V", "DC link voltage";
         WindingTemperature => "winding_temperature", "T_w", "K", "winding temperature";
+        SurfaceTemperature => "surface_temperature", "T_s", "K", "temperature of the motor's surface";
+        HeatCopper => "heat_copper", "P", "W", "copper heat of the phases, mean of the network's last tick";
+        HeatAir => "heat_air", "-", "W", "heat given to the air, mean of the network's last tick";
+        ThermalWarning => "thermal_warning", "-", "1", "1 while the winding is above its warning temperature";
+        Limited => "limited", "-", "1", "1 while the speed or the torque reference stands at its limit";
         EncoderPosition => "encoder_position", "-", "rad", "user position the encoder shows";
         ResolverPosition => "resolver_position", "-", "rad", "motor angle the resolver shows";
         ResolverSpeed => "resolver_speed", "-", "rad/s", "motor speed the resolver shows";
         Tripped => "tripped", "-", "1", "1 once the drive has tripped";
+        EnergyCopper => "energy_copper", "-", "J", "copper losses, counted with a thermal network";
+        EnergyHeatStored => "energy_heat_stored", "-", "J", "heat in winding and housing above that of the start";
+        EnergyAir => "energy_air", "-", "J", "heat given to the air";
     }
 }

@@ -1,0 +1,52 @@
+//! The ballscrew actuator (NASA / Impact Technologies): the motor turns a screw, the nut and the ram travel along it, and
+//! a fixture with play couples the ram to a load side with mass, damping and friction of its own
+//! (docs/theory/ballscrew.md).
+
+mod faults;
+mod records;
+
+use super::servo::{layout, Form};
+use super::{Finding, Port};
+use crate::fault::FaultKind;
+use crate::scalar::Scalar;
+use crate::transmission::gear::GearParameter;
+use crate::transmission::screw::{Screw, ScrewParameter};
+use crate::variable::{Group, Signal};
+use layout::At;
+use records::At as _;
+
+pub struct Ballscrew;
+
+impl Form for Ballscrew {
+    const LINEAR: bool = true;
+    const GROUPS: &'static [Group] = records::GROUPS;
+    const PORTS: &'static [Port] = records::PORTS;
+    const HIGH: &'static [Signal] = records::HIGH;
+    const LOW: &'static [Signal] = records::LOW;
+
+    fn faults() -> Vec<FaultKind> {
+        faults::catalogue()
+    }
+    fn ratio<S: Scalar>(raw: &[S]) -> S {
+        raw[GearParameter::Ratio.at()] / raw[ScrewParameter::Lead.place()]
+    }
+    fn screw_inertia<S: Scalar>(raw: &[S]) -> S {
+        let ratio = raw[GearParameter::Ratio.at()];
+        raw[ScrewParameter::Inertia.place()] / (ratio * ratio)
+    }
+    fn screw<S: Scalar>(raw: &[S]) -> Screw<S> {
+        Screw::derive(records::screw(raw), raw[GearParameter::Ratio.at()])
+    }
+    fn worn(departs: &dyn Fn(usize, f64) -> bool) -> (bool, bool) {
+        let spalls = [ScrewParameter::SpallGroove, ScrewParameter::SpallNut, ScrewParameter::SpallBall];
+        (spalls.into_iter().any(|p| departs(p.place(), 0.0)), departs(ScrewParameter::Debris.place(), 0.0))
+    }
+    fn check(raw: &[f64]) -> Vec<Finding> {
+        records::check(raw)
+    }
+}
+
+/// The ballscrew actuator at high fidelity.
+pub type High = super::servo::High<Ballscrew>;
+/// The ballscrew actuator at low fidelity: the printed L-R circuit.
+pub type Low = super::servo::Low<Ballscrew>;

@@ -1,0 +1,225 @@
+//! The records of the ballscrew actuator: those of a servo in the units of a travelling output, and the screw's own.
+
+use crate::actuator::servo::layout::{self, group, At as _, COMMAND};
+use crate::actuator::servo::signals::{self, HighSignal as H, LowSignal as L};
+use crate::actuator::{Finding, Port};
+use crate::control::position_speed::{ControlParameter as C, CONTROL};
+use crate::sensor::encoder::{EncoderParameter as E, ENCODER};
+use crate::transmission::friction::{FrictionParameter as F, FRICTION};
+use crate::transmission::gear::{GearParameter, LoadParameter as D, StopParameter as T, GEAR, LOAD, STOP};
+use crate::transmission::play::{PlayParameter as P, PLAY};
+use crate::transmission::screw::{RatingParameter, ScrewParameter, RATING, SCREW};
+use crate::variable::{extended, offset, relabelled, Group, Relabel, Signal, Variable};
+
+const fn change(index: usize, name: &'static str, unit: &'static str, text: &'static str) -> Relabel {
+    Relabel { index, name, unit, text }
+}
+const fn unit(index: usize, unit: &'static str) -> Relabel {
+    change(index, "", unit, "")
+}
+
+const RAM_GEAR: [Variable; GEAR.len()] = relabelled(GEAR, &[change(GearParameter::Ratio as usize, "", "", "motor speed over screw speed")]);
+const RAM_FRICTION: [Variable; FRICTION.len()] = relabelled(FRICTION, &[unit(F::JamPosition as usize, "m")]);
+const RAM_PLAY: [Variable; PLAY.len()] = relabelled(
+    PLAY,
+    &[
+        change(P::Total as usize, "", "m", "total play between ram and load"),
+        unit(P::Extra as usize, "m"),
+        change(P::Stiffness as usize, "", "N/m", "contact stiffness between ram and load (elastic model)"),
+        change(P::Damping as usize, "", "N s/m", "contact damping between ram and load (elastic model)"),
+    ],
+);
+const RAM_STOP: [Variable; STOP.len()] = relabelled(STOP, &[unit(T::Upper as usize, "m"), unit(T::Lower as usize, "m")]);
+const RAM_LOAD: [Variable; LOAD.len()] = relabelled(
+    LOAD,
+    &[
+        change(D::Inertia as usize, "mass", "kg", "mass of the load side"),
+        change(D::Stiffness as usize, "", "N/m", "spring on the load side, force proportional to the load's position"),
+        unit(D::SpringZero as usize, "m"),
+        unit(D::Damping as usize, "N s/m"),
+        unit(D::Friction as usize, "N"),
+    ],
+);
+const RAM_CONTROL: [Variable; CONTROL.len()] = relabelled(
+    CONTROL,
+    &[unit(C::PositionGain as usize, "rad/(m s)"), unit(C::AntiWindupThreshold as usize, "m"), unit(C::NoiseDeviation as usize, "m")],
+);
+const RAM_ENCODER: [Variable; ENCODER.len()] = relabelled(
+    ENCODER,
+    &[
+        change(E::Pulses as usize, "", "1/m", "pulses per metre of a linear scale on the load side"),
+        change(E::WheelRatio as usize, "encoder.interpolation", "", "interpolation between the scale's pulses"),
+        unit(E::Offset as usize, "m"),
+    ],
+);
+
+pub const GROUPS: &[Group] = &{
+    let mut all = [layout::GROUPS[0]; layout::GROUPS.len() + 2];
+    let mut i = 0;
+    while i < layout::GROUPS.len() {
+        all[i] = layout::GROUPS[i];
+        i += 1;
+    }
+    all[1] = group("gear", &RAM_GEAR);
+    all[2] = group("friction", &RAM_FRICTION);
+    all[3] = group("play", &RAM_PLAY);
+    all[4] = group("stop", &RAM_STOP);
+    all[5] = group("load", &RAM_LOAD);
+    all[9] = group("control", &RAM_CONTROL);
+    all[11] = group("sensor", &RAM_ENCODER);
+    all[layout::GROUPS.len()] = group("screw", SCREW);
+    all[layout::GROUPS.len() + 1] = group("rating", RATING);
+    all
+};
+
+const AT_SCREW: usize = offset(GROUPS, layout::GROUPS.len());
+const AT_RATING: usize = offset(GROUPS, layout::GROUPS.len() + 1);
+
+// The shared components stand where the servo looks for them.
+const _: () = assert!(AT_SCREW == offset(layout::GROUPS, layout::GROUPS.len()));
+
+/// Place in the whole parameter vector.
+pub trait At {
+    fn place(self) -> usize;
+}
+impl At for ScrewParameter {
+    fn place(self) -> usize {
+        AT_SCREW + self as usize
+    }
+}
+impl At for RatingParameter {
+    fn place(self) -> usize {
+        AT_RATING + self as usize
+    }
+}
+
+/// The screw's own parameters.
+pub fn screw<S>(raw: &[S]) -> &[S] {
+    &raw[AT_SCREW..AT_SCREW + SCREW.len()]
+}
+
+pub const PORTS: &[Port] = &[
+    Port {
+        name: layout::PORTS[COMMAND].name,
+        unit: "m",
+        text: "position, speed or torque command (m at the ram, rad/s or N m at the motor)",
+        parameter: "",
+    },
+    Port { name: "brake", unit: "N", text: "resistive force on the load side: opposes motion of either direction", parameter: "" },
+    Port { name: "shaft", unit: "N m", text: "signed torque on the fast shaft, positive opposes positive motion", parameter: "" },
+    Port { name: "user", unit: "N", text: "signed force on the load side, positive (compressive) opposes extension", parameter: "" },
+    Port { name: "supply", unit: "V", text: "DC link voltage", parameter: "inverter.supply_voltage" },
+];
+
+const fn signal(name: &'static str, unit: &'static str, text: &'static str) -> Signal {
+    Signal { name, symbol: "-", unit, text }
+}
+
+const HIGH_OWN: &[Signal] = &[
+    signal("ram_position", "m", "ram position, on the nut's side of the play"),
+    signal("ram_speed", "m/s", "ram speed, on the nut's side of the play"),
+    signal("load_friction_force", "N", "friction and damping of the load side, the brake's force included"),
+    signal("screw_torque", "N m", "force through the nut, referred to the fast shaft without losses"),
+    signal("spall_torque", "N m", "torque of balls falling into spalls, positive drives forwards"),
+    signal("screw_efficiency", "1", "applied efficiency under a load that opposes motion"),
+    signal("screw_efficiency_aiding", "1", "applied efficiency under a load that aids motion"),
+];
+const LOW_OWN: &[Signal] = &[
+    signal("ram_position", "m", "ram position, on the nut's side of the play"),
+    signal("ram_speed", "m/s", "ram speed, on the nut's side of the play"),
+    signal("screw_torque", "N m", "force through the nut, referred to the fast shaft without losses"),
+    signal("screw_efficiency", "1", "applied efficiency under a load that opposes motion"),
+    signal("screw_efficiency_aiding", "1", "applied efficiency under a load that aids motion"),
+    signal("circuit_current", "A", "current of the printed L-R circuit, sqrt(3/2) i_q: its I^2 R is the heat of all phases"),
+    signal("circuit_voltage", "V", "voltage of the printed L-R circuit, sqrt(3/2) v_q"),
+];
+
+pub const HIGH: &[Signal] = &extended::<{ signals::HIGH.len() + HIGH_OWN.len() }>(
+    signals::HIGH,
+    &[
+        change(H::Command as usize, "", "m", "command with its noise (m at the ram, rad/s or N m by the control mode)"),
+        change(H::UserPosition as usize, "", "m", "position of the load side"),
+        change(H::UserSpeed as usize, "", "m/s", "speed of the load side"),
+        change(H::BrakeTorque as usize, "brake_force", "N", "force the brake can oppose on the load side"),
+        change(H::UserTorque as usize, "load_force", "N", "signed load on the load side, spring included"),
+        change(
+            H::TransmissionTorque as usize,
+            "joint_force",
+            "N",
+            "force through the joint between ram and load: what the load cell shows",
+        ),
+        change(H::EncoderPosition as usize, "", "m", "load position the encoder shows"),
+    ],
+    HIGH_OWN,
+);
+pub const LOW: &[Signal] = &extended::<{ signals::LOW.len() + LOW_OWN.len() }>(
+    signals::LOW,
+    &[
+        change(L::Command as usize, "", "m", "command (m at the ram, rad/s or N m by the control mode)"),
+        change(L::UserPosition as usize, "", "m", "position of the load side"),
+        change(L::UserSpeed as usize, "", "m/s", "speed of the load side"),
+        change(L::BrakeTorque as usize, "brake_force", "N", "force the brake can oppose on the load side"),
+        change(L::EncoderPosition as usize, "", "m", "load position the encoder shows"),
+    ],
+    LOW_OWN,
+);
+
+fn finding(path: &str, value: f64, limit: f64, message: String) -> Finding {
+    Finding { path: path.to_string(), value, limit, message }
+}
+
+/// What a screw cannot be.
+pub fn check(raw: &[f64]) -> Vec<Finding> {
+    let g = |p: ScrewParameter| raw[p.place()];
+    let mut out = Vec::new();
+    let (ball, pitch) = (g(ScrewParameter::BallDiameter), g(ScrewParameter::PitchDiameter));
+    if ball >= pitch {
+        out.push(finding(
+            "screw.ball_diameter",
+            ball,
+            pitch,
+            format!("screw.ball_diameter: {ball} m is not below screw.pitch_diameter, {pitch} m"),
+        ));
+    }
+    let (eta, aiding) = (g(ScrewParameter::Efficiency), g(ScrewParameter::EfficiencyAiding));
+    if aiding > eta {
+        out.push(finding(
+            "screw.efficiency_aiding",
+            aiding,
+            eta,
+            format!("screw.efficiency_aiding: {aiding} exceeds screw.efficiency, {eta}"),
+        ));
+    }
+    let (circuits, balls) = (g(ScrewParameter::Circuits), g(ScrewParameter::BallsPerTurn));
+    for (path, value) in [("screw.circuits", circuits), ("screw.balls_per_turn", balls)] {
+        if value.fract() != 0.0 {
+            out.push(finding(
+                path,
+                value,
+                value.floor(),
+                format!("{path}: {value} is not a whole number; {} or {}", value.floor(), value.ceil()),
+            ));
+        }
+    }
+    let blocked = g(ScrewParameter::BlockedCircuits);
+    if blocked.fract() != 0.0 {
+        out.push(finding(
+            "screw.blocked_circuits",
+            blocked,
+            blocked.floor(),
+            format!("screw.blocked_circuits: a circuit is blocked or not, {blocked} is neither; {} or {}", blocked.floor(), blocked.ceil()),
+        ));
+    } else if blocked > circuits {
+        out.push(finding(
+            "screw.blocked_circuits",
+            blocked,
+            circuits,
+            format!("screw.blocked_circuits: {blocked} of the {circuits} in screw.circuits"),
+        ));
+    }
+    let ratio = raw[GearParameter::Ratio.at()];
+    if ratio <= 0.0 {
+        out.push(finding("gear.ratio", ratio, 0.0, format!("gear.ratio: {ratio} must be above 0")));
+    }
+    out
+}

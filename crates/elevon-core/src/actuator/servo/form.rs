@@ -1,0 +1,33 @@
+//! What distinguishes one servo from another.
+
+use crate::actuator::{Finding, Port};
+use crate::fault::FaultKind;
+use crate::scalar::Scalar;
+use crate::transmission::screw::Screw;
+use crate::variable::{Group, Signal};
+
+/// A kind of servo: its records, and how its transmission follows from them.
+///
+/// The groups begin with those of `layout::GROUPS`, in their order and of their lengths (units and names may differ), so
+/// that a parameter of a shared component stands at one place in every form.
+pub trait Form: Send + Sync + 'static {
+    /// The user's side travels: its coordinate is in metres, and the brake acts there.
+    const LINEAR: bool;
+    const GROUPS: &'static [Group];
+    const PORTS: &'static [Port];
+    /// Signals begin with those of `signals::HIGH` and `signals::LOW`, in their order.
+    const HIGH: &'static [Signal];
+    const LOW: &'static [Signal];
+
+    fn faults() -> Vec<FaultKind>;
+
+    /// Motor angle over user coordinate.
+    fn ratio<S: Scalar>(raw: &[S]) -> S;
+    /// Inertia on the fast shaft besides the motor's and the gear's.
+    fn screw_inertia<S: Scalar>(raw: &[S]) -> S;
+    fn screw<S: Scalar>(raw: &[S]) -> Screw<S>;
+    /// Does the screw need its own code: (spall, debris)?
+    fn worn(departs: &dyn Fn(usize, f64) -> bool) -> (bool, bool);
+    /// Findings of its own.
+    fn check(raw: &[f64]) -> Vec<Finding>;
+}

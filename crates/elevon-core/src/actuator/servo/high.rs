@@ -1,0 +1,184 @@
+//! High fidelity: three phases, switching inverter, fixed step (reference sheet 1.2 to 1.7).
+
+use super::form::Form;
+use super::layout::*;
+use super::march::march;
+use super::model::{Model, State};
+use super::start;
+use super::step::{control_step, park, seen_current, shaft_reading, HighStep};
+use super::structure::{sample_steps, Drive, Structure};
+use crate::actuator::{Finding, Inputs, Overheat, Port, Setup, Tick, Watch, Wiring, WATCHED};
+use crate::control::current_dq::{CurrentSample, PwmParameter};
+use crate::control::position_speed::ControlParameter;
+use crate::fault::FaultKind;
+use crate::motor::thermal::ThermalParameter;
+use crate::scalar::{three_phase, Scalar};
+use crate::sensor::current::CurrentSensorParameter;
+use crate::three;
+use crate::time::Steps;
+use crate::variable::{Group, Signal};
+use std::marker::PhantomData;
+
+/// A servo at high fidelity.
+pub struct High<F>(PhantomData<F>);
+
+const TICK_COMMAND_NOISE: u8 = 0;
+const TICK_CURRENT_NOISE: u8 = 1;
+const TICK_CONTROL: u8 = 2;
+const TICK_CURRENT_CONTROL: u8 = 3;
+
+const TICK_THERMAL: u8 = 4;
+const TICK_DEBRIS: u8 = 5;
+
+impl<F: Form> Wiring for High<F> {
+    type Structure = Structure;
+    type Model<S: Scalar> = Model<S>;
+    type State<S: Scalar> = State<S>;
+
+    const PORTS: &'static [Port] = F::PORTS;
+    const INITIAL: &'static [&'static str] = start::INITIAL;
+
+    fn groups() -> &'static [Group] {
+        F::GROUPS
+    }
+    fn signals() -> &'static [Signal] {
+        F::HIGH
+    }
+    fn faults() -> Vec<FaultKind> {
+        F::faults()
+    }
+    fn step(raw: &[f64]) -> f64 {
+        raw[SolverParameter::Step.at()]
+    }
+    fn fault_grid(raw: &[f64]) -> f64 {
+        raw[SolverParameter::FaultGrid.at()]
+    }
+    fn structure(setup: &Setup) -> Structure {
+        Structure::read::<F>(setup)
+    }
+
+    fn ticks(raw: &[f64], structure: &Structure) -> Vec<Tick> {
+        let mut ticks = Vec::new();
+        let mut add = |present: bool, index: usize, kind: u8| {
+            if present {
+                ticks.push(Tick { period: sample_steps(raw, index).max(1), kind });
+            }
+        };
+        add(raw[ControlParameter::NoiseDeviation.at()] != 0.0, ControlParameter::NoiseSampleTime.at(), TICK_COMMAND_NOISE);
+        add(raw[CurrentSensorParameter::NoiseDeviation.at()] != 0.0, CurrentSensorParameter::NoiseSampleTime.at(), TICK_CURRENT_NOISE);
+        add(!structure.control_every_step, ControlParameter::SampleTime.at(), TICK_CONTROL);
+        add(structure.drive == Drive::Pwm, PwmParameter::SampleTime.at(), TICK_CURRENT_CONTROL);
+        add(structure.heat, ThermalParameter::SampleTime.at(), TICK_THERMAL);
+        add(structure.debris, ControlParameter::SampleTime.at(), TICK_DEBRIS);
+        ticks
+    }
+
+    fn check(raw: &[f64]) -> Vec<Finding> {
+        super::checks::high::<F>(raw)
+    }
+
+    fn check_faulted(raw: &[f64]) -> Vec<Finding> {
+        super::checks::faulted::<F>(raw)
+    }
+
+    fn derive<S: Scalar>(raw: &[S], structure: &Structure) -> Model<S> {
+        Model::derive::<F>(raw, structure)
+    }
+    fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
+        start::start(model, raw, initial)
+    }
+    fn refresh<S: Scalar>(raw: &[S], state: &mut State<S>) {
+        start::refresh(raw, state);
+    }
+
+    fn tick<S: Scalar>(
+        kind: u8,
+        structure: &Structure,
+        m: &Model<S>,
+        inputs: &Inputs<S>,
+        s: &mut State<S>,
+        t: S,
+        noise: &mut dyn FnMut(u64) -> S,
+    ) {
+        match kind {
+            TICK_COMMAND_NOISE => s.command_noise = m.noise_deviation * noise(0),
+            TICK_CURRENT_NOISE => s.current_noise = three!(|j| noise(1 + j as u64)),
+            TICK_CONTROL => {
+                let reading = shaft_reading::<S, true>(m, structure, s);
+                control_step::<S, true>(m, structure, inputs[COMMAND].at(t), s, &reading);
+            }
+            TICK_THERMAL => {
+                m.extra.network.tick(&mut s.extra.network);
+                (s.star.resistance_factor, s.star.flux_factor) = m.extra.network.factors(&s.extra.network);
+            }
+            TICK_DEBRIS => s.extra.scatter = m.extra.screw.scatter.fma(noise(4), S::one()).maximum(S::zero()),
+            _ => {
+                let reading = shaft_reading::<S, true>(m, structure, s);
+                let angle = m.star.electrical_angle(reading.angle);
+                let (sin, cos) = angle.sin_cos();
+                let (sines, cosines) = three_phase(sin, cos);
+                let (current_q, current_d) = park(seen_current(m, structure, s), sines, cosines);
+                let supply = inputs[SUPPLY].at(t) * m.supply_scale;
+                let sample = CurrentSample {
+                    reference_d: S::zero(),
+                    reference_q: s.current_ref,
+                    current_d,
+                    current_q,
+                    speed: reading.speed,
+                    angle,
+                    supply,
+                };
+                m.current_control.step(&mut s.current_control, &sample);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn advance<S: Scalar>(
+        structure: &Structure,
+        models: &[Model<S>],
+        inputs: &[Inputs<S>],
+        states: &mut [State<S>],
+        from: Steps,
+        count: Steps,
+    ) {
+        match (structure.full, structure.extra, structure.drive == Drive::Pwm) {
+            (false, _, false) => march::<HighStep<false, false, false>, S>(structure, models, inputs, states, from, count),
+            (false, _, true) => march::<HighStep<false, false, true>, S>(structure, models, inputs, states, from, count),
+            (true, false, false) => march::<HighStep<true, false, false>, S>(structure, models, inputs, states, from, count),
+            (true, false, true) => march::<HighStep<true, false, true>, S>(structure, models, inputs, states, from, count),
+            (true, true, false) => march::<HighStep<true, true, false>, S>(structure, models, inputs, states, from, count),
+            (true, true, true) => march::<HighStep<true, true, true>, S>(structure, models, inputs, states, from, count),
+        }
+    }
+
+    #[inline(always)]
+    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, state: &State<S>, t: S, out: &mut [S]) {
+        super::observe::high::<F, S>(structure, m, inputs, state, t, out);
+    }
+
+    #[inline(always)]
+    fn watch<S: Scalar>(s: &State<S>) -> [Watch<S>; WATCHED] {
+        let currents = s.star.current[0].abs()
+            + s.star.current[1].abs()
+            + s.star.current[2].abs()
+            + s.star.loop_current[0].abs()
+            + s.star.loop_current[1].abs()
+            + s.star.loop_current[2].abs();
+        [
+            Watch { name: "motor_speed", value: s.motor_speed, limit: 1e6 },
+            Watch { name: "current_a", value: currents, limit: 1e7 },
+            Watch { name: "user_position", value: s.user_position, limit: 1e9 },
+            Watch { name: "torque_ref", value: s.control.integral + s.control.filtered_error, limit: 1e12 },
+        ]
+    }
+
+    #[inline(always)]
+    fn tripped<S: Scalar>(s: &State<S>) -> S {
+        s.bridge.tripped.maximum(s.extra.network.over)
+    }
+    fn overheated<S: Scalar>(s: &State<S>) -> Option<Overheat<S>> {
+        let network = &s.extra.network;
+        Some(Overheat { over: network.over, temperature: network.winding })
+    }
+}

@@ -1,0 +1,68 @@
+//! The state at the start of a run, and after a fault changed parameters.
+
+use super::layout::*;
+use super::model::{network, ExtraState, Model, State};
+use crate::control::current_dq::CurrentControlState;
+use crate::control::position_speed::PositionSpeedState;
+use crate::inverter::bridge::BridgeState;
+use crate::motor::star::{MotorParameter, StarState};
+use crate::motor::thermal::{NetworkState, ThermalParameter};
+use crate::scalar::Scalar;
+use crate::three;
+use crate::transmission::friction::FrictionParameter;
+
+/// Signals whose initial value a scenario may set.
+pub(super) const INITIAL: &[&str] =
+    &["motor_position", "motor_speed", "user_position", "user_speed", "current_a", "current_b", "current_c"];
+
+pub(super) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
+    let or = |i: usize, other: S| S::select(initial[i].equals(initial[i]), initial[i], other);
+    let zero = S::zero();
+    let motor_position = or(0, zero);
+    let driver = motor_position * model.gear.per_ratio;
+    let mut star = StarState::rest();
+    star.current = three!(|j| or(4 + j, zero));
+    let warm = model.extra.network.start(model.temperature, model.temperature);
+    heat(raw, &mut star, &warm);
+    let user_position = model.play.drag(driver, or(2, driver));
+    State {
+        star,
+        legs: [-S::one(); 3],
+        bridge: BridgeState::rest(),
+        control: PositionSpeedState::rest(),
+        current_ref: zero,
+        current_control: CurrentControlState::rest(),
+        motor_position,
+        motor_speed: or(1, zero),
+        user_position,
+        user_speed: or(3, zero),
+        command_noise: zero,
+        current_noise: [zero; 3],
+        held_angle: motor_position,
+        jam_side: (user_position - model.friction.jam_position).sign(),
+        jammed: S::select(S::splat(0.5).lt(model.friction.jam_anywhere), S::one(), zero),
+        filtered: [zero; 3],
+        transitions: zero,
+        voltage: [zero; 3],
+        energy: [zero; 8],
+        extra: ExtraState { network: warm, sensed: star.current, scatter: S::one() },
+    }
+}
+
+pub(super) fn refresh<S: Scalar>(raw: &[S], state: &mut State<S>) {
+    heat(raw, &mut state.star, &state.extra.network);
+    let position = raw[FrictionParameter::JamPosition.at()];
+    let free = state.jammed.equals(S::zero());
+    let side = (state.user_position - position).sign();
+    state.jam_side = S::select(free & state.jam_side.equals(S::zero()), side, state.jam_side);
+}
+
+/// Temperature factors: of the network where there is one, else of the given winding temperature.
+fn heat<S: Scalar>(raw: &[S], star: &mut StarState<S>, warm: &NetworkState<S>) {
+    if raw[ThermalParameter::Model.at()].lane(0) == 0.0 {
+        star.heat(Raw(raw).motor(), raw[MotorParameter::WindingTemperature.at()]);
+    } else {
+        let dt = raw[SolverParameter::Step.at()].lane(0);
+        (star.resistance_factor, star.flux_factor) = network(raw, dt).factors(warm);
+    }
+}

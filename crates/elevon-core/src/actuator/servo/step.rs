@@ -1,0 +1,161 @@
+//! One step of the high fidelity. It reads like the block diagram: sensors, control electronics, power electronics,
+//! motor, transmission, acquisition. With `FULL` false the optional details compile to nothing, with `EXTRA` false those
+//! that only some servos have; a detail at its healthy value changes no bit, so the forms agree exactly where both apply.
+
+use super::electrical::{coupling, electric_step, motor_torque};
+use super::march::{Moment, Stepper};
+use super::mechanical::mechanical_step;
+use super::model::{Model, State};
+use super::structure::{Drive, Structure};
+use crate::inverter::hysteresis::{count_transitions, relays, six_step};
+use crate::scalar::{three_phase, Scalar};
+use crate::sensor::filter::low_pass;
+use crate::sensor::resolver::Reading;
+use crate::three;
+
+/// What the controller is told of the shaft.
+#[inline(always)]
+pub(super) fn shaft_reading<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &mut State<S>) -> Reading<S> {
+    if FULL && structure.resolver {
+        m.resolver.read(s.motor_position, s.motor_speed, &mut s.held_angle)
+    } else {
+        Reading { angle: s.motor_position, position: s.motor_position, speed: s.motor_speed }
+    }
+}
+
+#[inline(always)]
+pub(super) fn control_step<S: Scalar, const FULL: bool>(
+    m: &Model<S>,
+    structure: &Structure,
+    command: S,
+    s: &mut State<S>,
+    reading: &Reading<S>,
+) {
+    let position = match structure.control.feedback {
+        1 if FULL => m.encoder.read(s.user_position),
+        2 if FULL => reading.position * m.gear.per_ratio,
+        _ => s.user_position,
+    };
+    let command = command + s.command_noise;
+    s.current_ref = m.control.step(&structure.control, &mut s.control, command, position, reading.speed);
+}
+
+#[inline(always)]
+fn measured_current<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure: &Structure, s: &State<S>) -> [S; 3] {
+    let mut current = s.star.current;
+    if EXTRA && structure.tap {
+        current = leg_current(m, structure, s);
+    }
+    if FULL && structure.measured_current {
+        m.sensor.measure(current, s.current_noise)
+    } else {
+        current
+    }
+}
+
+/// What the legs carry: the windings' currents and those of resistors at the centre tap.
+#[inline(always)]
+pub(super) fn leg_current<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>) -> [S; 3] {
+    if !structure.tap {
+        return s.star.current;
+    }
+    let drawn = m.extra.tap.currents(s.voltage);
+    three!(|j| s.star.current[j] + drawn[j])
+}
+
+/// Phase currents as the drive sees them.
+#[inline(always)]
+pub(super) fn seen_current<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>) -> [S; 3] {
+    if structure.current_filter {
+        s.extra.sensed
+    } else {
+        measured_current::<S, true, true>(m, structure, s)
+    }
+}
+
+/// Quadrature and direct components of three phase quantities (sheet 1.4).
+#[inline(always)]
+pub(super) fn park<S: Scalar>(x: [S; 3], sin: [S; 3], cos: [S; 3]) -> (S, S) {
+    let two_thirds = S::splat(2.0 / 3.0);
+    let q = two_thirds * (x[0] * sin[0] + x[1] * sin[1] + x[2] * sin[2]);
+    let d = -(two_thirds * (x[0] * cos[0] + x[1] * cos[1] + x[2] * cos[2]));
+    (q, d)
+}
+
+#[inline(always)]
+fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
+    m: &Model<S>,
+    structure: &Structure,
+    x: &Moment<S>,
+    s: &mut State<S>,
+) {
+    // Sensors and control electronics.
+    let reading = shaft_reading::<S, FULL>(m, structure, s);
+    if structure.control_every_step {
+        control_step::<S, FULL>(m, structure, x.command, s, &reading);
+    }
+    let (sin, cos) = m.star.electrical_angle(s.motor_position).sin_cos();
+    let mut measured = measured_current::<S, FULL, EXTRA>(m, structure, s);
+    if EXTRA && structure.current_filter {
+        s.extra.sensed = three!(|j| low_pass(m.extra.closing, s.extra.sensed[j], measured[j]));
+        measured = s.extra.sensed;
+    }
+    let (sin_c, cos_c) = if FULL && structure.resolver && (!EXTRA || structure.commutated) {
+        m.star.electrical_angle(reading.angle).sin_cos()
+    } else {
+        (sin, cos)
+    };
+    let (sin_phases, cos_phases) = three_phase(sin_c, cos_c);
+
+    // Power electronics.
+    let half_supply = S::splat(0.5) * (x.supply * m.supply_scale);
+    let old_legs = s.legs;
+    if PWM {
+        s.legs = m.current_control.compare(&s.current_control, x.t);
+    } else if FULL && structure.drive == Drive::Off {
+        s.legs = [S::zero(); 3];
+    } else {
+        let shape = if EXTRA && structure.six_step { six_step(sin_phases) } else { sin_phases };
+        let error = three!(|j| s.current_ref * shape[j] - measured[j]);
+        s.legs = relays(m.half_band, old_legs, error);
+    }
+    if EXTRA && structure.stops {
+        let lost = S::splat(0.5).lt(m.extra.resolver_off);
+        s.legs = three!(|j| S::select(lost, S::zero(), s.legs[j]));
+    }
+    s.transitions = count_transitions(s.transitions, old_legs, s.legs);
+
+    // Motor electromagnetics.
+    let c = coupling::<S, FULL>(m, structure, s, sin, cos);
+    let torque = motor_torque::<S, FULL>(m, structure, s, &c);
+    let (current, voltage) = electric_step::<S, FULL, EXTRA>(m, structure, s, &c, half_supply, old_legs);
+    if structure.acquisition {
+        let (q, d) = park(measured, sin_phases, cos_phases);
+        let (v_q, _) = park(voltage, sin_phases, cos_phases);
+        s.filtered[0] = low_pass(m.filter, s.filtered[0], q);
+        s.filtered[1] = low_pass(m.filter, s.filtered[1], d);
+        s.filtered[2] = low_pass(m.filter, s.filtered[2], v_q);
+    }
+
+    // Motor and transmission dynamics.
+    mechanical_step::<S, FULL, EXTRA>(m, structure, x, s, torque);
+    s.star.current = current;
+}
+
+/// The step of the inner loop with and without details, behind relays or a carrier.
+pub(super) struct HighStep<const FULL: bool, const EXTRA: bool, const PWM: bool>;
+
+impl<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool> Stepper<S> for HighStep<FULL, EXTRA, PWM> {
+    type Model = Model<S>;
+    type Structure = Structure;
+    type State = State<S>;
+
+    #[inline(always)]
+    fn dt(model: &Model<S>) -> S {
+        model.dt
+    }
+    #[inline(always)]
+    fn step(model: &Model<S>, structure: &Structure, moment: &Moment<S>, state: &mut State<S>) {
+        step::<S, FULL, EXTRA, PWM>(model, structure, moment, state);
+    }
+}

@@ -1,0 +1,167 @@
+//! What of a servo a run needs: equal over a lane block.
+
+use super::form::Form;
+use super::layout::*;
+use super::signals::HighSignal;
+use crate::actuator::Setup;
+use crate::control::position_speed::{ControlParameter, ControlStructure};
+use crate::inverter::bridge::{BridgeStructure, InverterParameter};
+use crate::motor::star::{MotorParameter, MotorStructure};
+use crate::motor::tap::TapParameter;
+use crate::motor::thermal::ThermalParameter;
+use crate::motor::unbalance::UnbalanceParameter;
+use crate::sensor::current::{CurrentSensor, CurrentSensorParameter};
+use crate::sensor::resolver::{Resolver, ResolverParameter};
+use crate::time::Steps;
+use crate::transmission::friction::FrictionParameter;
+use crate::transmission::gear::{GearParameter, LoadParameter};
+use crate::transmission::play::PlayParameter;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Drive {
+    Hysteresis,
+    Pwm,
+    Off,
+}
+
+/// Everything that decides which code runs; equal over a lane block.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Structure {
+    pub(super) drive: Drive,
+    pub(super) control: ControlStructure,
+    pub(super) motor: MotorStructure,
+    pub(super) control_every_step: bool,
+    pub(super) semi_implicit: bool,
+    pub(super) acquisition: bool,
+    pub(super) full: bool,
+    pub(super) bridge: bool,
+    pub(super) bridge_structure: BridgeStructure,
+    pub(super) elastic: bool,
+    pub(super) measured_current: bool,
+    pub(super) resolver: bool,
+    pub(super) accounts: bool,
+    pub(super) loaded: bool,
+    pub(super) sloped: bool,
+    pub(super) jams: bool,
+    pub(super) thermal: bool,
+    /// Any of the following: details that only some servos have.
+    pub(super) extra: bool,
+    pub(super) linear: bool,
+    /// A load side with damping and dry friction of its own.
+    pub(super) load_side: bool,
+    pub(super) heat: bool,
+    pub(super) tap: bool,
+    pub(super) unbalance: bool,
+    pub(super) spall: bool,
+    pub(super) debris: bool,
+    pub(super) current_filter: bool,
+    pub(super) six_step: bool,
+    /// A lost resolver turns the field, too.
+    pub(super) commutated: bool,
+    /// A lost resolver opens the bridge.
+    pub(super) stops: bool,
+}
+
+impl Structure {
+    pub(super) fn read<F: Form>(setup: &Setup) -> Self {
+        let raw = Raw(setup.raw);
+        let choice = |i: usize| setup.raw[i] as u8;
+        let departs = |i: usize, healthy: f64| setup.departs(i, healthy);
+        let drive = match choice(DriveParameter::Kind.at()) {
+            0 => Drive::Hysteresis,
+            1 => Drive::Pwm,
+            _ => Drive::Off,
+        };
+        let control = ControlStructure::read(raw.control());
+        let unbalance = departs(UnbalanceParameter::Inertia.at(), 0.0);
+        let motor = MotorStructure {
+            trapezoidal: choice(MotorParameter::EmfShape.at()) == 1,
+            shorted_loop: choice(MotorParameter::ShortModel.at()) == 1,
+            static_eccentricity: departs(MotorParameter::EccentricityStatic.at(), 0.0),
+            dynamic_eccentricity: unbalance || departs(MotorParameter::EccentricityDynamic.at(), 0.0),
+        };
+        let resolver_lost = departs(ResolverParameter::PowerOff.at(), 0.0);
+        let open_phase = (MotorParameter::OpenA.at()..=MotorParameter::OpenC.at()).any(|i| departs(i, 0.0));
+        let base = InverterParameter::SupplyVoltage.at();
+        let detailed = InverterParameter::DETAIL.clone().any(|i| departs(base + i, 0.0));
+        let stops = resolver_lost && choice(DriveParameter::FeedbackLoss.at()) == 1;
+        let bridge = open_phase || detailed || drive == Drive::Off || stops;
+        let switches = InverterParameter::OpenAHigh as usize..=InverterParameter::ShortedCLow as usize;
+        let switch_faults = switches.into_iter().any(|i| departs(base + i, 0.0));
+        let trips = switch_faults || departs(InverterParameter::TripCurrent.at(), 0.0);
+        let bridge_structure = BridgeStructure { switch_faults, open_phases: open_phase, trips };
+        let elastic = choice(PlayParameter::Model.at()) == 1;
+        let first_gain = CurrentSensorParameter::GainA.at();
+        let measured_current = !CurrentSensor::<f64>::ideal(raw.current_sensor()) || (0..9).any(|i| setup.touched[first_gain + i]);
+        let first_resolver = ResolverParameter::Mismatch.at();
+        let resolver = !Resolver::<f64>::ideal(raw.resolver()) || (0..5).any(|i| setup.touched[first_resolver + i]);
+        let accounts = setup.recorded.iter().any(|&s| F::HIGH[s].name.starts_with("energy"));
+        let loaded = F::LINEAR || departs(GearParameter::Efficiency.at(), 1.0) || departs(GearParameter::EfficiencyAiding.at(), 1.0);
+        let sloped = departs(FrictionParameter::ViscousSlope.at(), 0.0);
+        let jams = departs(FrictionParameter::JamTorque.at(), 0.0);
+        let mechanical = loaded || sloped || jams;
+        let thermal =
+            departs(MotorParameter::TemperatureCoefficient.at(), 0.0) || departs(MotorParameter::FluxTemperatureCoefficient.at(), 0.0);
+        let told = control.feedback != 0;
+        let heat = choice(ThermalParameter::Model.at()) != 0;
+        let tap = (TapParameter::LevelA.at()..=TapParameter::LevelC.at()).any(|i| departs(i, 0.0));
+        let load_side = F::LINEAR || departs(LoadParameter::Damping.at(), 0.0) || departs(LoadParameter::Friction.at(), 0.0);
+        let current_filter = setup.raw[CurrentSensorParameter::Bandwidth.at()] > 0.0;
+        let six_step = choice(DriveParameter::Commutation.at()) == 1;
+        let commutated = choice(DriveParameter::CommutationSource.at()) == 0;
+        let (spall, debris) = F::worn(&departs);
+        let separate = resolver && !commutated;
+        let extra = load_side || heat || tap || unbalance || spall || debris || current_filter || six_step || separate || stops;
+        let full = bridge
+            || extra
+            || elastic
+            || measured_current
+            || resolver
+            || accounts
+            || mechanical
+            || thermal
+            || told
+            || motor.trapezoidal
+            || motor.shorted_loop
+            || motor.dynamic_eccentricity;
+        Self {
+            drive,
+            control,
+            motor,
+            control_every_step: sample_steps(setup.raw, ControlParameter::SampleTime.at()) <= 1,
+            semi_implicit: choice(SolverParameter::Method.at()) == 1,
+            acquisition: setup
+                .recorded
+                .iter()
+                .any(|&s| (HighSignal::CurrentQMeas as usize..=HighSignal::VoltageQMeas as usize).contains(&s)),
+            full,
+            bridge,
+            bridge_structure,
+            elastic,
+            measured_current,
+            resolver,
+            accounts,
+            loaded,
+            sloped,
+            jams,
+            thermal,
+            extra,
+            linear: F::LINEAR,
+            load_side,
+            heat,
+            tap,
+            unbalance,
+            spall,
+            debris,
+            current_filter,
+            six_step,
+            commutated,
+            stops,
+        }
+    }
+}
+
+/// Whole solver steps in a sample time.
+pub(super) fn sample_steps(raw: &[f64], index: usize) -> Steps {
+    (raw[index] / raw[SolverParameter::Step.at()]).round() as Steps
+}

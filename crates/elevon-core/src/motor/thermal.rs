@@ -1,0 +1,163 @@
+//! Thermal network of a motor: winding, surface, ambient air (N 3.2, eq. 1; docs/theory/thermal.md).
+//!
+//! The copper heat is summed by the inner loop; the network advances on its own tick with the mean heat of that tick, so
+//! no heat is lost between the clocks. Temperatures and the heat given away follow from the same flows: the energy
+//! closes to rounding at any tick.
+
+use crate::scalar::Scalar;
+use crate::variables;
+
+/// Stefan-Boltzmann constant, W/(m2 K4).
+const STEFAN_BOLTZMANN: f64 = 5.670_374_419e-8;
+/// Newton steps on the surface temperature; the function is convex, so they converge from any start.
+const NEWTON: usize = 12;
+
+variables! {
+    /// The thermal network of a motor.
+    ThermalParameter, THERMAL {
+        Model => "model", "-", "1", Choice(&["off", "quasi_static", "dynamic"]), Plant, Some(0.0), "off: the winding's temperature is an input; quasi_static: surface without capacity, as printed; dynamic: a housing with capacity";
+        WindingMass => "winding_mass", "m", "kg", Positive, Plant, Some(1.0), "mass of the winding";
+        WindingHeat => "winding_heat", "c", "J/(kg K)", Positive, Plant, Some(385.0), "specific heat of the winding";
+        HousingCapacity => "housing_capacity", "C_h", "J/K", Positive, Plant, Some(1000.0), "heat capacity of the housing (dynamic)";
+        WindingToSurface => "winding_to_surface", "R_th", "K/W", Positive, Plant, Some(1.0), "thermal resistance from the winding to the surface";
+        Convection => "convection", "h", "W/(m2 K)", NonNegative, Plant, Some(10.0), "heat transfer coefficient of the surface";
+        Area => "area", "A", "m2", Positive, Plant, Some(0.1), "cooled surface";
+        Emissivity => "emissivity", "epsilon", "1", Unit, Plant, Some(0.9), "emissivity of the surface; 0: no radiation";
+        Ambient => "ambient", "T_a", "K", Positive, Plant, Some(293.15), "temperature of the air";
+        Warning => "warning", "-", "K", Positive, Controller, Some(403.15), "winding temperature above which the warning is set";
+        Trip => "trip", "-", "K", Positive, Controller, Some(428.15), "winding temperature at which the drive opens its bridge and the run ends";
+        SampleTime => "sample_time", "-", "s", Positive, Solver, Some(0.01), "tick of the network";
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Network<S> {
+    winding_capacity: S,
+    /// Zero: the surface has no capacity.
+    housing_capacity: S,
+    resistance: S,
+    convection: S,
+    radiation: S,
+    ambient: S,
+    pub warning: S,
+    pub trip: S,
+    period: S,
+    coefficient: S,
+    flux_coefficient: S,
+    reference: S,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct NetworkState<S> {
+    pub winding: S,
+    pub surface: S,
+    /// Heat of the phases and of the shorted turns since the last tick, J.
+    pub collected: [S; 2],
+    /// Mean of the last tick, W: phases, shorted turns, given to the air.
+    pub power: [S; 3],
+    /// Since the start, J.
+    pub heat_in: S,
+    pub heat_out: S,
+    begin: [S; 2],
+    /// 1 once the winding has passed the trip temperature.
+    pub over: S,
+}
+
+impl<S: Scalar> Network<S> {
+    /// `temperature` holds reference, coefficient of the resistance and of the flux; `period` the network's tick, s.
+    pub fn derive(raw: &[S], temperature: [S; 3], period: f64) -> Self {
+        use ThermalParameter as P;
+        let g = |p: P| raw[p as usize];
+        let dynamic = S::splat(1.5).lt(g(P::Model));
+        Self {
+            winding_capacity: g(P::WindingMass) * g(P::WindingHeat),
+            housing_capacity: S::select(dynamic, g(P::HousingCapacity), S::zero()),
+            resistance: g(P::WindingToSurface),
+            convection: g(P::Convection) * g(P::Area),
+            radiation: S::splat(STEFAN_BOLTZMANN) * g(P::Emissivity) * g(P::Area),
+            ambient: g(P::Ambient),
+            warning: g(P::Warning),
+            trip: g(P::Trip),
+            period: S::splat(period),
+            reference: temperature[0],
+            coefficient: temperature[1],
+            flux_coefficient: temperature[2],
+        }
+    }
+
+    /// Both nodes at the given temperatures; a surface without capacity follows the winding at once.
+    pub fn start(&self, winding: S, surface: S) -> NetworkState<S> {
+        let zero = S::zero();
+        let quasi = self.housing_capacity.equals(zero);
+        let settled = self.surface_after(winding, surface, zero, zero, zero);
+        let surface = S::select(quasi, settled, surface);
+        NetworkState {
+            winding,
+            surface,
+            collected: [zero; 2],
+            power: [zero; 3],
+            heat_in: zero,
+            heat_out: zero,
+            begin: [winding, surface],
+            over: zero,
+        }
+    }
+
+    /// Heat to the air at a surface temperature, W.
+    #[inline(always)]
+    fn to_air(&self, surface: S) -> S {
+        let fourth = |t: S| t.square().square();
+        self.convection * (surface - self.ambient) + self.radiation * (fourth(surface) - fourth(self.ambient))
+    }
+
+    /// Surface temperature at the end of an implicit step: `gain` is its length over the winding's capacity,
+    /// `inertia` the housing's capacity over it.
+    fn surface_after(&self, winding: S, surface: S, power: S, gain: S, inertia: S) -> S {
+        let series = self.resistance + gain;
+        // The winding's own balance, eliminated: what flows to the surface is (T_w + a P - T_s) / (R + a).
+        let driving = winding + gain * power;
+        let slope = inertia + S::one() / series + self.convection;
+        let mut t = surface;
+        for _ in 0..NEWTON {
+            let residue = inertia * (t - surface) - (driving - t) / series + self.to_air(t);
+            t = t - residue / (slope + S::splat(4.0) * self.radiation * t * t * t);
+        }
+        t
+    }
+
+    /// One tick with the heat collected since the last one.
+    pub fn tick(&self, s: &mut NetworkState<S>) {
+        let zero = S::zero();
+        let quasi = self.housing_capacity.equals(zero);
+        let (copper, loops) = (s.collected[0] / self.period, s.collected[1] / self.period);
+        let power = copper + loops;
+        let gain = self.period / self.winding_capacity;
+        let surface = self.surface_after(s.winding, s.surface, power, gain, self.housing_capacity / self.period);
+        let through = (s.winding + gain * power - surface) / (self.resistance + gain);
+        let out = S::select(quasi, through, self.to_air(surface));
+        s.heat_in = s.heat_in + self.period * power;
+        s.heat_out = s.heat_out + self.period * out;
+        s.winding = s.winding + gain * (power - through);
+        let capacity = S::select(quasi, S::one(), self.housing_capacity);
+        s.surface = S::select(quasi, surface, s.surface + self.period / capacity * (through - out));
+        s.collected = [zero; 2];
+        s.power = [copper, loops, out];
+        s.over = S::select(self.trip.lt(s.winding), S::one(), s.over);
+    }
+
+    /// Factors on the winding's resistance (its own temperature) and on the flux (the surface's).
+    pub fn factors(&self, s: &NetworkState<S>) -> (S, S) {
+        let one = S::one();
+        (one + self.coefficient * (s.winding - self.reference), one + self.flux_coefficient * (s.surface - self.reference))
+    }
+
+    /// Heat in both nodes above that of the start, J.
+    pub fn stored(&self, s: &NetworkState<S>) -> S {
+        self.winding_capacity * (s.winding - s.begin[0]) + self.housing_capacity * (s.surface - s.begin[1])
+    }
+
+    /// 1 while the winding is above its warning.
+    pub fn warns(&self, s: &NetworkState<S>) -> S {
+        S::indicator(self.warning.lt(s.winding))
+    }
+}

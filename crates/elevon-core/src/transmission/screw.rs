@@ -1,0 +1,168 @@
+//! Ball screw: efficiencies, preload, blocked return channels, starved and contaminated lubrication, spalls
+//! (docs/theory/ballscrew.md, "Screw" and "Faults").
+//!
+//! A set gives the two efficiencies; they mean a friction coefficient on the inclined plane of the thread. Faults add
+//! to that coefficient, and the efficiencies follow. With nothing added the set's own numbers are used unchanged.
+
+use crate::scalar::Scalar;
+use crate::variables;
+use std::f64::consts::{PI, TAU};
+
+variables! {
+    /// The ball screw and its nut.
+    ScrewParameter, SCREW {
+        Lead => "lead", "-", "m/rad", Positive, Plant, None, "travel of the nut per radian of the screw";
+        PitchDiameter => "pitch_diameter", "d_m", "m", Positive, Plant, Some(0.032), "diameter of the circle on which the balls run";
+        BallDiameter => "ball_diameter", "d_b", "m", Positive, Plant, Some(0.00635), "diameter of a ball";
+        ContactAngle => "contact_angle", "alpha", "rad", Between(0.1, 1.5), Plant, Some(std::f64::consts::FRAC_PI_4), "contact angle of the balls";
+        BallsPerTurn => "balls_per_turn", "Z", "1", AtLeast(1.0), Plant, Some(15.0), "balls in one turn";
+        Circuits => "circuits", "n", "1", AtLeast(1.0), Plant, Some(4.0), "return channels, each with one turn of balls";
+        NutLength => "nut_length", "-", "m", Positive, Plant, Some(0.05), "length of the nut: a defect of the screw's groove is felt while it is covered";
+        Efficiency => "efficiency", "eta", "1", Fraction, Plant, None, "efficiency under a load that opposes motion";
+        EfficiencyAiding => "efficiency_aiding", "eta_prime", "1", Between(-1e3, 1.0), Plant, None, "efficiency under a load that aids motion; 0 or less: the load cannot back-drive";
+        Preload => "preload", "F_pr", "N", NonNegative, Plant, Some(0.0), "force between the two nut halves";
+        Inertia => "inertia", "J_s", "kg m2", NonNegative, Plant, Some(0.0), "inertia of the screw";
+        FrictionSliding => "friction_sliding", "mu_s", "1", Unit, Plant, Some(0.10), "friction coefficient of balls that slide (blocked return, spalled track)";
+        FrictionDry => "friction_dry", "mu_dry", "1", Unit, Plant, Some(0.05), "friction coefficient without lubricant";
+        BlockedCircuits => "blocked_circuits", "b", "1", NonNegative, Plant, Some(0.0), "healthy 0; return channels that are jammed";
+        LubricantLost => "lubricant_lost", "s", "1", Unit, Plant, Some(0.0), "healthy 0; fraction of the lubricant lost";
+        Debris => "debris", "c", "1", Between(0.0, 0.05), Plant, Some(0.0), "healthy 0; mass of debris over mass of grease";
+        SpallGroove => "spall_groove", "w", "m", Between(0.0, 5e-3), Plant, Some(0.0), "healthy 0; length of a spall in the screw's groove";
+        SpallNut => "spall_nut", "w", "m", Between(0.0, 5e-3), Plant, Some(0.0), "healthy 0; length of a spall in the nut's groove";
+        SpallBall => "spall_ball", "w", "m", Between(0.0, 5e-3), Plant, Some(0.0), "healthy 0; length of a spall on a ball";
+        SpallDepth => "spall_depth", "d", "m", Between(0.0, 1e-3), Plant, Some(2e-4), "depth of the spalls, unless their chord is shallower";
+        SpallPosition => "spall_position", "-", "m", Any, Plant, Some(0.0), "ram position at which the nut's middle stands over the groove's spall";
+    }
+}
+
+variables! {
+    /// What the maker allows; feeds flags and scaling only.
+    RatingParameter, RATING {
+        Current => "current", "-", "A", Positive, Load, Some(1e9), "continuous phase current, peak";
+        Load => "load", "-", "N", Positive, Load, Some(1e9), "largest continuous load";
+    }
+}
+
+/// Film parameter with all of its lubricant, from which the asperities' share of the load follows as exp(-Lambda).
+const FULL_FILM: f64 = 3.0;
+/// Friction coefficient added per mass fraction of debris.
+const DEBRIS_FRICTION: f64 = 0.5;
+
+/// One defect that balls pass.
+#[derive(Clone, Copy, Debug)]
+struct Defect<S> {
+    /// Passes per fast-shaft radian.
+    passes: S,
+    /// One over the half width of a pass, in radians of the ball spacing.
+    per_width: S,
+    drop: S,
+}
+
+/// The screw as the fast shaft feels it.
+#[derive(Clone, Copy, Debug)]
+pub struct Screw<S> {
+    pub efficiency: S,
+    pub efficiency_aiding: S,
+    /// Friction torque of the preload on the fast shaft.
+    pub preload_torque: S,
+    /// Factor on the viscous friction: starved grease drags less.
+    pub viscous: S,
+    /// Spread of the dry friction under debris.
+    pub scatter: S,
+    preload: S,
+    per_balls: S,
+    defects: [Defect<S>; 3],
+    position: S,
+    reach: S,
+}
+
+/// Friction coefficients of driving and back-driving.
+fn coefficients<S: Scalar>(t: S, eta: S, aiding: S) -> [S; 2] {
+    let one = S::one();
+    [(one - eta) * t / (eta + t * t), (one - aiding) * t / (one + aiding * t * t)]
+}
+
+impl<S: Scalar> Screw<S> {
+    /// No screw: nothing is lost in it.
+    pub fn none() -> Self {
+        let (zero, one) = (S::zero(), S::one());
+        let defect = Defect { passes: zero, per_width: zero, drop: zero };
+        Self {
+            efficiency: one,
+            efficiency_aiding: one,
+            preload_torque: zero,
+            viscous: one,
+            scatter: zero,
+            preload: zero,
+            per_balls: zero,
+            defects: [defect; 3],
+            position: zero,
+            reach: zero,
+        }
+    }
+
+    /// `gear` is the ratio of a gearbox between motor and screw.
+    pub fn derive(raw: &[S], gear: S) -> Self {
+        use ScrewParameter as P;
+        let g = |p: P| raw[p as usize];
+        let (zero, one) = (S::zero(), S::one());
+        let slope = S::splat(2.0) * g(P::Lead) / g(P::PitchDiameter);
+        let level = one / (one + slope * slope).sqrt();
+        let (sin, cos) = g(P::ContactAngle).sin_cos();
+        let spacing = S::splat(PI) * g(P::PitchDiameter) / (g(P::BallsPerTurn) * level);
+        let (balls, mu) = (g(P::BallsPerTurn) * g(P::Circuits), coefficients(slope, g(P::Efficiency), g(P::EfficiencyAiding)));
+        let spalls = [g(P::SpallGroove), g(P::SpallNut), g(P::SpallBall)];
+        let sliding = g(P::BlockedCircuits).floor() / g(P::Circuits) + (spalls[0] + spalls[1] + spalls[2]) / (balls * spacing);
+        let full = S::splat(-FULL_FILM).exp();
+        let asperities = ((S::splat(-FULL_FILM) * (one - g(P::LubricantLost))).exp() - full) / (one - full);
+        let debris = S::splat(DEBRIS_FRICTION) * g(P::Debris);
+        let worn = mu.map(|mu| sliding * (g(P::FrictionSliding) - mu) + asperities * (g(P::FrictionDry) - mu) + debris);
+        let healthy = sliding.equals(zero) & asperities.equals(zero) & debris.equals(zero);
+        let (drive, back) = (mu[0] + worn[0], mu[1] + worn[1]);
+        let efficiency = S::select(healthy, g(P::Efficiency), (one - drive * slope) / (one + drive / slope));
+        let aiding = S::select(healthy, g(P::EfficiencyAiding), (one - back / slope) / (one + back * slope));
+        let gamma = g(P::BallDiameter) * cos / g(P::PitchDiameter);
+        let half = S::splat(0.5) * g(P::BallsPerTurn);
+        let passes = [half * (one + gamma), half * (one - gamma), g(P::PitchDiameter) / g(P::BallDiameter) * (one - gamma * gamma)];
+        let defect = |i: usize| {
+            let (length, present) = (spalls[i], zero.lt(spalls[i]));
+            let chord = length * length / (S::splat(4.0) * g(P::BallDiameter));
+            let per_width = spacing / (S::splat(PI) * S::select(present, length, spacing));
+            Defect { passes: passes[i] / gear, per_width, drop: chord.minimum(g(P::SpallDepth)) }
+        };
+        Self {
+            efficiency,
+            efficiency_aiding: aiding,
+            preload_torque: g(P::Preload) * g(P::Lead) / gear * (one / efficiency - aiding),
+            viscous: one - g(P::LubricantLost),
+            scatter: g(P::Debris).sqrt(),
+            preload: g(P::Preload),
+            per_balls: one / (balls * sin * level),
+            defects: [defect(0), defect(1), defect(2)],
+            position: g(P::SpallPosition),
+            reach: S::splat(0.5) * g(P::NutLength),
+        }
+    }
+
+    /// Torque of the balls that fall into the spalls and climb out of them, and the mean friction they leave; both on
+    /// the fast shaft. `force` goes through the nut, `ram` is its position.
+    #[inline(always)]
+    pub fn spall(&self, angle: S, force: S, ram: S) -> (S, S) {
+        let zero = S::zero();
+        let ball = (force.abs() + self.preload) * self.per_balls;
+        let covered = (ram - self.position).abs().le(self.reach);
+        let (mut torque, mut friction) = (zero, zero);
+        for (i, d) in self.defects.iter().enumerate() {
+            let turned = d.passes * angle;
+            let psi = turned - S::splat(TAU) * (turned * S::splat(1.0 / TAU)).round();
+            let u = psi * d.per_width;
+            let felt = if i == 0 { S::select(covered, ball * d.drop, zero) } else { ball * d.drop };
+            // E = -Q delta (1 - u^2)^2 inside the spall.
+            let inside = u.abs().lt(S::one());
+            let pull = S::splat(-4.0) * felt * u * (S::one() - u * u) * d.per_width * d.passes;
+            torque = torque + S::select(inside, pull, zero);
+            friction = friction + S::splat(0.5 / TAU) * felt * d.passes;
+        }
+        (torque, friction)
+    }
+}

@@ -1,0 +1,332 @@
+"""What is done on the bench: typed steps, read from TOML.
+
+The package's own procedures (`procedures/*.toml`) and a user's are the same kind of file. Steps
+change the bench one after the other; each ``trace`` step records one log with the bench as it
+stands.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    StrictFloat,
+    StrictInt,
+    StrictStr,
+    field_validator,
+    model_validator,
+)
+
+from elevon.documents import read_toml, validated
+from elevon.errors import InputError, unknown
+from elevon.scenario.scenario import Command, Term
+from elevon.units import parse_quantity
+
+__all__ = [
+    "BrakeStep",
+    "PlayStep",
+    "Procedure",
+    "SettingsStep",
+    "SpringStep",
+    "Step",
+    "TraceStep",
+    "WeightsStep",
+    "load_procedure",
+    "procedure_names",
+]
+
+Quantity = StrictInt | StrictFloat | StrictStr
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,59}\Z")
+
+
+class _Frozen(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+def _checked(value: Quantity, unit: str, low: float, name: str) -> Quantity:
+    """Return a quantity as given, after its unit and its lower limit have been checked."""
+    try:
+        number = parse_quantity(value, unit, name)
+    except InputError as error:
+        raise ValueError(str(error)) from error
+    if number < low:
+        raise ValueError(f"{name} = {value} is below {low:g} {unit}")
+    return value
+
+
+def _plain_name(value: str) -> str:
+    """Refuse what is no plain file name, or would be taken for a log's companion."""
+    if not _NAME.match(value) or value.endswith(("_loadcell", "_command")):
+        raise ValueError(f"{value!r} is not a plain file name (letters, digits, '-', '_')")
+    return value
+
+
+class PlayStep(_Frozen):
+    """Set the play: by the micrometer, as a net play (intrinsic play added), or in total.
+
+    Attributes
+    ----------
+    micrometer : quantity, optional
+        Reading, mm.
+    curve : str
+        ``geometric`` or ``measured``: how a reading becomes a play.
+    net, total : quantity, optional
+        Play at the user; `net` is what the spacing adds to the gear's own.
+    """
+
+    kind: Literal["play"]
+    micrometer: Quantity | None = None
+    curve: Literal["geometric", "measured"] = "measured"
+    net: Quantity | None = None
+    total: Quantity | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        given = [n for n in ("micrometer", "net", "total") if getattr(self, n) is not None]
+        if len(given) != 1:
+            raise ValueError("a play needs exactly one of 'micrometer', 'net', 'total'")
+        try:
+            self.value()
+        except InputError as error:
+            raise ValueError(str(error)) from error
+        return self
+
+    def value(self) -> float:
+        """Return the total play at the user [rad]."""
+        from elevon.bench.micrometer import INTRINSIC_PLAY, total_play
+
+        if self.micrometer is not None:
+            reading = 1e3 * parse_quantity(self.micrometer, "m", "micrometer")
+            return total_play(reading, self.curve)
+        text, extra = (self.net, INTRINSIC_PLAY) if self.net is not None else (self.total, 0.0)
+        assert text is not None
+        play = parse_quantity(text, "rad", "play")
+        if play < 0.0:
+            raise InputError(f"play = {text} must not be negative")
+        return play + extra
+
+
+class BrakeStep(_Frozen):
+    """Set what the brake's loop is asked for; no terms: the brake is off.
+
+    Attributes
+    ----------
+    terms : tuple of Term
+        Sum of waveforms, N m on the fast shaft, counted from the trigger.
+    """
+
+    kind: Literal["brake"]
+    terms: tuple[Term, ...] = ()
+
+
+class SpringStep(_Frozen):
+    """Fit the springs of the load module, or take them off.
+
+    Attributes
+    ----------
+    fitted : bool
+        Whether the cables are hooked on.
+    stiffness : quantity
+        Of each of the two springs, N/m.
+    radius : quantity
+        Of the winding guide, m.
+    extension : quantity
+        Of each spring while the user stands at zero, m.
+    mover : quantity
+        Displacement of the mover, m: adds a radial force on the guide.
+    """
+
+    kind: Literal["spring"]
+    fitted: bool = True
+    stiffness: Quantity = 61.4
+    radius: Quantity = 0.080
+    extension: Quantity = 0.10
+    mover: Quantity = 0.0
+
+    @field_validator("stiffness")
+    @classmethod
+    def _stiffness(cls, value: Quantity) -> Quantity:
+        return _checked(value, "N/m", 0.0, "stiffness")
+
+    @field_validator("radius", "extension", "mover")
+    @classmethod
+    def _length(cls, value: Quantity) -> Quantity:
+        return _checked(value, "m", 0.0, "length")
+
+
+class Drop(_Frozen):
+    """One mass hung on each cable from a time to another, counted from the trigger."""
+
+    mass: Quantity
+    at: Quantity
+    until: Quantity
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        _checked(self.mass, "kg", 0.0, "mass")
+        _checked(self.at, "s", 0.0, "at")
+        start, stop = (parse_quantity(x, "s") for x in (self.at, self.until))
+        if stop <= start:
+            raise ValueError(f"until = {self.until} must be after at = {self.at}")
+        return self
+
+
+class WeightsStep(_Frozen):
+    """Hang weights on the winding guide's cables; no drops: none.
+
+    Attributes
+    ----------
+    drops : tuple of Drop
+        In the order of time, not overlapping.
+    cables : int
+        One or two cables carry the mass each.
+    radius : quantity
+        Of the winding guide, m.
+    """
+
+    kind: Literal["weights"]
+    drops: tuple[Drop, ...] = ()
+    cables: Literal[1, 2] = 2
+    radius: Quantity = 0.080
+
+    @model_validator(mode="after")
+    def _apart(self) -> Self:
+        ends = 0.0
+        for drop in self.drops:
+            if parse_quantity(drop.at, "s") < ends:
+                raise ValueError(f"the drop at {drop.at} begins before the one before it ends")
+            ends = parse_quantity(drop.until, "s")
+        return self
+
+
+class SettingsStep(_Frozen):
+    """Change parameters of the actuator for the logs that follow, such as the drive's gains."""
+
+    kind: Literal["settings"]
+    parameters: dict[str, Quantity]
+
+
+class TraceStep(_Frozen):
+    """Record one log.
+
+    Attributes
+    ----------
+    name : str
+        File name without ending.
+    duration : quantity
+        Length of the log, s.
+    command : Command
+        As in a scenario, counted from the command's start.
+    """
+
+    kind: Literal["trace"]
+    name: StrictStr
+    duration: Quantity
+    command: Command = Command()
+
+    @field_validator("name")
+    @classmethod
+    def _plain(cls, value: str) -> str:
+        return _plain_name(value)
+
+    @field_validator("duration")
+    @classmethod
+    def _long(cls, value: Quantity) -> Quantity:
+        _checked(value, "s", 0.0, "duration")
+        if parse_quantity(value, "s") < 1.0:
+            raise ValueError(f"duration = {value}: a log lasts 1 s at least")
+        return value
+
+
+Step = Annotated[
+    PlayStep | BrakeStep | SpringStep | WeightsStep | SettingsStep | TraceStep,
+    Field(discriminator="kind"),
+]
+
+
+class Procedure(_Frozen):
+    """A bench procedure.
+
+    Attributes
+    ----------
+    name, text : str
+        What it is called and what it is for.
+    step : tuple of Step
+        In order; at least one of them a trace, each trace with a name of its own.
+    """
+
+    name: StrictStr
+    text: StrictStr = ""
+    step: tuple[Step, ...]
+
+    @field_validator("name")
+    @classmethod
+    def _plain(cls, value: str) -> str:
+        return _plain_name(value)
+
+    @model_validator(mode="after")
+    def _traced(self) -> Self:
+        names = [item.name for item in self.step if isinstance(item, TraceStep)]
+        if not names:
+            raise ValueError("no step of kind 'trace': nothing would be recorded")
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"two traces are named {name!r}")
+        return self
+
+    @property
+    def traces(self) -> tuple[TraceStep, ...]:
+        """The steps that record."""
+        return tuple(item for item in self.step if isinstance(item, TraceStep))
+
+
+def procedure_names() -> list[str]:
+    """Return the names of the package's own procedures."""
+    folder = files("elevon.bench") / "procedures"
+    return sorted(
+        item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml")
+    )
+
+
+def load_procedure(reference: str | os.PathLike[str]) -> Procedure:
+    """Load a procedure by its name, or from a TOML file.
+
+    Raises
+    ------
+    UnknownNameError
+        No procedure of that name, and no such file.
+    InputError
+        The file is wrong; the message holds file, line, key, limit and the nearest names.
+    """
+    text = os.fspath(reference)
+    names = procedure_names()
+    if text in names:
+        path = Path(str(files("elevon.bench") / "procedures" / f"{text}.toml"))
+    elif text.endswith(".toml") or os.sep in text:
+        path = Path(text)
+    else:
+        raise unknown("procedure", text, names)
+    document = read_toml(path)
+    return validated(Procedure, _located(document.data, path.parent), document)
+
+
+def _located(data: Any, folder: Path) -> Any:
+    """Make the files named in tables relative to the procedure's folder."""
+    if isinstance(data, list):
+        return [_located(item, folder) for item in data]
+    if not isinstance(data, Mapping):
+        return data
+    return {
+        key: str((folder / item).resolve())
+        if key == "file" and isinstance(item, str)
+        else _located(item, folder)
+        for key, item in data.items()
+    }

@@ -1,0 +1,162 @@
+"""What the bench writes of one run: the drive's trace, the load cell's file, the command note."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.bench.loadcell import Hx711, write_loadcell
+from elevon.bench.logs.drive import DriveFormat, write_drive_csv
+from elevon.bench.rig import RATE, Setup
+from elevon.bench.waveforms import WAVEFORMS
+from elevon.files import write_text
+from elevon.units import parse_quantity
+
+if TYPE_CHECKING:
+    from elevon.recording import Recording
+
+__all__ = ["recorded", "trace_files", "write_traces"]
+
+Floats = npt.NDArray[np.float64]
+
+_LOGGED = {
+    "encoder_position": "encoder_position",
+    "resolver_position": "resolver_position",
+    "resolver_speed": "motor_speed",
+    "speed_ref": "speed_ref",
+    "current_ref": "current_ref",
+    "current_d_meas": "current_d_meas",
+    "current_q_meas": "current_q_meas",
+}
+_CELL = ("motor_speed", "friction_torque", "user_position")
+_VOLTAGES = ("voltage_q_ref", "voltage_q_meas")
+
+
+def recorded(known: list[str]) -> str:
+    """Return what must be recorded, of the signals that a model has."""
+    wanted = [*_LOGGED, *_VOLTAGES, *_CELL]
+    return f"{','.join(name for name in wanted if name in known)}@{RATE:g} Hz"
+
+
+def trace_files(folder: Path, name: str, *, cell: bool) -> list[Path]:
+    """Return the files of one log, the trace last: where it stands, the others do."""
+    companions = [folder / f"{name}_command.json"]
+    if cell:
+        companions.append(folder / f"{name}_loadcell.csv")
+    return [*companions, folder / f"{name}.csv"]
+
+
+def write_traces(
+    folder: Path, setup: Setup, recording: Recording, layout: DriveFormat, *, force: bool
+) -> list[Path]:
+    """Write the files of one log, each whole or not at all.
+
+    Raises
+    ------
+    InputError
+        A cable went slack.
+    OutputExistsError, OutputError
+        As `elevon.files.write_text`.
+    """
+    cell = _cell(setup, recording)
+    files = trace_files(folder, setup.trace.name, cell=cell is not None)
+    note = json.dumps(_note(setup, layout), indent=2) + "\n"
+    write_text(files[0], note, force=force)
+    if cell is not None:
+        write_loadcell(files[1], *cell, force=force)
+    write_drive_csv(files[-1], _signals(setup, recording), layout=layout, force=force)
+    return files
+
+
+def _signals(setup: Setup, recording: Recording) -> dict[str, Floats]:
+    """The drive's own channels: its sensors, never the true motions."""
+    time = np.asarray(recording["resolver_position"].time, dtype=np.float64)
+    signals = {"time": time}
+    for name, column in _LOGGED.items():
+        if name in recording:
+            signals[column] = np.asarray(recording[name].values, dtype=np.float64)
+    pwm = setup.actuator.parameters["drive.kind"].value == "pwm"
+    voltage = recording[_VOLTAGES[0] if pwm else _VOLTAGES[1]].values
+    signals["voltage_q_ref"] = np.asarray(voltage, dtype=np.float64)
+    signals["trigger"] = (time >= setup.conditions.trigger).astype(np.float64)
+    return signals
+
+
+def _cell(setup: Setup, recording: Recording) -> tuple[Floats, Floats] | None:
+    """Time and force of the load cell on its own clock, None where it hangs idle."""
+    conditions, rig = setup.conditions, setup.rig
+    converter, stretch = Hx711(), 1.0 + conditions.cell.clock_drift
+    clock = np.asarray(recording["motor_speed"].time, dtype=np.float64)
+    if setup.brake is not None:
+        run = setup.brake
+        at = conditions.trigger + run.time * stretch
+        share = _reaction(setup, recording, np.searchsorted(clock, at).clip(0, len(clock) - 1))
+        force = run.torque * share * rig.equipment.chain_ratio / rig.equipment.arm
+        return run.time, converter.convert(force + run.noise)
+    if rig.springs is None and rig.weights is None:
+        return None
+    time = np.arange(int((clock[-1] - conditions.trigger) / stretch * converter.rate) + 1)
+    time = time / converter.rate
+    user = np.asarray(recording["user_position"].values, dtype=np.float64)
+    force = np.zeros_like(time)
+    if rig.springs is not None:
+        all_forces = rig.springs.forces(user)
+        force += np.interp(conditions.trigger + time * stretch, clock, all_forces)
+    if rig.weights is not None:
+        force += rig.weights.at(time * stretch)
+    rng, cell = np.random.default_rng([conditions.seed, 1]), conditions.cell
+    noise = cell.offset + cell.drift * time + cell.noise * rng.standard_normal(len(time))
+    return time, converter.convert(force + noise)
+
+
+def _reaction(setup: Setup, recording: Recording, index: npt.NDArray[np.intp]) -> Floats:
+    """Torque on the disk over what it could oppose, signed with the motion.
+
+    Sliding: all of it. At rest the brake and the gear's own dry friction share what holds the
+    shaft; how, statics cannot tell: ASSUMED in the ratio of what each could oppose.
+    """
+    speed = np.asarray(recording["motor_speed"].values, dtype=np.float64)[index]
+    held = np.asarray(recording["friction_torque"].values, dtype=np.float64)[index]
+    assert setup.brake is not None
+    able = setup.brake.torque + setup.actuator.parameters.value("friction.static")
+    share = np.clip(held / np.maximum(able, 1e-12), -1.0, 1.0)
+    return np.where(speed == 0.0, share, np.sign(speed))
+
+
+def _note(setup: Setup, layout: DriveFormat) -> dict[str, Any]:
+    """Return what the operator knows: degrees, Hz, s; not when anything began."""
+    note: dict[str, Any] = {}
+    terms = [term for term in setup.trace.command.terms if term.enabled]
+    mode = setup.trace.command.mode
+    if mode == "position" and len(terms) == 1 and terms[0].kind in WAVEFORMS:
+        note |= _waveform(terms[0])
+    note["brake"] = "on" if setup.brake is not None else "off"
+    rig = setup.rig
+    if setup.brake is not None:
+        note["load_cell_arm"] = rig.equipment.arm
+        note["chain_ratio"] = rig.equipment.chain_ratio
+    elif rig.springs is not None or rig.weights is not None:
+        note["load_cell_arm"] = (rig.springs or rig.weights).radius  # type: ignore[union-attr]
+    note["current"] = layout.current_convention
+    return note
+
+
+def _waveform(term: Any) -> dict[str, Any]:
+    from elevon.scenario.waveforms import unit_of, wave_records
+    from elevon.units import to_display
+
+    found: dict[str, Any] = {"waveform": term.kind}
+    for parameter in wave_records()[term.kind].parameters:
+        name = parameter.name
+        given = term.arguments.get(name)
+        if given is None or name in {"start", "end", "time", "phase", "repeat", "hold"}:
+            continue
+        unit = unit_of(parameter, "rad")
+        shown = unit.replace("rad", "deg")
+        value = parse_quantity(given, unit, name)
+        found[name] = float(f"{to_display(value, shown) if unit != shown else value:.12g}")
+    return found

@@ -1,0 +1,174 @@
+"""A calibration written as a parameter set: what changed, from which logs, and what it was."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from elevon.calibrate.estimate import LEVEL, Estimate
+from elevon.files import write_text
+from elevon.parameters import Parameter
+from elevon.parameters.records import record_of
+from elevon.parameters.write import updated_set
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.calibrate.calibration import Calibration
+    from elevon.calibrate.validation import Validation
+
+__all__ = ["calibrated_parameters", "set_text", "thresholds", "write_calibration", "write_values"]
+
+_MARGIN = 2.0  # a threshold over the largest error seen on the logs it comes from
+
+
+def calibrated_parameters(result: Calibration) -> list[Parameter]:
+    """Return the changed parameters with source, old value and interval."""
+    names = ", ".join(log.name for log in result.logs)
+    source = f"calibrated from {names}"
+    known = {item.path: item for item in result.estimates if item.in_set}
+    changes = []
+    for path, entry in result.actuator.parameters.items():
+        old = result.before.parameters[path]
+        item = known.get(path)
+        if item is None and entry.value == old.value:
+            continue
+        wiring = result.actuator.wiring
+        unit = old.unit or _unit(wiring, path)
+        if item is None:
+            note = _followed(path)
+            changes.append(
+                Parameter(path, entry.value, unit, source, note, "calibrated", old.value)
+            )
+            continue
+        given = f"; holds for {', '.join(item.given)} as given" if item.given else ""
+        note = f"{item.note}{'; ' if item.note else ''}{100 * LEVEL:.0f} % interval{given}"
+        changes.append(
+            Parameter(path, item.value, unit, source, note, "calibrated", old.value, item.interval)
+        )
+    return changes
+
+
+def _unit(wiring: str, path: str) -> str:
+    record = record_of(wiring, path)
+    return "" if record.choices is not None or record.unit == "1" else record.unit
+
+
+def _followed(path: str) -> str:
+    reasons = {
+        "friction.static": "not determined: its ratio to friction.dynamic is kept",
+        "control.torque_constant": "the controller is taken to know the motor, as before",
+        "drive.kind": "the kind of drive whose model explains the logs better",
+    }
+    return reasons.get(path, "scaled with motor.inertia: only the sum is determined")
+
+
+def thresholds(validation: Validation) -> dict[str, float]:
+    """Return twice the largest error of each signal over the logs, two digits, rounded up."""
+    found: dict[str, float] = {}
+    for error in validation.errors:
+        if math.isfinite(error.of_range):
+            found[error.signal] = max(found.get(error.signal, 0.0), _MARGIN * error.of_range)
+    return {name: _up(value) for name, value in found.items() if value > 0.0}
+
+
+def _up(value: float) -> float:
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return float(f"{math.ceil(value / unit) * unit:.6g}")
+
+
+def set_text(result: Calibration, *, name: str, base: str, validation: Validation | None) -> str:
+    """Return the TOML text of the calibrated set."""
+    import tomlkit
+
+    head = tomlkit.document()
+    head.add("name", tomlkit.item(name))
+    head.add("title", tomlkit.item(f"{result.before.title or result.before.name}, calibrated"))
+    head.add("base", tomlkit.item(base))
+    if validation is not None:
+        table = tomlkit.table()
+        table.add("transient", validation.transient)
+        limits = tomlkit.table()
+        limits.comment("largest RMS error, percent of the signal's range")
+        for signal, limit in thresholds(validation).items():
+            limits.add(signal, limit)
+        table.add("limits", limits)
+        head.add("validation", table)
+    return updated_set(tomlkit.dumps(head), calibrated_parameters(result))
+
+
+def write_calibration(
+    path: str | os.PathLike[str],
+    result: Calibration,
+    *,
+    validation: Validation | None = None,
+    force: bool = False,
+) -> Path:
+    """Write the set, whole or not at all; errors as `elevon.files.write_text`.
+
+    Parameters
+    ----------
+    path : path
+        The TOML file; the set is named after it.
+    result : Calibration
+        What was found.
+    validation : Validation, optional
+        On the same logs: gives the set its thresholds.
+    force : bool
+        Whether an existing file may be replaced.
+    """
+    target = Path(path).expanduser()
+    name = _name(target.stem)
+    text = set_text(result, name=name, base=_base(result.before, target), validation=validation)
+    return write_text(target, text, force=force)
+
+
+def write_values(
+    path: str | os.PathLike[str],
+    before: Actuator,
+    estimates: Sequence[Estimate],
+    source: str,
+    *,
+    force: bool = False,
+) -> Path:
+    """Write a set that changes the estimated values alone, with their intervals."""
+    import tomlkit
+
+    target = Path(path).expanduser()
+    head = tomlkit.document()
+    head.add("name", tomlkit.item(_name(target.stem)))
+    head.add("base", tomlkit.item(_base(before, target)))
+    changes = []
+    for item in estimates:
+        if item.in_set:
+            unit = before.parameters[item.path].unit or _unit(before.wiring, item.path)
+            note = f"{item.note}; {100 * LEVEL:.0f} % interval"
+            origin = f"calibrated from {source}"
+            changes.append(
+                Parameter(
+                    item.path, item.value, unit, origin, note, "calibrated", item.old, item.interval
+                )
+            )
+    return write_text(target, updated_set(tomlkit.dumps(head), changes), force=force)
+
+
+def _name(stem: str) -> str:
+    kept = "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in stem)
+    return kept if kept and kept[0].isalnum() else f"set-{kept.strip('-._')}"
+
+
+def _base(before: Actuator, target: Path) -> str:
+    """Name of a set of the package, else the way from the new file to the old one."""
+    from elevon.parameters.find import find_set
+
+    path, name = before.path, before.name
+    if path is None:
+        return name
+    try:
+        if find_set(name).resolve() == path.resolve():
+            return name
+    except ValueError:
+        pass
+    return os.path.relpath(path.resolve(), target.resolve().parent).replace(os.sep, "/")

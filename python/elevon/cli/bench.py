@@ -1,0 +1,103 @@
+"""``elevon bench``: the virtual test bench."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from elevon.cli.common import (
+    FaultOption,
+    FidelityOption,
+    ForceOption,
+    JsonOption,
+    SeedOption,
+    SetOption,
+    read_actuator,
+)
+from elevon.cli.output import print_json, print_table, progress_bar, say
+
+app = typer.Typer(
+    no_args_is_help=True, rich_markup_mode=None, help="Run the virtual test bench's procedures."
+)
+
+
+@app.callback()
+def _bench() -> None:
+    """Run the virtual test bench's procedures."""
+
+
+@app.command("list")
+def list_procedures(*, json: JsonOption = False) -> None:
+    """List the procedures that come with the package."""
+    from elevon.bench.procedure import load_procedure, procedure_names
+
+    found = [load_procedure(name) for name in procedure_names()]
+    if json:
+        rows = [{"name": p.name, "text": p.text, "logs": [t.name for t in p.traces]} for p in found]
+        print_json({"procedures": rows})
+        return
+    print_table(("procedure", "logs", "what for"), [(p.name, len(p.traces), p.text) for p in found])
+
+
+@app.command()
+def run(
+    procedure: Annotated[
+        str, typer.Argument(metavar="PROCEDURE", help="A name (elevon bench list) or a TOML file.")
+    ],
+    *,
+    actuator: Annotated[
+        str, typer.Option("--actuator", metavar="ACTUATOR", help="Name of a set, or a file.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the logs.")],
+    fault: FaultOption = None,
+    settings: SetOption = None,
+    seed: SeedOption = 0,
+    fidelity: FidelityOption = "high",
+    current: Annotated[str, typer.Option(help="Convention of the currents: rms or peak.")] = "rms",
+    shaft: Annotated[str, typer.Option(help="Shaft of the encoder column: fast or slow.")] = "fast",
+    truth: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the hidden values (JSON).")
+    ] = None,
+    force: ForceOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Carry out a procedure and write what the bench writes: traces, load cell, command notes."""
+    from elevon.bench.logs.drive import DriveFormat
+    from elevon.bench.procedure import load_procedure
+    from elevon.bench.run import run_procedure
+    from elevon.faults import Fault
+
+    asked = load_procedure(procedure)
+    loaded = read_actuator(actuator, settings)
+    ratio = loaded.parameters.value("gear.ratio") if "gear.ratio" in loaded.parameters else 1.0
+    layout = DriveFormat(encoder_shaft=shaft, current_convention=current, gear_ratio=ratio)
+    faults = [Fault.parse(text) for text in fault or ()]
+    with progress_bar(f"bench: {asked.name}") as advance:
+        result = run_procedure(
+            asked,
+            loaded,
+            out,
+            faults=faults,
+            seed=seed,
+            fidelity=fidelity,
+            layout=layout,
+            truth=truth,
+            force=force,
+            progress=advance,
+        )
+    if json:
+        print_json(result.to_dict())
+        return
+    rows = [
+        (
+            log.name,
+            log.status,
+            "kept" if log.resumed else "made",
+            ", ".join(p.name for p in log.files),
+        )
+        for log in result.logs
+    ]
+    print_table(("log", "status", "", f"files in {out}"), rows)
+    say(f"{result.sim_s:g} s simulated in {result.wall_s:.1f} s")

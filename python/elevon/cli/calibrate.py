@@ -1,0 +1,242 @@
+"""`elevon calibrate`: an actuator's parameters from bench logs."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from elevon.cli.calibrate_drops import is_drop_table, run_drops
+from elevon.cli.common import ForceOption, JsonOption, SetOption, check_outputs, read_actuator
+from elevon.cli.output import print_json, print_table, progress_bar, say
+from elevon.errors import InputError
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.calibrate.calibration import Calibration
+    from elevon.calibrate.log import BenchLog
+    from elevon.calibrate.validation import Validation
+
+app = typer.Typer(rich_markup_mode=None)
+
+LogsArgument = Annotated[list[Path], typer.Argument(metavar="LOG...", help="Drive logs.")]
+ActuatorOption = Annotated[
+    str, typer.Option("--actuator", metavar="ACTUATOR", help="Name of a set, or a file.")
+]
+LoadcellOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--loadcell",
+        help="Load-cell file; one for each log in order. By default NAME_loadcell.csv beside it.",
+    ),
+]
+CommandOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--command",
+        help="Command note; one for each log, or one for all. By default NAME_command.json.",
+    ),
+]
+MapOption = Annotated[Path | None, typer.Option("--map", help="Column map (TOML).")]
+FidelityOption = Annotated[str, typer.Option(help="Of the model runs: low or high.")]
+TransientOption = Annotated[
+    float | None, typer.Option(min=0.0, help="Left out at the beginning of each log [s].")
+]
+ReportOption = Annotated[Path | None, typer.Option("--report", help="HTML page to write.")]
+DateOption = Annotated[str | None, typer.Option(help="Date printed in the report.")]
+
+
+def one_each(
+    option: str, given: list[Path] | None, count: int, *, shared: bool = False
+) -> list[Path | None]:
+    """Spread files over logs.
+
+    A single load-cell file of several logs would be a guess, so it is refused; one command note
+    for all is what a bench run repeated gives.
+    """
+    if not given:
+        return [None] * count
+    if shared and len(given) == 1:
+        return [given[0]] * count
+    if len(given) != count:
+        raise InputError(f"{option}: {len(given)} given for {count} logs; one for each, in order")
+    return list(given)
+
+
+def read(
+    logs: list[Path],
+    loadcell: list[Path] | None,
+    command: list[Path] | None,
+    column_map: Path | None,
+) -> list[BenchLog]:
+    """Import logs with their companions; warnings of the import go to stderr."""
+    from elevon.calibrate.log import read_logs
+
+    found = read_logs(
+        logs,
+        loadcells=one_each("--loadcell", loadcell, len(logs)),
+        commands=one_each("--command", command, len(logs), shared=True),
+        column_map=column_map,
+    )
+    for log in found:
+        for text in log.warnings:
+            say(f"{log.name}: {text}")
+    return found
+
+
+@app.command()
+def calibrate(
+    logs: LogsArgument,
+    *,
+    actuator: ActuatorOption,
+    out: Annotated[Path | None, typer.Option(help="Set to write (TOML).")] = None,
+    loadcell: LoadcellOption = None,
+    command: CommandOption = None,
+    column_map: MapOption = None,
+    free: Annotated[
+        list[str] | None,
+        typer.Option(help="Parameter path to estimate, repeatable; or auto (the default)."),
+    ] = None,
+    fidelity: FidelityOption = "low",
+    transient: TransientOption = None,
+    settings: SetOption = None,
+    report: ReportOption = None,
+    json: JsonOption = False,
+    force: ForceOption = False,
+    date: DateOption = None,
+) -> int:
+    """Estimate what the logs determine, with intervals, and write it as a set."""
+    from elevon.calibrate.calibration import calibrate as run
+    from elevon.calibrate.write import write_calibration
+
+    check_outputs([out, report], force=force)
+    if out is not None and out.suffix.lower() != ".toml":
+        raise InputError(f"--out {out}: a set is a TOML file; end the name in .toml")
+    model = read_actuator(actuator, settings)
+    if len(logs) == 1 and is_drop_table(logs[0]):
+        return _drops(logs[0], model, out, as_json=json, force=force)
+    data = read(logs, loadcell, command, column_map)
+    with progress_bar("calibrating") as advance:
+        result = run(
+            data,
+            model,
+            free=_paths(free),
+            fidelity=fidelity,
+            transient=transient,
+            progress=lambda f: advance(0.9 * f),
+        )
+        before, after = _agreement(data, result, transient)
+        advance(1.0)
+    if out is not None:
+        say(f"set: {write_calibration(out, result, validation=after, force=force)}")
+    if report is not None:
+        page = _page(result, before, after, date)
+        say(f"report: {page.save(report, force=force)}")
+    _print(result, before, after, out, as_json=json)
+    return 0
+
+
+def _drops(path: Path, model: Actuator, out: Path | None, *, as_json: bool, force: bool) -> int:
+    """A table of hung weights: stiffness and dead zone."""
+    from elevon.calibrate.write import write_values
+
+    result, facts = run_drops(path, model)
+    if out is not None:
+        say(f"set: {write_values(out, model, result.estimates, path.name, force=force)}")
+    if as_json:
+        print_json(result.to_dict() | facts | {"out": None if out is None else str(out)})
+        return 0
+    rows = [
+        (i.path, f"{i.value:.5g}", f"{i.interval[0]:.5g}", f"{i.interval[1]:.5g}", i.unit)
+        for i in result.estimates
+    ]
+    print_table(("parameter", "value", "low", "high", "unit"), rows)
+    say(f"{len(facts['slips'])} slips mended; {facts['assumed']}")
+    return 0
+
+
+def _paths(free: list[str] | None) -> list[str] | None:
+    """Split ``--free a,b``; auto or nothing: everything that the logs determine."""
+    names = [name.strip() for text in free or () for name in text.split(",") if name.strip()]
+    if not names or names == ["auto"]:
+        return None
+    if "auto" in names:
+        raise InputError("--free auto stands alone: it frees what the logs can determine")
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"--free {name} is given twice")
+    return names
+
+
+def _agreement(
+    data: list[BenchLog], result: Calibration, transient: float | None
+) -> tuple[Validation | None, Validation | None]:
+    """Old and new values in closed loop on the same logs, where positions were logged."""
+    from elevon.calibrate.validation import validate
+
+    if any(log.user is None or log.motor is None for log in data):
+        say("a log lacks a position: the closed loop is not compared")
+        return None, None
+    try:
+        after = validate(data, result.actuator, transient=transient)
+        return validate(data, result.before, transient=after.transient), after
+    except InputError as error:
+        say(f"the closed loop is not compared: {error}")
+        return None, None
+
+
+def _page(
+    result: Calibration, before: Validation | None, after: Validation | None, date: str | None
+) -> Any:
+    from elevon.calibrate.report import calibration_report
+
+    return calibration_report(result, before, after, provenance=_provenance(), date=date)
+
+
+def _provenance() -> dict[str, object]:
+    import elevon
+
+    return {
+        "Elevon": elevon.__version__,
+        "Python": ".".join(str(part) for part in sys.version_info[:3]),
+    }
+
+
+def _print(
+    result: Calibration,
+    before: Validation | None,
+    after: Validation | None,
+    out: Path | None,
+    *,
+    as_json: bool,
+) -> None:
+    if as_json:
+        values = result.to_dict() | {
+            "out": None if out is None else str(out),
+            "validation": {
+                "before": None if before is None else before.to_dict(),
+                "after": None if after is None else after.to_dict(),
+            },
+        }
+        print_json(values)
+        return
+    rows = [
+        (
+            i.path,
+            "" if i.old is None else f"{i.old:.5g}",
+            f"{i.value:.5g}",
+            f"{i.interval[0]:.5g}",
+            f"{i.interval[1]:.5g}",
+            i.unit,
+            i.register,
+            ", ".join(i.given),
+        )
+        for i in result.estimates
+    ]
+    print_table(
+        ("parameter", "before", "after", "low", "high", "unit", "register", "holds for"), rows
+    )
+    for text in result.findings:
+        say(text)

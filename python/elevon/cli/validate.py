@@ -1,0 +1,76 @@
+"""`elevon validate`: an actuator held against logs."""
+
+from __future__ import annotations
+
+import typer
+
+from elevon.cli.calibrate import (
+    ActuatorOption,
+    CommandOption,
+    DateOption,
+    FidelityOption,
+    LoadcellOption,
+    LogsArgument,
+    MapOption,
+    ReportOption,
+    TransientOption,
+    _provenance,
+    read,
+)
+from elevon.cli.common import ForceOption, JsonOption, SetOption, check_outputs, read_actuator
+from elevon.cli.output import print_json, print_table, progress_bar, say
+
+app = typer.Typer(rich_markup_mode=None)
+
+
+@app.command()
+def validate(
+    logs: LogsArgument,
+    *,
+    actuator: ActuatorOption,
+    loadcell: LoadcellOption = None,
+    command: CommandOption = None,
+    column_map: MapOption = None,
+    fidelity: FidelityOption = "low",
+    transient: TransientOption = None,
+    settings: SetOption = None,
+    report: ReportOption = None,
+    json: JsonOption = False,
+    force: ForceOption = False,
+    date: DateOption = None,
+) -> int:
+    """Compare the model with logs, signal by signal; exit 1 where a threshold of the set fails."""
+    from elevon.calibrate.report import validation_report
+    from elevon.calibrate.validation import validate as run
+
+    check_outputs([report], force=force)
+    model = read_actuator(actuator, settings)
+    data = read(logs, loadcell, command, column_map)
+    with progress_bar("validating") as advance:
+        result = run(data, model, fidelity=fidelity, transient=transient, progress=advance)
+        advance(1.0)
+    if report is not None:
+        page = validation_report(result, provenance=_provenance(), date=date)
+        say(f"report: {page.save(report, force=force)}")
+    if json:
+        print_json(result.to_dict())
+    else:
+        rows = [
+            (
+                e.log,
+                e.signal,
+                f"{e.rms:.4g}",
+                f"{e.largest:.4g}",
+                e.unit,
+                f"{e.of_rms:.3g}",
+                f"{e.of_range:.3g}",
+                "" if e.limit is None else f"{e.limit:.3g}",
+                "" if e.passed is None else "pass" if e.passed else "FAIL",
+            )
+            for e in result.errors
+        ]
+        print_table(
+            ("log", "signal", "RMS", "max", "unit", "% of RMS", "% of range", "limit %", ""), rows
+        )
+        say(f"after {result.transient:g} s; {result.status}")
+    return 1 if result.status == "fail" else 0
