@@ -320,7 +320,8 @@ impl Sequence {
 
     fn switches_fail(&mut self, p: &[f64], see: &Seen) -> bool {
         let [at_0, at_25, at_75, lock] = see.switches;
-        let impossible = (at_0 && (at_75 || lock)) || (lock && !at_75) || (at_75 && !at_25);
+        let out_of_order = (lock && !at_75) || (at_75 && !at_25);
+        let impossible = out_of_order || (at_0 && at_75);
         self.impossible = if impossible { self.impossible + see.dt } else { 0.0 };
         if self.impossible > p[SequenceParameter::ProximityTime as usize] {
             return true;

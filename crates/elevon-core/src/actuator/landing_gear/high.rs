@@ -157,7 +157,7 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
     let angle = m.c.star.electrical_angle(s.body.motion.motor_position);
     let advance = (s.body.motion.motor_position - before) * m.c.star.pole_pairs;
     m.c.hall.observe(&mut s.body.hall, angle, advance, t + m.c.dt, m.c.dt);
-    if (k + 1) % m.mechanical == 0 {
+    if (k + 1).is_multiple_of(m.mechanical) {
         let torque = m.c.star.saturate(s.torque * m.per_torque_steps);
         let acting = m.c.acting(&s.body, inputs, torque, t);
         m.c.mechanics.kick(&mut s.body.motion, &acting, structure.rig);
