@@ -1,4 +1,4 @@
-"""The landing gear against closed forms: EMF, six-step torque, lever, energy, back-driving, fall."""
+"""The landing gear against closed forms: EMF, six-step torque, lever, energy, free fall."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def test_the_load_drives_back_only_through_an_efficient_train() -> None:
 
 @pytest.mark.parametrize("fidelity", ["high", "low"])
 def test_free_fall_extends_and_locks_without_the_motor(fidelity: str) -> None:
-    """Gravity alone, motor disconnected and standing, no current; the lock engages by its spring."""
+    """Gravity alone, motor apart and standing, no current; the lock engages by its spring."""
     rec = gear((0.1, "free_fall"), duration=6.0, fidelity=fidelity)
     assert rec.final["state"] == LOCKED
     assert rec.final["locked"] == 1.0
