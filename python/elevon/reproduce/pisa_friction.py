@@ -127,8 +127,8 @@ def reproduce_friction(*, seed: int = 0, progress: Progress | None = None) -> Fr
     )
     put_mass = actuator.parameters.value("screw.moving_mass")
     rows = [FrictionRow("mass", "both", None, None, put_mass, mass, "kg")]
-    for test, (position, force) in zip(tests, forces, strict=True):
-        rows += _friction_rows(actuator, test, position, force, mass, lead)
+    for test, log in zip(tests, forces, strict=True):
+        rows += _friction_rows(actuator, test, log, mass, lead)
     rows += _efficiency_rows(actuator, seed, progress)
     return FrictionResult(rows, _checks(rows), seed)
 
@@ -180,8 +180,9 @@ def _settled(log: Recording, lead: float) -> tuple[Floats, Floats]:
 
 
 def _friction_rows(
-    actuator: Actuator, test: _Test, position: Floats, force: Floats, mass: float, lead: float
+    actuator: Actuator, test: _Test, log: tuple[Floats, Floats], mass: float, lead: float
 ) -> list[FrictionRow]:
+    position, force = log
     resisting = test.direction * (force + mass * GRAVITY)
     kind = "ff" if test.released else "ffm"
     speed = 1e3 * test.speed

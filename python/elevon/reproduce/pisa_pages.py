@@ -193,5 +193,6 @@ def _hydraulic_figure(result: HydraulicResult) -> Figure:
                 one.plot(factors, [r.electric_mm_s for r in rows], "x--", color=colour)
             one.set(xlabel="Load factor", title=direction, ylim=(0, None))
         axes[0].set(ylabel="Ram speed [mm/s]")
+        axes[0].plot([], [], "x--", color=COLOURS["grey"], label="electromechanical, 28 V")
         axes[0].legend()
     return figure
