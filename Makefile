@@ -14,7 +14,7 @@ unexport VIRTUAL_ENV
 unexport CONDA_PREFIX
 
 RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name Cargo.toml)
-DEMO := $(BIN)/elevon reproduce torino-backlash --out out/demo --force
+DEMO := $(BIN)/elevon demo --out out/demo --force
 
 .DELETE_ON_ERROR:
 .PHONY: help setup demo test test-rust test-python test-long lint stubs bench format lock clean
@@ -37,7 +37,7 @@ $(STAMPS)/extension: $(STAMPS)/packages pyproject.toml $(RUST_SOURCES)
 	VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop --release --quiet --locked
 	@touch $@
 
-demo: setup ## the torino-backlash table and its report
+demo: setup ## a published table, then a bench found again from its logs: out/demo/report.html
 	$(DEMO)
 
 test: setup lint test-rust test-python ## every check but the long ones

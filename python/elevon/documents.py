@@ -148,13 +148,31 @@ def _fields(model: Any, location: Sequence[str | int]) -> list[str]:
     """Names of the fields of the model found at a location, following lists and mappings."""
     from pydantic import BaseModel
 
+    annotation = model
     for part in location:
         if isinstance(model, type) and issubclass(model, BaseModel):
             fields = {field.alias or name: field for name, field in model.model_fields.items()}
-            model = _inner_model(fields[str(part)].annotation) if part in fields else model
+            if part in fields:
+                annotation = fields[str(part)].annotation
+                model = _inner_model(annotation)
+            else:  # an index, or the tag of one of several models
+                model = _tagged(annotation, part) or model
     if isinstance(model, type) and issubclass(model, BaseModel):
         return [field.alias or name for name, field in model.model_fields.items()]
     return []
+
+
+def _tagged(annotation: Any, tag: str | int) -> Any:
+    """Find, among the models of an annotation, the one with a literal field of that value."""
+    from typing import get_args
+
+    from pydantic import BaseModel
+
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        literals = (get_args(field.annotation) for field in annotation.model_fields.values())
+        return annotation if any(tag in values for values in literals) else None
+    inner = (_tagged(argument, tag) for argument in get_args(annotation))
+    return next((found for found in inner if found is not None), None)
 
 
 def _inner_model(annotation: Any) -> Any:

@@ -46,8 +46,6 @@ def test_a_written_set_carries_thresholds_and_reads_back(tmp_path, logs, result,
     assert loaded.name == "bench-7"
     for name, value in loaded.parameters.items():
         expected = result.actuator.parameters[name].value
-        if name == "drive.kind":  # the base has the other one, and the set is written over it
-            continue
         assert value.value == (
             pytest.approx(expected, rel=1e-12) if isinstance(expected, float) else expected
         )

@@ -22,7 +22,9 @@ ROWS = [
     ["simulate"],
     ["bench", "campaign"],
     ["calibrate", "compare"],
+    ["lowfit"],
     ["reproduce"],
+    ["demo"],
     ["cli"],
 ]
 RANK = {room: rank for rank, row in enumerate(ROWS) for room in row}

@@ -93,7 +93,7 @@ def test_low_short_raises_the_mean_current_as_high_does() -> None:
                 duration=1.5,
                 mode="speed",
                 command=[constant(40.0)],
-                record="current_q@4 kHz",
+                record="current_q@2 kHz",
                 fidelity=fidelity,
                 scenario={"load": {"shaft": {"terms": [constant(2.0)]}}, "fault": faults},
             )

@@ -63,7 +63,7 @@ def test_make_targets_exist(target):
 
 
 def test_demo_is_the_command_of_this_page():
-    assert "reproduce torino-backlash --out out/demo" in (ROOT / "Makefile").read_text("utf-8")
+    assert "elevon demo --out out/demo" in (ROOT / "Makefile").read_text("utf-8")
 
 
 def test_example(tmp_path):

@@ -157,6 +157,7 @@ def brake_loop(
     terms: Sequence[Term],
     duration: float,
     rng: np.random.Generator,
+    *,
     converter: Hx711 | None = None,
 ) -> BrakeRun:
     """Run the torque loop at the load cell's rate.

@@ -67,7 +67,7 @@ class Rig:
     springs: Springs | None = None
     weights: Weights | None = None
     settings: Mapping[str, str | float] = field(default_factory=dict)
-    equipment: BrakeRig = BrakeRig()
+    equipment: BrakeRig = field(default_factory=BrakeRig)
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,8 @@ def setups(
         does not exist.
     """
     _check(actuator)
-    rig, found = Rig(), []
+    rig = Rig()
+    found: list[Setup] = []
     for step in procedure.step:
         if isinstance(step, TraceStep):
             conditions = draw_conditions(seed, len(found))

@@ -99,15 +99,15 @@ def _cell(setup: Setup, recording: Recording) -> tuple[Floats, Floats] | None:
         return run.time, converter.convert(force + run.noise)
     if rig.springs is None and rig.weights is None:
         return None
-    time = np.arange(int((clock[-1] - conditions.trigger) / stretch * converter.rate) + 1)
-    time = time / converter.rate
+    count = int((clock[-1] - conditions.trigger) / stretch * converter.rate) + 1
+    time = np.arange(count, dtype=np.float64) / converter.rate
     user = np.asarray(recording["user_position"].values, dtype=np.float64)
     force = np.zeros_like(time)
     if rig.springs is not None:
         all_forces = rig.springs.forces(user)
         force += np.interp(conditions.trigger + time * stretch, clock, all_forces)
     if rig.weights is not None:
-        force += rig.weights.at(time * stretch)
+        force += rig.weights.at(np.asarray(time * stretch, dtype=np.float64))
     rng, cell = np.random.default_rng([conditions.seed, 1]), conditions.cell
     noise = cell.offset + cell.drift * time + cell.noise * rng.standard_normal(len(time))
     return time, converter.convert(force + noise)

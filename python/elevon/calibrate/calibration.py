@@ -208,7 +208,7 @@ def calibrate(
         found += controller_estimates(actuator, law, torque, [log.name for log in logs])
     commands = _commands(logs, actuator, found)
     _go(progress, 0.35)
-    found = _asked(found, free, actuator)
+    every, found = found, _asked(found, free, actuator)
     direct = [p for p in free or () if p in KINEMATIC or p == "motor.emf_constant"]
     _missing(direct, found, torque)
     dynamic = None
@@ -225,10 +225,12 @@ def calibrate(
     if dynamic is not None:
         found += dynamic.estimates(actuator, [item.path for item in found], free)
     _missing(free, found, torque)
+    if not any(item.in_set for item in found):
+        raise InputError("the logs determine no parameter: nothing in them moves enough")
     fitted = _with_values(actuator, found, followed, torque, dynamic)
     kept = held_out(logs, keeps, actuator, fitted, part(progress, 0.8, 1.0)) if hold_out else ()
     if "control.derivative_time" in tamed(actuator, _plain(found)):
-        shortened = (
+        shortened: tuple[str, ...] = (
             "control.derivative_time is shortened in the set: as estimated, speed gain times it "
             "exceeds the inertia, which this controller without its filter cannot hold",
         )
@@ -236,6 +238,7 @@ def calibrate(
         shortened = ()
     findings = (
         *shortened,
+        *_undetermined(every, found, free),
         *plant_findings(logs, plant, torque, dynamic, actuator),
         *amplitude_findings(commands, found),
     )
@@ -261,6 +264,18 @@ def calibrate(
 def _telling(regression: Regression | None) -> Regression | None:
     """Drop a regression that explains nothing: its coefficients are noise."""
     return regression if regression and regression.explained > _DOUBTFUL else None
+
+
+def _undetermined(
+    every: Sequence[Estimate], kept: Sequence[Estimate], free: Sequence[str] | None
+) -> list[str]:
+    """Say which direct estimates were too loose, or outside the model, to be taken."""
+    return [
+        f"{item.path} is not taken: {item.value:.4g} +- {item.std:.2g} {item.unit} is not "
+        "determined by the signals, or not possible in the model"
+        for item in every
+        if item.in_set and item not in kept and (free is None or item.path in free)
+    ]
 
 
 def _plain(found: Sequence[Estimate]) -> dict[str, str | float]:

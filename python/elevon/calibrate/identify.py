@@ -19,7 +19,7 @@ Floats = npt.NDArray[np.float64]
 _CORRELATED = 0.95
 _LOOSEST = 0.25  # relative deviation (or of the size of an offset's meaning) still worth freeing
 _HOPELESS = 1.0  # the same, above which a parameter asked for is refused
-_SAME = 0.999  # correlation at which two parameters are one
+_SAME = 0.995  # correlation at which two parameters are one
 
 
 @dataclass(frozen=True)

@@ -33,10 +33,15 @@ def calibrated_parameters(result: Calibration) -> list[Parameter]:
     for path, entry in result.actuator.parameters.items():
         old = result.before.parameters[path]
         item = known.get(path)
-        if item is None and entry.value == old.value:
+        if item is None and entry.value == old.value and old.confidence != "override":
             continue
         wiring = result.actuator.wiring
         unit = old.unit or _unit(wiring, path)
+        if item is None and entry.value == old.value:
+            # Changed before the calibration: the base on disk does not have it.
+            source_before = f"ASSUMED: {old.source}"
+            changes.append(Parameter(path, entry.value, unit, source_before, "", "assumed"))
+            continue
         if item is None:
             note = _followed(path)
             changes.append(

@@ -33,5 +33,6 @@ COMMANDS: dict[str, Command] = {
     "validate": Command(
         "elevon.cli.validate", "Check an actuator against logs it was not fitted to."
     ),
+    "demo": Command("elevon.cli.demo", "Find a bench's hidden values from its logs; one report."),
     "reproduce": Command("elevon.cli.reproduce", "Recompute a published table or figure."),
 }

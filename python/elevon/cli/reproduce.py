@@ -117,6 +117,35 @@ def torino_compliance(
     return _exit_code(values)
 
 
+@app.command("low-fidelity")
+def low_fidelity(
+    *,
+    actuator: Annotated[str, typer.Option(help="A rotary actuator.")] = "torino-rotary",
+    as_json: Json = False,
+    seed: Seed = 0,
+) -> int:
+    """Compare the low model with the high one in the three cases in which it must hold."""
+    from elevon.cli.common import read_actuator
+    from elevon.cli.output import progress_bar
+    from elevon.reproduce.low_fidelity import reproduce_low_fidelity
+
+    model = read_actuator(actuator)
+    with progress_bar("seven runs") as advance:
+        values = reproduce_low_fidelity(model, seed=seed, progress=advance).to_dict()
+    if as_json:
+        print_json(values)
+    else:
+        columns = ("position_nrmse", "speed_nrmse", "q_current_nrmse", "q_current_rms_a",
+                   "q_current_error_a", "floor_a")  # fmt: skip
+        rows = [
+            [row["name"], *("" if row[key] is None else f"{row[key]:.4g}" for key in columns)]
+            for row in values["rows"]
+        ]
+        print_table(["case", *(name.replace("_", " ") for name in columns)], rows)
+        _print_checks(values)
+    return _exit_code(values)
+
+
 @app.command("pisa-functional")
 def pisa_functional(
     *,

@@ -11,6 +11,7 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 /// # Safety
 /// The processor must have AVX2 and FMA.
 #[target_feature(enable = "avx2,fma")]
+#[inline(never)]
 pub unsafe fn with_avx2<K: Kernel>(kernel: K) -> K::Output {
     kernel.run()
 }
@@ -18,6 +19,7 @@ pub unsafe fn with_avx2<K: Kernel>(kernel: K) -> K::Output {
 /// # Safety
 /// The processor must have AVX-512 F, DQ and VL.
 #[target_feature(enable = "avx2,fma,avx512f,avx512dq,avx512vl")]
+#[inline(never)]
 unsafe fn with_avx512<K: Kernel>(kernel: K) -> K::Output {
     kernel.run()
 }

@@ -82,7 +82,7 @@ fn run_width<W: Wiring>(width: Width, runs: &[&RunSpec], clocks: &[Clock], recor
         Width::Avx2 => run_block::<W, Avx2x4>(runs, clocks, recorded, monitor),
         #[cfg(target_arch = "x86_64")]
         Width::Avx512 => run_block::<W, Avx512x8>(runs, clocks, recorded, monitor),
-        _ => run_block::<W, Portable<4>>(runs, clocks, recorded, monitor),
+        _ => run_block::<W, Portable<2>>(runs, clocks, recorded, monitor),
     }
 }
 

@@ -49,7 +49,8 @@ impl Width {
     pub fn lanes(self) -> usize {
         match self {
             Self::Single => 1,
-            Self::Portable | Self::Avx2 => 4,
+            Self::Portable => 2,
+            Self::Avx2 => 4,
             Self::Avx512 => 8,
         }
     }

@@ -2,7 +2,7 @@
 
 use super::form::Form;
 use super::layout::*;
-use super::march::march;
+use super::march::March;
 use super::model::{Model, State};
 use super::start;
 use super::step::{control_step, park, seen_current, shaft_reading, HighStep};
@@ -142,13 +142,12 @@ impl<F: Form> Wiring for High<F> {
         from: Steps,
         count: Steps,
     ) {
+        let x = March { structure, models, inputs, states, from, count };
         match (structure.full, structure.extra, structure.drive == Drive::Pwm) {
-            (false, _, false) => march::<HighStep<false, false, false>, S>(structure, models, inputs, states, from, count),
-            (false, _, true) => march::<HighStep<false, false, true>, S>(structure, models, inputs, states, from, count),
-            (true, false, false) => march::<HighStep<true, false, false>, S>(structure, models, inputs, states, from, count),
-            (true, false, true) => march::<HighStep<true, false, true>, S>(structure, models, inputs, states, from, count),
-            (true, true, false) => march::<HighStep<true, true, false>, S>(structure, models, inputs, states, from, count),
-            (true, true, true) => march::<HighStep<true, true, true>, S>(structure, models, inputs, states, from, count),
+            (false, _, false) => x.run::<HighStep<false, false, false>>(),
+            (false, _, true) => x.run::<HighStep<false, false, true>>(),
+            (true, false, _) => x.run::<HighStep<true, false, false>>(),
+            (true, true, _) => x.run::<HighStep<true, true, false>>(),
         }
     }
 

@@ -3,7 +3,7 @@
 
 use super::form::Form;
 use super::layout::*;
-use super::march::{march, Moment, Stepper};
+use super::march::{March, Moment, Stepper};
 use super::model::network;
 use super::observe::low_screw;
 use super::signals::{LowSignal as Q, LOW};
@@ -552,7 +552,7 @@ impl<F: Form> Wiring for Low<F> {
         from: Steps,
         count: Steps,
     ) {
-        march::<LowStep, S>(structure, models, inputs, states, from, count);
+        March { structure, models, inputs, states, from, count }.run::<LowStep>();
     }
 
     #[inline(always)]

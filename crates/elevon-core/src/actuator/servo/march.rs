@@ -2,7 +2,7 @@
 
 use super::layout::{BRAKE, COMMAND, SHAFT, SUPPLY, USER};
 use crate::actuator::{Inputs, MAX_CHUNKS};
-use crate::scalar::Scalar;
+use crate::scalar::{Kernel, Scalar};
 use crate::time::Steps;
 
 /// Steps whose inputs are evaluated together.
@@ -62,15 +62,35 @@ pub(super) trait Stepper<S> {
     fn step(model: &Self::Model, structure: &Self::Structure, moment: &Moment<S>, state: &mut Self::State);
 }
 
+/// A stretch of steps of a block. It depends on no form of servo, so that all forms share its code.
+pub(super) struct March<'a, M, Q, Z, S> {
+    pub structure: &'a Q,
+    pub models: &'a [M],
+    pub inputs: &'a [Inputs<S>],
+    pub states: &'a mut [Z],
+    pub from: Steps,
+    pub count: Steps,
+}
+
+impl<M, Q, Z: Copy, S: Scalar> March<'_, M, Q, Z, S> {
+    pub fn run<T: Stepper<S, Model = M, Structure = Q, State = Z>>(self) {
+        S::vectorize(Stretch::<T, S>(self));
+    }
+}
+
+struct Stretch<'a, T: Stepper<S>, S: Scalar>(March<'a, T::Model, T::Structure, T::State, S>);
+
+impl<T: Stepper<S>, S: Scalar> Kernel for Stretch<'_, T, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        march::<T, S>(self.0);
+    }
+}
+
 #[inline(always)]
-pub(super) fn march<T: Stepper<S>, S: Scalar>(
-    structure: &T::Structure,
-    models: &[T::Model],
-    inputs: &[Inputs<S>],
-    states: &mut [T::State],
-    from: Steps,
-    count: Steps,
-) {
+fn march<T: Stepper<S>, S: Scalar>(x: March<'_, T::Model, T::Structure, T::State, S>) {
+    let March { structure, models, inputs, states, from, count } = x;
     // Commands depend on time alone: evaluated some steps ahead, they leave the chain from state to state.
     let mut commands = [[S::zero(); AHEAD]; MAX_CHUNKS];
     let mut moments = [Moment::none(); MAX_CHUNKS];

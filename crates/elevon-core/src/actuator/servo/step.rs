@@ -110,7 +110,7 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     // Power electronics.
     let half_supply = S::splat(0.5) * (x.supply * m.supply_scale);
     let old_legs = s.legs;
-    if PWM {
+    if PWM || (FULL && structure.drive == Drive::Pwm) {
         s.legs = m.current_control.compare(&s.current_control, x.t);
     } else if FULL && structure.drive == Drive::Off {
         s.legs = [S::zero(); 3];
@@ -142,7 +142,8 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     s.star.current = current;
 }
 
-/// The step of the inner loop with and without details, behind relays or a carrier.
+/// The step of the inner loop with and without details, behind relays or a carrier. With details the drive is looked up in
+/// the structure, which spares the compiler two copies of the largest code.
 pub(super) struct HighStep<const FULL: bool, const EXTRA: bool, const PWM: bool>;
 
 impl<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool> Stepper<S> for HighStep<FULL, EXTRA, PWM> {

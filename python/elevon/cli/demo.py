@@ -1,0 +1,63 @@
+"""``elevon demo``: a published table, then a bench with hidden values found again from its logs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from elevon.cli.common import ForceOption, JsonOption, SeedOption
+from elevon.cli.output import print_json, print_table, progress_bar, say
+
+if TYPE_CHECKING:
+    from elevon.demo.run import Demo
+
+app = typer.Typer(rich_markup_mode=None)
+
+
+@app.command()
+def demo(
+    *,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for reports and logs.")] = Path(
+        "out/demo"
+    ),
+    seed: SeedOption = 0,
+    force: ForceOption = False,
+    json: JsonOption = False,
+) -> int:
+    """Recompute a published table, then find a bench's hidden values from its logs."""
+    from elevon.demo.run import run_demo
+    from elevon.report.checks import all_passed
+
+    with progress_bar("demo") as advance:
+        result = run_demo(out, seed=seed, force=force, progress=advance)
+    if json:
+        print_json(result.to_dict())
+    else:
+        _print(result)
+    return 0 if all_passed(result.checks) else 1
+
+
+def _print(result: Demo) -> None:
+    rows = [
+        (
+            row["path"],
+            "" if row["before"] is None else f"{row['before']:.5g}",
+            f"{row['truth']:.5g}",
+            f"{row['value']:.5g}",
+            f"{row['low']:.5g} to {row['high']:.5g}",
+            row["unit"],
+        )
+        for row in result.rows()
+    ]
+    columns = ("parameter", "before", "hidden truth", "estimate", "90 % interval", "unit")
+    print_table(columns, rows, title="hidden values found again from three logs")
+    steps = [(name, f"{seconds:.1f}") for name, seconds in result.steps]
+    print_table(("step", "s"), [*steps, ("all", f"{result.seconds:.1f}")])
+    checks = result.checks
+    failed = [check for check in checks if not check.passed]
+    for check in failed:
+        say(f"failed: {check.name}: {check.value:.4g} {check.unit}, limit {check.limit:.4g}")
+    say(f"{len(checks) - len(failed)} of {len(checks)} checks passed")
+    say(f"report: {result.folder / 'report.html'}")

@@ -1,0 +1,95 @@
+"""`elevon fit-low`: tune the low model against the high one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from elevon.cli.common import (
+    ActuatorArgument,
+    FaultOption,
+    ForceOption,
+    JsonOption,
+    SeedOption,
+    SetOption,
+    check_outputs,
+    read_actuator,
+)
+from elevon.cli.output import print_json, print_table, progress_bar, say
+from elevon.errors import InputError
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.lowfit import Case, LowFit
+
+app = typer.Typer(rich_markup_mode=None)
+
+
+@app.command()
+def fit_low(
+    actuator: ActuatorArgument,
+    *,
+    settings: SetOption = None,
+    scenario: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FILE", help="Scenario to fit to instead of the stated list."),
+    ] = None,
+    fault: FaultOption = None,
+    out: Annotated[Path | None, typer.Option(metavar="SET.toml", help="Write the set.")] = None,
+    report: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a report.")] = None,
+    seed: SeedOption = 0,
+    json: JsonOption = False,
+    force: ForceOption = False,
+    date: Annotated[str | None, typer.Option(help="Date printed in the report.")] = None,
+) -> int:
+    """Fit the low model's free numbers to the high model over scenarios and faults."""
+    from elevon.lowfit import fit_low as run
+    from elevon.lowfit import write_fit
+
+    check_outputs([out, report], force=force)
+    model = read_actuator(actuator, settings)
+    cases = _cases(model, scenario, fault)
+    with progress_bar("high model, then the fit") as advance:
+        fit = run(model, cases, seed=seed, progress=advance)
+    if out is not None:
+        say(f"set: {write_fit(out, fit, force=force)}")
+    if report is not None:
+        from elevon.reproduce.lowfit_page import lowfit_report
+
+        say(f"report: {lowfit_report(fit, actuator, date=date).save(report, force=force)}")
+    if json:
+        print_json(fit.to_dict() | {"out": None if out is None else str(out)})
+    else:
+        _print(fit)
+    return 0
+
+
+def _cases(model: Actuator, files: list[Path] | None, faults: list[str] | None) -> list[Case]:
+    from elevon.lowfit import default_cases, named_cases
+    from elevon.scenario import Scenario
+
+    if not files:
+        if faults:
+            raise InputError("fit-low: --fault needs the --scenario it is to be added to")
+        return default_cases(model)
+    return named_cases([(path.stem, Scenario.load(path)) for path in files], faults or [])
+
+
+def _print(fit: LowFit) -> None:
+    values = fit.to_dict()
+    fitted = [
+        [row["path"], f"{row['old']:.4g}", f"{row['new']:.4g}", f"{row['deviation']:.2g}"]
+        for row in values["fitted"]
+    ]
+    fitted += [[row["path"], "", "kept", row["reason"]] for row in values["kept"]]
+    print_table(["number", "old", "new", "deviation"], fitted)
+    rows = [
+        [row["name"], *(f"{100 * row[when][n]:.2f}" for n in row["before"]
+                        for when in ("before", "after"))]
+        for row in values["cases"]
+    ]  # fmt: skip
+    head = [f"{n.replace('_', ' ')} {when}" for n in values["rms_before"]
+            for when in ("before", "after")]  # fmt: skip
+    print_table(["case", *head], rows, title="RMS of low less high, % of high's")

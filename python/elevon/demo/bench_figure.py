@@ -1,0 +1,72 @@
+"""A sketch of the bench."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from elevon.report.figures import COLOURS, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["bench_figure"]
+
+# Title, second line, left edge, bottom edge, colour. Sheet: 0 to 10 across, 0 to 4 up.
+_BOXES = (
+    ("Drive", "position, speed, current", 0.0, 2.6, "blue"),
+    ("Motor", "resolver", 2.7, 2.6, "blue"),
+    ("Gearbox 1:124", "friction, play", 5.4, 2.6, "blue"),
+    ("Output ring", "encoder", 8.1, 2.6, "blue"),
+    ("Chain and disk brake", "servo, torque loop", 2.7, 1.3, "green"),
+    ("Load cell", "24 bit, own clock", 5.4, 1.3, "green"),
+    ("Drive trace", "400 Hz CSV", 0.0, 0.0, "orange"),
+    ("Command note", "what the operator knows", 2.7, 0.0, "orange"),
+    ("Load-cell file", "80 Hz CSV", 5.4, 0.0, "orange"),
+)
+_WIDE, _HIGH = 2.1, 0.85
+_ARROWS = (
+    ((2.1, 3.02), (2.7, 3.02)),
+    ((4.8, 3.02), (5.4, 3.02)),
+    ((7.5, 3.02), (8.1, 3.02)),
+    ((3.75, 2.15), (3.75, 2.6)),
+    ((4.8, 1.85), (5.4, 1.85)),
+    ((5.4, 1.55), (4.8, 1.55)),
+    ((1.05, 2.6), (1.05, 0.85)),
+    ((6.45, 1.3), (6.45, 0.85)),
+)
+
+
+def bench_figure() -> Figure:
+    """Draw the bench: actuator in blue, equipment in green, files in orange."""
+    with new_figure(width=8.6, height=3.5) as (figure, axes):
+        for title, text, left, bottom, colour in _BOXES:
+            _box(axes, (left, bottom), title, text, COLOURS[colour])
+        for start, end in _ARROWS:
+            _arrow(axes, start, end)
+        _line(axes, ((9.15, 3.45), (9.15, 3.85), (1.05, 3.85)))
+        _arrow(axes, (1.05, 3.85), (1.05, 3.45))
+        axes.text(5.1, 3.9, "user position", ha="center", va="bottom")
+        axes.text(1.15, 1.7, "trigger", ha="left", va="center")
+        axes.set(xlim=(-0.1, 10.3), ylim=(-0.1, 4.2))
+        axes.axis("off")
+    return figure
+
+
+def _box(axes: Any, corner: tuple[float, float], title: str, text: str, colour: str) -> None:
+    from matplotlib.patches import FancyBboxPatch
+
+    style = "round,pad=0,rounding_size=0.08"
+    box = FancyBboxPatch(corner, _WIDE, _HIGH, boxstyle=style, fc="none", ec=colour, lw=1.6)
+    axes.add_patch(box)
+    middle = corner[0] + 0.5 * _WIDE
+    axes.text(middle, corner[1] + 0.55, title, ha="center", va="center", weight="bold")
+    axes.text(middle, corner[1] + 0.24, text, ha="center", va="center", size=8)
+
+
+def _arrow(axes: Any, start: tuple[float, float], end: tuple[float, float]) -> None:
+    look = {"arrowstyle": "-|>", "color": COLOURS["grey"], "lw": 1.2, "shrinkA": 1, "shrinkB": 1}
+    axes.annotate("", xy=end, xytext=start, arrowprops=look)
+
+
+def _line(axes: Any, points: tuple[tuple[float, float], ...]) -> None:
+    axes.plot(*zip(*points, strict=True), color=COLOURS["grey"], lw=1.2)

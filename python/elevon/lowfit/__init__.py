@@ -1,0 +1,16 @@
+"""Fit the low model's few free numbers to the high model over scenarios and faults."""
+
+from elevon.lowfit.cases import Case, default_cases, named_cases
+from elevon.lowfit.fit import FREE, LowFit, fit_low
+from elevon.lowfit.write import fitted_parameters, write_fit
+
+__all__ = [
+    "FREE",
+    "Case",
+    "LowFit",
+    "default_cases",
+    "fit_low",
+    "fitted_parameters",
+    "named_cases",
+    "write_fit",
+]

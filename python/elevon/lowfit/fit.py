@@ -1,0 +1,274 @@
+"""Least squares of the low model's own numbers against runs of the high model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.compare import CUTOFF_HZ, GRID_HZ, RATES, SIGNALS, filtered
+from elevon.errors import InputError, SimulationError
+from elevon.parameters.records import records
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.lowfit.cases import Case
+    from elevon.progress import Progress
+    from elevon.recording import Recording
+
+__all__ = ["FREE", "LowFit", "fit_low"]
+
+Array = npt.NDArray[np.float64]
+
+FREE = {"low.band_ratio": (0.05, 1.0), "low.voltage_ratio": (0.3, 0.9)}
+"""What may be fitted and between which limits. `low.step` is no free number: it is accuracy."""
+START_S = 4.0
+"""What came before is left out: the start from rest and the catching up after it [s]."""
+PROBE = 0.05
+"""Relative change by which is seen whether the runs depend on a number at all."""
+SEEN = 1e-4
+"""Smallest change of a signal over its size, for `PROBE`, that determines a number."""
+
+
+@dataclass(frozen=True)
+class LowFit:
+    """What was fitted, and how far the low model was and is from the high one.
+
+    Attributes
+    ----------
+    before, actuator : Actuator
+        As given; with the fitted numbers.
+    cases : tuple of Case
+        Over which the fit ran.
+    old, new : mapping of str to float
+        Value of every number that was fitted [SI].
+    deviation : mapping of str to float
+        Standard deviation of each over the cases, by leaving out one at a time (jackknife) [SI].
+    kept : mapping of str to str
+        Numbers left as they were, and why.
+    errors_before, errors_after : tuple of mapping of str to float
+        For each case, RMS of low less high over the size of high, by signal: RMS, of the
+        position about its mean.
+    """
+
+    before: Actuator
+    actuator: Actuator
+    cases: tuple[Case, ...]
+    old: Mapping[str, float]
+    new: Mapping[str, float]
+    deviation: Mapping[str, float]
+    kept: Mapping[str, str]
+    errors_before: tuple[Mapping[str, float], ...]
+    errors_after: tuple[Mapping[str, float], ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object of the command."""
+        return {
+            "status": "ok",
+            "actuator": self.before.name,
+            "drive": self.before.parameters["drive.kind"].value,
+            "fitted": [
+                {"path": path, "old": self.old[path], "new": value,
+                 "deviation": self.deviation[path]}
+                for path, value in self.new.items()
+            ],
+            "kept": [{"path": path, "reason": reason} for path, reason in self.kept.items()],
+            "cases": [
+                {"name": case.name, "before": dict(old), "after": dict(new)}
+                for case, old, new in zip(
+                    self.cases, self.errors_before, self.errors_after, strict=True
+                )
+            ],
+            "rms_before": _total(self.errors_before),
+            "rms_after": _total(self.errors_after),
+        }  # fmt: skip
+
+
+def fit_low(
+    actuator: Actuator,
+    cases: Sequence[Case],
+    *,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> LowFit:
+    """Fit the low model's free numbers to the high model.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        Its drive kind as set: the numbers belong to it.
+    cases : sequence of Case
+        At least one; the high model runs each once.
+    seed : int
+        Of every run.
+    progress : callable, optional
+        As for `simulate_batch`.
+
+    Returns
+    -------
+    LowFit
+
+    Raises
+    ------
+    InputError
+        No case, a case that is too short, or an actuator without any of these numbers.
+    SimulationError
+        A run did not reach its end.
+    """
+    from elevon.progress import part
+
+    free = _free(actuator)
+    _check(cases)
+    high = _signals(actuator, cases, "high", seed, part(progress, 0.0, 0.9))
+    problem = _Problem(actuator, tuple(cases), tuple(high), seed)
+    seen, kept = problem.split(free)
+    old = {path: float(actuator.parameters.value(path)) for path in seen}
+    rows = range(len(cases))
+    new = problem.solve(seen, rows)
+    deviation = problem.jackknife(seen, new, progress)
+    after = actuator.with_values(new, source="fitted to the high model")
+    errors = [problem.errors(values) for values in (old, new)]
+    return LowFit(actuator, after, tuple(cases), old, new, deviation, kept, *errors)
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """The high model's signals, and the low model's distance from them."""
+
+    actuator: Actuator
+    cases: tuple[Case, ...]
+    high: tuple[Mapping[str, Array], ...]
+    seed: int
+
+    def low(self, values: Mapping[str, float], rows: Sequence[int]) -> list[Mapping[str, Array]]:
+        changed = self.actuator.with_values(dict(values)) if values else self.actuator
+        return _signals(changed, [self.cases[row] for row in rows], "low", self.seed, None)
+
+    def errors(
+        self, values: Mapping[str, float], rows: Sequence[int] | None = None
+    ) -> tuple[Mapping[str, float], ...]:
+        """Return RMS of low less high over the size of high, by case and signal."""
+        chosen = range(len(self.cases)) if rows is None else rows
+        found = zip(self.low(values, chosen), (self.high[row] for row in chosen), strict=True)
+        return tuple({n: _rms(low[n] - high[n]) / _size(n, high[n]) for n in SIGNALS}
+                     for low, high in found)  # fmt: skip
+
+    def moved(self, path: str, value: float) -> float:
+        """Return the largest change of a signal, over its size, that another value makes."""
+        rows = range(len(self.cases))
+        pairs = zip(self.low({}, rows), self.low({path: value}, rows), self.high, strict=True)
+        return max(_rms(b[n] - a[n]) / _size(n, high[n]) for a, b, high in pairs for n in SIGNALS)
+
+    def split(self, free: Sequence[str]) -> tuple[list[str], dict[str, str]]:
+        """Return what the cases determine, and why the rest is kept."""
+        seen, kept = [], {}
+        for path in free:
+            value = (1.0 - PROBE) * float(self.actuator.parameters.value(path))
+            if self.moved(path, value) > SEEN:
+                seen.append(path)
+            else:
+                kept[path] = "no case depends on it with this drive"
+        return seen, kept
+
+    def solve(self, paths: Sequence[str], rows: Sequence[int]) -> dict[str, float]:
+        """Return the best values over the cases in `rows`, one coordinate after another, twice.
+
+        Each number acts in cases in which the other hardly does, and the play of a relay band
+        makes the sum of squares uneven on a small scale: a bracketing search is safe where a
+        gradient is not.
+        """
+        from scipy.optimize import minimize_scalar
+
+        values = {path: float(self.actuator.parameters.value(path)) for path in paths}
+        for _ in range(2):
+            for path in paths:
+
+                def cost(x: float, path: str = path) -> float:
+                    errors = self.errors({**values, path: x}, rows)
+                    return float(sum(value**2 for row in errors for value in row.values()))
+
+                found = minimize_scalar(
+                    cost, bounds=FREE[path], method="bounded", options={"xatol": 1e-4}
+                )
+                values[path] = float(found.x) if found.fun < cost(values[path]) else values[path]
+        return values
+
+    def jackknife(
+        self, paths: Sequence[str], best: Mapping[str, float], progress: Progress | None
+    ) -> dict[str, float]:
+        """Return the deviation of each number over the cases, from leaving out one at a time."""
+        count = len(self.cases)
+        if count < 2:
+            return dict.fromkeys(paths, float("nan"))
+        found = []
+        for left in range(count):
+            if progress is not None:
+                progress(0.9 + 0.1 * left / count)
+            found.append(self.solve(paths, [row for row in range(count) if row != left]))
+        return {
+            path: math.sqrt((count - 1) / count * sum((x[path] - best[path]) ** 2 for x in found))
+            for path in paths
+        }
+
+
+def _signals(
+    actuator: Actuator,
+    cases: Sequence[Case],
+    fidelity: str,
+    seed: int,
+    progress: Progress | None,
+) -> list[Mapping[str, Array]]:
+    from elevon.simulate import Run, simulate_batch
+
+    runs = [Run(actuator, case.scenario, seed, case.name) for case in cases]
+    record = f"{','.join(SIGNALS)}@{RATES[fidelity]}"
+    recordings = simulate_batch(runs, fidelity=fidelity, record=record, progress=progress)
+    return [_filtered(run, case) for run, case in zip(recordings, cases, strict=True)]
+
+
+def _filtered(run: Recording, case: Case) -> Mapping[str, Array]:
+    if run.status != "ok":
+        message = f"fit-low: {case.name}: the {run.meta['fidelity']} model ended as {run.status}"
+        raise SimulationError(f"{message}: {run.meta['message']}", run.status)
+    grid = np.arange(START_S, case.scenario.seconds, 1.0 / GRID_HZ)
+    return {name: filtered(run, name, grid, CUTOFF_HZ) for name in SIGNALS}
+
+
+def _free(actuator: Actuator) -> list[str]:
+    known = records(actuator.wiring)
+    free = [path for path in FREE if path in known]
+    if not free:
+        raise InputError(
+            f"fit-low: the low model of {actuator.name} ({actuator.wiring}) has none of "
+            f"{', '.join(FREE)}: there is nothing to fit"
+        )
+    return free
+
+
+def _check(cases: Sequence[Case]) -> None:
+    if not cases:
+        raise InputError("fit-low: there is no case to fit to")
+    for case in cases:
+        shortest = START_S + 1.0 / CUTOFF_HZ
+        if case.scenario.seconds <= shortest:
+            raise InputError(
+                f"fit-low: {case.name} lasts {case.scenario.seconds:g} s; more than "
+                f"{shortest:g} s are needed"
+            )
+
+
+def _total(errors: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    return {name: float(np.sqrt(np.mean([row[name] ** 2 for row in errors]))) for name in SIGNALS}
+
+
+def _size(name: str, values: Array) -> float:
+    """RMS; of a position, whose zero says nothing, RMS about the mean."""
+    return max(_rms(values - np.mean(values) if name == "user_position" else values), 1e-12)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,61 @@
+"""The fitted numbers as entries of a parameter set."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from elevon.parameters import Parameter
+from elevon.parameters.find import find_set
+from elevon.parameters.write import write_set
+
+if TYPE_CHECKING:
+    from elevon.lowfit.fit import LowFit
+
+__all__ = ["fitted_parameters", "write_fit"]
+
+
+def fitted_parameters(fit: LowFit) -> list[Parameter]:
+    """Return one entry for each fitted number: source, old value, deviation over the cases."""
+    names = "; ".join(case.name for case in fit.cases)
+    drive = fit.before.parameters["drive.kind"].value
+    entries = []
+    for path, value in fit.new.items():
+        spread = fit.deviation[path]
+        note = f"For drive.kind = {drive}. Standard deviation over the cases {spread:.2g}."
+        source = f"fitted to the high model over {len(fit.cases)} cases: {names}"
+        rounded = float(f"{value:.4g}")
+        entries.append(Parameter(path, rounded, "", source, note, "calibrated", fit.old[path]))
+    return entries
+
+
+def write_fit(path: str | os.PathLike[str], fit: LowFit, *, force: bool = False) -> Path:
+    """Write a set that changes the fitted numbers alone; errors as `elevon.files.write_text`."""
+    target = Path(path).expanduser()
+    return write_set(
+        target,
+        name=_name(target.stem),
+        changes=fitted_parameters(fit),
+        base=_base(fit, target),
+        title=f"{fit.before.title or fit.before.name}, low model fitted",
+        force=force,
+    )
+
+
+def _name(stem: str) -> str:
+    kept = "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in stem)
+    return kept if kept and kept[0].isalnum() else f"set-{kept.strip('-._')}"
+
+
+def _base(fit: LowFit, target: Path) -> str:
+    """Name of a set of the package, else the way from the new file to the old one."""
+    path, name = fit.before.path, fit.before.name
+    if path is None:
+        return name
+    try:
+        if find_set(name).resolve() == path.resolve():
+            return name
+    except ValueError:
+        pass
+    return os.path.relpath(path.resolve(), target.resolve().parent).replace(os.sep, "/")

@@ -1,0 +1,165 @@
+"""High against low fidelity in the three cases in which the low model must hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elevon.compare import Comparison, compare, default_scenario, filtered
+from elevon.report import Check, all_passed
+from elevon.scenario import Scenario
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.progress import Progress
+
+__all__ = ["CASES", "CaseRow", "LowFidelityResult", "reproduce_low_fidelity"]
+
+POSITION_LIMIT = 0.005
+CURRENT_LIMIT = 0.05
+
+CASES = {
+    "hysteresis, 1 N m of brake": ("hysteresis", True, False),
+    "carrier PWM, no load": ("pwm", False, False),
+    "hysteresis, no load": ("hysteresis", False, True),
+}
+"""Drive, whether braked, and whether the current is below the relay band: there the current is
+held beside the ripple floor, not against a limit."""
+
+
+@dataclass(frozen=True, slots=True)
+class CaseRow:
+    """One case.
+
+    Attributes
+    ----------
+    name : str
+        Drive and load.
+    position_nrmse, speed_nrmse, q_current_nrmse : float
+        As in `Comparison`.
+    q_current_rms_a, q_current_error_a : float
+        RMS of the high model's filtered current and of the difference [A].
+    floor_a : float or None
+        RMS difference of two high runs that differ only in step [A]; where it is needed.
+    """
+
+    name: str
+    position_nrmse: float
+    speed_nrmse: float
+    q_current_nrmse: float
+    q_current_rms_a: float
+    q_current_error_a: float
+    floor_a: float | None
+
+    def checks(self) -> list[Check]:
+        """Return what this case is held to."""
+        found = [Check(f"{self.name}: position", self.position_nrmse, POSITION_LIMIT, "")]
+        if self.floor_a is None:
+            limit = CURRENT_LIMIT
+            found.append(Check(f"{self.name}: q current", self.q_current_nrmse, limit, ""))
+        return found
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return one row of the command's JSON object."""
+        return {name: getattr(self, name) for name in self.__slots__}
+
+
+@dataclass(frozen=True, slots=True)
+class LowFidelityResult:
+    """All three cases."""
+
+    actuator: str
+    rows: tuple[CaseRow, ...]
+
+    @property
+    def checks(self) -> list[Check]:
+        """Position everywhere, current where it exceeds the relay band."""
+        return [check for row in self.rows for check in row.checks()]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object of the command."""
+        checks = self.checks
+        return {
+            "status": "pass" if all_passed(checks) else "fail",
+            "actuator": self.actuator,
+            "checks": [check.to_dict() for check in checks],
+            "rows": [row.to_dict() for row in self.rows],
+        }
+
+
+def reproduce_low_fidelity(
+    actuator: Actuator, *, seed: int = 0, progress: Progress | None = None
+) -> LowFidelityResult:
+    """Run the three cases: the campaign's 45 deg at 0.05 Hz, compared after 10 s.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        Of wiring ``rotary``; its drive kind is replaced by the case's.
+    seed : int
+        Of every run.
+    progress : callable, optional
+        As for `simulate`.
+
+    Returns
+    -------
+    LowFidelityResult
+
+    Raises
+    ------
+    SimulationError
+        A run did not reach its end.
+    """
+    from elevon.progress import part
+
+    rows = []
+    for number, (name, (drive, braked, floored)) in enumerate(CASES.items()):
+        start, stop = number / 4.0, (number + 1) / 4.0
+        model = actuator.with_values({"drive.kind": drive})
+        scenario = _scenario(braked)
+        found = compare(model, scenario, seed=seed, progress=part(progress, start, stop))
+        span = part(progress, stop, 1.0)
+        floor = _floor(model, scenario, found, seed, span) if floored else None
+        rows.append(_row(name, found, floor))
+    return LowFidelityResult(actuator.name, tuple(rows))
+
+
+def _scenario(braked: bool) -> Scenario:
+    whole = default_scenario()
+    if braked:
+        return whole
+    data = whole.to_dict()
+    return Scenario.from_dict({key: data[key] for key in ("duration", "command")})
+
+
+def _floor(
+    model: Actuator, scenario: Scenario, found: Comparison, seed: int, progress: Progress | None
+) -> float:
+    """RMS difference of the q current of two high runs, one with four fifths of the step."""
+    from elevon.simulate import simulate
+
+    step = 0.8 * float(model.parameters.value("solver.step"))
+    other = simulate(
+        model.with_values({"solver.step": step}),
+        scenario,
+        record="current_q@10 kHz",
+        seed=seed,
+        progress=progress,
+    )
+    again = filtered(other, "current_q", found.time, found.cutoff)
+    return float(np.sqrt(np.mean((again - found.high["current_q"]) ** 2)))
+
+
+def _row(name: str, found: Comparison, floor: float | None) -> CaseRow:
+    values = found.to_dict()
+    return CaseRow(
+        name,
+        found.position_nrmse,
+        found.speed_nrmse,
+        found.q_current_nrmse,
+        values["q_current_rms_a"],
+        values["q_current_rms_error_a"],
+        floor,
+    )
