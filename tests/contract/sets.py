@@ -54,8 +54,8 @@ def takes_actions(name: str) -> bool:
 def scenario(name: str, fault: dict[str, Any] | None = None) -> Any:
     """A short run in which everything moves, with a fault if given.
 
-    A position swing, 0.03 in SI at 4 Hz, that takes up any play; a gear leaves its down-lock and
-    returns to it.
+    A position swing, 0.03 in SI at 4 Hz, that takes up any play; a gear retracts from its
+    down-lock and extends into it again.
     """
     data: dict[str, Any] = {
         "duration": 0.12,
@@ -65,10 +65,16 @@ def scenario(name: str, fault: dict[str, Any] | None = None) -> Any:
         },
     }
     if takes_actions(name):
+        # A whole cycle of a short stroke: every switch and the lock change.
         data = {
-            "duration": "2.6 s",
-            "command": {"mode": "gear", "steps": [step(0.01, "retract"), step(0.85, "extend")]},
-            "initial": {"nut_position": "267 mm"},
+            "duration": "4 s",
+            "command": {"mode": "gear", "steps": [step(0.01, "retract"), step(2.3, "extend")]},
+            "initial": {"nut_position": "33 mm"},
+            "parameters": {
+                "lever.stroke": "30 mm",
+                "proximity.position_25": "8 mm",
+                "proximity.position_75": "22 mm",
+            },
         }
     return elevon.Scenario.from_dict({**data, "fault": [fault]} if fault else data)
 

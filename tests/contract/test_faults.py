@@ -36,7 +36,11 @@ def simulate(name: str, fidelity: str, fault: dict[str, Any] | None) -> Any:
     """Every signal of a short run."""
     chosen = ",".join(sets.signals(name, fidelity)) + "@1 kHz"
     return elevon.simulate(
-        elevon.Actuator.load(name), sets.scenario(name, fault), fidelity=fidelity, record=[chosen], seed=5
+        elevon.Actuator.load(name),
+        sets.scenario(name, fault),
+        fidelity=fidelity,
+        record=[chosen],
+        seed=5,
     )
 
 

@@ -75,7 +75,7 @@ fn status(d: &Bound<'_, PyDict>, output: &RunOutput) -> PyResult<()> {
     let (name, message) = match &output.status {
         Status::Ok => ("ok", String::new()),
         Status::Tripped { time, reason } if reason.is_empty() => ("tripped", format!("the drive tripped at {time} s")),
-        Status::Tripped { time, reason } => ("tripped", format!("at {time} s: {reason}")),
+        Status::Tripped { time, reason } => ("tripped", format!("at {:.6} s: {reason}", time)),
         Status::Overheated { time, temperature } => {
             ("tripped", format!("the winding passed thermal.trip at {time} s, {temperature:.2} K: the drive opened its bridge"))
         }
@@ -185,7 +185,9 @@ pub fn sensitivities<'py>(
     let passes = chosen.div_ceil(8) as u64;
     let total = (spec.duration / dt).round() as u64 * passes;
     let outputs = polled(py, total, progress, |monitor| model.sensitivities(&spec, &wanted, &faults, &clocks, monitor))?;
-    let outputs = outputs.ok_or_else(|| bad("sensitivities need the low fidelity of an actuator without a state machine: switching has no useful derivative"))?;
+    let outputs = outputs.ok_or_else(|| {
+        bad("sensitivities need the low fidelity of an actuator without a state machine: switching has no useful derivative")
+    })?;
     let signals: Vec<&'static str> = model.signals().iter().map(|s| s.name).collect();
     let list = PyList::empty(py);
     for (i, output) in outputs.into_iter().enumerate() {

@@ -191,3 +191,4 @@ def exit_code(values: dict[str, Any]) -> int:
 
 # Commands in modules of their own; they need what stands above.
 from elevon.cli import reproduce_nasa as _nasa  # noqa: E402, F401
+from elevon.cli import reproduce_pisa as _pisa  # noqa: E402, F401

@@ -112,7 +112,7 @@ def _parameters(report: Report, demo: Demo, rows: list[dict[str, Any]]) -> None:
             row["before"],
             row["truth"],
             row["value"],
-            f"{row['low']:.5g} to {row['high']:.5g}",
+            f"{row['low']:.4g} to {row['high']:.4g}",
             _percent(row),
             row["unit"],
             "yes" if row["inside"] else "no",

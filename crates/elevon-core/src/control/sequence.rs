@@ -41,7 +41,8 @@ pub enum Phase {
 }
 
 /// Why the control unit is in its fault state.
-pub const FAULTS: &[&str] = &["none", "motion time-out", "lock not released", "lock not engaged", "stalled", "overspeed", "overcurrent", "hall", "proximity"];
+pub const FAULTS: &[&str] =
+    &["none", "motion time-out", "lock not released", "lock not engaged", "stalled", "overspeed", "overcurrent", "hall", "proximity"];
 const MOTION: u8 = 1;
 const NOT_RELEASED: u8 = 2;
 const NOT_ENGAGED: u8 = 3;
@@ -210,11 +211,7 @@ impl Sequence {
     fn refusal(&self, p: &[f64], see: &Seen) -> Option<(u8, f64)> {
         use SequenceParameter as P;
         if see.command == FREE_FALL {
-            return if self.phase == Phase::Locked {
-                Some((6, 1.0))
-            } else {
-                see.on_wheels.then_some((5, 1.0))
-            };
+            return if self.phase == Phase::Locked { Some((6, 1.0)) } else { see.on_wheels.then_some((5, 1.0)) };
         }
         if self.released || self.releasing > 0.0 {
             return Some((1, 1.0));
@@ -323,13 +320,15 @@ impl Sequence {
 
     fn switches_fail(&mut self, p: &[f64], see: &Seen) -> bool {
         let [at_0, at_25, at_75, lock] = see.switches;
-        let impossible = (at_0 && (at_75 || lock)) || (lock && !at_75) || (at_75 && !at_25);
+        let out_of_order = (lock && !at_75) || (at_75 && !at_25);
+        let impossible = out_of_order || (at_0 && at_75);
         self.impossible = if impossible { self.impossible + see.dt } else { 0.0 };
         if self.impossible > p[SequenceParameter::ProximityTime as usize] {
             return true;
         }
         let margin = p[SequenceParameter::ProximityTravel as usize];
-        let missed = |on: bool, place: f64| if self.extending { !on && see.travel > place + margin } else { on && see.travel < place - margin };
+        let missed =
+            |on: bool, place: f64| if self.extending { !on && see.travel > place + margin } else { on && see.travel < place - margin };
         self.action != Move::Rest && (missed(at_25, see.quarters[0]) || missed(at_75, see.quarters[1]))
     }
 

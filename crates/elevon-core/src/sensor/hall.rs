@@ -70,11 +70,11 @@ impl<S: Scalar> Hall<S> {
     pub fn code(&self, angle: S) -> [S; 3] {
         let half = S::splat(0.5);
         let common = angle + self.offset;
-        let dead = half.lt(self.power_off);
+        let dead = half.le(self.power_off);
         three!(|j| {
             let turns = (common + self.own[j]) * S::splat(PER_TURN) - S::splat(1.0 / 12.0 + j as f64 / 3.0);
-            let high = (turns - turns.floor()).lt(half) | half.lt(self.high[j]);
-            S::select(high & self.low[j].le(half) & !dead, S::one(), S::zero())
+            let high = (turns - turns.floor()).lt(half) | half.le(self.high[j]);
+            S::select(high & self.low[j].lt(half) & !dead, S::one(), S::zero())
         })
     }
 

@@ -67,7 +67,7 @@ impl Switches {
     fn show(&mut self, raw: &[f64]) {
         use ProximityParameter as P;
         for j in 0..4 {
-            let (stuck_on, stuck_off) = (raw[P::On0 as usize + j] > 0.5, raw[P::Off0 as usize + j] > 0.5);
+            let (stuck_on, stuck_off) = (raw[P::On0 as usize + j] >= 0.5, raw[P::Off0 as usize + j] >= 0.5);
             self.shown[j] = (self.on[j] || stuck_on) && !stuck_off;
         }
     }

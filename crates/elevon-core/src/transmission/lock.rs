@@ -38,7 +38,7 @@ impl<S: Scalar> Lock<S> {
     pub fn derive(raw: &[S]) -> Self {
         use LockParameter as P;
         let g = |p: P| raw[p as usize];
-        let blocked = S::splat(0.5).lt(g(P::Blocked));
+        let blocked = S::splat(0.5).le(g(P::Blocked));
         Self {
             engage: g(P::EngageTravel),
             release: g(P::ReleaseTravel),
@@ -61,13 +61,13 @@ impl<S: Scalar> Lock<S> {
     /// Locked (1) or not after a step at `travel`.
     #[inline(always)]
     pub fn engaged(&self, before: S, travel: S) -> S {
-        let held = S::select(travel.le(self.release) & self.stuck.le(S::splat(0.5)), S::zero(), before);
+        let held = S::select(travel.le(self.release) & self.stuck.lt(S::splat(0.5)), S::zero(), before);
         S::select(self.engage.le(travel), S::one(), held)
     }
 
     /// Does a stuck lock hold the nut back at this travel?
     #[inline(always)]
     pub fn holds_back(&self, engaged: S, travel: S) -> S::Mask {
-        S::splat(0.5).lt(self.stuck) & S::splat(0.5).lt(engaged) & travel.le(S::zero())
+        S::splat(0.5).le(self.stuck) & S::splat(0.5).lt(engaged) & travel.le(S::zero())
     }
 }

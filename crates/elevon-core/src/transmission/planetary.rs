@@ -37,7 +37,11 @@ impl<S: Scalar> Planetary<S> {
     pub fn derive(raw: &[S]) -> Self {
         use PlanetaryParameter as P;
         let g = |p: P| raw[p as usize];
-        Self { ratio: g(P::RatioFirst) * g(P::RatioSecond), efficiency: g(P::EfficiencyFirst) * g(P::EfficiencySecond), efficiency_second: g(P::EfficiencySecond) }
+        Self {
+            ratio: g(P::RatioFirst) * g(P::RatioSecond),
+            efficiency: g(P::EfficiencyFirst) * g(P::EfficiencySecond),
+            efficiency_second: g(P::EfficiencySecond),
+        }
     }
 }
 

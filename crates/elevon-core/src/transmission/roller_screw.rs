@@ -16,8 +16,7 @@ variables! {
         Preload => "preload", "F_pr", "N", Positive, Plant, None, "preload of the nut; its friction 2 F_pr (1/eta_0 - 1) is part of the friction tables and is not added again";
         JamForce => "jam_force", "F_jam", "N", NonNegative, Plant, Some(0.0), "resistive force where the screw is jammed; 0: none";
         JamPosition => "jam_position", "-", "m", Any, Plant, Some(0.0), "middle of the jammed travel of the nut";
-        JamWidth => "jam_width", "-", "m", Positive, Plant, Some(0.01), "length of the jammed travel";
-        JamAnywhere => "jam_anywhere", "-", "1", Unit, Plant, Some(1.0), "1: jammed wherever it is, 0: only over jam_width about jam_position";
+        JamWidth => "jam_width", "-", "m", NonNegative, Plant, Some(0.0), "length of the jammed travel; 0: jammed wherever it is";
     }
 }
 
@@ -32,7 +31,6 @@ pub struct RollerScrew<S> {
     jam_force: S,
     jam_position: S,
     jam_half: S,
-    jam_anywhere: S,
 }
 
 impl<S: Scalar> RollerScrew<S> {
@@ -48,7 +46,6 @@ impl<S: Scalar> RollerScrew<S> {
             jam_force: g(P::JamForce),
             jam_position: g(P::JamPosition),
             jam_half: S::splat(0.5) * g(P::JamWidth),
-            jam_anywhere: g(P::JamAnywhere),
         }
     }
 
@@ -69,7 +66,7 @@ impl<S: Scalar> RollerScrew<S> {
     /// Resistive force of a jam at this nut position.
     #[inline(always)]
     pub fn jam(&self, nut: S) -> S {
-        let there = (nut - self.jam_position).abs().le(self.jam_half) | S::splat(0.5).lt(self.jam_anywhere);
+        let there = (nut - self.jam_position).abs().le(self.jam_half) | self.jam_half.le(S::zero());
         S::select(there, self.jam_force, S::zero())
     }
 }

@@ -31,7 +31,11 @@ fn lever(out: &mut Vec<Finding>, raw: &[f64]) {
     let view = Raw(raw);
     if let Some(x) = opens_at(view.lever()) {
         let at = |p: LeverParameter| raw[p.at()];
-        let (g, d, l) = (at(LeverParameter::Arm), at(LeverParameter::PivotX).hypot(at(LeverParameter::PivotY)), at(LeverParameter::LengthRetracted) + x);
+        let (g, d, l) = (
+            at(LeverParameter::Arm),
+            at(LeverParameter::PivotX).hypot(at(LeverParameter::PivotY)),
+            at(LeverParameter::LengthRetracted) + x,
+        );
         let message = format!(
             "lever.arm: the triangle of actuator, lever and airframe does not close at user_position = {:.1} mm: the actuator is {l:.4} m long there and must lie between |D - g_a| = {:.4} m and D + g_a = {:.4} m (D = {d:.4} m, g_a = {g:.4} m)",
             1e3 * x, (d - g).abs(), d + g
@@ -39,7 +43,12 @@ fn lever(out: &mut Vec<Finding>, raw: &[f64]) {
         out.push(finding("lever.arm", g, (d - l).abs(), message));
     }
     if at_or_below_zero(raw) {
-        out.push(finding("lever.pivot_x", raw[LeverParameter::PivotX.at()], 0.0, "lever.pivot_x: the pivot of the leg must lie in front of the actuator's (above 0 m)".into()));
+        out.push(finding(
+            "lever.pivot_x",
+            raw[LeverParameter::PivotX.at()],
+            0.0,
+            "lever.pivot_x: the pivot of the leg must lie in front of the actuator's (above 0 m)".into(),
+        ));
     }
 }
 
@@ -54,7 +63,10 @@ fn tables(out: &mut Vec<Finding>, raw: &[f64]) {
             let (a, b) = (speed(k), speed(k + 1));
             ordered(out, raw, (a.0, &a.1), (b.0, &b.1), false, "m/s");
         }
-        for (ff, ffm, way) in [(Friction::FfExtension1, Friction::FfmExtension1, "extension"), (Friction::FfRetraction1, Friction::FfmRetraction1, "retraction")] {
+        for (ff, ffm, way) in [
+            (Friction::FfExtension1, Friction::FfmExtension1, "extension"),
+            (Friction::FfRetraction1, Friction::FfmRetraction1, "retraction"),
+        ] {
             let (low, high) = (format!("friction.ff_{way}_{}", k + 1), format!("friction.ffm_{way}_{}", k + 1));
             ordered(out, raw, (ff.at() + k, &low), (ffm.at() + k, &high), true, "N");
         }
@@ -64,12 +76,33 @@ fn tables(out: &mut Vec<Finding>, raw: &[f64]) {
 fn common(out: &mut Vec<Finding>, raw: &[f64]) {
     lever(out, raw);
     tables(out, raw);
-    ordered(out, raw, (Screw::EfficiencyLoaded.at(), "screw.efficiency_loaded"), (Screw::EfficiencyUnloaded.at(), "screw.efficiency_unloaded"), true, "");
+    ordered(
+        out,
+        raw,
+        (Screw::EfficiencyLoaded.at(), "screw.efficiency_loaded"),
+        (Screw::EfficiencyUnloaded.at(), "screw.efficiency_unloaded"),
+        true,
+        "",
+    );
     ordered(out, raw, (Lock::ReleaseTravel.at(), "lock.release_travel"), (Lock::EngageTravel.at(), "lock.engage_travel"), false, "m");
     ordered(out, raw, (Lock::EngageTravel.at(), "lock.engage_travel"), (Lock::Travel.at(), "lock.travel"), false, "m");
     ordered(out, raw, (Lock::BlockTravel.at(), "lock.block_travel"), (Lock::EngageTravel.at(), "lock.engage_travel"), false, "m");
-    ordered(out, raw, (Proximity::Position0.at(), "proximity.position_0"), (Proximity::Position25.at(), "proximity.position_25"), false, "m");
-    ordered(out, raw, (Proximity::Position25.at(), "proximity.position_25"), (Proximity::Position75.at(), "proximity.position_75"), false, "m");
+    ordered(
+        out,
+        raw,
+        (Proximity::Position0.at(), "proximity.position_0"),
+        (Proximity::Position25.at(), "proximity.position_25"),
+        false,
+        "m",
+    );
+    ordered(
+        out,
+        raw,
+        (Proximity::Position25.at(), "proximity.position_25"),
+        (Proximity::Position75.at(), "proximity.position_75"),
+        false,
+        "m",
+    );
     ordered(out, raw, (Proximity::Position75.at(), "proximity.position_75"), (LeverParameter::Stroke.at(), "lever.stroke"), false, "m");
     ordered(out, raw, (Sequence::SpeedLow.at(), "control.speed_low"), (Sequence::SpeedHigh.at(), "control.speed_high"), true, "rad/s");
     ordered(out, raw, (Sequence::SpeedHigh.at(), "control.speed_high"), (Sequence::Overspeed.at(), "control.overspeed"), false, "rad/s");
@@ -79,14 +112,24 @@ fn common(out: &mut Vec<Finding>, raw: &[f64]) {
         out.push(finding("inverter.supply_voltage", v, limit, format!("inverter.supply_voltage: {v} V is outside control.undervoltage = {low} V to control.overvoltage = {high} V: every move would be refused")));
     }
     if raw[Motor::ShortModel.at()] != 0.0 {
-        out.push(finding("motor.short_model", 1.0, 0.0, "motor.short_model: this actuator has the reduced model of shorted turns only".into()));
+        out.push(finding(
+            "motor.short_model",
+            1.0,
+            0.0,
+            "motor.short_model: this actuator has the reduced model of shorted turns only".into(),
+        ));
     }
 }
 
 fn whole_multiple(out: &mut Vec<Finding>, raw: &[f64], (index, path): (usize, &str), (step, step_path): (usize, &str)) {
     let ratio = raw[index] / raw[step];
     if ratio.round() < 1.0 || (ratio - ratio.round()).abs() > 1e-6 * ratio {
-        out.push(finding(path, raw[index], raw[step], format!("{path}: {:e} s is not a whole multiple of {step_path}, {:e} s", raw[index], raw[step])));
+        out.push(finding(
+            path,
+            raw[index],
+            raw[step],
+            format!("{path}: {:e} s is not a whole multiple of {step_path}, {:e} s", raw[index], raw[step]),
+        ));
     }
 }
 
@@ -111,7 +154,13 @@ pub fn high(raw: &[f64]) -> Vec<Finding> {
     let (l, r) = (turns * raw[Motor::Inductance.at()], raw[Motor::Resistance.at()] + raw[Inverter::OnResistance.at()]);
     step_limit(&mut out, "solver.step", dt, l / r, "electrical pole R / L of motor.winding_resistance and motor.winding_inductance");
     step_limit(&mut out, "solver.step", dt, link(raw), "pole of supply.resistance and supply.capacitance");
-    step_limit(&mut out, "solver.step", dt, 0.1 * raw[SixStepParameter::SwitchingPeriod.at()], "carrier: inverter.switching_period needs ten steps");
+    step_limit(
+        &mut out,
+        "solver.step",
+        dt,
+        0.1 * raw[SixStepParameter::SwitchingPeriod.at()],
+        "carrier: inverter.switching_period needs ten steps",
+    );
     out
 }
 
@@ -122,6 +171,12 @@ pub fn low(raw: &[f64]) -> Vec<Finding> {
     whole_multiple(&mut out, raw, (PiRateParameter::Period.at(), "control.period"), (LowParameter::Step.at(), "low.step"));
     step_limit(&mut out, "low.step", dt, link(raw), "pole of supply.resistance and supply.capacitance");
     let (k, r) = (2.0 * raw[Motor::EmfConstant.at()], 2.0 * (raw[Motor::Resistance.at()] + raw[Inverter::OnResistance.at()]));
-    step_limit(&mut out, "low.step", dt, raw[Motor::Inertia.at()] * r / (k * k), "electromechanical pole (2 k)^2 / (R J) of motor.emf_constant and motor.inertia");
+    step_limit(
+        &mut out,
+        "low.step",
+        dt,
+        raw[Motor::Inertia.at()] * r / (k * k),
+        "electromechanical pole (2 k)^2 / (R J) of motor.emf_constant and motor.inertia",
+    );
     out
 }

@@ -10,46 +10,71 @@ macro_rules! places {
     }};
 }
 
-const fn attribute(name: &'static str, unit: &'static str, path: &'static str, flag: &'static str, text: &'static str) -> Attribute {
-    Attribute { name, unit, default: None, path, flag, text }
+const fn attribute(name: &'static str, unit: &'static str, path: &'static str, text: &'static str) -> Attribute {
+    Attribute { name, unit, default: None, path, flag: "", text }
 }
 
 fn motor() -> Vec<FaultKind> {
-    const PHASE: &[Attribute] = &[attribute("phase", "rad", "motor.eccentricity_static_phase", "", "electrical phase angle of the narrow gap")];
-    const PHASE_DYNAMIC: &[Attribute] = &[attribute("phase", "rad", "motor.eccentricity_dynamic_phase", "", "mechanical phase angle of the narrow gap")];
+    const PHASE: &[Attribute] = &[attribute("phase", "rad", "motor.eccentricity_static_phase", "electrical phase angle of the narrow gap")];
+    const PHASE_DYNAMIC: &[Attribute] =
+        &[attribute("phase", "rad", "motor.eccentricity_dynamic_phase", "mechanical phase angle of the narrow gap")];
     vec![
         FaultKind {
-            kind: "short", unit: "1", range: Range::Between(0.0, 0.95), low: true, attributes: &[],
+            kind: "short",
+            unit: "1",
+            range: Range::Between(0.0, 0.95),
+            low: true,
+            attributes: &[],
             places: places!("motor.phase_a": "motor.turns_a" Lose, "motor.phase_b": "motor.turns_b" Lose, "motor.phase_c": "motor.turns_c" Lose),
             effect: "fraction of the turns of a phase shorted: R ~ N, L ~ N^2, k ~ N; torque falls in four of six sectors",
             source: "T2 (fault coefficients N_j)",
         },
         FaultKind {
-            kind: "open_phase", unit: "1", range: Range::Unit, low: true, attributes: &[],
+            kind: "open_phase",
+            unit: "1",
+            range: Range::Unit,
+            low: true,
+            attributes: &[],
             places: places!("motor.phase_a": "motor.open_a" Set, "motor.phase_b": "motor.open_b" Set, "motor.phase_c": "motor.open_c" Set),
             effect: "1: the phase is interrupted, from its next current zero on; two sectors are left with torque",
             source: "T3 Table 1.1 (open circuit)",
         },
         FaultKind {
-            kind: "eccentricity_static", unit: "1", range: Range::Between(0.0, 0.9), low: true, attributes: PHASE,
+            kind: "eccentricity_static",
+            unit: "1",
+            range: Range::Between(0.0, 0.9),
+            low: true,
+            attributes: PHASE,
             places: places!("motor": "motor.eccentricity_static" Add),
             effect: "k_j (1 + zeta cos(theta_e - phi + 2 pi (j-1)/3)); torque ripple at the electrical frequency",
             source: "T2 (eccentricity coefficient zeta, phi)",
         },
         FaultKind {
-            kind: "eccentricity_dynamic", unit: "1", range: Range::Between(0.0, 0.9), low: true, attributes: PHASE_DYNAMIC,
+            kind: "eccentricity_dynamic",
+            unit: "1",
+            range: Range::Between(0.0, 0.9),
+            low: true,
+            attributes: PHASE_DYNAMIC,
             places: places!("motor": "motor.eccentricity_dynamic" Add),
             effect: "fraction of the air gap; the modulation turns with the shaft (law ASSUMED: the paper names the fault only)",
             source: "N 4.3",
         },
         FaultKind {
-            kind: "demagnetisation", unit: "1", range: Range::Between(0.0, 0.95), low: true, attributes: &[],
+            kind: "demagnetisation",
+            unit: "1",
+            range: Range::Between(0.0, 0.95),
+            low: true,
+            attributes: &[],
             places: places!("motor": "motor.flux_fraction" Lose),
             effect: "fraction of the magnets' flux lost: more current for the same torque",
             source: "ASSUMED: uniform loss of flux, the usual first model",
         },
         FaultKind {
-            kind: "bearing_wear", unit: "N m", range: Range::Between(0.0, 1.0), low: true, attributes: &[],
+            kind: "bearing_wear",
+            unit: "N m",
+            range: Range::Between(0.0, 1.0),
+            low: true,
+            attributes: &[],
             places: places!("motor.bearing": "motor.bearing_torque" Add),
             effect: "dry friction on the motor shaft",
             source: "ASSUMED: wear as dry friction",
@@ -60,7 +85,11 @@ fn motor() -> Vec<FaultKind> {
 fn power() -> Vec<FaultKind> {
     vec![
         FaultKind {
-            kind: "open_switch", unit: "1", range: Range::Unit, low: false, attributes: &[],
+            kind: "open_switch",
+            unit: "1",
+            range: Range::Unit,
+            low: false,
+            attributes: &[],
             places: places!(
                 "inverter.a_high": "inverter.open_a_high" Set, "inverter.a_low": "inverter.open_a_low" Set,
                 "inverter.b_high": "inverter.open_b_high" Set, "inverter.b_low": "inverter.open_b_low" Set,
@@ -70,7 +99,11 @@ fn power() -> Vec<FaultKind> {
             source: "T3 Table 1.1 (open circuit)",
         },
         FaultKind {
-            kind: "shorted_switch", unit: "1", range: Range::Unit, low: false, attributes: &[],
+            kind: "shorted_switch",
+            unit: "1",
+            range: Range::Unit,
+            low: false,
+            attributes: &[],
             places: places!(
                 "inverter.a_high": "inverter.shorted_a_high" Set, "inverter.a_low": "inverter.shorted_a_low" Set,
                 "inverter.b_high": "inverter.shorted_b_high" Set, "inverter.b_low": "inverter.shorted_b_low" Set,
@@ -80,7 +113,11 @@ fn power() -> Vec<FaultKind> {
             source: "T3 Table 1.1 (short)",
         },
         FaultKind {
-            kind: "sag", unit: "1", range: Range::Between(0.0, 0.99), low: true, attributes: &[],
+            kind: "sag",
+            unit: "1",
+            range: Range::Between(0.0, 0.99),
+            low: true,
+            attributes: &[],
             places: places!("supply": "inverter.supply_scale" Lose),
             effect: "fraction of the supply voltage lost: slower, below control.undervoltage moves are refused",
             source: "T3 Table 1.1 (power connector)",
@@ -89,40 +126,65 @@ fn power() -> Vec<FaultKind> {
 }
 
 fn sensors() -> Vec<FaultKind> {
-    const PERIOD: &[Attribute] = &[Attribute { name: "period", unit: "s", default: Some(0.1), path: "", flag: "", text: "period of the interruptions" }];
+    const PERIOD: &[Attribute] =
+        &[Attribute { name: "period", unit: "s", default: Some(0.1), path: "", flag: "", text: "period of the interruptions" }];
     vec![
         FaultKind {
-            kind: "hall_high", unit: "1", range: Range::Unit, low: true, attributes: &[],
+            kind: "hall_high",
+            unit: "1",
+            range: Range::Unit,
+            low: true,
+            attributes: &[],
             places: places!("sensor.hall_a": "hall.stuck_high_a" Set, "sensor.hall_b": "hall.stuck_high_b" Set, "sensor.hall_c": "hall.stuck_high_c" Set),
             effect: "1: the sensor always reads high: wrong sectors, the code 111, a hall fault of the control unit",
             source: "T3 Table 1.1 (position sensor)",
         },
         FaultKind {
-            kind: "hall_low", unit: "1", range: Range::Unit, low: true, attributes: &[],
+            kind: "hall_low",
+            unit: "1",
+            range: Range::Unit,
+            low: true,
+            attributes: &[],
             places: places!("sensor.hall_a": "hall.stuck_low_a" Set, "sensor.hall_b": "hall.stuck_low_b" Set, "sensor.hall_c": "hall.stuck_low_c" Set),
             effect: "1: the sensor always reads low: wrong sectors, the code 000, a hall fault of the control unit",
             source: "T3 Table 1.1 (position sensor)",
         },
         FaultKind {
-            kind: "offset", unit: "rad", range: Range::Between(-0.5, 0.5), low: true, attributes: &[],
+            kind: "offset",
+            unit: "rad",
+            range: Range::Between(-0.5, 0.5),
+            low: true,
+            attributes: &[],
             places: places!("sensor.hall": "hall.offset" Add, "sensor.hall_a": "hall.offset_a" Add, "sensor.hall_b": "hall.offset_b" Add, "sensor.hall_c": "hall.offset_c" Add),
             effect: "electrical angle by which the sensors switch early: torque ripple, less torque per ampere",
             source: "T3 Table 1.1 (position sensor)",
         },
         FaultKind {
-            kind: "dropout", unit: "1", range: Range::Between(0.0, 1.0), low: true, attributes: PERIOD,
+            kind: "dropout",
+            unit: "1",
+            range: Range::Between(0.0, 1.0),
+            low: true,
+            attributes: PERIOD,
             places: places!("sensor.hall": "hall.power_off" Pulse),
             effect: "duty of the Hall sensors' power lost: the code 000, no commutation, speed shown as zero",
             source: "N 4.5 (resolver power, here the Hall sensors')",
         },
         FaultKind {
-            kind: "proximity_on", unit: "1", range: Range::Unit, low: true, attributes: &[],
+            kind: "proximity_on",
+            unit: "1",
+            range: Range::Unit,
+            low: true,
+            attributes: &[],
             places: places!("sensor.proximity_0": "proximity.on_0" Set, "sensor.proximity_25": "proximity.on_25" Set, "sensor.proximity_75": "proximity.on_75" Set, "sensor.proximity_100": "proximity.on_100" Set),
             effect: "1: the switch always reads on",
             source: "ASSUMED: the usual failure of an inductive switch",
         },
         FaultKind {
-            kind: "proximity_off", unit: "1", range: Range::Unit, low: true, attributes: &[],
+            kind: "proximity_off",
+            unit: "1",
+            range: Range::Unit,
+            low: true,
+            attributes: &[],
             places: places!("sensor.proximity_0": "proximity.off_0" Set, "sensor.proximity_25": "proximity.off_25" Set, "sensor.proximity_75": "proximity.off_75" Set, "sensor.proximity_100": "proximity.off_100" Set),
             effect: "1: the switch never reads on",
             source: "ASSUMED: broken wire",
@@ -132,48 +194,90 @@ fn sensors() -> Vec<FaultKind> {
 
 fn mechanical() -> Vec<FaultKind> {
     const JAM: &[Attribute] = &[
-        attribute("position", "m", "screw.jam_position", "screw.jam_anywhere", "nut position in the middle of the jam; not given: everywhere"),
-        attribute("width", "m", "screw.jam_width", "", "length of the jammed travel"),
+        Attribute {
+            name: "position",
+            unit: "m",
+            default: Some(0.0),
+            path: "screw.jam_position",
+            flag: "",
+            text: "nut position in the middle of the jam",
+        },
+        Attribute {
+            name: "width",
+            unit: "m",
+            default: Some(0.0),
+            path: "screw.jam_width",
+            flag: "",
+            text: "length of the jammed travel; 0: jammed wherever it is",
+        },
     ];
     vec![
         FaultKind {
-            kind: "friction_growth", unit: "N", range: Range::Between(0.0, 5000.0), low: true, attributes: &[],
+            kind: "friction_growth",
+            unit: "N",
+            range: Range::Between(0.0, 5000.0),
+            low: true,
+            attributes: &[],
             places: places!("screw": "friction.growth" Add),
             effect: "force added to the friction of the screw, in FF and FFM: more current, no free fall at the end",
             source: "N 4.1 (wear of the screw)",
         },
         FaultKind {
-            kind: "efficiency_loss", unit: "1", range: Range::Between(0.0, 0.5), low: true, attributes: &[],
+            kind: "efficiency_loss",
+            unit: "1",
+            range: Range::Between(0.0, 0.5),
+            low: true,
+            attributes: &[],
             places: places!("screw": "screw.efficiency_scale" Lose, "gear_first": "gear.efficiency_first" Lose, "gear_second": "gear.efficiency_second" Lose),
             effect: "fraction of an efficiency lost; the load cannot drive back once the train's is below one half",
             source: "N 4.1",
         },
         FaultKind {
-            kind: "jam", unit: "N", range: Range::Between(0.0, 1e5), low: true, attributes: JAM,
+            kind: "jam",
+            unit: "N",
+            range: Range::Between(0.0, 1e5),
+            low: true,
+            attributes: JAM,
             places: places!("screw": "screw.jam_force" Add),
             effect: "resistive force on the nut: the motor stalls, retries, the control unit faults",
             source: "N 4.2",
         },
         FaultKind {
-            kind: "brake_dragging", unit: "N m", range: Range::Between(0.0, 10.0), low: true, attributes: &[],
+            kind: "brake_dragging",
+            unit: "N m",
+            range: Range::Between(0.0, 10.0),
+            low: true,
+            attributes: &[],
             places: places!("brake": "brake.drag" Add),
             effect: "torque left when released, at most the brake's own",
             source: "ASSUMED: worn or swollen disc",
         },
         FaultKind {
-            kind: "brake_slipping", unit: "1", range: Range::Unit, low: true, attributes: &[],
+            kind: "brake_slipping",
+            unit: "1",
+            range: Range::Unit,
+            low: true,
+            attributes: &[],
             places: places!("brake": "brake.torque" Lose),
             effect: "fraction of the holding torque lost: the leg creeps down when the drive is off",
             source: "ASSUMED: oil on the disc",
         },
         FaultKind {
-            kind: "lock_not_engaging", unit: "1", range: Range::Unit, low: true, attributes: &[],
+            kind: "lock_not_engaging",
+            unit: "1",
+            range: Range::Unit,
+            low: true,
+            attributes: &[],
             places: places!("lock": "lock.blocked" Set),
             effect: "1: the sleeve blocks and the down-lock does not engage: retries, then a fault",
             source: "ASSUMED: dirt under the sleeve",
         },
         FaultKind {
-            kind: "lock_not_releasing", unit: "1", range: Range::Unit, low: true, attributes: &[],
+            kind: "lock_not_releasing",
+            unit: "1",
+            range: Range::Unit,
+            low: true,
+            attributes: &[],
             places: places!("lock": "lock.stuck" Set),
             effect: "1: the segments of an engaged lock stay: retries, then a fault",
             source: "ASSUMED: sticking segments",

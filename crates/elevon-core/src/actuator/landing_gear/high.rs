@@ -51,7 +51,16 @@ struct Part<S> {
 
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
-fn part<S: Scalar>(m: &Model<S>, structure: &BridgeStructure, s: &mut State<S>, legs: [S; 3], k: [S; 3], resistance: [S; 3], dt: S, start: [S; 3]) -> Part<S> {
+fn part<S: Scalar>(
+    m: &Model<S>,
+    structure: &BridgeStructure,
+    s: &mut State<S>,
+    legs: [S; 3],
+    k: [S; 3],
+    resistance: [S; 3],
+    dt: S,
+    start: [S; 3],
+) -> Part<S> {
     let half = S::splat(0.5);
     let zero = S::zero();
     let half_supply = half * s.body.link;
@@ -75,7 +84,11 @@ fn part<S: Scalar>(m: &Model<S>, structure: &BridgeStructure, s: &mut State<S>, 
     let tiny = S::splat(1e-30);
     let middle: [S; 3] = three!(|j| {
         let whole = free[j] - i[j];
-        let share = S::select(whole.abs().lt(tiny), S::one(), ((current[j] - i[j]) / S::select(whole.abs().lt(tiny), S::one(), whole)).clamp(zero, S::one()));
+        let share = S::select(
+            whole.abs().lt(tiny),
+            S::one(),
+            ((current[j] - i[j]) / S::select(whole.abs().lt(tiny), S::one(), whole)).clamp(zero, S::one()),
+        );
         half * (i[j] + current[j]) * share
     });
     let mut out = Part { current, voltage: three!(|j| terminal[j] - neutral), charge: zero, impulse: zero, copper: zero, inverter: zero };
@@ -144,7 +157,7 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
     let angle = m.c.star.electrical_angle(s.body.motion.motor_position);
     let advance = (s.body.motion.motor_position - before) * m.c.star.pole_pairs;
     m.c.hall.observe(&mut s.body.hall, angle, advance, t + m.c.dt, m.c.dt);
-    if (k + 1) % m.mechanical == 0 {
+    if (k + 1).is_multiple_of(m.mechanical) {
         let torque = m.c.star.saturate(s.torque * m.per_torque_steps);
         let acting = m.c.acting(&s.body, inputs, torque, t);
         m.c.mechanics.kick(&mut s.body.motion, &acting, structure.rig);
@@ -200,15 +213,38 @@ impl Wiring for High {
 
     fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
         let zero = S::zero();
-        State { body: model.c.start(raw, initial), current: [zero; 3], legs: [zero; 3], bridge: BridgeState::rest(), cut: zero, torque: zero, voltage: [zero; 3] }
+        State {
+            body: model.c.start(raw, initial),
+            current: [zero; 3],
+            legs: [zero; 3],
+            bridge: BridgeState::rest(),
+            cut: zero,
+            torque: zero,
+            voltage: [zero; 3],
+        }
     }
 
-    fn tick<S: Scalar>(_kind: u8, _structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &mut State<S>, t: S, noise: &mut dyn FnMut(u64) -> S) {
+    fn tick<S: Scalar>(
+        _kind: u8,
+        _structure: &Structure,
+        m: &Model<S>,
+        inputs: &Inputs<S>,
+        s: &mut State<S>,
+        t: S,
+        noise: &mut dyn FnMut(u64) -> S,
+    ) {
         m.c.tick(&mut s.body, inputs, t, noise);
     }
 
     #[inline(always)]
-    fn advance<S: Scalar>(structure: &Structure, models: &[Model<S>], inputs: &[Inputs<S>], states: &mut [State<S>], from: Steps, count: Steps) {
+    fn advance<S: Scalar>(
+        structure: &Structure,
+        models: &[Model<S>],
+        inputs: &[Inputs<S>],
+        states: &mut [State<S>],
+        from: Steps,
+        count: Steps,
+    ) {
         for k in from..from + count {
             for ((model, inputs), state) in models.iter().zip(inputs).zip(states.iter_mut()) {
                 step(model, structure, inputs, state, k);

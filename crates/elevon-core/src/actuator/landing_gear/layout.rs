@@ -31,6 +31,8 @@ variables! {
 pub const LOADS: usize = 9;
 
 variables! {
+    // The curve is read as a slice from its first value.
+    #[allow(dead_code)]
     /// Load of the leg on the ram at load factor 1, at nine even positions of the stroke; it pushes towards extension.
     LoadCurveParameter, LOAD_CURVE {
         Factor => "factor", "N_z", "1", NonNegative, Load, Some(1.0), "load factor on the load curve";
@@ -109,6 +111,8 @@ pub trait At {
 
 macro_rules! views {
     ($($name:ident $index:literal $id:ident),*) => {
+        // Every group has its view, also where single parameters are looked up by `At` alone.
+        #[allow(dead_code)]
         impl<'a, S> Raw<'a, S> {
             $(pub fn $name(self) -> &'a [S] {
                 const AT: usize = offset(GROUPS, $index);

@@ -182,12 +182,27 @@ impl Wiring for Low {
         State { body: model.c.start(raw, initial), current: S::zero(), torque: S::zero() }
     }
 
-    fn tick<S: Scalar>(_kind: u8, _structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &mut State<S>, t: S, noise: &mut dyn FnMut(u64) -> S) {
+    fn tick<S: Scalar>(
+        _kind: u8,
+        _structure: &Structure,
+        m: &Model<S>,
+        inputs: &Inputs<S>,
+        s: &mut State<S>,
+        t: S,
+        noise: &mut dyn FnMut(u64) -> S,
+    ) {
         m.c.tick(&mut s.body, inputs, t, noise);
     }
 
     #[inline(always)]
-    fn advance<S: Scalar>(structure: &Structure, models: &[Model<S>], inputs: &[Inputs<S>], states: &mut [State<S>], from: Steps, count: Steps) {
+    fn advance<S: Scalar>(
+        structure: &Structure,
+        models: &[Model<S>],
+        inputs: &[Inputs<S>],
+        states: &mut [State<S>],
+        from: Steps,
+        count: Steps,
+    ) {
         for k in from..from + count {
             for ((model, inputs), state) in models.iter().zip(inputs).zip(states.iter_mut()) {
                 step(model, structure, inputs, state, k);

@@ -2,6 +2,7 @@
 //! `kick` changes the speeds, `drift` the positions; forces towards extension are positive.
 
 use super::layout::*;
+use crate::motor::star::MotorParameter;
 use crate::piecewise::{Curve, Knots};
 use crate::scalar::Scalar;
 use crate::transmission::brake::Brake;
@@ -11,7 +12,6 @@ use crate::transmission::lock::Lock;
 use crate::transmission::planetary::{Governor, Planetary, PlanetaryParameter};
 use crate::transmission::roller_screw::{RollerScrew, ScrewParameter};
 use crate::transmission::train_friction::TrainFriction;
-use crate::motor::star::MotorParameter;
 
 const GRAVITY: f64 = 9.80665;
 
@@ -226,7 +226,8 @@ impl<S: Scalar> Mechanics<S> {
         let half = S::splat(0.5);
         let arm = self.lever.at(s.nut_position.clamp(S::zero(), self.lever.stroke));
         let together = half * self.inertia(s, &arm) * s.motor_speed * s.motor_speed;
-        let apart = half * self.inertia_motor * s.motor_speed * s.motor_speed + half * self.mass_released(s, &arm) * s.nut_speed * s.nut_speed;
+        let apart =
+            half * self.inertia_motor * s.motor_speed * s.motor_speed + half * self.mass_released(s, &arm) * s.nut_speed * s.nut_speed;
         S::select(half.lt(released), apart, together)
     }
 
@@ -271,7 +272,11 @@ impl<S: Scalar> Mechanics<S> {
         }
         let before = self.kinetic_energy(s, released);
         let arm = self.lever.at(s.nut_position.clamp(S::zero(), self.lever.stroke));
-        let taken = S::select(S::splat(0.5).lt(released), self.mass_screw / (self.mass_screw + self.leg * arm.per_square), self.inertia_train / (self.inertia_train + self.leg * arm.per_square * (self.travel * self.travel)));
+        let taken = S::select(
+            S::splat(0.5).lt(released),
+            self.mass_screw / (self.mass_screw + self.leg * arm.per_square),
+            self.inertia_train / (self.inertia_train + self.leg * arm.per_square * (self.travel * self.travel)),
+        );
         let slowed = S::select(s.carrying.lt(carrying), taken, S::one());
         s.carrying = carrying;
         s.nut_speed = slowed * s.nut_speed;
@@ -304,7 +309,15 @@ impl<S: Scalar> Mechanics<S> {
         let (up, down) = self.ends(s);
         let inertia = self.inertia(s, &f.arm);
         let rate = self.rate_term * s.carrying * self.leg * r * r * r * f.arm.rate * w * w;
-        let shaft = Shaft { speed: w, active: active - rate, fixed: self.friction.breakaway * rubbing + other, kinetic: rubbing + other, inertia, blocked_up: up, blocked_down: down };
+        let shaft = Shaft {
+            speed: w,
+            active: active - rate,
+            fixed: self.friction.breakaway * rubbing + other,
+            kinetic: rubbing + other,
+            inertia,
+            blocked_up: up,
+            blocked_down: down,
+        };
         let moved = self.move_shaft(&shaft);
         s.motor_speed = moved.speed;
         s.nut_speed = r * moved.speed;
@@ -333,7 +346,15 @@ impl<S: Scalar> Mechanics<S> {
         let own = self.friction.at(s.motor_speed * self.travel, zero.le(heading), s.nut_position, self.screw.turns);
         let rubbing = self.travel * (own.train - own.screw).maximum(zero);
         let other = brake + self.bearing;
-        let motor = Shaft { speed: s.motor_speed, active: pushed, fixed: self.friction.breakaway * rubbing + other, kinetic: rubbing + other, inertia: self.inertia_motor, blocked_up: never, blocked_down: never };
+        let motor = Shaft {
+            speed: s.motor_speed,
+            active: pushed,
+            fixed: self.friction.breakaway * rubbing + other,
+            kinetic: rubbing + other,
+            inertia: self.inertia_motor,
+            blocked_up: never,
+            blocked_down: never,
+        };
         let turned = self.move_shaft(&motor);
 
         let v = s.nut_speed;
@@ -345,7 +366,15 @@ impl<S: Scalar> Mechanics<S> {
         let governor = self.governor.force(v);
         let (up, down) = self.ends(s);
         let rate = self.rate_term * s.carrying * self.leg * f.arm.rate * v * v;
-        let ram = Shaft { speed: v, active: axial - governor - rate, fixed: self.friction.breakaway * resistance + loss + jam, kinetic: resistance + loss + jam, inertia: self.mass_released(s, &f.arm), blocked_up: up, blocked_down: down };
+        let ram = Shaft {
+            speed: v,
+            active: axial - governor - rate,
+            fixed: self.friction.breakaway * resistance + loss + jam,
+            kinetic: resistance + loss + jam,
+            inertia: self.mass_released(s, &f.arm),
+            blocked_up: up,
+            blocked_down: down,
+        };
         let fallen = self.move_shaft(&ram);
         s.motor_speed = turned.speed;
         s.nut_speed = fallen.speed;

@@ -1,0 +1,190 @@
+"""An open-loop hydraulic leg actuator beside the electromechanical one (P eqs. 1 and 2).
+
+The cylinder's speed follows from the supply pressure, the load and a restrictor; oil density and
+restrictor loss depend on temperature. Nothing closes a loop on speed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elevon.report.checks import Check, all_passed
+from elevon.reproduce.pisa_gear import Stroke, run_strokes
+
+if TYPE_CHECKING:
+    from elevon.progress import Progress
+    from elevon.recording import Recording
+
+__all__ = ["HydraulicActuator", "HydraulicResult", "HydraulicRow", "reproduce_hydraulic"]
+
+TEMPERATURES = (-40.0, 20.0, 70.0)
+FACTORS = (0.0, 1.0, 1.5, 3.5)
+
+
+@dataclass(frozen=True, slots=True)
+class HydraulicActuator:
+    """Cylinder, restrictor and oil, SI; every number ASSUMED, as P prints none.
+
+    Attributes
+    ----------
+    supply_pressure : float
+        Pa; a light helicopter's system, 1500 psi class.
+    piston_area : float
+        m2; 8.24 kN at that pressure, above the 6.98 kN of the critical load.
+    restrictor_diameter : float
+        m; 50 mm/s at 20 C without load, the high speed of the electromechanical actuator.
+    restrictor_loss : float
+        Loss coefficient at high Reynolds number; a sharp orifice, ``1/0.61**2``.
+    restrictor_reynolds : float
+        Reynolds number at which the loss has doubled; a short bore, order of magnitude.
+    density, expansion : float
+        kg/m3 at 20 C and 1/K; mineral hydraulic oil.
+    viscosity_40, viscosity_100 : float
+        m2/s; MIL-PRF-5606 class, Walther's rule between.
+    """
+
+    supply_pressure: float = 10.3e6
+    piston_area: float = 8e-4
+    restrictor_diameter: float = 0.75e-3
+    restrictor_loss: float = 2.7
+    restrictor_reynolds: float = 250.0
+    density: float = 860.0
+    expansion: float = 8e-4
+    viscosity_40: float = 14e-6
+    viscosity_100: float = 5e-6
+
+    def oil_density(self, temperature: float) -> float:
+        """Return the density in kg/m3 at a temperature in degrees Celsius."""
+        return self.density * (1.0 - self.expansion * (temperature - 20.0))
+
+    def viscosity(self, temperature: float) -> float:
+        """Return the kinematic viscosity in m2/s by Walther's rule (ASTM D341)."""
+
+        def w(viscosity: float) -> float:
+            return math.log10(math.log10(1e6 * viscosity + 0.7))
+
+        t40, t100 = math.log10(313.15), math.log10(373.15)
+        slope = (w(self.viscosity_40) - w(self.viscosity_100)) / (t100 - t40)
+        exponent = w(self.viscosity_40) + slope * (t40 - math.log10(temperature + 273.15))
+        return float(1e-6 * (10.0 ** (10.0**exponent) - 0.7))
+
+    def speed(self, force: float, temperature: float) -> float:
+        """Return the ram speed in m/s under a force in N that aids when positive; 0 when stalled.
+
+        ``p = (1/2) rho K_s u^2`` with ``K_s = K (1 + Re_c/Re)``, ``Re = u d/nu``: a quadratic in
+        the jet speed u.
+        """
+        pressure = self.supply_pressure + force / self.piston_area
+        if pressure <= 0.0:
+            return 0.0
+        d = self.restrictor_diameter
+        b = self.restrictor_reynolds * self.viscosity(temperature) / d
+        head = 8.0 * pressure / (self.oil_density(temperature) * self.restrictor_loss)
+        jet = 0.5 * (math.sqrt(b * b + head) - b)
+        return jet * 0.25 * math.pi * d * d / self.piston_area
+
+
+@dataclass(frozen=True, slots=True)
+class HydraulicRow:
+    """Speeds in mid-stroke at one temperature, load factor and direction."""
+
+    temperature_c: float
+    nz: float
+    direction: str
+    hydraulic_mm_s: float
+    electric_mm_s: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return one row of the command's JSON object."""
+        return {
+            "temperature_c": self.temperature_c,
+            "nz": self.nz,
+            "direction": self.direction,
+            "hydraulic_mm_s": self.hydraulic_mm_s,
+            "electric_mm_s": self.electric_mm_s,
+        }
+
+
+@dataclass(frozen=True)
+class HydraulicResult:
+    """Everything `elevon reproduce pisa-hydraulic` reports."""
+
+    rows: list[HydraulicRow]
+    checks: list[Check]
+    temperatures: tuple[float, ...] = TEMPERATURES
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object of the command."""
+        return {
+            "status": "pass" if all_passed(self.checks) else "fail",
+            "rows": [row.to_dict() for row in self.rows],
+            "checks": [check.to_dict() for check in self.checks],
+        }
+
+
+def reproduce_hydraulic(
+    *, hydraulic: HydraulicActuator | None = None, progress: Progress | None = None
+) -> HydraulicResult:
+    """Compare both actuators at mid-stroke over load and temperature.
+
+    The electromechanical one runs at 28 V with its winding at the temperature; its speed is read
+    where the ram passes the middle of the stroke.
+    """
+    leg = hydraulic or HydraulicActuator()
+    cases = [
+        (temperature, factor, action)
+        for temperature in TEMPERATURES
+        for factor in FACTORS
+        for action in ("extend", "retract")
+    ]
+    strokes = [
+        Stroke(action, factor, 28.0, {"motor.winding_temperature": temperature + 273.15})
+        for temperature, factor, action in cases
+    ]
+    runs = run_strokes(strokes, fidelity="low", progress=progress)
+    rows = []
+    for (temperature, factor, action), run in zip(cases, runs, strict=True):
+        speed, load = _middle(run)
+        sign = 1.0 if action == "extend" else -1.0
+        rows.append(
+            HydraulicRow(
+                temperature,
+                factor,
+                "extension" if action == "extend" else "retraction",
+                1e3 * leg.speed(sign * load, temperature),
+                1e3 * abs(speed),
+            )
+        )
+    return HydraulicResult(rows, _checks(rows))
+
+
+def _middle(run: Recording) -> tuple[float, float]:
+    """Ram speed in m/s over the middle tenth of the stroke, and the load there in N."""
+    ram = run["user_position"]
+    kept = (ram.values > 0.119) & (ram.values < 0.145)
+    time, place = ram.time[kept], ram.values[kept]
+    if time.size < 2:
+        return 0.0, float("nan")
+    return float((place[-1] - place[0]) / (time[-1] - time[0])), float(
+        run["load_force"].values[kept].mean()
+    )
+
+
+def _spread(rows: Sequence[HydraulicRow], name: str) -> float:
+    speeds = np.array([getattr(row, name) for row in rows])
+    return float(100.0 * (speeds.max() - speeds.min()) / speeds.mean())
+
+
+def _checks(rows: Sequence[HydraulicRow]) -> list[Check]:
+    lifting = [row for row in rows if row.direction == "retraction"]
+    electric = _spread(lifting, "electric_mm_s")
+    hydraulic = _spread(lifting, "hydraulic_mm_s")
+    return [
+        Check("retraction, spread of the controlled speed", electric, 5.0, "%"),
+        Check("retraction, spread of the hydraulic speed", hydraulic, electric, "%", at_least=True),
+    ]

@@ -1,0 +1,273 @@
+"""Friction tests of the Pisa landing gear, and what their logs alone tell.
+
+Free fall (FF): the stages are apart and the rig moves screw, nut and ram. Modified free fall
+(FFM): everything is connected, the bench holds the brake open and the rig drives the motor back.
+The ram hangs from the load cell. At constant speed the friction is ``-(F_LC + m g)`` (P 4.1).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.errors import SimulationError
+from elevon.report.checks import Check, all_passed
+from elevon.reproduce.pisa_gear import ACTUATOR, Stroke, run_strokes
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.progress import Progress
+    from elevon.recording import Recording
+
+__all__ = ["FrictionResult", "FrictionRow", "reproduce_friction"]
+
+Floats = npt.NDArray[np.float64]
+
+GRAVITY = 9.80665
+SPEEDS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+"""Speeds of the tests [mm/s]."""
+FACTORS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)
+"""Load factors of the loaded retractions; the first gives the friction at working speed."""
+TURNS = 10
+"""Whole turns of the screw that are evaluated."""
+HARMONICS = 5
+LIMIT = 0.03
+"""Of the largest value of a kind."""
+SUPPLY = 30.3
+
+
+@dataclass(frozen=True, slots=True)
+class FrictionRow:
+    """A quantity put into the model and recovered from the logs."""
+
+    quantity: str
+    direction: str
+    speed_mm_s: float | None
+    load_n: float | None
+    put_in: float
+    recovered: float
+    unit: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return one row of the command's JSON object."""
+        return {
+            "quantity": self.quantity,
+            "direction": self.direction,
+            "speed_mm_s": self.speed_mm_s,
+            "load_n": self.load_n,
+            "put_in": self.put_in,
+            "recovered": self.recovered,
+            "unit": self.unit,
+        }
+
+
+@dataclass(frozen=True)
+class FrictionResult:
+    """Everything `elevon reproduce pisa-friction` reports."""
+
+    rows: list[FrictionRow]
+    checks: list[Check]
+    seed: int
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object of the command."""
+        return {
+            "status": "pass" if all_passed(self.checks) else "fail",
+            "rows": [row.to_dict() for row in self.rows],
+            "checks": [check.to_dict() for check in self.checks],
+            "seed": self.seed,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class _Test:
+    """One pull or push of the rig."""
+
+    released: bool
+    speed: float
+    direction: int
+
+    @property
+    def way(self) -> str:
+        return "extension" if self.direction > 0 else "retraction"
+
+
+def reproduce_friction(*, seed: int = 0, progress: Progress | None = None) -> FrictionResult:
+    """Run the tests, recover weight, friction, harmonics and efficiency from their logs.
+
+    Raises
+    ------
+    SimulationError
+        A run tripped or diverged.
+    """
+    from elevon.actuator import Actuator
+
+    actuator = Actuator.load(ACTUATOR)
+    lead = 2.0 * math.pi * actuator.parameters.value("screw.lead")
+    tests = [
+        _Test(released, 1e-3 * speed, direction)
+        for released in (False, True)
+        for speed in SPEEDS
+        for direction in (1, -1)
+    ]
+    logs = _run_rig(actuator, tests, lead, seed, progress)
+    forces = [_settled(log, lead) for log in logs]
+    mass = float(
+        np.mean(
+            [
+                -(ahead.mean() + back.mean()) / (2.0 * GRAVITY)
+                for (_, ahead), (_, back) in zip(forces[::2], forces[1::2], strict=True)
+            ]
+        )
+    )
+    put_mass = actuator.parameters.value("screw.moving_mass")
+    rows = [FrictionRow("mass", "both", None, None, put_mass, mass, "kg")]
+    for test, log in zip(tests, forces, strict=True):
+        rows += _friction_rows(actuator, test, log, mass, lead)
+    rows += _efficiency_rows(actuator, seed, progress)
+    return FrictionResult(rows, _checks(rows), seed)
+
+
+def _run_rig(
+    actuator: Actuator,
+    tests: Sequence[_Test],
+    lead: float,
+    seed: int,
+    progress: Progress | None,
+) -> list[Recording]:
+    from elevon.scenario import Scenario
+    from elevon.simulate import Run, simulate_batch
+
+    runs = []
+    for number, test in enumerate(tests):
+        travel = (TURNS + 1) * lead
+        start = 0.02 if test.direction > 0 else 0.02 + travel
+        values: dict[str, Any] = {"low.step": 1e-4}
+        values["release.open" if test.released else "brake.powered"] = (
+            "yes" if test.released else "always"
+        )
+        speed = {"kind": "constant", "value": test.direction * test.speed}
+        scenario = Scenario.from_dict(
+            {
+                "duration": round(travel / test.speed, 2),
+                "load": {"rig_speed": {"terms": [speed]}},
+                "initial": {"nut_position": start},
+                "parameters": values,
+            }
+        )
+        label = f"{'FF' if test.released else 'FFM'}, {test.way}, {1e3 * test.speed:g} mm/s"
+        runs.append(Run(actuator, scenario, seed, label, number))
+    logs = simulate_batch(
+        runs, fidelity="low", record="nut_position,load_cell@500 Hz", progress=progress
+    )
+    for log in logs:
+        if log.status != "ok":
+            raise SimulationError(f"{log.meta['label']}: {log.meta['message']}", log.status)
+    return logs
+
+
+def _settled(log: Recording, lead: float) -> tuple[Floats, Floats]:
+    """Return position and force over whole turns, the first turn left out."""
+    position, force = log["nut_position"].values, log["load_cell"].values
+    travel = np.abs(position - position[0])
+    kept = (travel >= lead) & (travel < (TURNS + 1) * lead * (1.0 - 1e-9))
+    return position[kept], force[kept]
+
+
+def _friction_rows(
+    actuator: Actuator, test: _Test, log: tuple[Floats, Floats], mass: float, lead: float
+) -> list[FrictionRow]:
+    position, force = log
+    resisting = test.direction * (force + mass * GRAVITY)
+    kind = "ff" if test.released else "ffm"
+    speed = 1e3 * test.speed
+    put = _table(actuator, f"{kind}_{test.way}", test.speed)
+    rows = [
+        FrictionRow(f"friction_{kind}", test.way, speed, None, put, float(resisting.mean()), "N")
+    ]
+    if not test.released:
+        return rows
+    ripple = resisting - resisting.mean()
+    for order in range(1, HARMONICS + 1):
+        wave = np.exp(2j * math.pi * order * position / lead)
+        found = float(np.abs(2.0 * np.mean(ripple * wave)))
+        put = _table(actuator, f"harmonic_{order}", test.speed)
+        rows.append(FrictionRow(f"harmonic_{order}", test.way, speed, None, put, found, "N"))
+    preload = 2.0 * actuator.parameters.value("screw.preload")
+    put = _table(actuator, f"ff_{test.way}", test.speed)
+    apparent = 1.0 / (1.0 + float(resisting.mean()) / preload)
+    rows.append(
+        FrictionRow(
+            "preload_efficiency", test.way, speed, None, 1.0 / (1.0 + put / preload), apparent, "1"
+        )
+    )
+    return rows
+
+
+def _table(actuator: Actuator, name: str, speed: float) -> float:
+    """Return what the set's own table says at a speed in m/s."""
+    value = actuator.parameters.value
+    knots = [value(f"friction.speed_{k}") for k in range(1, 9)]
+    return float(np.interp(speed, knots, [value(f"friction.{name}_{k}") for k in range(1, 9)]))
+
+
+def _efficiency_rows(actuator: Actuator, seed: int, progress: Progress | None) -> list[FrictionRow]:
+    """Efficiency of the screw from retractions under load, less the friction of the unloaded one.
+
+    Current, speed and the known load curve are all that is used of a run.
+    """
+    strokes = [Stroke("retract", factor, SUPPLY) for factor in FACTORS]
+    runs = run_strokes(strokes, fidelity="low", duration=8.0, seed=seed, progress=progress)
+    value = actuator.parameters.value
+    gear = value("gear.efficiency_first") * value("gear.efficiency_second")
+    ratio = value("gear.ratio_first") * value("gear.ratio_second")
+    travel = value("screw.lead") / ratio
+    means = [_steady(run) for run in runs]
+    torques = [-2.0 * value("motor.emf_constant") * current for current, _, _ in means]
+    free = torques[0]
+    knot, loaded, scale = (
+        value("screw.efficiency_unloaded"),
+        value("screw.efficiency_loaded"),
+        value("screw.efficiency_force"),
+    )
+    rows = []
+    for torque, (_, speed, load) in zip(torques[1:], means[1:], strict=True):
+        found = load * travel / (torque - free) / gear
+        put = loaded + (knot - loaded) * math.exp(-load / scale)
+        working = 1e3 * abs(speed) * travel
+        rows.append(FrictionRow("efficiency", "retraction", working, load, put, found, "1"))
+    return rows
+
+
+def _steady(run: Recording) -> tuple[float, float, float]:
+    """Mean current, motor speed and load of the steady part of a retraction."""
+    ram, speed = run["user_position"].values, run["motor_speed"].values
+    kept = (speed < -560.0) & (ram > 0.075) & (ram < 0.16)
+    return (
+        float(run["current_mean"].values[kept].mean()),
+        float(speed[kept].mean()),
+        float(run["load_force"].values[kept].mean()),
+    )
+
+
+def _checks(rows: Sequence[FrictionRow]) -> list[Check]:
+    kinds = {
+        "mass": ("mass",),
+        "mean friction, FFM": ("friction_ffm",),
+        "mean friction, FF": ("friction_ff",),
+        "harmonics": tuple(f"harmonic_{order}" for order in range(1, HARMONICS + 1)),
+        "efficiency at the preload": ("preload_efficiency",),
+        "efficiency over load": ("efficiency",),
+    }
+    checks = []
+    for name, quantities in kinds.items():
+        mine = [row for row in rows if row.quantity in quantities]
+        largest = max(abs(row.put_in) for row in mine)
+        worst = max(abs(row.recovered - row.put_in) for row in mine) / largest
+        checks.append(Check(f"{name}: worst error over the largest", 100.0 * worst, 3.0, "%"))
+    return checks

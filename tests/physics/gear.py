@@ -1,0 +1,48 @@
+"""Short words for the landing-gear tests."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import elevon
+
+NAME = "pisa-landing-gear"
+EXTENDED = "267 mm"
+
+
+def gear(
+    *steps: tuple[float, str],
+    duration: float,
+    record: str = "all@1 kHz",
+    start: str | float | None = None,
+    fidelity: str = "low",
+    faults: list[Any] | None = None,
+    values: dict[str, Any] | None = None,
+    load: dict[str, Any] | None = None,
+) -> Any:
+    """Run the gear; each step is a time and an action."""
+    data: dict[str, Any] = {
+        "duration": duration,
+        "command": {"mode": "gear", "steps": [{"time": t, "action": a} for t, a in steps]},
+        "parameters": values or {},
+        "fault": faults or [],
+        "load": load or {},
+    }
+    if start is not None:
+        data["initial"] = {"nut_position": start}
+    scenario = elevon.Scenario.from_dict(data)
+    return elevon.simulate(elevon.Actuator.load(NAME), scenario, fidelity=fidelity, record=[record])
+
+
+def states(rec: Any) -> list[int]:
+    """The states the control unit went through."""
+    found: list[int] = []
+    for value in rec["state"].values:
+        if not found or found[-1] != int(value):
+            found.append(int(value))
+    return found
+
+
+def value(path: str) -> float:
+    """A number of the set, SI."""
+    return float(elevon.Actuator.load(NAME).parameters.value(path))

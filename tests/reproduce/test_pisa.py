@@ -1,0 +1,69 @@
+"""The three reproductions of the landing gear, through their public functions."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from elevon.reproduce.hydraulic import HydraulicActuator, reproduce_hydraulic
+from elevon.reproduce.pisa_friction import reproduce_friction
+from elevon.reproduce.pisa_functional import reproduce_functional
+from elevon.reproduce.pisa_pages import friction_report, functional_report, hydraulic_report
+
+
+def test_functional_runs_meet_their_requirements() -> None:
+    """Six conditions; the limit one has no requirement and no say in the status."""
+    result = reproduce_functional(fidelity="low")
+    values = result.to_dict()
+    assert values["status"] == "pass"
+    assert [row["condition"] for row in values["rows"]] == [
+        "nominal", "normal", "normal", "critical", "critical", "limit"]  # fmt: skip
+    assert len(values["checks"]) == 5
+    limit = values["rows"][-1]
+    assert limit["passed"] is None
+    assert limit["requirement_s"] is None
+    # 14 V cannot reach the high speed in retraction: slower than every other condition.
+    assert limit["retraction_s"] > 1.2 * max(row["retraction_s"] for row in values["rows"][:-1])
+    assert "limit" in functional_report(result, date="2000-01-01").html().lower()
+
+
+def test_friction_tests_recover_what_was_put_in() -> None:
+    """Every kind within 3 % of its largest, from logs with noise."""
+    result = reproduce_friction(seed=3)
+    assert result.to_dict()["status"] == "pass"
+    kinds = {row.quantity for row in result.rows}
+    assert kinds == {"mass", "friction_ffm", "friction_ff", "preload_efficiency", "efficiency",
+                     *(f"harmonic_{order}" for order in range(1, 6))}  # fmt: skip
+    for kind in ("friction_ffm", "friction_ff"):
+        mine = [row for row in result.rows if row.quantity == kind]
+        assert {row.direction for row in mine} == {"extension", "retraction"}
+        assert min(row.speed_mm_s for row in mine) == 1.0
+        assert max(row.speed_mm_s for row in mine) == 10.0
+    assert friction_report(result, date="2000-01-01").html()
+
+
+def test_other_seed_other_noise() -> None:
+    """The recovered numbers come from the logs, not from the set."""
+    first, second = reproduce_friction(seed=1), reproduce_friction(seed=2)
+    assert first.rows[0].recovered != second.rows[0].recovered
+
+
+def test_hydraulic_speed_follows_load_and_temperature() -> None:
+    """P eq. (1) at constant loss, stall below zero pressure, controlled speed held."""
+    ideal = HydraulicActuator(restrictor_reynolds=0.0)
+    area = 0.25 * math.pi * ideal.restrictor_diameter**2
+    force = 2000.0
+    pressure = ideal.supply_pressure + force / ideal.piston_area
+    closed = (
+        area
+        / ideal.piston_area
+        * math.sqrt(2.0 / (ideal.oil_density(20.0) * ideal.restrictor_loss) * pressure)
+    )
+    assert ideal.speed(force, 20.0) == pytest.approx(closed, rel=1e-12)
+    assert ideal.speed(-1.01 * ideal.supply_pressure * ideal.piston_area, 20.0) == 0.0
+    assert ideal.viscosity(40.0) == pytest.approx(14e-6, rel=1e-9)
+    assert ideal.viscosity(100.0) == pytest.approx(5e-6, rel=1e-9)
+    result = reproduce_hydraulic()
+    assert result.to_dict()["status"] == "pass"
+    assert hydraulic_report(result, date="2000-01-01").html()
