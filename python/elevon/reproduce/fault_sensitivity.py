@@ -34,6 +34,8 @@ ROTARY_FAULTS = (
     "short@motor.phase_a=0.1",
     "eccentricity_static@motor=0.2",
     "eccentricity_dynamic@motor=0.2",
+    "resistor_short@motor.phase_a=0.25",
+    "unbalance@motor.rotor=5e-4 kg m2,phase=0",
     "open_phase@motor.phase_a=1",
     "open_switch@inverter.a_high=1",
     "shorted_switch@inverter.a_high=1",
@@ -60,6 +62,11 @@ RECORD = (
 )
 SLOW_HZ, FAST_HZ = 2.0, 50.0
 """A feature's level is below the first cut-off, its ripple between the two."""
+_WEAK = {
+    "offset@sensor.resolver": (
+        "it has the loss of torque per ampere, not the d current of a misplaced commutation"
+    )
+}
 FLOORS = 3.0
 """A change smaller than this many floors is not seen."""
 
@@ -103,6 +110,9 @@ class Sensitivity:
             return "seen by both"
         if abs(self.ratio) < 1e-6:
             return "not in the low model: only the relays' ripple changes, and it has no relays"
+        kind = self.fault.split("=")[0]
+        if kind in _WEAK:
+            return f"too weak in the low model: {_WEAK[kind]}"
         return "wrong sign in the low model" if self.ratio < 0.0 else "too weak in the low model"
 
     def to_dict(self) -> dict[str, Any]:
@@ -161,7 +171,7 @@ def fault_sensitivity(
     parsed = [Fault.parse(text) for text in _default(actuator, faults)]
     in_low = [fault for fault in parsed if _low_has(actuator.wiring, fault)]
     other_step = actuator.with_values(
-        {"solver.step": 0.8 * actuator.parameters.value("solver.step")}
+        {"solver.step": 0.5 * actuator.parameters.value("solver.step")}
     )
     spans = [part(progress, *span) for span in ((0.0, 0.05), (0.05, 0.95), (0.95, 1.0))]
     run = _Runner(actuator, scenario, start, seed)

@@ -1,0 +1,67 @@
+"""Every fault of the rotary actuator's catalogue has a test of its signature."""
+
+import ast
+from pathlib import Path
+
+from elevon import _core
+
+PHYSICS = Path(__file__).resolve().parents[1] / "physics"
+
+# Kind and kind of place -> the test of what it does to the physics.
+SIGNATURES = {
+    ("short", "motor"): "test_short_ripples_at_twice_the_electrical_frequency",
+    ("eccentricity_static", "motor"): (
+        "test_static_eccentricity_shows_at_the_electrical_frequency"
+    ),
+    ("eccentricity_dynamic", "motor"): "test_dynamic_eccentricity_turns_with_the_shaft",
+    ("open_phase", "motor"): "test_open_phase_leaves_one_loop_of_two_phases",
+    ("open_switch", "inverter"): "test_open_switch_takes_one_half_wave_of_its_phase",
+    ("shorted_switch", "inverter"): ("test_shorted_switch_trips_the_drive_and_the_status_says_so"),
+    ("demagnetisation", "motor"): "test_demagnetisation_needs_more_current_for_the_same_torque",
+    ("sag", "supply"): "test_supply_sag_lowers_the_speed_that_can_be_reached",
+    ("gain", "current"): "test_current_sensor_gain_changes_what_the_drive_delivers",
+    ("offset", "current"): "test_current_sensor_offset_ripples_at_the_electrical_frequency",
+    ("friction", "transmission"): "test_friction_raises_the_moving_current_by_the_torque_balance",
+    ("lubrication", "transmission"): (
+        "test_lubrication_raises_the_moving_current_in_proportion_to_speed"
+    ),
+    ("play", "transmission"): "test_play_widens_the_lost_motion_by_its_severity",
+    ("jam", "transmission"): "test_jam_stops_the_output_at_its_place",
+    ("gain_drift", "control"): "test_gain_drift_scales_the_loop_it_names",
+    ("dropout", "resolver"): "test_lost_resolver_makes_the_position_jump_and_recover",
+    ("mismatch", "resolver"): "test_mismatched_resolver_errs_at_twice_the_shaft_frequency",
+    ("offset", "resolver"): (
+        "test_resolver_offset_costs_torque_by_the_cosine_of_the_electrical_error"
+    ),
+    ("offset", "encoder"): "test_encoder_error_moves_the_output_the_other_way",
+    ("gain", "encoder"): "test_encoder_error_moves_the_output_the_other_way",
+    ("gain", "resolver"): "test_resolver_gain_shows_a_speed_off_by_it",
+    ("unbalance", "motor"): "test_unbalance_swings_the_speed_once_a_turn",
+    ("resistor_short", "motor"): "test_resistor_draws_the_phase_voltage_over_its_resistance",
+    ("missing_counts", "encoder"): "test_missing_counts_make_the_encoder_read_short",
+}
+
+
+def _room(place: str) -> str:
+    """`sensor.current_a` -> current, `inverter.a_high` -> inverter."""
+    parts = place.split(".")
+    return parts[1].split("_")[0] if parts[0] == "sensor" else parts[0]
+
+
+def test_every_fault_has_a_signature_test() -> None:
+    asked = {
+        (record["kind"], _room(place))
+        for record in _core.faults("rotary")
+        for place in record["places"]
+    }
+    assert asked == set(SIGNATURES)
+
+
+def test_the_signature_tests_exist() -> None:
+    written = {
+        node.name
+        for path in PHYSICS.glob("test_*.py")
+        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.FunctionDef)
+    }
+    assert set(SIGNATURES.values()) <= written
