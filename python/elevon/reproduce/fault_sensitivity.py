@@ -64,7 +64,7 @@ SLOW_HZ, FAST_HZ = 2.0, 50.0
 """A feature's level is below the first cut-off, its ripple between the two."""
 _WEAK = {
     "offset@sensor.resolver": (
-        "it has the loss of torque per ampere, not the d current of a misplaced commutation"
+        "the rest is the relays' ripple, and it has no relays; with drive.kind = pwm both agree"
     )
 }
 FLOORS = 3.0
