@@ -131,7 +131,8 @@ impl Resolver {
         if let Some(mode) = d.get_item("command_mode")? {
             let mode: String = mode.extract()?;
             let modes = self.model.modes();
-            let choice = modes.iter().position(|&m| m == mode).ok_or_else(|| bad(format!("command mode {mode:?}; modes: {}", modes.join(", "))))?;
+            let choice =
+                modes.iter().position(|&m| m == mode).ok_or_else(|| bad(format!("command mode {mode:?}; modes: {}", modes.join(", "))))?;
             if modes.len() > 1 {
                 parameters[self.parameter("control.mode")?] = choice as f64;
             }
