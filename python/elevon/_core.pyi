@@ -7,19 +7,19 @@ import numpy as np
 import numpy.typing as npt
 
 __all__ = [
-    "version",
-    "wirings",
-    "parameters",
-    "signals",
-    "ports",
-    "initial",
-    "faults",
-    "waveforms",
-    "profiles",
     "check",
-    "widths",
-    "simulate",
+    "faults",
+    "initial",
+    "parameters",
+    "ports",
+    "profiles",
     "sensitivities",
+    "signals",
+    "simulate",
+    "version",
+    "waveforms",
+    "widths",
+    "wirings",
 ]
 
 def version() -> str: ...

@@ -215,7 +215,7 @@ def _best_drive(
         cost = sum(float(np.sum(np.minimum(np.abs(r), 10.0))) for r in rest)
         problems.append((cost, problem))
     best, other = problems[0], problems[-1]
-    return other[1] if other[0] < 0.9 * best[0] else best[1]
+    return other[1] if other[0] < best[0] else best[1]
 
 
 def _fixed(
