@@ -105,7 +105,7 @@ impl<S: Scalar> Network<S> {
 
     /// Heat to the air at a surface temperature, W.
     #[inline(always)]
-    fn to_air(&self, surface: S) -> S {
+    fn lost_to_air(&self, surface: S) -> S {
         let fourth = |t: S| t.square().square();
         self.convection * (surface - self.ambient) + self.radiation * (fourth(surface) - fourth(self.ambient))
     }
@@ -119,7 +119,7 @@ impl<S: Scalar> Network<S> {
         let slope = inertia + S::one() / series + self.convection;
         let mut t = surface;
         for _ in 0..NEWTON {
-            let residue = inertia * (t - surface) - (driving - t) / series + self.to_air(t);
+            let residue = inertia * (t - surface) - (driving - t) / series + self.lost_to_air(t);
             t = t - residue / (slope + S::splat(4.0) * self.radiation * t * t * t);
         }
         t
@@ -134,7 +134,7 @@ impl<S: Scalar> Network<S> {
         let gain = self.period / self.winding_capacity;
         let surface = self.surface_after(s.winding, s.surface, power, gain, self.housing_capacity / self.period);
         let through = (s.winding + gain * power - surface) / (self.resistance + gain);
-        let out = S::select(quasi, through, self.to_air(surface));
+        let out = S::select(quasi, through, self.lost_to_air(surface));
         s.heat_in = s.heat_in + self.period * power;
         s.heat_out = s.heat_out + self.period * out;
         s.winding = s.winding + gain * (power - through);
