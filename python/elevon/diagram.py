@@ -88,7 +88,81 @@ _ROTARY = Diagram(
     ),
 )
 
-_DIAGRAMS = {"rotary": _ROTARY}
+_BALLSCREW = Diagram(
+    source="command",
+    blocks=(
+        Block(
+            "Control electronics",
+            ("position P, speed PI", "feed-forward, limits", "control.*"),
+            "current_ref",
+        ),
+        Block(
+            "Power electronics",
+            ("relays or carrier PWM", "sinusoidal or six-step", "inverter.* drive.*"),
+            "voltage_a, b, c",
+        ),
+        Block(
+            "Motor",
+            ("three-phase star", "thermal network", "motor.* thermal.*"),
+            "motor_torque",
+        ),
+        Block(
+            "Screw and nut",
+            ("inertia, friction, spall", "efficiency either way", "friction.* screw.*"),
+            "motor_position",
+        ),
+        Block(
+            "Ram, load side",
+            ("play, joint, load mass", "load cell, end stops", "play.* load.* stop.*"),
+            "user_position",
+        ),
+    ),
+    loads=((1, "supply"), (4, "ram load, N")),
+    feedback=(
+        (2, 1, "current_a, b, c (sensors)"),
+        (3, 0, "motor_speed, motor_position (resolver)"),
+        (4, 0, "user_position / encoder"),
+    ),
+)
+
+_LANDING_GEAR = Diagram(
+    source="extend, retract, stop, free fall",
+    blocks=(
+        Block(
+            "Control unit",
+            ("state machine, interlocks", "speed PI, rate limit", "control.*"),
+            "voltage demand",
+        ),
+        Block(
+            "Power stage",
+            ("six-step, PWM", "legs HIGH, LOW, ZERO", "inverter.* six_step.*"),
+            "voltage_a, b, c",
+        ),
+        Block(
+            "Motor and brake",
+            ("trapezoidal EMF, Hall", "detent, brake", "motor.* brake.*"),
+            "motor_torque",
+        ),
+        Block(
+            "Gear, roller screw",
+            ("two planetary stages", "release, friction, preload", "gear.* screw.*"),
+            "ram position",
+        ),
+        Block(
+            "Lever, leg, down-lock",
+            ("triangle, varying inertia", "load factor, lock", "lever.* leg.* lock.*"),
+            "user_position",
+        ),
+    ),
+    loads=((1, "supply"), (4, "load factor, rig speed")),
+    feedback=(
+        (2, 1, "hall sensors (commutation)"),
+        (2, 0, "motor_speed"),
+        (4, 0, "proximity switches, lock state"),
+    ),
+)
+
+_DIAGRAMS = {"rotary": _ROTARY, "ballscrew": _BALLSCREW, "landing_gear": _LANDING_GEAR}
 
 
 def diagrams() -> list[str]:
