@@ -126,6 +126,7 @@ def test_every_waveform_is_fitted_within_its_own_uncertainty(kind):
         assert abs(fit.values[name] - CASES[kind][name]) < 5 * std, name
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", CASES)
 def test_the_kind_of_waveform_is_recognised(kind):
     assert best_waveform(trace_of(kind, CASES[kind])).kind == kind

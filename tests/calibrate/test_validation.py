@@ -78,6 +78,7 @@ def test_a_transient_longer_than_the_log_is_refused(logs, before):
         calibrate(logs, before, transient=25.0)
 
 
+@pytest.mark.long
 def test_reports_hold_what_was_found(logs, result, checked, before, truth, tmp_path):
     page = calibration_report(result, validate(logs, before), checked, truth=truth.values)
     html = page.html()

@@ -43,6 +43,7 @@ def test_friction_tests_recover_what_was_put_in() -> None:
     assert friction_report(result, date="2000-01-01").html()
 
 
+@pytest.mark.long
 def test_other_seed_other_noise() -> None:
     """The recovered numbers come from the logs, not from the set."""
     first, second = reproduce_friction(seed=1), reproduce_friction(seed=2)
