@@ -29,7 +29,7 @@ import elevon
 from elevon import _core
 
 STEPS = 1_000_000
-LANE_STEPS = 100_000
+LANE_STEPS = STEPS  # the common job's second in every lane
 LANES = 64
 LOW_SECONDS = 500.0
 LOW_BATCH_SECONDS = 100.0
