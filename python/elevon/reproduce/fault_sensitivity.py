@@ -62,11 +62,6 @@ RECORD = (
 )
 SLOW_HZ, FAST_HZ = 2.0, 50.0
 """A feature's level is below the first cut-off, its ripple between the two."""
-_WEAK = {
-    "offset@sensor.resolver": (
-        "the rest is the relays' ripple, and it has no relays; with drive.kind = pwm both agree"
-    )
-}
 FLOORS = 3.0
 """A change smaller than this many floors is not seen."""
 
@@ -110,9 +105,6 @@ class Sensitivity:
             return "seen by both"
         if abs(self.ratio) < 1e-6:
             return "not in the low model: only the relays' ripple changes, and it has no relays"
-        kind = self.fault.split("=")[0]
-        if kind in _WEAK:
-            return f"too weak in the low model: {_WEAK[kind]}"
         return "wrong sign in the low model" if self.ratio < 0.0 else "too weak in the low model"
 
     def to_dict(self) -> dict[str, Any]:
