@@ -13,7 +13,7 @@ from elevon.bench.logs.importing import import_log
 from elevon.bench.micrometer import INTRINSIC_PLAY
 from elevon.bench.procedure import Procedure, load_procedure, procedure_names
 from elevon.bench.rig import setups
-from elevon.bench.run import run_procedure
+from elevon.bench.run import claim_bench, run_procedure
 from elevon.cli import main
 from elevon.documents import Document, validated
 from elevon.errors import InputError, Interrupted, OutputExistsError
@@ -128,6 +128,86 @@ def test_an_interrupted_procedure_goes_on_where_it_stopped(tmp_path, actuator):
         run_procedure(two, actuator, tmp_path, seed=9)
     run_procedure(two, actuator, tmp_path, seed=9, force=True)
     assert (tmp_path / "one.csv").stat().st_mtime_ns != before
+
+
+def two_logs(tmp_path):
+    path = tmp_path / "pair.toml"
+    trace = (
+        '[[step]]\nkind = "trace"\nname = "{}"\nduration = "1 s"\n'
+        '[step.command]\nterms = [{{ kind = "sine", amplitude = "2 deg", frequency = "1 Hz" }}]\n'
+    )
+    path.write_text('name = "pair"\n' + trace.format("one") + trace.format("two"))
+    return path
+
+
+TRIPS = "shorted_switch@inverter.a_high=1"
+
+
+def test_a_tripped_run_stays_tripped_when_its_log_is_kept(tmp_path, capsys):
+    whole = ["bench", "run", str(two_logs(tmp_path)), "--actuator", "torino-rotary"]
+    whole += ["--fault", TRIPS, "--json"]
+    reports = []
+    for folder in ("once", "twice", "twice"):
+        out = ["--out", str(tmp_path / folder), "--truth", str(tmp_path / f"{folder}.json")]
+        reports.append((main([*whole, *out]), json.loads(capsys.readouterr().out)))
+    once, first, second = reports
+    assert once[1]["status"] == "tripped"
+    assert [log["resumed"] for log in second[1]["logs"]] == [True, True]
+    for code, report in (first, second):
+        assert (code, report["status"]) == (once[0], once[1]["status"])
+        for log, same in zip(report["logs"], once[1]["logs"], strict=True):
+            assert log["status"] == same["status"] == "tripped"
+            assert log["message"] == same["message"] != ""
+
+
+def test_a_half_done_tripped_procedure_agrees_with_one_made_in_one_go(tmp_path, actuator):
+    pair = load_procedure(two_logs(tmp_path))
+    once = run_procedure(pair, actuator, tmp_path / "once", faults=[TRIPS])
+    with pytest.raises(Interrupted):
+        run_procedure(
+            pair, actuator, tmp_path / "halves", faults=[TRIPS], progress=lambda f: f < 0.6
+        )
+    state = json.loads((tmp_path / "halves" / "bench-pair.json").read_text())
+    assert list(state["logs"]) == ["one"]
+    later = run_procedure(pair, actuator, tmp_path / "halves", faults=[TRIPS])
+    assert [log.resumed for log in later.logs] == [True, False]
+    assert [log.status for log in later.logs] == [log.status for log in once.logs]
+    assert later.to_dict()["status"] == once.to_dict()["status"] == "tripped"
+    for name in ("one.csv", "two.csv"):
+        first, second = ((tmp_path / f / name).read_bytes() for f in ("once", "halves"))
+        assert first == second
+
+
+def test_a_log_that_is_not_as_it_was_written_is_made_again(tmp_path, actuator):
+    pair = load_procedure(two_logs(tmp_path))
+    first = run_procedure(pair, actuator, tmp_path, fidelity="low", truth=tmp_path / "t.json")
+    good = (tmp_path / "one.csv").read_bytes()
+    (tmp_path / "one.csv").write_bytes(good[:-100])
+    again = run_procedure(pair, actuator, tmp_path, fidelity="low", truth=tmp_path / "t.json")
+    assert [log.resumed for log in again.logs] == [False, True]
+    assert (tmp_path / "one.csv").read_bytes() == good
+    assert json.loads((tmp_path / "t.json").read_text())["logs"] == json.loads(
+        json.dumps(first.hidden["logs"], default=str)
+    )
+    state = tmp_path / "bench-pair.json"
+    state.write_text(json.dumps({"bench": json.loads(state.read_text())["bench"]}))
+    unknown = run_procedure(pair, actuator, tmp_path, fidelity="low")
+    assert [log.resumed for log in unknown.logs] == [False, False]
+    with pytest.raises(OutputExistsError, match=r"t\.json"):
+        run_procedure(pair, actuator, tmp_path / "x", seed=3, truth=tmp_path / "t.json")
+
+
+def test_a_claimed_folder_keeps_no_earlier_log(tmp_path, actuator):
+    pair = load_procedure(two_logs(tmp_path))
+    run_procedure(pair, actuator, tmp_path, fidelity="low")
+    with pytest.raises(OutputExistsError, match="other work"):
+        claim_bench(pair, actuator, tmp_path, fidelity="low", seed=5)
+    claim_bench(pair, actuator, tmp_path, fidelity="low")
+    kept = run_procedure(pair, actuator, tmp_path, fidelity="low")
+    assert [log.resumed for log in kept.logs] == [True, True]
+    claim_bench(pair, actuator, tmp_path, fidelity="low", force=True)
+    made = run_procedure(pair, actuator, tmp_path, fidelity="low")
+    assert [log.resumed for log in made.logs] == [False, False]
 
 
 def test_the_brakes_loop_settles_on_its_set_point_and_is_limited_in_rate():

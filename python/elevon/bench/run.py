@@ -5,15 +5,15 @@ from __future__ import annotations
 import hashlib
 import json
 import time as clock
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from elevon.bench.logs.drive import DriveFormat
 from elevon.bench.rig import Setup, setups
-from elevon.bench.traces import recorded, trace_files, write_traces
-from elevon.errors import InputError, OutputExistsError
+from elevon.bench.state import BenchState
+from elevon.bench.traces import recorded, write_traces
 from elevon.files import check_output, write_text
 from elevon.progress import Progress, part
 
@@ -22,23 +22,25 @@ if TYPE_CHECKING:
     from elevon.bench.procedure import Procedure
     from elevon.faults import Fault
 
-__all__ = ["BenchLogFiles", "BenchResult", "run_procedure"]
+__all__ = ["BenchLogFiles", "BenchResult", "claim_bench", "run_procedure", "state_file"]
 
 
 @dataclass(frozen=True, slots=True)
 class BenchLogFiles:
-    """One log: its files, whether the run ended as it should, and whether it was there before."""
+    """One log: its files, how its run ended (and why), and whether it was there before."""
 
     name: str
     status: str
     files: tuple[Path, ...]
     resumed: bool
+    message: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain types."""
         return {
             "name": self.name,
             "status": self.status,
+            "message": self.message,
             "files": [str(path) for path in self.files],
             "resumed": self.resumed,
         }
@@ -46,13 +48,28 @@ class BenchLogFiles:
 
 @dataclass(frozen=True, slots=True)
 class BenchResult:
-    """The logs of a procedure."""
+    """The logs of a procedure.
+
+    Attributes
+    ----------
+    procedure : str
+        Its name.
+    logs : tuple of BenchLogFiles
+        In order.
+    truth : Path or None
+        Where what is hidden was written.
+    sim_s, wall_s : float
+        Simulated time of the logs made now, and the time it took.
+    hidden : mapping
+        What the logs' reader is not told.
+    """
 
     procedure: str
     logs: tuple[BenchLogFiles, ...]
     truth: Path | None
     sim_s: float
     wall_s: float
+    hidden: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
@@ -64,6 +81,32 @@ class BenchResult:
             "sim_s": self.sim_s,
             "wall_s": self.wall_s,
         }
+
+
+def state_file(folder: Path, procedure: str) -> Path:
+    """Return the file beside a procedure's logs that holds how each of them ended."""
+    return folder / f"bench-{procedure}.json"
+
+
+def claim_bench(
+    procedure: Procedure,
+    actuator: Actuator,
+    out: str | Path,
+    *,
+    faults: Sequence[Fault | str] = (),
+    seed: int = 0,
+    fidelity: str = "high",
+    layout: DriveFormat | None = None,
+    force: bool = False,
+) -> None:
+    """Make a folder a procedure's own before it is run; arguments and errors as `run_procedure`.
+
+    With `force` whatever logs are there count as absent from then on: `run_procedure` without
+    `force` makes them anew. Without it, finished logs of the very same work keep counting.
+    """
+    layout = layout or _layout(actuator)
+    found = setups(procedure, actuator, faults=faults, seed=seed)
+    _claim(procedure, Path(out).expanduser(), found, fidelity, layout, force=force)
 
 
 def run_procedure(
@@ -102,7 +145,8 @@ def run_procedure(
         File (JSON) for what the logs' reader is not told.
     force : bool
         Whether logs that are there may be replaced. Without it, logs of the very same work are
-        kept and the missing ones are made; logs of other work are refused.
+        kept, with the status of their runs, and the missing ones are made; logs of other work are
+        refused.
     progress : callable, optional
         Told the done fraction; returns False to stop.
 
@@ -116,22 +160,42 @@ def run_procedure(
         As `elevon.simulate`. Logs that were complete stay.
     """
     begin = clock.perf_counter()
-    layout = layout or DriveFormat(gear_ratio=actuator.parameters.value("gear.ratio"))
+    layout = layout or _layout(actuator)
     found = setups(procedure, actuator, faults=faults, seed=seed)
     folder = Path(out).expanduser()
-    if truth is not None:
+    hidden = _hidden(procedure, actuator, found, fidelity)
+    text = json.dumps(hidden, indent=1, default=str) + "\n"
+    same = truth is not None and _holds(Path(truth).expanduser(), text)
+    if truth is not None and not same:
         check_output(truth, force=force)
-    state = folder / f"bench-{procedure.name}.json"
-    resume = _claim(state, found, _key(found, fidelity, layout), force=force)
+    state = _claim(procedure, folder, found, fidelity, layout, force=force)
     logs, simulated = [], 0.0
     for number, setup in enumerate(found):
         share = part(progress, number / len(found), (number + 1) / len(found))
-        log, seconds = _one(setup, folder, layout, fidelity, share, resume=resume, force=force)
+        log, seconds = _one(setup, state, layout, fidelity, share, force=force)
         logs.append(log)
         simulated += seconds
-    written = _truth(truth, procedure, actuator, found, fidelity, force=force)
+    written = None if truth is None else write_text(truth, text, force=force or same)
     wall = clock.perf_counter() - begin
-    return BenchResult(procedure.name, tuple(logs), written, simulated, wall)
+    return BenchResult(procedure.name, tuple(logs), written, simulated, wall, hidden)
+
+
+def _layout(actuator: Actuator) -> DriveFormat:
+    return DriveFormat(gear_ratio=actuator.parameters.value("gear.ratio"))
+
+
+def _claim(
+    procedure: Procedure,
+    folder: Path,
+    found: Sequence[Setup],
+    fidelity: str,
+    layout: DriveFormat,
+    *,
+    force: bool,
+) -> BenchState:
+    names = [setup.trace.name for setup in found]
+    key = _key(found, fidelity, layout)
+    return BenchState.claim(state_file(folder, procedure.name), key, names, force=force)
 
 
 def _key(found: Sequence[Setup], fidelity: str, layout: DriveFormat) -> str:
@@ -143,53 +207,23 @@ def _key(found: Sequence[Setup], fidelity: str, layout: DriveFormat) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
-def _claim(state: Path, found: Sequence[Setup], key: str, *, force: bool) -> bool:
-    """Check the folder and leave the key in it; True when there is work to resume."""
-    folder = state.parent
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder}: is not a folder")
-    old = _old_key(state)
-    if old == key and not force:
-        return True
-    if not force:
-        if old is not None:
-            raise OutputExistsError(
-                f"{state}: belongs to other work; use force (--force) to replace them"
-            )
-        for setup in found:
-            for path in trace_files(folder, setup.trace.name, cell=True):
-                check_output(path)
-    write_text(state, json.dumps({"bench": key}) + "\n", force=True)
-    return False
-
-
-def _old_key(state: Path) -> str | None:
-    try:
-        found = json.loads(state.read_text("utf-8"))
-    except FileNotFoundError:
-        return None
-    except (OSError, ValueError) as error:
-        raise OutputExistsError(f"{state}: cannot be read ({error}); use force") from error
-    return str(found.get("bench", "")) if isinstance(found, dict) else ""
-
-
 def _one(
     setup: Setup,
-    folder: Path,
+    state: BenchState,
     layout: DriveFormat,
     fidelity: str,
     progress: Progress | None,
     *,
-    resume: bool,
     force: bool,
 ) -> tuple[BenchLogFiles, float]:
     from elevon.scenario.compile import signal_records
     from elevon.simulate import simulate
 
-    name = setup.trace.name
-    kept = [path for path in trace_files(folder, name, cell=True) if path.exists()]
-    if resume and (folder / f"{name}.csv") in kept:
-        return BenchLogFiles(name, "ok", tuple(kept), True), 0.0
+    name, folder = setup.trace.name, state.path.parent
+    kept = state.kept(name)
+    if kept is not None:
+        files = tuple(folder / file for file in kept.files)
+        return BenchLogFiles(name, kept.status, files, True, kept.message), 0.0
     known = list(signal_records(setup.actuator.wiring, fidelity))
     recording = simulate(
         setup.actuator,
@@ -199,26 +233,26 @@ def _one(
         seed=setup.conditions.seed,
         progress=progress,
     )
-    files = write_traces(folder, setup, recording, layout, force=force or resume)
-    status = str(recording.meta["status"])
-    return BenchLogFiles(name, status, tuple(files), False), float(recording.meta["sim_s"])
+    files = tuple(write_traces(folder, setup, recording, layout, force=force or state.resumed))
+    status, message = str(recording.meta["status"]), str(recording.meta["message"])
+    state.note(name, status, message, files)
+    return BenchLogFiles(name, status, files, False, message), float(recording.meta["sim_s"])
 
 
-def _truth(
-    path: str | Path | None,
-    procedure: Procedure,
-    actuator: Actuator,
-    found: Sequence[Setup],
-    fidelity: str,
-    *,
-    force: bool,
-) -> Path | None:
-    if path is None:
-        return None
-    content = {
+def _hidden(
+    procedure: Procedure, actuator: Actuator, found: Sequence[Setup], fidelity: str
+) -> dict[str, Any]:
+    return {
         "procedure": procedure.name,
         "actuator": actuator.name,
         "fidelity": fidelity,
         "logs": [setup.truth() for setup in found],
     }
-    return write_text(path, json.dumps(content, indent=1, default=str) + "\n", force=force)
+
+
+def _holds(path: Path, text: str) -> bool:
+    """Whether a file holds just this text: then it comes from the very same work."""
+    try:
+        return path.read_text("utf-8") == text
+    except (OSError, ValueError):
+        return False

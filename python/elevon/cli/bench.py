@@ -93,7 +93,7 @@ def run(
     rows = [
         (
             log.name,
-            log.status,
+            f"{log.status}: {log.message}" if log.message else log.status,
             "kept" if log.resumed else "made",
             ", ".join(p.name for p in log.files),
         )
