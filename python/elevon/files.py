@@ -10,11 +10,31 @@ import os
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
 
 from elevon.errors import OutputError, OutputExistsError
 
-__all__ = ["atomic_path", "check_output", "write_bytes", "write_text"]
+__all__ = ["atomic_path", "check_output", "journal", "write_bytes", "write_text"]
+
+_journal: ContextVar[list[Path] | None] = ContextVar("journal", default=None)
+
+
+@contextmanager
+def journal() -> Iterator[list[Path]]:
+    """Note down what is written, for whoever must say what is there when the work is cut short.
+
+    Yields
+    ------
+    list of Path
+        Grows by a file each time one has got its name; files of an inner journal are not in it.
+    """
+    written: list[Path] = []
+    token = _journal.set(written)
+    try:
+        yield written
+    finally:
+        _journal.reset(token)
 
 
 def check_output(path: str | os.PathLike[str], *, force: bool = False) -> Path:
@@ -75,11 +95,16 @@ def atomic_path(path: str | os.PathLike[str], *, force: bool = False) -> Iterato
         As `check_output`; also when the disk is full or the file appears meanwhile.
     """
     target = check_output(path, force=force)
-    temporary = _temporary(target)
+    # Named before it is made: a Ctrl-C in between must find what to remove.
+    name = f".{target.stem[:64]}.{secrets.token_hex(6)}.part{target.suffix}"
+    temporary = target.parent / name
     try:
+        _make(temporary, target)
         yield temporary
         _sync(temporary)
         _publish(temporary, target, force=force)
+        if (written := _journal.get()) is not None:
+            written.append(target)
     except OutputError:
         raise
     except OSError as error:
@@ -102,15 +127,12 @@ def write_text(path: str | os.PathLike[str], text: str, *, force: bool = False) 
     return write_bytes(path, text.encode("utf-8"), force=force)
 
 
-def _temporary(target: Path) -> Path:
-    """Make an empty, hidden temporary file beside the target, with the mode of any new file."""
-    name = f".{target.stem[:64]}.{secrets.token_hex(6)}.part{target.suffix}"
-    temporary = target.parent / name
+def _make(temporary: Path, target: Path) -> None:
+    """Make an empty, hidden file beside the target, with the mode of any new file."""
     try:
         os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
     except OSError as error:
         raise OutputError(f"{target}: cannot be written: {error}") from error
-    return temporary
 
 
 def _sync(path: Path) -> None:

@@ -13,7 +13,7 @@ from elevon.bench.traces import trace_files
 from elevon.errors import InputError, OutputExistsError
 from elevon.files import check_output, write_text
 
-__all__ = ["BenchState", "LogRecord", "digests"]
+__all__ = ["BenchState", "LogRecord", "digests", "finished_logs"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +112,14 @@ class BenchState:
         """Write the state, whole or not at all."""
         content = {"bench": self.key, "logs": {n: asdict(log) for n, log in self.logs.items()}}
         write_text(self.path, json.dumps(content, indent=1) + "\n", force=True)
+
+
+def finished_logs(path: Path) -> list[str]:
+    """Return the names of the logs that a state file calls finished; none where there is none."""
+    try:
+        return list(_records(_load(path) or {}))
+    except OutputExistsError:
+        return []
 
 
 def digests(files: Iterable[Path]) -> dict[str, str]:

@@ -1,16 +1,14 @@
 """Command line: a table of command modules, each loaded only when its command is asked for.
 
-A command is one module with a `typer.Typer` named ``app``. To add one, add a line to `COMMANDS`.
+A command is one module with a `typer.Typer` named ``app``. To add one, add a line to
+`elevon.cli.registry.COMMANDS`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from elevon.cli.registry import COMMANDS, Command
-from elevon.cli.runner import run
-
-__all__ = ["COMMANDS", "Command", "main"]
+__all__ = ["main"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -19,11 +17,26 @@ def main(argv: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     argv : sequence of str, optional
-        Arguments after the program's name; by default those of the process.
+        Arguments after the program's name; by default those of the process, which then is taken
+        to end with the command.
 
     Returns
     -------
     int
         0 success, 1 a run or a check failed, 2 bad usage or input, 130 interrupted.
     """
-    return run(argv)
+    from elevon.cli import interrupt
+
+    with interrupt.watched(owner=argv is None):
+        try:
+            from elevon.cli.runner import run
+
+            return run(argv)
+        except KeyboardInterrupt:  # before the command began
+            interrupt.ignore()
+            import sys
+
+            sys.stderr.write(
+                "elevon: interrupted; nothing was written; give the command again to start over\n"
+            )
+            return interrupt.INTERRUPTED

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from elevon.cli import interrupt
 from elevon.cli.common import JsonOption
 from elevon.cli.output import print_json, progress_bar, say
 
@@ -28,7 +29,10 @@ def batch(
 
     read, document = load_plan(plan)
     planned = resolve_plan(read, document)
-    with progress_bar(f"running {read.name}") as advance:
+    with (
+        interrupt.telling(lambda: _kept(out)),
+        progress_bar(f"running {read.name}") as advance,
+    ):
         result = run_campaign(
             read,
             planned,
@@ -43,6 +47,20 @@ def batch(
     else:
         _print(result, out)
     return 1 if result.manifest.status == "failed" else 0
+
+
+def _kept(out: Path) -> str:
+    from elevon.campaign import read_manifest
+    from elevon.errors import InputError
+
+    try:
+        manifest = read_manifest(out)
+    except InputError:
+        return "nothing is kept; give the same command again to start over"
+    return (
+        f"{len(manifest.runs)} of {manifest.total} runs are kept in {out}; give the same command "
+        "again to go on"
+    )
 
 
 def _summary(result: Any, out: Path) -> dict[str, Any]:

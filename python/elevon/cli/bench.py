@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from elevon.cli import interrupt
 from elevon.cli.common import (
     FaultOption,
     FidelityOption,
@@ -17,6 +18,9 @@ from elevon.cli.common import (
     read_actuator,
 )
 from elevon.cli.output import print_json, print_table, progress_bar, say
+
+if TYPE_CHECKING:
+    from elevon.bench.procedure import Procedure
 
 app = typer.Typer(
     no_args_is_help=True, rich_markup_mode=None, help="Run the virtual test bench's procedures."
@@ -74,7 +78,10 @@ def run(
     ratio = loaded.parameters.value("gear.ratio") if "gear.ratio" in loaded.parameters else 1.0
     layout = DriveFormat(encoder_shaft=shaft, current_convention=current, gear_ratio=ratio)
     faults = [Fault.parse(text) for text in fault or ()]
-    with progress_bar(f"bench: {asked.name}") as advance:
+    with (
+        interrupt.telling(lambda: _kept(out, asked, force=force)),
+        progress_bar(f"bench: {asked.name}") as advance,
+    ):
         result = run_procedure(
             asked,
             loaded,
@@ -101,3 +108,15 @@ def run(
     ]
     print_table(("log", "status", "", f"files in {out}"), rows)
     say(f"{result.sim_s:g} s simulated in {result.wall_s:.1f} s")
+
+
+def _kept(out: Path, procedure: Procedure, *, force: bool) -> str:
+    from elevon.bench.run import state_file
+    from elevon.bench.state import finished_logs
+
+    names = [trace.name for trace in procedure.traces]
+    done = [n for n in finished_logs(state_file(out.expanduser(), procedure.name)) if n in names]
+    again = "give the same command again" + (", without --force," if force else "")
+    if not done:
+        return f"no log is finished; {again} to start over"
+    return f"{len(done)} of {len(names)} logs are kept in {out}; {again} to go on"

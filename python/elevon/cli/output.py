@@ -8,6 +8,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Protocol
 
+from elevon.cli import interrupt
+
 
 def plain(value: Any) -> Any:
     """Turn numpy scalars and arrays, paths, mappings and sequences into JSON's own types.
@@ -28,8 +30,12 @@ def plain(value: Any) -> Any:
 
 
 def print_json(value: Mapping[str, Any]) -> None:
-    """Write one JSON object, and nothing else, on stdout."""
-    sys.stdout.write(json.dumps(plain(value), allow_nan=False, indent=2) + "\n")
+    """Write one JSON object, and nothing else, on stdout; with it the command has answered."""
+    text = json.dumps(plain(value), allow_nan=False, indent=2) + "\n"
+    interrupt.check()
+    sys.stdout.write(text)
+    sys.stdout.flush()
+    interrupt.ignore()
 
 
 def print_table(
@@ -76,7 +82,8 @@ def progress_bar(title: str) -> Iterator[Advance]:
     Yields
     ------
     callable
-        Takes the done fraction (0 to 1); returns True ("carry on").
+        Takes the done fraction (0 to 1); returns True ("carry on"). A Ctrl-C whose exception was
+        lost comes out here.
     """
     if not sys.stderr.isatty():
         yield _plain_progress(title)
@@ -94,6 +101,7 @@ def progress_bar(title: str) -> Iterator[Advance]:
         task = bar.add_task(title, total=1.0)
 
         def advance(fraction: float) -> bool:
+            interrupt.check()
             bar.update(task, completed=fraction)
             return True
 
@@ -105,6 +113,7 @@ def _plain_progress(title: str) -> Advance:
 
     def advance(fraction: float) -> bool:
         nonlocal tenths
+        interrupt.check()
         if int(fraction * 10) > tenths:
             tenths = int(fraction * 10)
             say(f"{title}: {tenths * 10} %")

@@ -5,15 +5,17 @@ from __future__ import annotations
 import importlib
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import typer
 import typer.core
 
+from elevon.cli import interrupt
 from elevon.cli.registry import COMMANDS
-from elevon.errors import ElevonError, nearest
+from elevon.errors import ElevonError, Interrupted, nearest
+from elevon.files import journal
 
-INTERRUPTED = 130
 USAGE = 2
 FAILED = 1
 
@@ -88,21 +90,56 @@ def _root(
 def run(argv: Sequence[str] | None = None) -> int:
     """Run the command line, turning every expected failure into a message and an exit code."""
     arguments = list(sys.argv[1:] if argv is None else argv)
+    with journal() as written:
+        try:
+            code = _code(arguments)
+        except (KeyboardInterrupt, Interrupted, typer.Abort):
+            return _interrupted(written)
+        except Exception:
+            # A Ctrl-C inside a library may come out as an error of that library.
+            if interrupt.noticed():
+                return _interrupted(written)
+            raise
+        # Typer, too, knows Ctrl-C, but has nothing to say about it.
+        return _interrupted(written) if code == interrupt.INTERRUPTED else code
+
+
+def _code(arguments: list[str]) -> int:
     try:
         outcome = typer.main.get_command(app).main(
             args=arguments, prog_name="elevon", standalone_mode=False
         )
+    except Interrupted:
+        raise
     except _UsageError as error:
         return _usage(error)
     except ElevonError as error:
+        interrupt.check()
         return _fail(str(error), error.exit_code)
-    except (KeyboardInterrupt, typer.Abort):
-        return _fail("interrupted", INTERRUPTED)
     except BrokenPipeError:
         return _closed_pipe()
     except OSError as error:
+        interrupt.check()
         return _fail(str(error), FAILED)
     return outcome if isinstance(outcome, int) else 0
+
+
+def _interrupted(written: Sequence[Path]) -> int:
+    interrupt.ignore()
+    interrupt.drop_output()
+    return _fail(f"interrupted; {interrupt.story() or _kept(written)}", interrupt.INTERRUPTED)
+
+
+def _kept(written: Sequence[Path], most: int = 4) -> str:
+    """Say which files of this command are there; each of them is whole."""
+    files = [str(path) for path in dict.fromkeys(written) if path.is_file()]
+    if not files:
+        return "nothing was written; give the command again to start over"
+    more = f" and {len(files) - most} more" if len(files) > most else ""
+    return (
+        f"kept, each whole: {', '.join(files[:most])}{more}; give the command again with --force "
+        "to do all of it"
+    )
 
 
 def _usage(error: Any) -> int:
