@@ -112,12 +112,15 @@ impl<S: Scalar> PositionSpeed<S> {
         let present = |x: S| S::indicator(S::zero().lt(x));
         let (ti, td, filter) = (g(P::IntegralTime), g(P::DerivativeTime), g(P::DerivativeFilter));
         let dt = S::splat(ts);
+        // The filter decays exactly over a tick, and a ramp gives K_p T_d times its slope at any tick: the gain N of the
+        // continuous form is its limit for short ticks, the difference of two samples that for long ones.
+        let decay = S::one() - (-(filter * dt / guarded(td))).exp();
         Self {
             position_gain: g(P::PositionGain) * g(P::PositionGainScale),
             speed_gain: gain,
             integral_step: present(ti) * gain / guarded(ti) * dt,
-            derivative_gain: present(td) * gain * filter,
-            derivative_decay: S::one() - (-(filter * dt / guarded(td))).exp(),
+            derivative_gain: gain * td / dt * decay,
+            derivative_decay: decay,
             speed_limit: g(P::SpeedLimit),
             torque_limit: g(P::TorqueConstant) * g(P::CurrentLimit),
             per_torque_constant: S::one() / g(P::TorqueConstant),
