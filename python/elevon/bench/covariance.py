@@ -12,7 +12,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["robust_covariance"]
+__all__ = ["long_run_covariance", "robust_covariance"]
 
 FloatArray = npt.NDArray[np.float64]
 _SLOWEST = 0.97  # bound on the fitted persistence, as Andrews and Monahan advise
@@ -44,12 +44,23 @@ def robust_covariance(jacobian: FloatArray, residual: FloatArray) -> FloatArray:
     if np.linalg.cond(normal) > 1e14:
         return np.full((p, p), math.inf)
     bread = np.linalg.inv(normal)
-    meat = _long_run(scaled * residual[:, None]) * (n / (n - p))
+    meat = long_run_covariance(scaled * residual[:, None]) * (n / (n - p))
     return np.asarray(bread @ meat @ bread / np.outer(scale, scale), dtype=np.float64)
 
 
-def _long_run(scores: FloatArray) -> FloatArray:
-    """Sum over all lags of the autocovariance of the scores, shape (p, p)."""
+def long_run_covariance(scores: FloatArray) -> FloatArray:
+    """Return the sum over all lags of the autocovariance of scores.
+
+    Parameters
+    ----------
+    scores : ndarray, shape (n, p)
+        Residual times derivative, rows in the order of time.
+
+    Returns
+    -------
+    ndarray, shape (p, p)
+        Covariance of their sum.
+    """
     rho = np.array([_persistence(column) for column in scores.T])
     white = scores[1:] - rho * scores[:-1]
     count = len(white)

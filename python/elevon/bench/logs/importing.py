@@ -118,7 +118,7 @@ def import_log(
     examine_channels(time, values, ratio, report)
     cell = loadcell or near_cell
     if cell is not None:
-        recording = join_loadcell(recording, cell, note, report, limits)
+        recording = join_loadcell(recording, cell, note, report, limits, gear_ratio=ratio)
     _note_findings(note, report)
     meta = _meta(path, report, note, ratio, convention)
     return ImportedLog(recording.with_meta(**meta), report, note)

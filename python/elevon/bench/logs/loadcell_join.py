@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from elevon.bench.clock_fit import RESONATOR_STD, RESONATOR_TOLERANCE
 from elevon.bench.loadcell import LoadCellLog, read_loadcell
 from elevon.bench.logs.limits import Limits
 from elevon.bench.logs.quality import clock_quality
@@ -19,8 +20,6 @@ from elevon.recording import Recording
 
 __all__ = ["join_loadcell"]
 
-_LEAST_DRIFT_STD = 2e-3  # a drift known worse than this is not applied
-
 
 def join_loadcell(
     recording: Recording,
@@ -28,6 +27,8 @@ def join_loadcell(
     note: CommandNote | None,
     report: ImportReport,
     limits: Limits,
+    *,
+    gear_ratio: float,
 ) -> Recording:
     """Add the load cell's channels on a clock of their own, moved to the drive's time.
 
@@ -43,6 +44,8 @@ def join_loadcell(
         Findings and the synchronisation are added to it.
     limits : Limits
         Bounds on size.
+    gear_ratio : float
+        Fast over slow.
 
     Returns
     -------
@@ -60,7 +63,8 @@ def join_loadcell(
     for start, end, missing in quality.gaps[:20]:
         report.warn("load_cell", "gap", f"{missing} samples missing, {start:.3f} to {end:.3f} s")
     time, value = log.time[quality.keep], log.value[quality.keep]
-    fit = _synchronise(recording, time, value, report)
+    choices = _shared(recording, gear_ratio, note)
+    fit = _synchronise(recording, choices, time, value, report)
     moved = time if fit is None else fit.to_first(time)
     report.clocks["load_cell"] = {
         "samples": quality.samples,
@@ -77,7 +81,11 @@ def join_loadcell(
 
 
 def _synchronise(
-    recording: Recording, time: FloatArray, value: FloatArray, report: ImportReport
+    recording: Recording,
+    choices: list[FloatArray],
+    time: FloatArray,
+    value: FloatArray,
+    report: ImportReport,
 ) -> ClockFit | None:
     drive = recording.clocks["drive"].time
     edge = None
@@ -87,57 +95,92 @@ def _synchronise(
             report.note(
                 "trigger", "more-edges", f"{edge.later} changes after the first; the first is used"
             )
-    signals = _shared(recording)
     try:
-        if signals is None:
-            raise InputError("synchronisation: the log holds no current and no speed")
-        fit = align_clocks(drive, signals, time, value, edge=edge)
+        if not choices:
+            raise InputError("synchronisation: the log holds no current, no speed, no positions")
+        fit = align_clocks(drive, choices[0], time, value, edge=edge, alternatives=choices[1:])
     except InputError as error:
         if edge is None:
             report.warn("load_cell", "not-synchronised", f"{error}; its clock stays its own")
             report.synchronisation = {"method": "none"}
             return None
+        report.note("load_cell", "trigger-alone", f"{error}")
         fit = ClockFit(edge.time, edge.std, 0.0, math.inf, "trigger", math.nan)
-    if fit.drift_std > _LEAST_DRIFT_STD and fit.drift != 0.0:
-        report.note(
-            "load_cell",
-            "drift-unknown",
-            f"clock drift {fit.drift:.2e} is known only to {fit.drift_std:.1e}: not applied",
-        )
-        middle = float(time.mean())
-        fit = ClockFit(
-            fit.offset + fit.drift * middle if edge is None else fit.offset,
-            fit.offset_std,
-            0.0,
-            fit.drift_std,
-            fit.method,
-            fit.explained,
-        )
+    _fit_findings(fit, report)
     report.synchronisation = {
         "method": fit.method,
         "offset_s": fit.offset,
         "offset_std_s": fit.offset_std,
         "drift": fit.drift,
-        "drift_std": fit.drift_std if math.isfinite(fit.drift_std) else None,
-        "explained": fit.explained if math.isfinite(fit.explained) else None,
+        "drift_std": _finite(fit.drift_std),
+        "explained": _finite(fit.explained),
+        "residual_s": _finite(fit.residual) if edge is not None else None,
+        "residual_std_s": _finite(fit.residual_std) if edge is not None else None,
     }
     return fit
 
 
-def _shared(recording: Recording) -> FloatArray | None:
-    """Return what the drive saw of the brake: torque current, its size, direction of motion."""
-    columns = []
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _fit_findings(fit: ClockFit, report: ImportReport) -> None:
+    """Say what the two logs could not settle."""
+    if fit.refused is not None:
+        report.note(
+            "load_cell",
+            "drift-unknown",
+            f"clock drift {fit.refused[0]:.2e} is known only to {fit.refused[1]:.1e}, little "
+            f"better than a resonator keeps ({RESONATOR_STD:.1e}): not applied",
+        )
+    elif not math.isfinite(fit.drift_std):
+        report.note(
+            "load_cell",
+            "drift-unknown",
+            "nothing that both logs saw tells the clock's drift: the trigger gives the offset only",
+        )
+    if abs(fit.drift) - 2.0 * fit.drift_std > RESONATOR_TOLERANCE:
+        report.warn(
+            "load_cell",
+            "drift-large",
+            f"clock drift {fit.drift:.2e}, known to {fit.drift_std:.1e}: more than a ceramic "
+            f"resonator may be off ({RESONATOR_TOLERANCE:g})",
+        )
+    if fit.set_aside is not None:
+        report.warn(
+            "load_cell",
+            "offset-assumed",
+            f"no trigger: {fit.offset:.3f} s has the load cell begin within the drive's trace; "
+            f"{fit.set_aside:.3f} s, before it, would explain it as well",
+        )
+
+
+def _shared(recording: Recording, gear_ratio: float, note: CommandNote | None) -> list[FloatArray]:
+    """Return the sets of signals that may show what the load cell saw.
+
+    A brake acts on the fast shaft: torque current, its size, direction of motion. Weights and
+    springs act on the user: what they wind up between the two positions. Where the operator says
+    whether the brake was on, only one of them is meant.
+    """
+    brake = []
     for name in ("current_q_meas", "current_ref"):
         if name in recording:
             current = recording[name].values
-            columns += [current, np.abs(current)]
+            brake += [current, np.abs(current)]
             break
     if "motor_speed" in recording:
         speed = recording["motor_speed"].values
         size = float(np.nanstd(speed))
         if size > 0.0:
-            columns.append(np.tanh(speed / (0.1 * size)))
-    return np.column_stack(columns) if columns else None
+            brake.append(np.tanh(speed / (0.1 * size)))
+    wound = []
+    if "resolver_position" in recording and "encoder_position" in recording:
+        motor, user = (recording[f"{name}_position"].values for name in ("resolver", "encoder"))
+        wound.append(motor / gear_ratio - user)
+    sets = [np.column_stack(columns) for columns in (brake, wound) if columns]
+    if len(sets) == 2 and note is not None and note.brake is not None:
+        return sets[:1] if note.brake else sets[1:]
+    return sets
 
 
 def _check_overlap(recording: Recording, time: FloatArray, report: ImportReport) -> None:
