@@ -37,12 +37,16 @@ class Brake:
         Seconds from the log's first sample, and the size of the resistive torque or force.
     drift_std : float
         Relative deviation of the load cell's clock.
+    turning : float
+        1 or -1 where the cell's sign turns with the motion (-1: against it), 0 where it is pulled
+        one way only: tells how the cell's own offset enters `level`.
     """
 
     known: Known
     time: Floats
     level: Floats
     drift_std: float = 0.0
+    turning: float = 0.0
 
     @property
     def measured(self) -> bool:
@@ -81,7 +85,7 @@ def brake_of(
             level = _level(at, np.asarray(channel.values, dtype=np.float64), time, speed)
             if level is not None:
                 kind: Known = "torque" if known == "torque" else "force"
-                return Brake(kind, *level, _drift(synchronised))
+                return Brake(kind, *level[:2], _drift(synchronised), level[2])
     if note is not None and note.brake:
         return Brake("on", off.time, off.level)
     return off
@@ -93,8 +97,10 @@ def _drift(synchronised: Mapping[str, Any]) -> float:
     return _RESONATOR if std is None else min(float(std), _RESONATOR)
 
 
-def _level(at: Floats, value: Floats, time: Floats, speed: Floats) -> tuple[Floats, Floats] | None:
-    """Size of a resistive torque, from samples where the shaft moves; (time, level)."""
+def _level(
+    at: Floats, value: Floats, time: Floats, speed: Floats
+) -> tuple[Floats, Floats, float] | None:
+    """Size of a resistive torque, from samples where the shaft moves; (time, level, turning)."""
     from scipy.ndimage import uniform_filter1d
 
     moving = np.interp(at, time, speed)
@@ -108,12 +114,12 @@ def _level(at: Floats, value: Floats, time: Floats, speed: Floats) -> tuple[Floa
     signed = size > 0.0 and abs(turning) > _SIGNED * size and direction.std() > 0.0
     # One sign throughout, whichever way the shaft turns, is a cell that is pulled one way only.
     steady = abs(float(value.mean())) > 0.9 * size
-    level = value * direction * np.sign(turning) if signed and not steady else np.abs(value)
-    if not signed and not steady:
-        level = value * (np.sign(float(value.mean())) or 1.0)
+    turns = float(np.sign(turning)) if signed and not steady else 0.0
+    way = float(np.sign(value.mean())) or 1.0
+    level = value * direction * turns if turns else value * way
     width = max(1, round(_SMOOTHING / max(float(np.median(np.diff(at))), 1e-6)))
     smooth = _in_pieces(at, np.asarray(level, dtype=np.float64), width, uniform_filter1d)
-    return at, np.maximum(smooth, 0.0)
+    return at, np.maximum(smooth, 0.0), turns
 
 
 def _in_pieces(at: Floats, level: Floats, width: int, smooth: object) -> Floats:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.calibrate.balance import Regression, controller_law, torque_balance
+from elevon.calibrate.balance import torque_balance
+from elevon.calibrate.breakaway import static_friction
 from elevon.calibrate.candidates import tamed
 from elevon.calibrate.direct import saturated_speed
 from elevon.calibrate.dynamic import Dynamic, dynamic_stage
@@ -18,14 +19,17 @@ from elevon.calibrate.estimate import Estimate
 from elevon.calibrate.findings import amplitude_findings, plant_findings
 from elevon.calibrate.heldout import HeldOut, held_out
 from elevon.calibrate.kinematics import KINEMATIC, CommandFit, command_fit
+from elevon.calibrate.law import controller_law
 from elevon.calibrate.log import BenchLog
 from elevon.calibrate.plant import (
     Torque,
     controller_estimates,
     plant_estimates,
+    static_estimate,
     torque_scale,
 )
 from elevon.calibrate.positions import position_estimates
+from elevon.calibrate.regression import Regression
 from elevon.errors import InputError, Interrupted
 from elevon.parameters.records import record_of
 from elevon.progress import Progress, part
@@ -36,7 +40,7 @@ if TYPE_CHECKING:
 __all__ = ["Calibration", "calibrate"]
 
 Bools = npt.NDArray[np.bool_]
-_LOOSEST = 0.25  # relative deviation above which the logs do not determine a value
+_LOOSEST = 0.25  # of the value, or of the one before: a larger deviation determines nothing
 _DOUBTFUL = 0.2  # share of the current below which a regression explains nothing
 _RUN_IN = 1.0  # s at least before a log counts
 _SETTLED = 0.5  # s after the set point has left its limit for the first time
@@ -204,6 +208,11 @@ def calibrate(
     if plant is not None:
         estimates, followed = plant_estimates(actuator, plant, torque)
         found += estimates
+        dry = next((i.value for i in estimates if i.path == "friction.dynamic"), None)
+        static = static_friction(
+            logs, keeps, constant=torque.constant, offset=plant["offset"], lag=plant["lag"]
+        )
+        found += static_estimate(actuator, static, dry, torque)
     if law is not None:
         found += controller_estimates(actuator, law, torque, [log.name for log in logs])
     commands = _commands(logs, actuator, found)
@@ -326,7 +335,7 @@ def _commands(
     logs: Sequence[BenchLog], actuator: Actuator, found: list[Estimate]
 ) -> list[CommandFit]:
     """Commands, and the position gain pooled over them."""
-    from elevon.calibrate.positions import gain_estimate
+    from elevon.calibrate.positions import encoder_count, gain_estimate
 
     value = actuator.parameters.value
     limit = next(
@@ -334,7 +343,7 @@ def _commands(
     )
     gain = value("control.position_gain")
     fits = [fit for log in logs if (fit := command_fit(log, gain, limit)) is not None]
-    pooled = gain_estimate(fits, gain)
+    pooled = gain_estimate(fits, gain, encoder_count(actuator))
     if pooled is not None:
         found.append(pooled)
     return fits
@@ -353,7 +362,9 @@ def _asked(found: list[Estimate], free: Sequence[str] | None, actuator: Actuator
             )
             if low or item.value > record.maximum or not np.isfinite(item.std):
                 continue
-            if record.minimum >= 0.0 and item.std > _LOOSEST * abs(item.value):
+            # What is loose may still tell the value before wrong.
+            scale = max(abs(item.value), abs(item.old or 0.0))
+            if record.minimum >= 0.0 and item.std > _LOOSEST * scale:
                 continue
         kept.append(item)
     return kept

@@ -128,7 +128,7 @@ def dynamic_stage(
     Returns
     -------
     Dynamic or None
-        None where nothing is left to free.
+        None where the logs determine nothing of what could be freed.
     """
 
     def check() -> bool:
@@ -147,6 +147,8 @@ def dynamic_stage(
     jac = problem.jacobian(chosen, x, step_sizes(chosen))
     kept, ranking = choose(chosen, jac, residual, blocks_of(problem, residual), required)
     state[0] = 0.3
+    if not kept:
+        return None
 
     def advance(fraction: float) -> None:
         state[0] = 0.3 + 0.7 * fraction

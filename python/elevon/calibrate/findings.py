@@ -6,12 +6,12 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from elevon.calibrate.balance import Regression
 from elevon.calibrate.dynamic import Dynamic
 from elevon.calibrate.estimate import Estimate
 from elevon.calibrate.kinematics import CommandFit
 from elevon.calibrate.log import BenchLog
 from elevon.calibrate.plant import Torque
+from elevon.calibrate.regression import Regression
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -93,6 +93,15 @@ def _convention(torque: Torque, actuator: Actuator) -> list[str]:
 def amplitude_findings(commands: Sequence[CommandFit], found: Sequence[Estimate]) -> list[str]:
     """Name a constant amplitude factor between the bench and the model, and where it sits."""
     says = []
+    play = next((item for item in found if item.path == "play.total"), None)
+    if play is not None and "floats" in play.note:
+        says.append(
+            "the user is not dragged through the play but moves within it on its own (its inertia "
+            "is not small against its friction): play.total comes from the span of the two "
+            "positions' difference and holds the give of the contacts; encoder gain and delay "
+            "cannot be told; a model whose user has no inertia will miss the user's position by "
+            "up to half the play"
+        )
     gain = next((item for item in found if item.path == "sensor.encoder.gain"), None)
     if gain is not None and abs(gain.value - 1.0) > max(_FACTOR, 3.0 * gain.std):
         says.append(

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.calibrate.balance import controller_law, torque_balance
+from elevon.calibrate.balance import torque_balance
+from elevon.calibrate.law import controller_law
 from elevon.calibrate.log import BenchLog
 from elevon.calibrate.plant import controller_estimates, plant_estimates, torque_scale
 from elevon.calibrate.problem import Problem

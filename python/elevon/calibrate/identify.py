@@ -89,7 +89,7 @@ def choose(
     blocks: Sequence[npt.NDArray[np.int64]],
     required: Sequence[str],
 ) -> tuple[list[int], Identifiability]:
-    """Drop, one by one, what the logs cannot determine; return the indices kept.
+    """Drop, one by one, what the logs cannot determine; return the indices kept, maybe none.
 
     Parameters
     ----------
@@ -120,15 +120,19 @@ def choose(
         covariance = _covariance([part[:, :, kept] for part in jac], residual, blocks)
         loose = _looseness([free[k] for k in kept], covariance)
         optional = [j for j, k in enumerate(kept) if free[k].path not in required]
-        worst = max(optional, key=lambda j: loose[j], default=None)
-        if worst is None or not loose[worst] > _LOOSEST:
+        # Of two that cannot be told apart, the looser one goes, even where both look tight.
+        blind = np.array([_twin(covariance, j) > _SAME for j in range(len(kept))])
+        worst = max(optional, key=lambda j: (blind[j], loose[j]), default=None)
+        if worst is None or not (blind[worst] or loose[worst] > _LOOSEST):
             break
         index = kept[worst]
         dropped[free[index].path] = _reason(
             [free[k] for k in kept], covariance, worst, loose[worst]
         )
         kept.remove(index)
-    _refuse(free, kept, jac, residual, blocks)
+    if not kept:
+        return [], Identifiability(np.empty(0), (), {}, (), dropped)
+    _refuse(free, kept, jac, residual, blocks, required=required)
     chosen = [free[k] for k in kept]
     ranking = rank(chosen, [part[:, :, kept] for part in jac], residual, blocks, dropped)
     return kept, ranking
@@ -140,14 +144,15 @@ def _refuse(
     jac: Sequence[Floats],
     residual: Sequence[Floats],
     blocks: Sequence[npt.NDArray[np.int64]],
+    *,
+    required: Sequence[str],
 ) -> None:
-    if not kept:
-        raise InputError("the logs determine none of the parameters: nothing moves enough")
+    """Raise where a required parameter is hopeless, or the twin of another one."""
     covariance = _covariance([part[:, :, list(kept)] for part in jac], residual, blocks)
     items = [free[k] for k in kept]
     loose = _looseness(items, covariance)
     for j, item in enumerate(items):
-        if loose[j] > _HOPELESS or _twin(covariance, j) > _SAME:
+        if item.path in required and (loose[j] > _HOPELESS or _twin(covariance, j) > _SAME):
             why = _reason(items, covariance, j, loose[j])
             raise InputError(f"--free {item.path}: the logs cannot determine it: {why}")
 

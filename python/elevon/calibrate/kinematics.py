@@ -54,6 +54,8 @@ class CommandFit:
         Of the waveform [rad]; NaN where it has none.
     factor : float or None
         Amplitude over the amplitude the operator noted.
+    reach : float
+        Size of the following error the gain stands on [rad]: amplitude of a sine of its RMS.
     """
 
     log: str
@@ -63,6 +65,7 @@ class CommandFit:
     amplitude: float
     amplitude_std: float
     factor: float | None
+    reach: float
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain types."""
@@ -155,6 +158,7 @@ def _with_gain(log: BenchLog, fit: WaveformFit, gain: float, limit: float) -> Co
         amplitude=amplitude,
         amplitude_std=math.nan if at is None else float(std[at]),
         factor=factor,
+        reach=math.sqrt(2.0) * float(np.std(ref)),
     )
 
 

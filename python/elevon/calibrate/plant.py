@@ -9,14 +9,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from elevon.calibrate.balance import Regression
 from elevon.calibrate.estimate import Estimate, quantile
+from elevon.calibrate.regression import Regression
 from elevon.parameters.records import record_of
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["Torque", "controller_estimates", "plant_estimates", "torque_scale"]
+__all__ = [
+    "Torque",
+    "controller_estimates",
+    "plant_estimates",
+    "static_estimate",
+    "torque_scale",
+]
 
 Floats = npt.NDArray[np.float64]
 _TIED = 0.01  # relative: closer than this the controller is taken to know the motor
@@ -143,7 +149,7 @@ def plant_estimates(
             "sensor.load_cell_offset",
             "N m",
             lambda b: scale(b) * float(b[cell]),
-            "of the brake torque the load cell shows",
+            "of the brake torque the load cell shows, the mean over its log",
             register="sensor",
             in_set=False,
         )
@@ -168,6 +174,48 @@ def plant_estimates(
             floor=0.0,
         )
     return found, follow
+
+
+def static_estimate(
+    actuator: Actuator,
+    found: tuple[float, float, float] | None,
+    dynamic: float | None,
+    torque: Torque,
+) -> list[Estimate]:
+    """Static friction as an estimate; no less than the dynamic one, which it cannot be.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        Values before.
+    found : (float, float, float) or None
+        From `elevon.calibrate.breakaway.static_friction`.
+    dynamic : float or None
+        Dynamic friction [N m], where it is estimated.
+    torque : Torque
+        Scale of every torque.
+    """
+    if found is None:
+        return []
+    value, scatter, degrees = found
+    std = float(np.hypot(scatter, torque.relative * value))
+    half = quantile(degrees) * std
+    low = max(value - half, 0.0)
+    least = 0.0 if dynamic is None else dynamic
+    return [
+        Estimate(
+            "friction.static",
+            max(value, least),
+            std,
+            (low, max(value + half, least)),
+            "N m",
+            "plant",
+            actuator.parameters.value("friction.static"),
+            "direct",
+            () if torque.measured else _GIVEN,
+            "torque at which the shaft breaks away; ripple and noise of the torque lower it",
+        )
+    ]
 
 
 def _inertia(
@@ -231,15 +279,17 @@ def controller_estimates(
     gain, gain_std = _delta(law, lambda b: torque.believed * float(b[0]))
     gain_std = float(np.hypot(gain_std, extra * gain))
     rows = [("control.speed_gain", gain, gain_std, given, "")]
-    times: list[tuple[str, str, Callable[[Floats], float]]] = [
-        ("control.integral_time", "integral", lambda b: float(b[0] / b[1])),
-        ("control.derivative_time", "derivative", lambda b: float(b[2] / b[0])),
-    ]
-    for path, branch, function in times:
-        if law[branch] > _SEEN * law.std(branch):
-            rows.append((path, *_delta(law, function), (), ""))
-        elif value(path) > 0.0:
-            rows.append((path, 0.0, 0.0, (), f"no {branch} action is seen in {', '.join(logs)}"))
+    none = "no {} action is seen in " + ", ".join(logs)
+    if law["integral"] > _SEEN * law.std("integral"):
+        found_time = _delta(law, lambda b: float(b[0] / b[1]))
+        rows.append(("control.integral_time", *found_time, (), ""))
+    elif value("control.integral_time") > 0.0:
+        rows.append(("control.integral_time", 0.0, 0.0, (), none.format("integral")))
+    late, late_std = _delta(law, lambda b: float(b[2] / b[0]))
+    if late > 0.0:
+        rows.append(("control.derivative_time", late, late_std, (), ""))
+    elif value("control.derivative_time") > 0.0:
+        rows.append(("control.derivative_time", 0.0, late_std, (), none.format("derivative")))
     gains, gains_std = _delta(law, lambda b: torque.believed * float(b[1]))
     found = []
     for path, number, std, condition, note in rows:

@@ -13,13 +13,14 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.calibrate.blocks import block_covariance, stroke_blocks
+from elevon.calibrate.estimate import quantile
 from elevon.calibrate.log import BenchLog
 
 __all__ = ["PlayFit", "fit_play", "through_play"]
 
 Floats = npt.NDArray[np.float64]
 _TRAVEL = 3.0  # plays (or counts) of travel both ways that a log must have
-_NAMES = ("play", "offset", "gain", "delay")
+_FLOATS = 3.0  # counts of residual that no rounding leaves: the user is not dragged
 
 
 @dataclass(frozen=True)
@@ -35,8 +36,13 @@ class PlayFit:
         Degrees of freedom of the deviations.
     rms : float
         Of the residual [rad].
+    reach : float
+        Greatest half range of motion in a log [rad at the user].
     logs : tuple of str
         Logs used.
+    floats : bool
+        The user is not dragged: it moves on its own within the play. Only the span of the two
+        positions' difference is known then; gain and delay are not.
     """
 
     play: tuple[float, float]
@@ -45,7 +51,9 @@ class PlayFit:
     delay: tuple[float, float]
     degrees: float
     rms: float
+    reach: float
     logs: tuple[str, ...]
+    floats: bool = False
 
 
 def through_play(driver: Floats, width: float) -> Floats:
@@ -114,9 +122,54 @@ def fit_play(logs: Sequence[BenchLog], ratio: float, count: float) -> PlayFit | 
     value = np.array(best.x)
     value[0] = abs(value[0])
     rms = count * float(np.sqrt(np.mean(residual(best.x) ** 2)))
+    if rms > _FLOATS * count:
+        return _spanned(used, drivers, users, keeps, count=count, rms=rms)
     pairs = [(float(v), float(s)) for v, s in zip(value, std, strict=True)]
     return PlayFit(
-        pairs[0], pairs[1], pairs[2], pairs[3], degrees, rms, tuple(x.name for x in used)
+        play=pairs[0],
+        offset=pairs[1],
+        gain=pairs[2],
+        delay=pairs[3],
+        degrees=degrees,
+        rms=rms,
+        reach=0.5 * max(float(np.ptp(x)) for x in drivers),
+        logs=tuple(x.name for x in used),
+    )
+
+
+def _spanned(
+    logs: Sequence[BenchLog],
+    drivers: Sequence[Floats],
+    users: Sequence[Floats],
+    keeps: Sequence[npt.NDArray[np.bool_]],
+    *,
+    count: float,
+    rms: float,
+) -> PlayFit:
+    """Play of a user that flies from one end of the gap to the other.
+
+    The difference of the two positions piles up at both ends. What it leaves out at either side
+    within twenty to one is on the way or not yet in contact; what lies beyond two hundred to one
+    is the give of the contacts: the play is between the two spans, less the count of the rounding.
+    """
+    inner, outer, middles = [], [], []
+    for x, y, keep in zip(drivers, users, keeps, strict=True):
+        edges = np.percentile((y - x)[keep], [0.5, 5.0, 95.0, 99.5])
+        inner.append(edges[2] - edges[1])
+        outer.append(edges[3] - edges[0])
+        middles.append(0.5 * (edges[3] + edges[0]))
+    low, high = max(min(inner) - count, 0.0), max(outer) - count
+    half = 0.5 * (high - low) / quantile(np.inf)
+    return PlayFit(
+        play=(0.5 * (low + high), half),
+        offset=(float(np.mean(middles)), half),
+        gain=(1.0, np.inf),
+        delay=(0.0, np.inf),
+        degrees=np.inf,
+        rms=rms,
+        reach=0.5 * max(float(np.ptp(x)) for x in drivers),
+        logs=tuple(log.name for log in logs),
+        floats=True,
     )
 
 

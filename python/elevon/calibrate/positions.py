@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 __all__ = ["gain_estimate", "position_estimates"]
 
 _OTHER = 0.005  # relative: a limit nearer the set's than this is the set's
+_ROUNDED = 0.1  # counts: what rounding to counts may shift where every stroke turns alike
+_TURNS = 0.2  # share of that in the encoder's gain
+_FLAT = 0.25  # counts: the same where the user stands still in the play, long at one count
 _LOOSE = 0.05  # relative deviation above which the position gain is not determined
 
 
@@ -76,17 +79,19 @@ def _play(play: PlayFit, count: float, actuator: Actuator) -> list[Estimate]:
     total, offset = play.play[0] - extra, play.offset[0] + 0.5 * count
     # The model's encoder truncates; one that rounds would sit half a count lower.
     offset_std = math.hypot(play.offset[1], count / math.sqrt(12.0))
+    rounded = _ROUNDED * count
+    total_std = math.hypot(play.play[1], rounded)
     resolver = value("sensor.resolver.offset") / value("gear.ratio")
     rows = [
         _made(
             "play.total",
             total,
-            play.play[1],
+            total_std,
             play.degrees,
             unit="rad",
             register="plant",
             old=value("play.total"),
-            note="total, at the user",
+            note=f"total, at the user{'; it floats: from the span' if play.floats else ''}",
             in_set=total >= 0.0,
         ),
         _made(
@@ -94,11 +99,22 @@ def _play(play: PlayFit, count: float, actuator: Actuator) -> list[Estimate]:
             offset + resolver,
             offset_std,
             math.inf,
+            half=quantile(play.degrees) * play.offset[1] + 0.5 * count,
             unit="rad",
             register="sensor",
             old=value("sensor.encoder.offset"),
             note="encoder less motor over ratio, the play centred: only the difference is known",
         ),
+    ]
+    return rows if play.floats else [*rows, *_encoder(play, actuator, rounded)]
+
+
+def _encoder(play: PlayFit, actuator: Actuator, rounded: float) -> list[Estimate]:
+    """Delay and gain of the encoder against the motor's sensor."""
+    # All counts between the turns tell the gain, only those at the turns are rounded alike.
+    gain, std = play.gain[0], math.hypot(play.gain[1], _TURNS * rounded / play.reach)
+    seen = abs(gain - 1.0) > max(3.0 * std, 1e-4)
+    return [
         _made(
             "sensor.encoder_delay",
             play.delay[0],
@@ -109,10 +125,6 @@ def _play(play: PlayFit, count: float, actuator: Actuator) -> list[Estimate]:
             old=None,
             note="of the encoder behind the motor's sensor",
         ),
-    ]
-    gain, std = play.gain
-    seen = abs(gain - 1.0) > max(3.0 * std, 1e-4)
-    rows.append(
         _made(
             "sensor.encoder.gain",
             gain,
@@ -120,12 +132,11 @@ def _play(play: PlayFit, count: float, actuator: Actuator) -> list[Estimate]:
             play.degrees,
             unit="1",
             register="sensor",
-            old=value("sensor.encoder.gain"),
+            old=actuator.parameters.value("sensor.encoder.gain"),
             note="encoder over motor and ratio",
             in_set=seen,
-        )
-    )
-    return rows
+        ),
+    ]
 
 
 def _made(
@@ -139,8 +150,9 @@ def _made(
     old: float | None,
     note: str,
     in_set: bool | None = None,
+    half: float | None = None,
 ) -> Estimate:
-    half = quantile(degrees) * std
+    half = quantile(degrees) * std if half is None else half
     inside = old is not None if in_set is None else in_set
     return Estimate(
         path,
@@ -157,24 +169,35 @@ def _made(
     )
 
 
-def gain_estimate(fits: Sequence[CommandFit], old: float) -> Estimate | None:
-    """Position gain pooled over the commands; the logs' scatter counts where it is larger."""
-    good = [fit for fit in fits if 0.0 < fit.gain_std < _LOOSE * fit.gain]
+def gain_estimate(fits: Sequence[CommandFit], old: float, count: float) -> Estimate | None:
+    """Position gain pooled over the commands; the logs' scatter counts where it is larger.
+
+    Parameters
+    ----------
+    fits : sequence of CommandFit
+        One a log.
+    old : float
+        Gain before [1/s].
+    count : float
+        One count of the encoder at the user [rad]: what rounding may shift counts like noise.
+    """
+    rounded = [math.hypot(fit.gain_std, _FLAT * count * fit.gain / fit.reach) for fit in fits]
+    good = [
+        (fit, std) for fit, std in zip(fits, rounded, strict=True) if 0.0 < std < _LOOSE * fit.gain
+    ]
     if not good:
         return None
-    weight = [1.0 / fit.gain_std**2 for fit in good]
-    total = sum(weight)
-    gain = sum(w * fit.gain for w, fit in zip(weight, good, strict=True)) / total
-    chi = sum(w * (fit.gain - gain) ** 2 for w, fit in zip(weight, good, strict=True))
+    total = sum(1.0 / std**2 for _, std in good)
+    gain = sum(fit.gain / std**2 for fit, std in good) / total
+    chi = sum(((fit.gain - gain) / std) ** 2 for fit, std in good)
     spread = max(1.0, chi / max(len(good) - 1, 1))
-    std = math.sqrt(spread / total)
     return _made(
         "control.position_gain",
         gain,
-        std,
+        math.sqrt(spread / total),
         max(len(good) - 1.0, 2.0),
         unit="1/s",
         register="controller",
         old=old,
-        note=f"from the command's waveform in {', '.join(f.log for f in good)}",
+        note=f"from the command's waveform in {', '.join(fit.log for fit, _ in good)}",
     )

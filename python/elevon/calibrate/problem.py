@@ -137,7 +137,9 @@ class Problem:
         log = self.logs[index]
         offset = values.get("sensor.load_cell_offset", 0.0)
         if log.brake.measured and offset:
-            return log.brake.time, np.maximum(log.brake.level - offset, 0.0)
+            way = np.sign(np.interp(log.brake.time, log.time, log.speed))
+            shown = offset * (log.brake.turning * way if log.brake.turning else 1.0)
+            return log.brake.time, np.maximum(log.brake.level - shown, 0.0)
         knots = [v for p, v in values.items() if p.startswith(f"load.brake[{log.name}]")]
         if not knots:
             return None

@@ -1,0 +1,160 @@
+"""The speed controller's law as a regression; no plant enters it.
+
+    k_t i_ref = K_p e + K_i int e dt + K_d (dw_ref/dt - dw/dt),   e = w_ref - w.
+
+The motion has a coefficient of its own in the first term and in the last. A set point that goes
+by stairs (counts of an encoder, a slower position loop) makes the derivative branch spike; the
+log's samples stand in step with the drive and catch those spikes too often or too seldom, and what
+the drive reads a tick late looks like a derivative or a set-point weight. All that lands on the
+set point's slope and on the motion's own term; the gains are read from the error and from the
+motion's slope, which is smooth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.calibrate.direct import saturated_speed
+from elevon.calibrate.log import BenchLog
+from elevon.calibrate.motion import acceleration_of, dilated, integral, kernel, smoothed
+from elevon.calibrate.regression import Regression, robust_regression, with_deviations
+
+__all__ = ["controller_law"]
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+_SETTLED = 0.25  # s around a saturated set point in which anti-windup may act
+_LEAST = 200  # samples
+_TERMS = ("proportional", "integral", "derivative", "slope", "motion")
+
+
+@dataclass(frozen=True)
+class _Law:
+    """Columns and set point of every log, and which samples are used; one array a log."""
+
+    columns: Sequence[Floats]
+    targets: Sequence[Floats]
+    inside: Sequence[Bools]
+    periods: Sequence[float]
+
+    def set_point(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """Solve on the set point of the current."""
+        return self._solve(self.columns, self.targets)
+
+    def without(self, column: int) -> Floats:
+        """Solve without one column; its coefficient comes back as zero."""
+        rest = [np.delete(c, column, axis=1) for c in self.columns]
+        return np.insert(self._solve(rest, self.targets)[0], column, 0.0)
+
+    def joint(self) -> Floats:
+        """Solve with one derivative gain for both slopes; coefficients in the common order."""
+        joined = [np.column_stack((c[:, :2], c[:, 2] + c[:, 3], c[:, 4:])) for c in self.columns]
+        beta = self._solve(joined, self.targets)[0]
+        return np.insert(beta, 2, beta[2])
+
+    def late(self) -> Floats:
+        """Solve with slopes that may come late, by their own derivatives."""
+        more = [
+            np.column_stack((c, *(np.gradient(c[:, k], dt) for k in (2, 3))))
+            for c, dt in zip(self.columns, self.periods, strict=True)
+        ]
+        return self._solve(more, self.targets)[0][:-2]
+
+    def _solve(
+        self, columns: Sequence[Floats], targets: Sequence[Floats]
+    ) -> tuple[Floats, Floats, Floats, Floats]:
+        rows = [c[good] for c, good in zip(columns, self.inside, strict=True)]
+        data = [t[good] for t, good in zip(targets, self.inside, strict=True)]
+        return robust_regression(np.vstack(rows), np.concatenate(data))
+
+
+def controller_law(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regression | None:
+    """Regress the current's set point on the speed error, its integral and its derivative.
+
+    Parameters
+    ----------
+    logs : sequence of BenchLog
+        All of them count: the law holds whatever the load.
+    keeps : sequence of ndarray of bool
+        Samples that may be used, one a log.
+
+    Returns
+    -------
+    Regression or None
+        ``proportional``, ``integral``, ``derivative`` (of the motion), ``slope`` (of the set
+        point), ``motion`` (what the motion's weight differs from the set point's), one ``start`` a
+        log; None where the error hardly moves.
+
+    Notes
+    -----
+    What no log can settle enters the deviations as half the difference it makes: for gain and
+    integral one weight for set point and motion in the place of two, for the derivative one gain
+    in the place of two, and slopes that come late as a filter or a slow tick would have them.
+    """
+    law, present, times = _ready(logs, keeps)
+    design = np.vstack([c[good] for c, good in zip(law.columns, law.inside, strict=True)])
+    size = np.linalg.norm(design, axis=0)
+    if len(design) < _LEAST or not np.all(size > 0.0):
+        return None
+    if np.linalg.matrix_rank(design / size) < design.shape[1]:
+        return None
+    names = (*_TERMS, *(f"start[{k}]" for k in present))
+    beta, rest, weight, design = law.set_point()
+    found = with_deviations(names, beta, design, rest, weight, times=times)
+    if not np.isfinite(found.covariance).all():
+        return found
+    sloped = np.isin(names, ("derivative", "slope"))
+    covariance = found.covariance
+    for other in (
+        np.where(sloped, beta, law.without(_TERMS.index("motion"))),
+        np.where(sloped, law.joint(), beta),
+        np.where(sloped, law.late(), beta),
+    ):
+        gap = 0.5 * (other - beta)
+        covariance = covariance + np.outer(gap, gap)
+    return replace(found, covariance=covariance)
+
+
+def _ready(
+    logs: Sequence[BenchLog], keeps: Sequence[Bools]
+) -> tuple[_Law, list[int], list[tuple[Floats, Floats, float]]]:
+    """Columns of every log, which logs have any sample, and the times of the samples used."""
+    inside = [_inside(log, keep) for log, keep in zip(logs, keeps, strict=True)]
+    present = [k for k, good in enumerate(inside) if good.any()]
+    columns, targets = [], []
+    for k, log in enumerate(logs):
+        sigma = kernel(log)
+        starts = [np.full(len(log.time), float(j == k)) for j in present]
+        columns.append(np.column_stack((*_columns(log, sigma), *starts)))
+        targets.append(smoothed(log.current_target, sigma))
+    times = [
+        (log.time[good], log.speed[good], log.period)
+        for log, good in zip(logs, inside, strict=True)
+    ]
+    return _Law(columns, targets, inside, [log.period for log in logs]), present, times
+
+
+def _inside(log: BenchLog, keep: Bools) -> Bools:
+    """Samples away from a saturated set point and from the log's ends."""
+    saturated = np.abs(log.speed_ref) >= 0.999 * saturated_speed(log)
+    good = keep & log.good & ~dilated(saturated, log.period, _SETTLED)
+    margin = max(4, round(4.0 * kernel(log)))
+    good[:margin] = good[-margin:] = False
+    return np.asarray(good, dtype=np.bool_)
+
+
+def _columns(log: BenchLog, sigma: float) -> list[Floats]:
+    """Error, its integral, the motion's slope (negative), the set point's, the motion."""
+    speed, acceleration = acceleration_of(log, sigma)
+    turned = integral(log.time, log.speed) if log.motor is None else log.motor - log.motor[0]
+    return [
+        smoothed(log.speed_ref, sigma) - speed,
+        smoothed(integral(log.time, log.speed_ref) - turned, sigma),
+        -acceleration,
+        smoothed(log.speed_ref, sigma, 1) / log.period,
+        -speed,
+    ]
