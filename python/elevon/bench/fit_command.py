@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -34,6 +35,8 @@ _OUTLIER = 6.0
 _FAR = 10.0  # of the robust spread: no noise reaches it
 _FEW = 0.01  # of the samples: more than that is no stray but a model that does not fit
 _LEAST = 20
+_ROUGH = 25  # evaluations from each guess
+_MOST = 200  # evaluations of the best one
 _SCORED = 2000  # samples enough to tell the kinds apart
 
 
@@ -229,22 +232,20 @@ def _best(
     free: Sequence[str],
     start: Mapping[str, float] | None = None,
 ) -> tuple[dict[str, float], FloatArray, FloatArray, bool]:
-    """Least squares from each guess; the best one's values, Jacobian (n, p), residual."""
-    from scipy.optimize import least_squares
+    """Least squares from each guess, the best carried to its end.
 
+    Returns its values, Jacobian (n, p), residual, and whether it converged.
+    """
     spread = float(np.ptp(t))
-    results = []
-    for guess in [start] if start is not None else guesses(kind, t, y, known):
-        base = {**guess, **known}
-        if not free:
-            return base, np.empty((len(t), 0)), y - evaluate(kind, base, t), True
-        x0 = np.array([base[name] for name in free])
+    scale = np.array([_typical(name, y, spread) for name in free])
 
-        def residual(x: FloatArray, base: dict[str, float] = base) -> FloatArray:
+    def solve(base: Mapping[str, float], x0: FloatArray, most: int) -> Any:
+        from scipy.optimize import least_squares
+
+        def residual(x: FloatArray) -> FloatArray:
             return _model(kind, base, free, x, t) - y
 
-        scale = np.array([_typical(name, y, spread) for name in free])
-        solution = least_squares(
+        return least_squares(
             residual,
             x0,
             jac="3-point",
@@ -252,10 +253,18 @@ def _best(
             xtol=1e-13,
             ftol=1e-13,
             gtol=1e-13,
-            max_nfev=200,
+            max_nfev=most,
         )
-        results.append((float(solution.cost), base, solution))
-    _, base, solution = min(results, key=lambda item: item[0])
+
+    results = []
+    for guess in [start] if start is not None else guesses(kind, t, y, known):
+        base = {**guess, **known}
+        if not free:
+            return base, np.empty((len(t), 0)), y - evaluate(kind, base, t), True
+        rough = solve(base, np.array([base[name] for name in free]), _ROUGH)
+        results.append((float(rough.cost), base, rough))
+    _, base, rough = min(results, key=lambda item: item[0])
+    solution = rough if rough.status > 0 else solve(base, rough.x, _MOST)
     values = {**base, **dict(zip(free, map(float, solution.x), strict=True))}
     return values, np.asarray(solution.jac), -np.asarray(solution.fun), bool(solution.success)
 
