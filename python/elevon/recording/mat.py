@@ -16,11 +16,14 @@ import numpy.typing as npt
 from elevon.errors import FormatError, InputError
 from elevon.recording.assemble import check_size, header_bytes, rebuild
 from elevon.recording.header import Header
-from elevon.recording.mat5 import Value, read_variables
+from elevon.recording.mat5 import Variable, variables
 from elevon.recording.names import check_name
 from elevon.recording.recording import Recording
 
 __all__ = ["check", "read", "write"]
+
+_Array = npt.NDArray[np.float64]
+_Value = _Array | str | dict[str, _Array]
 
 _LIMIT = 2**31 - 1
 _PER_CHANNEL = 256
@@ -55,7 +58,7 @@ def write(recording: Recording, path: Path) -> None:
 
 def read(path: Path, max_bytes: int) -> Recording:
     """Read the description, then the structs it names."""
-    content = read_variables(path, max_bytes)
+    content = _content(path, max_bytes)
     text = content.get("elevon")
     if not isinstance(text, str):
         raise FormatError(f"{path}: is a MATLAB file, but no recording (no text 'elevon')")
@@ -64,7 +67,33 @@ def read(path: Path, max_bytes: int) -> Recording:
     return rebuild(header, lambda name: _struct(path, content, name), str(path))
 
 
-def _struct(path: Path, content: dict[str, Value], name: str) -> dict[str, npt.NDArray[np.float64]]:
+def _content(path: Path, max_bytes: int) -> dict[str, _Value]:
+    """Return the real arrays, texts and structs of a file; those of other kinds are passed over."""
+    check_size(str(path), path.stat().st_size, max_bytes)
+    content: dict[str, _Value] = {}
+    for variable in variables(path, lambda size: check_size(str(path), size, max_bytes)):
+        value = _value(variable)
+        if value is None:
+            continue
+        if variable.name in content:
+            raise FormatError(f"{path}: is damaged: two variables are named {variable.name!a}")
+        content[variable.name] = value
+    return content
+
+
+def _value(variable: Variable) -> _Value | None:
+    if variable.kind == "text":
+        return variable.text()
+    if variable.kind == "struct" and variable.count == 1:
+        return {field.name: field.numbers() for field in variable.fields() if _is_real(field)}
+    return variable.numbers() if _is_real(variable) else None
+
+
+def _is_real(variable: Variable) -> bool:
+    return variable.kind == "numbers" and not variable.is_complex
+
+
+def _struct(path: Path, content: dict[str, _Value], name: str) -> dict[str, _Array]:
     """Return the vectors of one clock's struct."""
     value = content.get(name)
     if not isinstance(value, dict):

@@ -1,12 +1,15 @@
-"""A strict reader of MATLAB version 5 files: real vectors, texts and plain structs, within bounds.
+"""The one reader of MATLAB version 5 files: strict, lazy, and bounded in what it expands.
 
 A file is a chain of elements: a tag (type, length) and as many bytes, padded to eight; a variable
 may be compressed with zlib. SciPy's reader believes the tags, and a damaged file brings it to read
-outside its memory; this one checks every length and count before it uses them.
+outside its memory; this one checks every length and count before it uses them. Only numbers, texts
+and the fields of plain structs are ever decoded: cells, objects, function handles and sparse
+matrices are told by their kind, and their content is not looked at.
 """
 
 import struct
 import zlib
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,24 +17,30 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import FormatError
-from elevon.recording.assemble import check_size
 
-__all__ = ["Value", "read_variables"]
-
-Value = npt.NDArray[np.float64] | str | dict[str, npt.NDArray[np.float64]]
+__all__ = ["Variable", "variables"]
 
 _MATRIX, _COMPRESSED = 14, 15
-_STRUCT, _TEXT, _NUMBERS = 2, 4, range(6, 16)
+_OPAQUE = 17
+_NUMBERS = range(6, 16)
+_KINDS = {
+    1: "cell", 2: "struct", 3: "object", 4: "text", 5: "sparse", 16: "function",
+    _OPAQUE: "opaque object",
+} | dict.fromkeys(_NUMBERS, "numbers")  # fmt: skip
 _COMPLEX = 0x08
-_STORED = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8"} | {
-    12: "i8",
-    13: "u8",
-}
+_STORED = {
+    1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8",
+}  # fmt: skip
 _CODES = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16"}
+_HEAD = 128
 _PIECE = 2**16
+_MOST_VARIABLES = 512
+_MOST_SIZES = 32
+_LONGEST_FIELD = 64
+_SHOWN = 60
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class _Source:
     """The file and its byte order, which every step needs."""
 
@@ -41,17 +50,21 @@ class _Source:
     def damaged(self, why: str) -> FormatError:
         return FormatError(f"{self.path}: is a damaged MATLAB file: {why}")
 
-    def element(self, data: memoryview, at: int) -> tuple[int, memoryview, int]:
-        """Return type, bytes and end of the element at an offset, the short form included."""
+    def tag(self, data: bytes | memoryview, at: int = 0) -> tuple[int, int]:
+        """Return the two integers of a tag."""
         if at + 8 > len(data):
             raise self.damaged("an element is cut off")
-        word, length = struct.unpack_from(f"{self.order}II", data, at)
-        if word >> 16:
-            kind, length, start, end = word & 0xFFFF, word >> 16, at + 4, at + 8
+        kind, length = struct.unpack_from(f"{self.order}II", data, at)
+        return kind, length
+
+    def element(self, data: memoryview, at: int) -> tuple[int, memoryview, int]:
+        """Return type, bytes and end of the element at an offset, the short form included."""
+        kind, length = self.tag(data, at)
+        start, end = at + 8, at + 8 + length + (-length) % 8
+        if kind >> 16:
+            kind, length, start, end = kind & 0xFFFF, kind >> 16, at + 4, at + 8
             if length > 4:
-                raise self.damaged("a short element is too long")
-        else:
-            kind, start, end = word, at + 8, at + 8 + length + (-length) % 8
+                raise self.damaged(f"a short element of {length} bytes")
         if start + length > len(data):
             raise self.damaged("an element is longer than what holds it")
         return kind, data[start : start + length], end
@@ -62,160 +75,214 @@ class _Source:
         return struct.unpack(f"{self.order}{len(data) // 4}i", data)
 
 
-def read_variables(path: Path, max_bytes: int) -> dict[str, Value]:
-    """Read the variables of a file; those of other kinds are passed over.
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A variable or field: its heading, and its content, decoded only when asked for.
+
+    Attributes
+    ----------
+    name : str
+        Foreign text; empty for an opaque object.
+    kind : str
+        ``numbers``, ``text``, ``struct``, ``cell``, ``object``, ``sparse``, ``function`` or
+        ``opaque object``.
+    is_complex : bool
+        Whether there is an imaginary part; it is never decoded.
+    shape : tuple of int
+        As declared; nothing of that size has been made.
+    """
+
+    name: str
+    kind: str
+    is_complex: bool
+    shape: tuple[int, ...]
+    _source: _Source
+    _content: memoryview
+
+    @property
+    def count(self) -> int:
+        """Number of elements declared."""
+        count = 1
+        for length in self.shape:
+            count *= length
+        return count
+
+    def numbers(self) -> npt.NDArray[np.float64]:
+        """Return the real part.
+
+        Returns
+        -------
+        ndarray, shape (count,)
+            Column by column; NaN payloads as stored.
+
+        Raises
+        ------
+        FormatError
+            No numbers, or stored in another number than declared.
+        """
+        self._expect("numbers")
+        if not self.count:
+            return np.empty(0)
+        stored, values, _ = self._source.element(self._content, 0)
+        if stored not in _STORED:
+            raise self._damaged(f"numbers are stored as type {stored}")
+        dtype = np.dtype(self._source.order + _STORED[stored])
+        if len(values) != self.count * dtype.itemsize:
+            raise self._damaged(f"{self.count} numbers declared, {len(values)} bytes stored")
+        return np.frombuffer(values, dtype).astype(np.float64)
+
+    def text(self) -> str:
+        """Return a text; FormatError where it is none, or its bytes are not in their code."""
+        self._expect("text")
+        stored, values, _ = self._source.element(self._content, 0)
+        code = _CODES.get(stored)
+        if code is None:
+            raise self._damaged(f"text is stored as type {stored}")
+        if code == "utf-16":
+            code = "utf-16-le" if self._source.order == "<" else "utf-16-be"
+        try:
+            return bytes(values).decode(code)
+        except UnicodeDecodeError as error:
+            raise self._damaged(f"text is not {code}") from error
+
+    def fields(self) -> Iterator["Variable"]:
+        """Yield the fields of a struct of one row; an empty one as numbers of shape (0, 0).
+
+        Raises
+        ------
+        FormatError
+            No struct of one row, or damaged.
+        """
+        self._expect("struct")
+        if self.count != 1:
+            raise FormatError(f"{self._place}: arrays of structures cannot be read")
+        source = self._source
+        _, raw, at = source.element(self._content, 0)
+        width = source.integers(raw)[0]
+        _, names, at = source.element(self._content, at)
+        if not 0 < width <= _LONGEST_FIELD or len(names) % width:
+            raise self._damaged(f"field names of width {width}")
+        for start in range(0, len(names), width):
+            name = bytes(names[start : start + width]).split(b"\0")[0].decode("latin-1")
+            kind, body, at = source.element(self._content, at)
+            if kind != _MATRIX:
+                raise self._damaged(f"the field {_quoted(name)} is an element of type {kind}")
+            yield _variable(source, body, name)
+
+    @property
+    def _place(self) -> str:
+        return f"{self._source.path}, {_quoted(self.name)}"
+
+    def _expect(self, kind: str) -> None:
+        if self.kind != kind:
+            raise FormatError(f"{self._place}: is of kind {self.kind}, not {kind}")
+
+    def _damaged(self, why: str) -> FormatError:
+        return self._source.damaged(f"{_quoted(self.name)}: {why}")
+
+
+def variables(path: Path, check: Callable[[int], None]) -> Generator[Variable, None, None]:
+    """Yield the variables of a file, one after the other.
 
     Parameters
     ----------
     path : Path
         The file.
-    max_bytes : int
-        The most that all variables together may expand to.
+    check : callable
+        Told how many bytes all variables so far expand to, before any of them is held; raises
+        where that is too much.
 
-    Returns
-    -------
-    dict of str to (ndarray of shape (n,), str, or dict of such arrays)
-        Real arrays as vectors, texts, and structs of one row with their real arrays.
+    Yields
+    ------
+    Variable
+        In the order of the file.
 
     Raises
     ------
     FormatError
-        Not version 5, damaged, or too large.
+        Not version 5, damaged, or more than 512 variables.
     """
-    check_size(str(path), path.stat().st_size, max_bytes)
-    content = memoryview(path.read_bytes())
-    head = bytes(content[:128])
+    with path.open("rb") as stream:
+        source = _Source(path, _byte_order(path, stream.read(_HEAD)))
+        size = path.stat().st_size
+        total = count = 0
+        while raw := stream.read(8):
+            kind, length = source.tag(raw)
+            if length > size - stream.tell():
+                raise source.damaged("it is cut off")
+            if kind != _COMPRESSED:
+                check(total + length)
+            body = memoryview(stream.read(length))
+            if kind == _COMPRESSED:
+                kind, body = _expanded(source, body, total, check)
+            else:
+                stream.seek((-length) % 8, 1)
+            total, count = total + len(body), count + 1
+            if kind != _MATRIX:
+                raise source.damaged(f"an element of type {kind} stands where a variable should")
+            if count > _MOST_VARIABLES:
+                raise FormatError(f"{path}: more than {_MOST_VARIABLES} variables")
+            yield _variable(source, body)
+
+
+def _byte_order(path: Path, head: bytes) -> str:
     if head.startswith((b"MATLAB 7.3", b"\x89HDF")):
         raise FormatError(f"{path}: is a MATLAB 7.3 file (HDF5); save it with -v7")
     order = {b"IM": "<", b"MI": ">"}.get(head[126:128])
-    if len(head) < 128 or order is None or head[124:126] not in {b"\x00\x01", b"\x01\x00"}:
+    if len(head) < _HEAD or order is None:
         raise FormatError(f"{path}: is not a MATLAB version 5 file")
-    source = _Source(path, order)
-    variables: dict[str, Value] = {}
-    at, budget = 128, max_bytes
-    while at < len(content):
-        kind, body, at = _top(source, content, at)
-        if kind == _COMPRESSED:
-            expanded = _expanded(source, body, budget)
-            kind, body, _ = source.element(expanded, 0)
-        budget -= len(body)
-        if kind != _MATRIX or budget < 0:
-            raise source.damaged(f"an element of type {kind} stands where a variable should")
-        name, value = _matrix(source, body)
-        if value is None:
-            continue
-        if name in variables:
-            raise source.damaged(f"two variables are named {name!r}")
-        variables[name] = value
-    return variables
+    (version,) = struct.unpack(f"{order}H", head[124:126])
+    if version != 0x0100:
+        raise FormatError(f"{path}: is a MATLAB file of unknown version {version:#06x}")
+    return order
 
 
-def _top(source: _Source, content: memoryview, at: int) -> tuple[int, memoryview, int]:
-    """Return an element at the top, where compressed ones are not padded."""
-    if at + 8 > len(content):
-        raise source.damaged("it is cut off")
-    kind, length = struct.unpack_from(f"{source.order}II", content, at)
-    if at + 8 + length > len(content):
-        raise source.damaged("it is cut off")
-    padding = 0 if kind == _COMPRESSED else (-length) % 8
-    return kind, content[at + 8 : at + 8 + length], at + 8 + length + padding
-
-
-def _expanded(source: _Source, body: memoryview, budget: int) -> memoryview:
-    """Expand a compressed variable to the length that it declares, when the budget allows it."""
+def _expanded(
+    source: _Source, body: memoryview, total: int, check: Callable[[int], None]
+) -> tuple[int, memoryview]:
+    """Return type and content of a compressed variable, expanded as far as it declares."""
     worker = zlib.decompressobj()
     try:
-        result = bytearray(worker.decompress(body, 8))
-        if len(result) < 8:
-            raise source.damaged("a compressed variable is cut off")
-        length = struct.unpack_from(f"{source.order}II", result)[1]
-        check_size(str(source.path), length, budget)
-        while len(result) < 8 + length:
-            piece = worker.decompress(worker.unconsumed_tail, min(_PIECE, 8 + length - len(result)))
+        tag = worker.decompress(body, 8)
+        kind, length = source.tag(tag)
+        check(total + length)
+        result = bytearray()
+        while len(result) < length:
+            piece = worker.decompress(worker.unconsumed_tail, min(_PIECE, length - len(result)))
             if not piece:
                 raise source.damaged("a compressed variable is cut off")
             result += piece
-        if worker.decompress(worker.unconsumed_tail, _PIECE) or not worker.eof:
-            raise source.damaged("a compressed variable has another length than it says")
+        if worker.decompress(worker.unconsumed_tail, 1):
+            raise source.damaged("a compressed variable expands to more than it declares")
+        if not worker.eof:
+            raise source.damaged("a compressed variable is cut off")
     except zlib.error as error:
         raise source.damaged(f"a compressed variable: {error}") from error
-    return memoryview(result)
+    return kind, memoryview(result)
 
 
-def _matrix(source: _Source, data: memoryview) -> tuple[str, Value | None]:
-    """Read one variable: flags, sizes, name, content."""
+def _variable(source: _Source, data: memoryview, name: str | None = None) -> Variable:
+    """Read a heading: flags, sizes and name; fields are named by their struct."""
+    if not data:  # how version 5 writes an empty field
+        return Variable(name or "", "numbers", False, (0, 0), source, data)
     _, flags, at = source.element(data, 0)
     word = source.integers(flags)[0]
-    kind, is_complex = word & 0xFF, bool((word >> 8) & _COMPLEX)
-    if kind not in {_STRUCT, _TEXT, *_NUMBERS}:
-        return "", None  # cells, sparse matrices, objects: laid out in other ways
+    kind = _KINDS.get(word & 0xFF)
+    if kind is None:
+        raise source.damaged(f"a variable of class {word & 0xFF}")
+    if word & 0xFF == _OPAQUE:  # it has no size, and its name is not where others have theirs
+        return Variable(name or "", kind, False, (0, 0), source, data[:0])
     _, sizes, at = source.element(data, at)
+    _, raw, at = source.element(data, at)
     shape = source.integers(sizes)
-    if len(shape) < 2 or min(shape) < 0:
+    if not 2 <= len(shape) <= _MOST_SIZES or min(shape) < 0:
         raise source.damaged("a variable has no size")
-    _, raw, at = source.element(data, at)
-    name = bytes(raw).decode("latin-1")
-    count = 1
-    for length in shape:
-        count *= length
-    if kind == _STRUCT:
-        return name, _fields(source, data, at) if count == 1 else None
-    if is_complex:
-        return name, None
-    stored, values, _ = source.element(data, at)
-    if kind == _TEXT:
-        return name, _text(source, stored, values)
-    return name, _numbers(source, stored, values, count)
+    if name is None and not raw:  # what a file's objects hold, kept beside its variables
+        return Variable("", _KINDS[_OPAQUE], False, shape, source, data[:0])
+    own = bytes(raw).decode("latin-1") if name is None else name
+    return Variable(own, kind, bool((word >> 8) & _COMPLEX), shape, source, data[at:])
 
 
-def _numbers(
-    source: _Source, stored: int, values: memoryview, count: int
-) -> npt.NDArray[np.float64]:
-    if stored not in _STORED:
-        raise source.damaged(f"numbers are stored as type {stored}")
-    dtype = np.dtype(source.order + _STORED[stored])
-    if len(values) != count * dtype.itemsize:
-        raise source.damaged(f"{len(values)} bytes for {count} numbers")
-    return np.frombuffer(values, dtype).astype(np.float64)
-
-
-def _text(source: _Source, stored: int, values: memoryview) -> str:
-    code = _CODES.get(stored)
-    if code is None:
-        raise source.damaged(f"text is stored as type {stored}")
-    if code == "utf-16":
-        code = "utf-16-le" if source.order == "<" else "utf-16-be"
-    try:
-        return bytes(values).decode(code)
-    except UnicodeDecodeError as error:
-        raise source.damaged(f"text is not {code}") from error
-
-
-def _fields(source: _Source, data: memoryview, at: int) -> dict[str, npt.NDArray[np.float64]]:
-    """Read the real arrays of a struct; its other fields, and structs in it, are passed over."""
-    _, raw, at = source.element(data, at)
-    (width,) = source.integers(raw)[:1]
-    _, names, at = source.element(data, at)
-    if width < 1 or len(names) % width:
-        raise source.damaged("the names of a struct's fields have no length")
-    fields: dict[str, npt.NDArray[np.float64]] = {}
-    for start in range(0, len(names), width):
-        name = bytes(names[start : start + width]).split(b"\0")[0].decode("latin-1")
-        kind, body, at = source.element(data, at)
-        if kind != _MATRIX:
-            raise source.damaged(f"the field {name!r} is an element of type {kind}")
-        value = _plain(source, body)
-        if value is not None:
-            fields[name] = value
-    return fields
-
-
-def _plain(source: _Source, data: memoryview) -> npt.NDArray[np.float64] | None:
-    """Read a field when it is a real array, without going down into anything else."""
-    if not len(data):
-        return np.empty(0)  # how version 5 writes an empty field
-    _, flags, _ = source.element(data, 0)
-    if source.integers(flags)[0] & 0xFF not in _NUMBERS:
-        return None
-    _, value = _matrix(source, data)
-    return value if isinstance(value, np.ndarray) else None
+def _quoted(text: str) -> str:
+    """Return foreign text safe to show."""
+    return ascii(text if len(text) <= _SHOWN else text[:_SHOWN] + "...")

@@ -16,7 +16,7 @@ from elevon.bench.logs.column_map import ColumnMap, read_column_map
 from elevon.bench.logs.detect import read_table
 from elevon.bench.logs.limits import DEFAULT_LIMITS, Limits
 from elevon.bench.logs.loadcell_join import join_loadcell
-from elevon.bench.logs.mat5 import has_variable
+from elevon.bench.logs.matlab import has_variable
 from elevon.bench.logs.quality import ClockQuality, clock_quality
 from elevon.bench.logs.report import ImportReport
 from elevon.bench.logs.sidecar import CommandNote, read_command_note
