@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from elevon.cli import interrupt
 from elevon.cli.common import ForceOption, JsonOption, SeedOption
 from elevon.cli.output import print_json, print_table, progress_bar, say
 
@@ -26,17 +27,29 @@ def demo(
     force: ForceOption = False,
     json: JsonOption = False,
 ) -> int:
-    """Recompute a published table, then find a bench's hidden values from its logs."""
+    """Recompute a published table, then find a bench's hidden values from its logs.
+
+    An interrupted demonstration goes on where it was when the same command is given again.
+    """
     from elevon.demo.run import run_demo
     from elevon.report.checks import all_passed
 
-    with progress_bar("demo") as advance:
+    with interrupt.telling(lambda: _kept(out)), progress_bar("demo") as advance:
         result = run_demo(out, seed=seed, force=force, progress=advance)
     if json:
         print_json(result.to_dict())
     else:
         _print(result)
     return 0 if all_passed(result.checks) else 1
+
+
+def _kept(out: Path) -> str:
+    from elevon.demo.kept import finished_steps
+
+    done = finished_steps(out.expanduser())
+    if not done:
+        return "no step is finished; give the same command again to start over"
+    return f"kept in {out}: {', '.join(done)}; give the same command again to go on"
 
 
 def _print(result: Demo) -> None:
@@ -53,8 +66,8 @@ def _print(result: Demo) -> None:
     ]
     columns = ("parameter", "before", "hidden truth", "estimate", "90 % interval", "unit")
     print_table(columns, rows, title="hidden values found again from three logs")
-    steps = [(name, f"{seconds:.1f}") for name, seconds in result.steps]
-    print_table(("step", "s"), [*steps, ("all", f"{result.seconds:.1f}")])
+    steps = [(step.name, f"{step.seconds:.1f}", step.kept) for step in result.steps]
+    print_table(("step", "s", ""), [*steps, ("all", f"{result.seconds:.1f}", "")])
     checks = result.checks
     failed = [check for check in checks if not check.passed]
     for check in failed:

@@ -62,7 +62,7 @@ def torino_backlash(
     if picture is not None:
         from elevon.report.figures import save_figure
 
-        say(f"picture: {save_figure(summary_figure(result), picture, force=force)}")
+        say(f"picture: {save_figure(summary_figure(result.rows), picture, force=force)}")
     if as_json:
         print_json(values)
     else:

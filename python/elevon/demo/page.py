@@ -273,11 +273,21 @@ def _backlash(report: Report, demo: Demo) -> None:
         f"{abs(worst.error_deg):.4f} of {worst.limit_deg:.4f} deg. All rows and traces: "
         "backlash.html in this folder.",
     )
-    section.figure(summary_figure(demo.backlash), "Total play against the spacing of the gears.")
+    section.figure(
+        summary_figure(demo.backlash.rows), "Total play against the spacing of the gears."
+    )
 
 
 def _times(report: Report, demo: Demo) -> None:
-    rows: list[list[object]] = [[name, seconds] for name, seconds in demo.steps]
-    rows.append(["all", demo.seconds])
-    table = Table(["Step", "Time [s]"], rows, formats=["", ".1f"])
+    rows: list[list[object]] = [[step.name, step.seconds, step.kept] for step in demo.steps]
+    rows.append(["all", demo.seconds, ""])
+    resumed = any(step.kept for step in demo.steps)
+    columns = ["Step", "Time [s]", "Resumed"] if resumed else ["Step", "Time [s]"]
+    table = Table(
+        columns,
+        rows if resumed else [row[:2] for row in rows],
+        "Wall time of this run; drawing and writing this page is not in it."
+        + (" Steps kept from an interrupted run took only the time to read them." * resumed),
+        formats=["", ".1f", ""],
+    )
     report.section("Time of each step").table(table)

@@ -1,30 +1,42 @@
-"""The demonstration's steps, each timed."""
+"""The demonstration's steps, each timed, each kept for a run that is interrupted."""
 
 from __future__ import annotations
 
 import json
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from elevon.demo.hidden import RECOVERED, hidden_actuator
+from elevon.demo.kept import Kept, inputs_of, work_key
+from elevon.demo.pieces import Found, Plays, Step, validation_from_json, validation_to_json
+from elevon.demo.procedure import HELD_OUT, demo_procedure
 from elevon.progress import Progress, part
 from elevon.report.checks import Check, all_passed
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.bench.logs.importing import ImportedLog
-    from elevon.calibrate import BenchLog, Calibration, Validation
-    from elevon.reproduce.backlash import BacklashResult
+    from elevon.calibrate import BenchLog, Validation
 
 __all__ = ["Demo", "demo_files", "run_demo"]
 
 Result = TypeVar("Result")
-HELD_OUT = "held-out"
 _PAGES = ("report.html", "backlash.html", "calibrated.toml", "truth.json")
+
+
+@dataclass(frozen=True)
+class _Work(Generic[Result]):
+    """A step that can be kept: how it is done, and its result's way to JSON and back."""
+
+    piece: str
+    do: Callable[[], Result]
+    write: Callable[[Result], Any]
+    read: Callable[[Any], Result]
+    inputs: str = ""
+    files: Sequence[Path] = ()
 
 
 @dataclass
@@ -39,9 +51,11 @@ class Demo:
         The published set, and the one on the bench.
     folder : Path
         Of the outputs.
-    steps : list of (str, float)
-        What was done, and the seconds it took.
-    backlash, imported, calibration : BacklashResult, list of ImportedLog, Calibration
+    kept : Kept
+        What an interrupted run left, and this one leaves if it is interrupted.
+    steps : list of Step
+        What was done, the seconds it took, and what of it was kept from an interrupted run.
+    backlash, imported, calibration : Plays, list of ImportedLog, Found
         Results.
     before, after : Validation
         Published and calibrated values against all logs, the held-out one among them.
@@ -53,27 +67,45 @@ class Demo:
     base: Actuator
     hidden: Actuator
     folder: Path
-    steps: list[tuple[str, float]] = field(default_factory=list)
-    backlash: BacklashResult = field(init=False)
+    kept: Kept
+    steps: list[Step] = field(default_factory=list)
+    backlash: Plays = field(init=False)
     imported: list[ImportedLog] = field(init=False)
     logs: list[BenchLog] = field(init=False)
-    calibration: Calibration = field(init=False)
+    calibration: Found = field(init=False)
     before: Validation = field(init=False)
     after: Validation = field(init=False)
     truth: dict[str, float] = field(default_factory=dict)
     bench_truth: dict[str, Any] = field(default_factory=dict)
 
-    def timed(self, name: str, work: Callable[[], Result]) -> Result:
-        """Do a step and note its time."""
+    def timed(
+        self, name: str, work: Callable[[], Result], kept: Callable[[Result], str] | None = None
+    ) -> Result:
+        """Do a step and note its time, and what `kept` says of its result."""
         begin = clock.perf_counter()
         result = work()
-        self.steps.append((name, clock.perf_counter() - begin))
+        seconds = clock.perf_counter() - begin
+        self.steps.append(Step(name, seconds, "" if kept is None else kept(result)))
+        return result
+
+    def resumed(self, name: str, work: _Work[Result]) -> Result:
+        """Take a step's result from an interrupted run, or do it and keep its result."""
+        begin = clock.perf_counter()
+        found = self.kept.load(work.piece, work.inputs, work.read)
+        if found is not None:
+            result, before = found
+            text = f"kept from the interrupted run, which took {before:.1f} s for it"
+            self.steps.append(Step(name, clock.perf_counter() - begin, text))
+            return result
+        result = self.timed(name, work.do)
+        seconds = self.steps[-1].seconds
+        self.kept.save(work.piece, work.inputs, work.write(result), seconds, work.files)
         return result
 
     @property
     def seconds(self) -> float:
         """Time of all steps so far."""
-        return sum(seconds for _, seconds in self.steps)
+        return sum(step.seconds for step in self.steps)
 
     @property
     def checks(self) -> list[Check]:
@@ -121,7 +153,7 @@ class Demo:
             "checks": [check.to_dict() for check in checks],
             "seed": self.seed,
             "rows": self.rows(),
-            "steps": [{"name": name, "seconds": seconds} for name, seconds in self.steps],
+            "steps": [step.to_dict() for step in self.steps],
             "wall_s": self.seconds,
             "report": str(self.folder / "report.html"),
         }
@@ -148,6 +180,10 @@ def run_demo(
 ) -> Demo:
     """Run the demonstration and write its report.
 
+    A run that was interrupted goes on where it stopped when it is started again with the same
+    arguments: what is kept in the folder ``unfinished`` is used, as long as it belongs to exactly
+    this work, done by exactly this package.
+
     Parameters
     ----------
     out : path
@@ -155,7 +191,7 @@ def run_demo(
     seed : int
         Of the hidden values.
     force : bool
-        Whether what is there may be replaced.
+        Whether what an earlier, complete run or other work left may be replaced.
     progress : callable, optional
         Told the done fraction; returns False to stop.
 
@@ -167,53 +203,77 @@ def run_demo(
         `progress` returned False.
     """
     from elevon.actuator import Actuator
-    from elevon.files import check_output
 
-    for path in demo_files(out):
-        check_output(path, force=force)
     base = Actuator.load("torino-rotary")
-    demo = Demo(seed, base, hidden_actuator(base, seed), Path(out).expanduser())
-    _backlash(demo, part(progress, 0.0, 0.25), force=force)
-    _bench(demo, part(progress, 0.25, 0.5), force=force)
+    hidden = hidden_actuator(base, seed)
+    folder = Path(out).expanduser()
+    kept = Kept(folder, work_key(seed, base, hidden))
+    demo = Demo(seed, base, hidden, folder, kept)
+    _claim(demo, force=force)
+    _backlash(demo, part(progress, 0.0, 0.25))
+    logs = _bench(demo, part(progress, 0.25, 0.5))
     _read(demo)
-    _calibrate(demo, part(progress, 0.5, 0.85), force=force)
-    _validate(demo, part(progress, 0.85, 0.97))
+    _calibrate(demo, part(progress, 0.5, 0.85), logs)
+    _validate(demo, part(progress, 0.85, 0.97), logs)
     _report(demo, force=force)
+    kept.clear()
     if progress is not None:
         progress(1.0)
     return demo
 
 
-def _backlash(demo: Demo, progress: Progress | None, *, force: bool) -> None:
+def _claim(demo: Demo, *, force: bool) -> None:
+    """Refuse what may not be replaced, before any work; name the work, or go on with it."""
+    from elevon.bench.run import claim_bench
+    from elevon.files import check_output
+
+    if demo.kept.begun(force=force):
+        check_output(demo.folder / "report.html", force=force)
+        return
+    for path in demo_files(demo.folder):
+        check_output(path, force=force)
+    claim_bench(demo_procedure(), demo.hidden, demo.folder / "logs", seed=demo.seed, force=force)
+    demo.kept.begin()
+
+
+def _backlash(demo: Demo, progress: Progress | None) -> None:
     from elevon.reproduce.backlash import reproduce_backlash
     from elevon.reproduce.backlash.page import backlash_report
 
-    def work() -> BacklashResult:
+    page = demo.folder / "backlash.html"
+
+    def work() -> Plays:
         result = reproduce_backlash(progress=progress)
-        backlash_report(result).save(demo.folder / "backlash.html", force=force)
-        return result
+        backlash_report(result).save(page, force=True)
+        return Plays.of(result)
 
-    demo.backlash = demo.timed("published backlash table, fifteen plays", work)
-
-
-def _bench(demo: Demo, progress: Progress | None, *, force: bool) -> None:
-    from elevon.bench.procedure import load_procedure
-    from elevon.bench.run import run_procedure
-
-    procedure = load_procedure(Path(str(files("elevon.demo") / "bench.toml")))
-    demo.timed(
-        "virtual bench: four logs of 20 s",
-        lambda: run_procedure(
-            procedure,
-            demo.hidden,
-            demo.folder / "logs",
-            seed=demo.seed,
-            truth=demo.folder / "truth.json",
-            force=force,
-            progress=progress,
-        ),
+    demo.backlash = demo.resumed(
+        "published backlash table, fifteen plays",
+        _Work("backlash", work, Plays.to_json, Plays.from_json, files=[page]),
     )
-    demo.bench_truth = json.loads((demo.folder / "truth.json").read_text("utf-8"))
+
+
+def _bench(demo: Demo, progress: Progress | None) -> list[Path]:
+    """Make the logs that are missing; return the files of all."""
+    from elevon.bench.run import BenchResult, run_procedure
+    from elevon.files import write_text
+
+    folder, truth = demo.folder / "logs", demo.folder / "truth.json"
+
+    def work() -> BenchResult:
+        return run_procedure(
+            demo_procedure(), demo.hidden, folder, seed=demo.seed, progress=progress
+        )
+
+    def kept(result: BenchResult) -> str:
+        old = sum(log.resumed for log in result.logs)
+        return f"{old} of {len(result.logs)} logs kept from the interrupted run" if old else ""
+
+    result = demo.timed("virtual bench: four logs of 20 s", work, kept)
+    text = json.dumps(result.hidden, indent=1, default=str) + "\n"
+    write_text(truth, text, force=True)
+    demo.bench_truth = json.loads(text)
+    return [path for log in result.logs for path in log.files]
 
 
 def _read(demo: Demo) -> None:
@@ -229,15 +289,29 @@ def _read(demo: Demo) -> None:
     demo.timed("import and synchronisation of the two clocks", work)
 
 
-def _calibrate(demo: Demo, progress: Progress | None, *, force: bool) -> None:
+def _calibrate(demo: Demo, progress: Progress | None, logs: Sequence[Path]) -> None:
     from elevon.calibrate import calibrate
     from elevon.calibrate.write import write_calibration
 
     used = [log for log in demo.logs if log.name != f"{HELD_OUT}.csv"]
-    demo.calibration = demo.timed(
-        "calibration on three logs", lambda: calibrate(used, demo.base, progress=progress)
+    target = demo.folder / "calibrated.toml"
+
+    def work() -> Found:
+        result = calibrate(used, demo.base, progress=progress)
+        write_calibration(target, result, force=True)
+        return Found.of(result)
+
+    demo.calibration = demo.resumed(
+        "calibration on three logs",
+        _Work(
+            "calibration",
+            work,
+            lambda found: found.to_json(demo.base),
+            lambda data: Found.from_json(data, demo.base),
+            inputs_of(logs),
+            [target],
+        ),
     )
-    write_calibration(demo.folder / "calibrated.toml", demo.calibration, force=force)
     demo.truth = _truth(demo)
 
 
@@ -255,16 +329,24 @@ def _truth(demo: Demo) -> dict[str, float]:
     return truth
 
 
-def _validate(demo: Demo, progress: Progress | None) -> None:
+def _validate(demo: Demo, progress: Progress | None, logs: Sequence[Path]) -> None:
     from elevon.calibrate import validate
 
-    def work() -> None:
-        demo.before = validate(demo.logs, demo.base, progress=part(progress, 0.0, 0.5))
-        demo.after = validate(
-            demo.logs, demo.calibration.actuator, progress=part(progress, 0.5, 1.0)
+    def validated(piece: str, actuator: Actuator, share: Progress | None) -> Validation:
+        what = "published" if piece == "before" else "calibrated"
+        return demo.resumed(
+            f"validation of the {what} values on all four logs",
+            _Work(
+                piece,
+                lambda: validate(demo.logs, actuator, progress=share),
+                validation_to_json,
+                validation_from_json,
+                inputs_of(logs, actuator.hash),
+            ),
         )
 
-    demo.timed("validation, before and after, held-out log among the four", work)
+    demo.before = validated("before", demo.base, part(progress, 0.0, 0.5))
+    demo.after = validated("after", demo.calibration.actuator, part(progress, 0.5, 1.0))
 
 
 def _report(demo: Demo, *, force: bool) -> None:

@@ -12,7 +12,11 @@ from elevon.reproduce.backlash.campaign import FREQUENCY, START, BacklashResult
 from elevon.reproduce.provenance import provenance
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.figure import Figure
+
+    from elevon.reproduce.backlash.campaign import RowResult
 
 __all__ = ["backlash_report", "summary_figure"]
 
@@ -54,19 +58,19 @@ def backlash_report(result: BacklashResult, *, date: str | None = None) -> Repor
     return report
 
 
-def summary_figure(result: BacklashResult) -> Figure:
+def summary_figure(rows: Sequence[RowResult]) -> Figure:
     """Draw measured, calculated and recovered play over the spacing."""
-    spacing = np.array([row.measured.spacing_mm for row in result.rows])
+    spacing = np.array([row.measured.spacing_mm for row in rows])
     with new_figure(width=8.0, height=3.8) as (figure, axes):
         axes.plot(
             spacing,
-            [row.formula_deg for row in result.rows],
+            [row.formula_deg for row in rows],
             color=COLOURS["grey"],
             label="geometric formula, with the intrinsic play",
         )
         axes.plot(
             spacing,
-            [row.measured.measured_total_deg for row in result.rows],
+            [row.measured.measured_total_deg for row in rows],
             "o",
             ms=8,
             mfc="none",
@@ -75,7 +79,7 @@ def summary_figure(result: BacklashResult) -> Figure:
         )
         axes.plot(
             spacing,
-            [row.play_out_deg for row in result.rows],
+            [row.play_out_deg for row in rows],
             "x",
             color=COLOURS["orange"],
             label="recovered from the simulated encoder",
@@ -93,7 +97,7 @@ def _comparison(report: Report, result: BacklashResult) -> None:
         "The formula is that of ideal teeth. Above some 2 mm of spacing the printed gears' flanks "
         "are no involutes any more and the bench shows more play than the formula.",
     )
-    section.figure(summary_figure(result), "Total play against the spacing of the gears.")
+    section.figure(summary_figure(result.rows), "Total play against the spacing of the gears.")
     columns = [
         "Row", "Micrometer [mm]", "Measured [deg]", "Formula [deg]", "Put in [deg]",
         "Recovered [deg]", "Error [deg]", "Limit [deg]", "Motor less encoder [deg]", "Flat [s]",

@@ -1,0 +1,24 @@
+"""What is done on the demonstration's bench."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from elevon.bench.procedure import Procedure
+
+__all__ = ["HELD_OUT", "LOADED", "demo_procedure"]
+
+HELD_OUT = "held-out"
+"""Name of the log that is kept from the calibration."""
+LOADED = "loaded"
+"""Of the logs calibrated on, the one whose brake acts."""
+
+
+def demo_procedure() -> Procedure:
+    """Return the procedure: three logs to calibrate on, one kept back."""
+    from elevon.bench.procedure import load_procedure
+
+    return load_procedure(Path(str(files("elevon.demo") / "bench.toml")))
