@@ -87,7 +87,7 @@ def make_truth(values=None, cases=tuple(CASES), seed=0, **sensors):
         if brake:
             document["load"] = {"brake": {"terms": list(brake)}}
         runs.append(Run(actuator, Scenario.from_dict(document), seed=seed, label=name))
-    kept = simulate_batch(runs, record="drive_log,brake_torque@400 Hz")
+    kept = simulate_batch(runs, record="drive_log,brake_torque,user_position@400 Hz")
     return Truth(actuator, recordings=dict(zip(cases, kept, strict=True)), **sensors)
 
 

@@ -34,6 +34,16 @@ def test_registers_stay_apart(result):
     assert all(registers[path] == "sensor" for path in OFFSETS)
 
 
+def test_where_each_log_began_in_the_play_is_told_apart_from_the_sensors(result, truth):
+    for name, recording in truth.recordings.items():
+        motor, user = (float(recording[s].values[0]) for s in ("motor_position", "user_position"))
+        item = result[f"initial.lead[{name}.csv]"]
+        assert item.register == "initial"
+        assert not item.in_set
+        true = motor / truth.actuator.parameters.value("gear.ratio") - user
+        assert item.interval[0] <= true <= item.interval[1]
+
+
 def test_the_load_cell_separates_torque_constant_and_inertia(result):
     assert result.torque.measured
     assert result["motor.emf_constant"].given == ()

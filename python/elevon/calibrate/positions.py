@@ -31,6 +31,7 @@ def position_estimates(logs: Sequence[BenchLog], actuator: Actuator) -> list[Est
     play = fit_play(logs, value("gear.ratio"), count)
     if play is not None:
         found += _play(play, count, actuator)
+        found += [_initial(log, play, count, value("gear.ratio")) for log in logs if _told(log)]
     sensor = speed_sensor(logs)
     if sensor is not None:
         for name, unit in (("gain", "1"), ("offset", "rad/s")):
@@ -107,6 +108,28 @@ def _play(play: PlayFit, count: float, actuator: Actuator) -> list[Estimate]:
         ),
     ]
     return rows if play.floats else [*rows, *_encoder(play, actuator, rounded)]
+
+
+def _told(log: BenchLog) -> bool:
+    return log.motor is not None and log.user is not None
+
+
+def _initial(log: BenchLog, play: PlayFit, count: float, ratio: float) -> Estimate:
+    """Where in the play the motor stood when a log began."""
+    assert log.motor is not None
+    assert log.user is not None
+    seen = play.gain[0] * log.motor[0] / ratio + play.offset[0] - log.user[0]
+    return _made(
+        f"initial.lead[{log.name}]",
+        float(seen),
+        math.hypot(play.offset[1], count / math.sqrt(12.0)),
+        math.inf,
+        half=quantile(play.degrees) * play.offset[1] + 0.5 * count,
+        unit="rad",
+        register="initial",
+        old=None,
+        note="motor over ratio less user at the first sample; 0: the middle of the play",
+    )
 
 
 def _encoder(play: PlayFit, actuator: Actuator, rounded: float) -> list[Estimate]:
