@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 __all__ = ["bench_figure"]
 
-# Title, second line, left edge, bottom edge, colour. Sheet: 0 to 10 across, 0 to 4 up.
+# Title, second line, left edge, bottom edge, colour. Sheet: 0 to 10 across, -0.7 to 4 up.
 _BOXES = (
     ("Drive", "position, speed, current", 0.0, 2.6, "blue"),
     ("Motor", "resolver", 2.7, 2.6, "blue"),
@@ -38,7 +38,7 @@ _ARROWS = (
 
 def bench_figure() -> Figure:
     """Draw the bench: actuator in blue, equipment in green, files in orange."""
-    with new_figure(width=8.6, height=3.5) as (figure, axes):
+    with new_figure(width=8.6, height=4.0) as (figure, axes):
         for title, text, left, bottom, colour in _BOXES:
             _box(axes, (left, bottom), title, text, COLOURS[colour])
         for start, end in _ARROWS:
@@ -46,8 +46,10 @@ def bench_figure() -> Figure:
         _line(axes, ((9.15, 3.45), (9.15, 3.85), (1.05, 3.85)))
         _arrow(axes, (1.05, 3.85), (1.05, 3.45))
         axes.text(5.1, 3.9, "user position", ha="center", va="bottom")
-        axes.text(1.15, 1.7, "trigger", ha="left", va="center")
-        axes.set(xlim=(-0.1, 10.3), ylim=(-0.1, 4.2))
+        _line(axes, ((1.05, 0.0), (1.05, -0.35), (6.45, -0.35), (6.45, 0.0)), style=":")
+        text = "the trigger: an edge in the trace, the zero of the load cell's file"
+        axes.text(3.75, -0.42, text, ha="center", va="top", size=8)
+        axes.set(xlim=(-0.1, 10.3), ylim=(-0.75, 4.2))
         axes.axis("off")
     return figure
 
@@ -68,5 +70,5 @@ def _arrow(axes: Any, start: tuple[float, float], end: tuple[float, float]) -> N
     axes.annotate("", xy=end, xytext=start, arrowprops=look)
 
 
-def _line(axes: Any, points: tuple[tuple[float, float], ...]) -> None:
-    axes.plot(*zip(*points, strict=True), color=COLOURS["grey"], lw=1.2)
+def _line(axes: Any, points: tuple[tuple[float, float], ...], style: str = "-") -> None:
+    axes.plot(*zip(*points, strict=True), color=COLOURS["grey"], lw=1.2, ls=style)

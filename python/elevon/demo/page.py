@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from elevon.calibrate.estimate import LEVEL
+from elevon.calibrate.positions import encoder_count
 from elevon.calibrate.validation import SIGNALS
 from elevon.demo.bench_figure import bench_figure
+from elevon.demo.page_parameters import parameters_section
 from elevon.report import Report, Table
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.backlash.page import summary_figure
@@ -42,10 +42,14 @@ def demo_report(demo: Demo) -> Report:
     )
     report.fact("Checks passed", f"{sum(passed)} of {len(passed)}")
     report.fact("Truths inside", f"{inside} of {len(rows)}", f"{100 * LEVEL:.0f} % intervals")
-    report.fact("Logs", "4 of 20 s", "one kept back from the fit")
-    report.fact("All steps", f"{demo.seconds:.0f} s")
+    length = f"{max(log.duration for log in demo.logs):.0f} s"
+    times = "\N{MULTIPLICATION SIGN}"
+    report.fact("Logs", f"{len(demo.logs)} {times} {length}", "one kept back from the fit")
+    resumed = sum(bool(step.kept) for step in demo.steps)
+    note = f"{resumed} of {len(demo.steps)} steps resumed" if resumed else ""
+    report.fact("All steps", f"{demo.seconds:.0f} s", note)
     _bench(report, demo)
-    _parameters(report, demo, rows)
+    parameters_section(report, demo, rows)
     _agreement(report, demo)
     _clocks(report, demo)
     _backlash(report, demo)
@@ -73,7 +77,11 @@ def _bench(report: Report, demo: Demo) -> None:
         "true current, no command. When the command began, where in the play the motor stood, the "
         "cell's offset and its clock's error were left to chance.",
     )
-    section.figure(bench_figure(), "The bench. Orange: what is written to files.")
+    section.figure(
+        bench_figure(),
+        "The bench. Blue: the actuator. Green: what loads it. Orange: what is written to files, "
+        "and all that the calibration is given of it.",
+    )
     logs = demo.bench_truth["logs"]
     rows = [
         [
@@ -85,85 +93,21 @@ def _bench(report: Report, demo: Demo) -> None:
         ]
         for k, log in enumerate(logs)
     ]
-    columns = ["Log", "Brake", "Trigger [s]", "Command begins [s]", "Motor in the play [%]"]
+    columns = ["Log", "Brake", "Trigger at [s]", "Command begins at [s]", "Motor in the play [%]"]
     formats = ["", "", ".3f", ".3f", "+.0f"]
-    caption = "What chance set; the calibration saw none of it."
+    caption = (
+        "What chance set; the calibration was told none of it. Where the motor stands in the play "
+        "at first: 0 is the middle, \N{PLUS-MINUS SIGN}50 its ends."
+    )
     section.table(Table(columns, rows, caption, formats=formats))
-
-
-def _parameters(report: Report, demo: Demo, rows: list[dict[str, Any]]) -> None:
-    section = report.section(
-        "Parameters against the hidden truth",
-        f"Intervals are meant to hold {100 * LEVEL:.0f} % of the truths. The model behind the "
-        "calibration is the low one; the logs come from the high one, with a PWM bridge, encoder "
-        f"counts and noise. Here {sum(row['inside'] for row in rows)} of {len(rows)} are inside: "
-        "what the low model lacks shows as a bias that the intervals do not cover.",
-    )
-    with new_figure(width=8.5, height=0.34 * len(rows) + 1.3) as (figure, axes):
-        _draw_errors(axes, rows)
-    section.figure(
-        figure,
-        "Error of each estimate in percent of the truth, with its interval; grey: the published "
-        "value the calibration began with (an arrow where it lies outside the plot).",
-    )
-    cells = [
-        [
-            row["path"],
-            row["before"],
-            row["truth"],
-            row["value"],
-            f"{row['low']:.4g} to {row['high']:.4g}",
-            _percent(row),
-            row["unit"],
-            "yes" if row["inside"] else "no",
-        ]
-        for row in rows
-    ]
-    columns = ["Parameter", "Before", "Truth", "Estimate", "Interval", "Error", "Unit", "Inside"]
-    section.table(Table(columns, cells, "Offsets are compared in their own unit.", digits=5))
-    if demo.calibration.findings:
-        section.text("What the calibration itself has to say:")
-        section.points(demo.calibration.findings)
-
-
-def _percent(row: dict[str, Any]) -> str:
-    if row["path"].endswith("offset") or row["truth"] == 0.0:
-        return f"{row['value'] - row['truth']:+.2g} {row['unit']}".replace("-", "\N{MINUS SIGN}")
-    error = 100.0 * (row["value"] / row["truth"] - 1.0)
-    return f"{error:+.2f} %".replace("-", "\N{MINUS SIGN}")
-
-
-def _draw_errors(axes: Any, rows: list[dict[str, Any]]) -> None:
-    shown = [row for row in rows if abs(row["truth"]) > 0.0 and row["before"] != 0.0]
-    shown = [row for row in shown if not row["path"].endswith("offset")]
-    reach = 1.0 + max(
-        100.0 * max(abs(row["low"] / row["truth"] - 1.0), abs(row["high"] / row["truth"] - 1.0))
-        for row in shown
-    )
-    for place, row in enumerate(reversed(shown)):
-        ends = [100.0 * (row[key] / row["truth"] - 1.0) for key in ("low", "high")]
-        colour = COLOURS["blue"] if row["inside"] else COLOURS["orange"]
-        axes.plot(ends, [place, place], color=colour, lw=4, solid_capstyle="butt")
-        axes.plot(100.0 * (row["value"] / row["truth"] - 1.0), place, "o", color=colour, ms=4)
-        if row["before"] is None:
-            continue
-        old = 100.0 * (row["before"] / row["truth"] - 1.0)
-        marker = "D" if abs(old) < reach else ">" if old > 0.0 else "<"
-        axes.plot(np.clip(old, -0.97 * reach, 0.97 * reach), place, marker, color=COLOURS["grey"])
-    axes.axvline(0.0, color=COLOURS["green"], lw=1.2)
-    axes.set(
-        xlim=(-reach, reach),
-        yticks=range(len(shown)),
-        yticklabels=[row["path"] for row in reversed(shown)],
-        xlabel="Error [% of the truth]",
-    )
 
 
 def _agreement(report: Report, demo: Demo) -> None:
     section = report.section(
         "Logs against the model, before and after",
         f"The low model run in closed loop on each log's own rebuilt command; the first "
-        f"{demo.after.transient:g} s are left out. The last log was kept from the calibration.",
+        f"{demo.after.transient:g} s are left out. The last log was kept from the calibration. "
+        f"One count of the encoder is {math.degrees(encoder_count(demo.base)):.4f} deg.",
     )
     old = {(e.log, e.signal): e for e in demo.before.errors}
     rows = []
@@ -178,29 +122,31 @@ def _agreement(report: Report, demo: Demo) -> None:
         "Unit",
         "RMS before",
         "RMS after",
-        "Of range before [%]",
+        "Of range, before [%]",
         "after [%]",
     ]
-    section.table(Table(columns, rows, "RMS of model less log.", digits=3))
+    caption = "RMS of model less log, and the same in percent of the range of the logged signal."
+    section.table(Table(columns, rows, caption, digits=3))
     earlier = {trace.log: trace for trace in demo.before.traces}
     for trace in demo.after.traces:
         section.figure(
             _trace_figure(trace, earlier[trace.log]),
-            f"{trace.log}: log and model on the left, model less log on the right.",
+            f"{trace.log}: log and calibrated model on the left; on the right model less log, "
+            "with the published values before and the calibrated ones after.",
         )
     kept = demo.after.traces[-1]
     for name in ("motor_speed", "current_q_meas"):
         label, factor, unit = _SHOWN[name]
         section.chart(
-            f"{kept.log}: {label}",
-            kept.time,
+            f"{kept.log}, the log kept back: {label}",
+            kept.time[kept.used],
             {
-                "log": factor * kept.measured[name],
-                "before": factor * earlier[kept.log].simulated[name],
-                "after": factor * kept.simulated[name],
+                "log": factor * kept.measured[name][kept.used],
+                "before": factor * earlier[kept.log].simulated[name][kept.used],
+                "after": factor * kept.simulated[name][kept.used],
             },
             y_label=f"{label} [{unit}]",
-            note="Drag to zoom, double click to go back.",
+            note="Point at it for numbers, drag to zoom, double click to go back.",
         )
 
 
@@ -213,13 +159,14 @@ def _trace_figure(trace: Trace, before: Trace) -> Figure:
             label, factor, unit = _SHOWN[name]
             log, new = factor * trace.measured[name][keep], factor * trace.simulated[name][keep]
             old = factor * before.simulated[name][keep]
-            left.plot(time[thin], log[thin], color=COLOURS["grey"], lw=2.4, label="log")
-            left.plot(time[thin], new[thin], color=COLOURS["orange"], lw=0.9, label="model, after")
-            right.plot(time[thin], (old - log)[thin], color=COLOURS["blue"], lw=0.7, label="before")
-            right.plot(
-                time[thin], (new - log)[thin], color=COLOURS["orange"], lw=0.7, label="after"
-            )
+            # Colours as in the charts below.
+            left.plot(time[thin], log[thin], color=COLOURS["blue"], lw=2.4, label="log")
+            left.plot(time[thin], new[thin], color=COLOURS["green"], lw=0.9, label="model, after")
+            for label_, model, colour in (("before", old, "orange"), ("after", new, "green")):
+                rest = (model - log)[thin]
+                right.plot(time[thin], rest, color=COLOURS[colour], lw=0.7, label=label_)
             left.set(ylabel=f"{label} [{unit}]")
+            right.set(ylabel=f"[{unit}]")
         axes[0][0].set(title="Log and model")
         axes[0][1].set(title="Model less log")
         for axis in axes[0]:
@@ -233,8 +180,9 @@ def _trace_figure(trace: Trace, before: Trace) -> Figure:
 def _clocks(report: Report, demo: Demo) -> None:
     section = report.section(
         "Two clocks",
-        "The load cell's file begins at the trigger's edge and runs on another clock. What both "
-        "logs saw gives its offset and drift.",
+        "The load cell's file begins at the trigger's edge in the drive's trace and runs on a "
+        "clock of its own. What both saw gives the offset, an instant on the drive's clock, and "
+        "the drift, by which the cell's seconds are longer.",
     )
     rows = []
     for log, item in zip(demo.bench_truth["logs"], demo.imported, strict=True):
@@ -255,12 +203,17 @@ def _clocks(report: Report, demo: Demo) -> None:
             ]
         )
     columns = [
-        "Log", "From", "True offset [s]", "Found [s]", "Std [ms]",
-        "True drift [ppm]", "Found [ppm]", "Std [ppm]",
+        "Log", "Found from", "True offset [s]", "Found [s]", "Deviation [ms]",
+        "True drift [ppm]", "Found [ppm]", "Deviation [ppm]",
     ]  # fmt: skip
     formats = ["", "", ".4f", ".4f", ".2f", "+.0f", "+.0f", ".0f"]
     section.table(
-        Table(columns, rows, "Offset and drift of the load cell's clock.", formats=formats)
+        Table(
+            columns,
+            rows,
+            "Offset and drift of the load cell's clock, with their estimated standard deviations.",
+            formats=formats,
+        )
     )
 
 

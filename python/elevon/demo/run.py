@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from elevon.demo.hidden import RECOVERED, hidden_actuator
 from elevon.demo.kept import Kept, inputs_of, work_key
 from elevon.demo.pieces import Found, Plays, Step, validation_from_json, validation_to_json
-from elevon.demo.procedure import HELD_OUT, demo_procedure
+from elevon.demo.procedure import HELD_OUT, LOADED, demo_procedure
 from elevon.progress import Progress, part
 from elevon.report.checks import Check, all_passed
 
@@ -326,6 +326,15 @@ def _truth(demo: Demo) -> dict[str, float]:
     constant, inertia = 1.5 * value("motor.emf_constant"), value("motor.inertia")
     truth["derived.torque_constant"] = constant
     truth["derived.inertia"] = inertia + value("gear.inertia")
+    truth["derived.integral_gain"] = value("control.speed_gain") / value("control.integral_time")
+    for log in demo.bench_truth["logs"]:
+        zero = log["conditions"]["zero"] * log["parameters"]["play.total"]
+        truth[f"initial.lead[{log['name']}.csv]"] = zero
+    for log in (log for log in demo.bench_truth["logs"] if log["name"] == LOADED):
+        cell, rig = log["conditions"]["cell"], log["brake"]
+        middle = 0.5 * (demo.logs[0].duration - log["conditions"]["trigger"])
+        offset = cell["offset"] + cell["drift"] * middle
+        truth["sensor.load_cell_offset"] = offset * rig["arm"] / rig["chain_ratio"]
     return truth
 
 
