@@ -43,8 +43,9 @@ def torque_balance(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
     -------
     Regression or None
         Coefficients ``inertia``, ``viscous``, ``dry``, ``brake`` (with a load cell), ``cell`` (its
-        offset, where another log shows the friction alone), ``offset`` (of the current), ``lag``
-        [s]; None without enough motion both ways.
+        offset, where another log shows the friction alone), ``offset`` (of the current's sensor;
+        ``constant`` where only the set point is logged), ``lag`` [s]; None without enough motion
+        both ways.
     """
     clean = [k for k, log in enumerate(logs) if log.brake.known in {"off", "torque"}]
     chosen = clean or list(range(len(logs)))
@@ -55,13 +56,14 @@ def torque_balance(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
     if sum(int(m.sum()) for m in masks) < 200 or not _both_ways(motions, masks):
         return None
     both = cell and any(log.brake.known == "off" for log in used)
+    measured = all(log.current_signal == "current_q_meas" for log in used)
     names = (
         "inertia",
         "viscous",
         "dry",
         *(("brake",) if cell else ()),
         *(("cell",) if both else ()),
-        "offset",
+        "offset" if measured else "constant",
         "lag",
     )
     problem = _Balance(used, motions, masks, cell, both)

@@ -10,26 +10,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.calibrate.balance import torque_balance
-from elevon.calibrate.breakaway import static_friction
-from elevon.calibrate.candidates import tamed
 from elevon.calibrate.direct import saturated_speed
 from elevon.calibrate.dynamic import Dynamic, dynamic_stage
 from elevon.calibrate.estimate import Estimate
 from elevon.calibrate.findings import amplitude_findings, plant_findings
 from elevon.calibrate.heldout import HeldOut, held_out
-from elevon.calibrate.kinematics import KINEMATIC, CommandFit, command_fit
-from elevon.calibrate.law import controller_law
+from elevon.calibrate.kinematics import KINEMATIC, CommandFit
 from elevon.calibrate.log import BenchLog
 from elevon.calibrate.plant import (
     Torque,
-    controller_estimates,
-    plant_estimates,
-    static_estimate,
-    torque_scale,
 )
-from elevon.calibrate.positions import position_estimates
 from elevon.calibrate.regression import Regression
+from elevon.calibrate.signals import signal_stage
+from elevon.calibrate.taking import asked, missing, shortened, undetermined, with_values
 from elevon.errors import InputError, Interrupted
 from elevon.parameters.records import record_of
 from elevon.progress import Progress, part
@@ -40,8 +33,6 @@ if TYPE_CHECKING:
 __all__ = ["Calibration", "calibrate"]
 
 Bools = npt.NDArray[np.bool_]
-_LOOSEST = 0.25  # of the value, or of the one before: a larger deviation determines nothing
-_DOUBTFUL = 0.2  # share of the current below which a regression explains nothing
 _RUN_IN = 1.0  # s at least before a log counts
 _SETTLED = 0.5  # s after the set point has left its limit for the first time
 
@@ -198,28 +189,11 @@ def calibrate(
     skipped = {log.name: _run_in(log, transient) for log in logs}
     keeps = [log.good & (log.time >= skipped[log.name]) for log in logs]
     _go(progress, 0.02)
-    positions = position_estimates(logs, actuator)
-    _go(progress, 0.1)
-    plant, law = _telling(torque_balance(logs, keeps)), _telling(controller_law(logs, keeps))
-    _go(progress, 0.25)
-    torque = torque_scale(actuator, plant)
-    found = list(positions)
-    followed: dict[str, float] = {}
-    if plant is not None:
-        estimates, followed = plant_estimates(actuator, plant, torque)
-        found += estimates
-        dry = next((i.value for i in estimates if i.path == "friction.dynamic"), None)
-        static = static_friction(
-            logs, keeps, constant=torque.constant, offset=plant["offset"], lag=plant["lag"]
-        )
-        found += static_estimate(actuator, static, dry, torque)
-    if law is not None:
-        found += controller_estimates(actuator, law, torque, [log.name for log in logs])
-    commands = _commands(logs, actuator, found)
-    _go(progress, 0.35)
-    every, found = found, _asked(found, free, actuator)
+    signals = signal_stage(logs, keeps, actuator, lambda f: _go(progress, 0.02 + 0.33 * f))
+    plant, law, torque = signals.plant, signals.law, signals.torque
+    found = asked(signals.estimates, free, actuator)
     direct = [p for p in free or () if p in KINEMATIC or p == "motor.emf_constant"]
-    _missing(direct, found, torque)
+    missing(direct, found, torque)
     dynamic = None
     if model_runs or plant is None or law is None:
         dynamic = dynamic_stage(
@@ -233,23 +207,16 @@ def calibrate(
         )
     if dynamic is not None:
         found += dynamic.estimates(actuator, [item.path for item in found], free)
-    _missing(free, found, torque)
+    missing(free, found, torque)
     if not any(item.in_set for item in found):
         raise InputError("the logs determine no parameter: nothing in them moves enough")
-    fitted = _with_values(actuator, found, followed, torque, dynamic)
+    fitted = with_values(actuator, found, signals.followed, torque, dynamic)
     kept = held_out(logs, keeps, actuator, fitted, part(progress, 0.8, 1.0)) if hold_out else ()
-    if "control.derivative_time" in tamed(actuator, _plain(found)):
-        shortened: tuple[str, ...] = (
-            "control.derivative_time is shortened in the set: as estimated, speed gain times it "
-            "exceeds the inertia, which this controller without its filter cannot hold",
-        )
-    else:
-        shortened = ()
     findings = (
-        *shortened,
-        *_undetermined(every, found, free),
+        *shortened(actuator, found),
+        *undetermined(signals.estimates, found, free),
         *plant_findings(logs, plant, torque, dynamic, actuator),
-        *amplitude_findings(commands, found),
+        *amplitude_findings(signals.commands, found),
     )
     _go(progress, 1.0)
     return Calibration(
@@ -258,37 +225,16 @@ def calibrate(
         logs=tuple(logs),
         skipped=skipped,
         estimates=tuple(found),
-        followed=followed,
+        followed=signals.followed,
         torque=torque,
         plant=plant,
         law=law,
-        commands=tuple(commands),
+        commands=signals.commands,
         dynamic=dynamic,
         held_out=tuple(kept),
         findings=findings,
         wall_s=clock.perf_counter() - begin,
     )
-
-
-def _telling(regression: Regression | None) -> Regression | None:
-    """Drop a regression that explains nothing: its coefficients are noise."""
-    return regression if regression and regression.explained > _DOUBTFUL else None
-
-
-def _undetermined(
-    every: Sequence[Estimate], kept: Sequence[Estimate], free: Sequence[str] | None
-) -> list[str]:
-    """Say which direct estimates were too loose, or outside the model, to be taken."""
-    return [
-        f"{item.path} is not taken: {item.value:.4g} +- {item.std:.2g} {item.unit} is not "
-        "determined by the signals, or not possible in the model"
-        for item in every
-        if item.in_set and item not in kept and (free is None or item.path in free)
-    ]
-
-
-def _plain(found: Sequence[Estimate]) -> dict[str, str | float]:
-    return {item.path: item.value for item in found if item.in_set}
 
 
 def _check(
@@ -329,79 +275,3 @@ def _run_in(log: BenchLog, transient: float | None) -> float:
 def _go(progress: Progress | None, fraction: float) -> None:
     if progress is not None and not progress(fraction):
         raise Interrupted("calibration stopped")
-
-
-def _commands(
-    logs: Sequence[BenchLog], actuator: Actuator, found: list[Estimate]
-) -> list[CommandFit]:
-    """Commands, and the position gain pooled over them."""
-    from elevon.calibrate.positions import encoder_count, gain_estimate
-
-    value = actuator.parameters.value
-    limit = next(
-        (i.value for i in found if i.path == "control.speed_limit"), value("control.speed_limit")
-    )
-    gain = value("control.position_gain")
-    fits = [fit for log in logs if (fit := command_fit(log, gain, limit)) is not None]
-    pooled = gain_estimate(fits, gain, encoder_count(actuator))
-    if pooled is not None:
-        found.append(pooled)
-    return fits
-
-
-def _asked(found: list[Estimate], free: Sequence[str] | None, actuator: Actuator) -> list[Estimate]:
-    """Keep what was asked for, what no set holds, and only what a set can take."""
-    kept = []
-    for item in found:
-        if item.in_set and free is not None and item.path not in free:
-            continue
-        if item.in_set:
-            record = record_of(actuator.wiring, item.path)
-            low = item.value < record.minimum or (
-                record.minimum_open and item.value == record.minimum
-            )
-            if low or item.value > record.maximum or not np.isfinite(item.std):
-                continue
-            # What is loose may still tell the value before wrong.
-            scale = max(abs(item.value), abs(item.old or 0.0))
-            if record.minimum >= 0.0 and item.std > _LOOSEST * scale:
-                continue
-        kept.append(item)
-    return kept
-
-
-def _missing(free: Sequence[str] | None, found: Sequence[Estimate], torque: Torque) -> None:
-    known = {item.path for item in found}
-    for path in free or ():
-        if path in known:
-            continue
-        if path == "motor.emf_constant" and not torque.measured:
-            raise InputError(
-                "--free motor.emf_constant: without a load cell the logs tell only the ratio of "
-                "inertia and friction to the torque constant; add --loadcell, or leave it out"
-            )
-        raise InputError(
-            f"--free {path}: nothing in the logs excites it enough; leave it out or add a log "
-            "that does"
-        )
-
-
-def _with_values(
-    actuator: Actuator,
-    found: Sequence[Estimate],
-    followed: Mapping[str, float],
-    torque: Torque,
-    dynamic: Dynamic | None,
-) -> Actuator:
-    values: dict[str, str | float] = dict(followed)
-    values |= {item.path: item.value for item in found if item.in_set}
-    if torque.measured and torque.tied and "motor.emf_constant" in values:
-        values["control.torque_constant"] = torque.believed
-    if dynamic is not None and dynamic.drive != actuator.parameters["drive.kind"].value:
-        values["drive.kind"] = dynamic.drive
-    if "friction.dynamic" in values and "friction.static" not in values:
-        old = actuator.parameters.value
-        ratio = old("friction.static") / max(old("friction.dynamic"), 1e-300)
-        values["friction.static"] = max(ratio, 1.0) * float(values["friction.dynamic"])
-    values |= tamed(actuator, values)
-    return actuator.with_values(values, source="calibration")

@@ -133,16 +133,17 @@ def plant_estimates(
     follow = _inertia(add, actuator, scale, total, rest)
     add("friction.dynamic", "N m", lambda b: scale(b) * b[2], floor=0.0)
     add("friction.viscous", "N m s/rad", lambda b: scale(b) * b[1], floor=0.0)
-    offset = plant.names.index("offset")
-    add(
-        "sensor.current_offset",
-        "A",
-        lambda b: float(b[offset]),
-        "or a constant load: the current alone cannot tell them apart",
-        given=(),
-        register="sensor",
-        in_set=False,
-    )
+    if "offset" in plant.names:
+        offset = plant.names.index("offset")
+        add(
+            "sensor.current_offset",
+            "A",
+            lambda b: float(b[offset]),
+            "or a constant load: the current alone cannot tell them apart",
+            given=(),
+            register="sensor",
+            in_set=False,
+        )
     if "cell" in plant.names:
         cell = plant.names.index("cell")
         add(
@@ -153,7 +154,24 @@ def plant_estimates(
             register="sensor",
             in_set=False,
         )
+    _lag(add, plant)
+    return found, follow
+
+
+def _lag(add: Callable[..., float], plant: Regression) -> None:
+    """The measured current's lag behind the torque, or the torque's behind its set point."""
     lag = len(plant.names) - 1
+    if "constant" in plant.names:
+        add(
+            "derived.current_loop_lag",
+            "s",
+            lambda b: -float(b[lag]),
+            "of the torque behind the current's set point: no measured current is in the logs",
+            given=(),
+            register="controller",
+            in_set=False,
+        )
+        return
     add(
         "sensor.current_lag",
         "s",
@@ -173,7 +191,6 @@ def plant_estimates(
             register="sensor",
             floor=0.0,
         )
-    return found, follow
 
 
 def static_estimate(

@@ -1,0 +1,107 @@
+"""Which estimates are taken into the set, and which must be refused or explained."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elevon.calibrate.candidates import tamed
+from elevon.calibrate.dynamic import Dynamic
+from elevon.calibrate.estimate import Estimate
+from elevon.calibrate.plant import Torque
+from elevon.errors import InputError
+from elevon.parameters.records import record_of
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["asked", "missing", "shortened", "undetermined", "with_values"]
+
+_LOOSEST = 0.25  # of the value, or of the one before: a larger deviation determines nothing
+
+
+def asked(
+    found: Sequence[Estimate], free: Sequence[str] | None, actuator: Actuator
+) -> list[Estimate]:
+    """Keep what was asked for, what no set holds, and only what a set can take."""
+    kept = []
+    for item in found:
+        if item.in_set and free is not None and item.path not in free:
+            continue
+        if item.in_set:
+            record = record_of(actuator.wiring, item.path)
+            low = item.value < record.minimum or (
+                record.minimum_open and item.value == record.minimum
+            )
+            if low or item.value > record.maximum or not np.isfinite(item.std):
+                continue
+            # What is loose may still tell the value before wrong.
+            scale = max(abs(item.value), abs(item.old or 0.0))
+            if record.minimum >= 0.0 and item.std > _LOOSEST * scale:
+                continue
+        kept.append(item)
+    return kept
+
+
+def missing(free: Sequence[str] | None, found: Sequence[Estimate], torque: Torque) -> None:
+    """Raise `InputError` for a path that was asked for and is not estimated."""
+    known = {item.path for item in found}
+    for path in free or ():
+        if path in known:
+            continue
+        if path == "motor.emf_constant" and not torque.measured:
+            raise InputError(
+                "--free motor.emf_constant: without a load cell the logs tell only the ratio of "
+                "inertia and friction to the torque constant; add --loadcell, or leave it out"
+            )
+        raise InputError(
+            f"--free {path}: nothing in the logs excites it enough; leave it out or add a log "
+            "that does"
+        )
+
+
+def undetermined(
+    every: Sequence[Estimate], kept: Sequence[Estimate], free: Sequence[str] | None
+) -> list[str]:
+    """Say which direct estimates were too loose, or outside the model, to be taken."""
+    return [
+        f"{item.path} is not taken: {item.value:.4g} +- {item.std:.2g} {item.unit} is not "
+        "determined by the signals, or not possible in the model"
+        for item in every
+        if item.in_set and item not in kept and (free is None or item.path in free)
+    ]
+
+
+def with_values(
+    actuator: Actuator,
+    found: Sequence[Estimate],
+    followed: Mapping[str, float],
+    torque: Torque,
+    dynamic: Dynamic | None,
+) -> Actuator:
+    """Return the actuator with what was estimated, and what has to follow from it."""
+    values: dict[str, str | float] = dict(followed)
+    values |= {item.path: item.value for item in found if item.in_set}
+    if torque.measured and torque.tied and "motor.emf_constant" in values:
+        values["control.torque_constant"] = torque.believed
+    if dynamic is not None and dynamic.drive != actuator.parameters["drive.kind"].value:
+        values["drive.kind"] = dynamic.drive
+    if "friction.dynamic" in values and "friction.static" not in values:
+        old = actuator.parameters.value
+        ratio = old("friction.static") / max(old("friction.dynamic"), 1e-300)
+        values["friction.static"] = max(ratio, 1.0) * float(values["friction.dynamic"])
+    values |= tamed(actuator, values)
+    return actuator.with_values(values, source="calibration")
+
+
+def shortened(actuator: Actuator, found: Sequence[Estimate]) -> list[str]:
+    """Say so where the set cannot hold the derivative time as estimated."""
+    values: dict[str, str | float] = {item.path: item.value for item in found if item.in_set}
+    if "control.derivative_time" not in tamed(actuator, values):
+        return []
+    return [
+        "control.derivative_time is shortened in the set: as estimated, speed gain times it "
+        "exceeds the inertia, which this controller without its filter cannot hold"
+    ]
