@@ -142,8 +142,8 @@ def _agreement(report: Report, demo: Demo) -> None:
             kept.time[kept.used],
             {
                 "log": factor * kept.measured[name][kept.used],
-                "before": factor * earlier[kept.log].simulated[name][kept.used],
                 "after": factor * kept.simulated[name][kept.used],
+                "before": factor * earlier[kept.log].simulated[name][kept.used],
             },
             y_label=f"{label} [{unit}]",
             note="Point at it for numbers, drag to zoom, double click to go back.",
@@ -161,8 +161,8 @@ def _trace_figure(trace: Trace, before: Trace) -> Figure:
             old = factor * before.simulated[name][keep]
             # Colours as in the charts below.
             left.plot(time[thin], log[thin], color=COLOURS["blue"], lw=2.4, label="log")
-            left.plot(time[thin], new[thin], color=COLOURS["green"], lw=0.9, label="model, after")
-            for label_, model, colour in (("before", old, "orange"), ("after", new, "green")):
+            left.plot(time[thin], new[thin], color=COLOURS["orange"], lw=0.9, label="model, after")
+            for label_, model, colour in (("before", old, "green"), ("after", new, "orange")):
                 rest = (model - log)[thin]
                 right.plot(time[thin], rest, color=COLOURS[colour], lw=0.7, label=label_)
             left.set(ylabel=f"{label} [{unit}]")
@@ -190,16 +190,18 @@ def _clocks(report: Report, demo: Demo) -> None:
         if not found or found.get("offset_s") is None:
             continue
         true = log["conditions"]
+        told = all(finding.code != "drift-unknown" for finding in item.report.findings)
+        told = told and found["drift_std"] is not None
         rows.append(
             [
-                log["name"],
+                log["name"].replace("-", "\N{NON-BREAKING HYPHEN}"),
                 found["method"],
                 true["trigger"],
                 found["offset_s"],
                 1e3 * found["offset_std_s"],
                 1e6 * true["cell"]["clock_drift"],
-                1e6 * found["drift"],
-                None if found["drift_std"] is None else 1e6 * found["drift_std"],
+                1e6 * found["drift"] if told else None,
+                1e6 * found["drift_std"] if told else None,
             ]
         )
     columns = [
@@ -211,7 +213,8 @@ def _clocks(report: Report, demo: Demo) -> None:
         Table(
             columns,
             rows,
-            "Offset and drift of the load cell's clock, with their estimated standard deviations.",
+            "Offset and drift of the load cell's clock, with their estimated standard deviations; "
+            "empty where nothing that both saw tells the drift.",
             formats=formats,
         )
     )

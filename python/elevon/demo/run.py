@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time as clock
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -110,7 +110,9 @@ class Demo:
     @property
     def checks(self) -> list[Check]:
         """What must hold: the published table, the hidden values, the held-out log."""
-        found = list(self.backlash.checks)
+        found = [
+            replace(check, name=f"backlash table, {check.name}") for check in self.backlash.checks
+        ]
         count = encoder_count(self.base)
         for path, limit in RECOVERED.items():
             true = self.truth[path]
