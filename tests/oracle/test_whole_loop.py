@@ -175,14 +175,35 @@ def test_speeds_agree(short: float) -> None:
     assert np.sqrt(np.mean((ours - theirs) ** 2)) < 0.01 * np.max(np.abs(theirs))
 
 
+@cache
+def scatter(short: float) -> np.ndarray:
+    """RMS of each phase over the second half, shape (16, 3), for bands that differ by 1e-4.
+
+    The instants part within milliseconds, so these are draws of what chance makes of one case.
+    """
+    rows = []
+    for k in range(16):
+        band = 0.5 * (1.0 + 1e-4 * (k - 8))
+        kept = run_core(short, {"inverter.hysteresis_band": band}, DURATION)
+        parts = [kept[f"current_{x}"].values for x in "abc"]
+        rows.append([np.sqrt(np.mean(part[part.size // 2 :] ** 2)) for part in parts])
+    return np.array(rows)
+
+
 @CASES
 def test_rms_and_mean_currents_agree(short: float) -> None:
-    """Each phase over the second half of the run."""
-    for name in ("current_a", "current_b", "current_c"):
+    """Each phase over the second half of the run: the oracle's RMS is one more of the core's draws.
+
+    The draws scatter by less than 1 %, and the oracle lies within three deviations of their mean.
+    """
+    draws = scatter(short)
+    middle, spread = draws.mean(axis=0), draws.std(axis=0, ddof=1)
+    for k, name in enumerate(("current_a", "current_b", "current_c")):
         ours, theirs = both(name, short)
         half = slice(ours.size // 2, None)
         rms = np.sqrt(np.mean(theirs[half] ** 2))
-        assert np.sqrt(np.mean(ours[half] ** 2)) == pytest.approx(rms, rel=0.01), name
+        assert spread[k] < 0.01 * rms, name
+        assert abs(middle[k] - rms) < 3.0 * spread[k] * math.sqrt(1.0 + 1.0 / len(draws)), name
         assert np.mean(ours[half]) == pytest.approx(np.mean(theirs[half]), abs=0.02 * rms), name
 
 
