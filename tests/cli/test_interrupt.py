@@ -60,11 +60,11 @@ HALF = {
         ["bench", "run", "chirp", "--actuator", "torino-rotary", "--out", "OUT/logs", "--json"],
     ),
     "calibrate": (
-        "elevon.calibrate.calibration.torque_balance",
+        "elevon.calibrate.calibration.calibrate",
         ["calibrate", "LOG", "--actuator", "torino-rotary", "--out", "OUT/set.toml", "--json"],
     ),
     "validate": (
-        "elevon.calibrate.validation.reconstruct",
+        "elevon.calibrate.validation.validate",
         ["validate", "LOG", "--actuator", "torino-rotary", "--report", "OUT/r.html", "--json"],
     ),
     "report": (
@@ -241,6 +241,22 @@ def test_a_process_group_stopped_in_the_core_goes_on_later(tmp_path):
     assert "interrupted; 1 of 2 logs are kept in logs" in err.splitlines()[-1]
     assert list(json.loads(state.read_text())["logs"]) == ["one"]
     assert not (tmp_path / "logs" / "two.csv").exists()
+
+
+def test_the_exit_code_is_the_same_where_the_exception_passed_through_exec(tmp_path):
+    """Python started with -m remembers such an exception and would end by the signal."""
+    (tmp_path / "design.py").write_text(
+        "import signal, sys, elevon.bench.spring as spring\n"
+        "from elevon.cli import main\n"
+        "def design(*a, **k): exec('signal.raise_signal(signal.SIGINT)', globals())\n"
+        "spring.design_spring = design\n"
+        "sys.argv = ['elevon', 'design', 'spring', '--json']\n"
+        "sys.exit(main())\n"
+    )
+    command = [sys.executable, "-m", "design"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (130, "")
+    assert done.stderr.startswith("elevon: interrupted; nothing was written")
 
 
 def test_an_answer_that_nobody_reads_is_dropped_whole_on_ctrl_c(tmp_path):

@@ -31,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         try:
             from elevon.cli.runner import run
 
-            return run(argv)
+            code = run(argv)
         except KeyboardInterrupt:  # before the command began
             interrupt.ignore()
             import sys
@@ -39,4 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stderr.write(
                 "elevon: interrupted; nothing was written; give the command again to start over\n"
             )
-            return interrupt.INTERRUPTED
+            code = interrupt.INTERRUPTED
+        if argv is None and code == interrupt.INTERRUPTED:
+            interrupt.leave()
+        return code

@@ -13,12 +13,22 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from types import FrameType
-from typing import Any
+from typing import Any, NoReturn
 
-__all__ = ["INTERRUPTED", "check", "ignore", "noticed", "story", "telling", "watched"]
+__all__ = [
+    "INTERRUPTED",
+    "check",
+    "drop_output",
+    "ignore",
+    "leave",
+    "noticed",
+    "story",
+    "telling",
+    "watched",
+]
 
 INTERRUPTED = 130
 """Exit code."""
@@ -76,12 +86,10 @@ def watched(*, owner: bool) -> Iterator[None]:
     earlier, _watch = _watch, _Watch(owner=owner)
     # Whoever ignores the signal (nohup, a shell's background job) or handles it keeps doing so.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        try:
+        with suppress(ValueError):  # not the main thread: signals do not come here
             signal.signal(signal.SIGINT, _watch.note)
             _watch.installed = True
             _watch.hook, sys.unraisablehook = sys.unraisablehook, _watch.lost
-        except ValueError:
-            pass  # not the main thread: signals do not come here
     try:
         yield
     finally:
@@ -139,3 +147,19 @@ def drop_output() -> None:
 
     if _watch.owner:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def leave() -> NoReturn:
+    """End an interrupted process with its exit code.
+
+    Where the exception has passed through `exec` (so dataclasses are made), Python started with
+    ``-m`` would end the process by the signal instead, although the exception was caught.
+    """
+    import atexit
+    import os
+
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):
+            stream.flush()
+    atexit._run_exitfuncs()
+    os._exit(INTERRUPTED)
