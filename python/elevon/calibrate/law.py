@@ -29,6 +29,7 @@ Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 _SETTLED = 0.25  # s around a saturated set point in which anti-windup may act
 _LEAST = 200  # samples
+_NARROWEST = 3.0  # samples, deviation of the kernel: stairs of the set point are averaged over it
 _TERMS = ("proportional", "integral", "derivative", "slope", "motion")
 
 
@@ -91,7 +92,7 @@ def controller_law(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
 
     Notes
     -----
-    What no log can settle enters the deviations as half the difference it makes: for gain and
+    What no log can settle enters the deviations as the difference it makes: for gain and
     integral one weight for set point and motion in the place of two, for the derivative one gain
     in the place of two, and slopes that come late as a filter or a slow tick would have them.
     """
@@ -114,7 +115,7 @@ def controller_law(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
         np.where(sloped, law.joint(), beta),
         np.where(sloped, law.late(), beta),
     ):
-        gap = 0.5 * (other - beta)
+        gap = other - beta
         covariance = covariance + np.outer(gap, gap)
     return replace(found, covariance=covariance)
 
@@ -127,7 +128,7 @@ def _ready(
     present = [k for k, good in enumerate(inside) if good.any()]
     columns, targets = [], []
     for k, log in enumerate(logs):
-        sigma = kernel(log)
+        sigma = _sigma(log)
         starts = [np.full(len(log.time), float(j == k)) for j in present]
         columns.append(np.column_stack((*_columns(log, sigma), *starts)))
         targets.append(smoothed(log.current_target, sigma))
@@ -138,11 +139,15 @@ def _ready(
     return _Law(columns, targets, inside, [log.period for log in logs]), present, times
 
 
+def _sigma(log: BenchLog) -> float:
+    return max(kernel(log), _NARROWEST)
+
+
 def _inside(log: BenchLog, keep: Bools) -> Bools:
     """Samples away from a saturated set point and from the log's ends."""
     saturated = np.abs(log.speed_ref) >= 0.999 * saturated_speed(log)
     good = keep & log.good & ~dilated(saturated, log.period, _SETTLED)
-    margin = max(4, round(4.0 * kernel(log)))
+    margin = round(4.0 * _sigma(log))
     good[:margin] = good[-margin:] = False
     return np.asarray(good, dtype=np.bool_)
 
