@@ -199,7 +199,7 @@ def calibrate(
         dynamic = dynamic_stage(
             logs,
             keeps,
-            actuator,
+            actuator.with_values(dict(signals.followed), source="calibration"),
             found,
             free,
             fidelity=fidelity,
@@ -215,7 +215,7 @@ def calibrate(
     findings = (
         *shortened(actuator, found),
         *undetermined(signals.estimates, found, free),
-        *plant_findings(logs, plant, torque, dynamic, actuator),
+        *plant_findings(logs, plant, torque, dynamic, actuator, found=found),
         *amplitude_findings(signals.commands, found),
     )
     _go(progress, 1.0)

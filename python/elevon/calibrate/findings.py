@@ -29,6 +29,8 @@ def plant_findings(
     torque: Torque,
     dynamic: Dynamic | None,
     actuator: Actuator,
+    *,
+    found: Sequence[Estimate],
 ) -> list[str]:
     """Sentences on torque scale, brakes, drive and misfit."""
     says = []
@@ -67,8 +69,13 @@ def plant_findings(
             f"the signals themselves say {b:.5g}"
             for path, a, b in dynamic.absorbed
         ]
-        says += [f"{path} ended at its bound" for path in dynamic.fit.at_bound]
-        says += [f"{p} is not determined: {why}" for p, why in dynamic.ranking.dropped.items()]
+        says += [f"{path}: the model runs end at its bound" for path in dynamic.fit.at_bound]
+        known = {item.path for item in found}
+        says += [
+            f"{path} is not determined: {why}"
+            for path, why in dynamic.ranking.dropped.items()
+            if path not in known
+        ]
         if not dynamic.fit.converged:
             says.append("the fit on model runs stopped before its tolerance was met")
     return says

@@ -20,6 +20,7 @@ _SOFT = 3.0  # deviations beyond which residuals weigh less
 _AGREE = 0.1  # relative difference up to which exact derivatives hold
 _CLOUD = 32  # starts tried where the first values explain too little
 _EXPLAINED = 0.5  # share of the current's variance the first values must explain
+_CLOSE = 1e-5  # relative: switching instants leave the cost no smoother
 _STEP = 0.01  # of the meaningful change ... of a logarithm
 
 
@@ -157,8 +158,8 @@ def fit_dynamic(
         f_scale=_SOFT,
         x_scale=np.array([item.size for item in free]),
         max_nfev=most,
-        ftol=1e-7,
-        xtol=1e-7,
+        ftol=_CLOSE,
+        xtol=_CLOSE,
         gtol=1e-9,
     )
     x = np.asarray(best.x, dtype=np.float64)

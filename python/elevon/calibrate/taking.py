@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,11 @@ if TYPE_CHECKING:
 
 __all__ = ["asked", "missing", "shortened", "undetermined", "with_values"]
 
+#: Offsets of sensors, which no parameter holds: they go with the set's promises on logs.
+_OFFSETS = {
+    "sensor.speed_offset": "motor_speed",
+    "sensor.current_offset": "current_q_meas",
+}
 _LOOSEST = 0.25  # of the value, or of the one before: a larger deviation determines nothing
 
 
@@ -93,7 +99,14 @@ def with_values(
         ratio = old("friction.static") / max(old("friction.dynamic"), 1e-300)
         values["friction.static"] = max(ratio, 1.0) * float(values["friction.dynamic"])
     values |= tamed(actuator, values)
-    return actuator.with_values(values, source="calibration")
+    offsets = {
+        signal: item.value
+        for item in found
+        for path, signal in _OFFSETS.items()
+        if item.path == path
+    }
+    fitted = actuator.with_values(values, source="calibration")
+    return replace(fitted, validation={**(actuator.validation or {}), "offsets": offsets})
 
 
 def shortened(actuator: Actuator, found: Sequence[Estimate]) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +29,7 @@ SIGNALS: dict[str, str] = {
     "motor_speed": "rad/s",
     "current_q_meas": "A",
 }
+_UNMEASURED = {"force", "on"}  # a brake of which no torque is known
 TRANSIENT = 10.0  # s, as the published comparison leaves out
 
 
@@ -110,6 +111,10 @@ class Validation:
         How each log's command was found.
     traces : tuple of Trace
         For plots.
+    offsets : mapping of str to float
+        Taken off the logs: what the set says its sensors add (SI).
+    notes : mapping of str to str
+        What to know of a log.
     """
 
     actuator: str
@@ -118,6 +123,8 @@ class Validation:
     errors: tuple[SignalError, ...]
     commands: Mapping[str, str]
     traces: tuple[Trace, ...]
+    offsets: Mapping[str, float] = field(default_factory=dict)
+    notes: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def status(self) -> str:
@@ -136,6 +143,8 @@ class Validation:
             "transient_s": self.transient,
             "signals": [e.to_dict() for e in self.errors],
             "commands": dict(self.commands),
+            "offsets": dict(self.offsets),
+            "notes": dict(self.notes),
         }
 
 
@@ -154,7 +163,7 @@ def validate(
     logs : sequence of BenchLog
         With the encoder's position.
     actuator : Actuator
-        The model; thresholds from its ``[validation]`` table.
+        The model; thresholds and the sensors' offsets from its ``[validation]`` table.
     fidelity : str
         ``low`` or ``high``.
     transient : float, optional
@@ -167,10 +176,7 @@ def validate(
     InputError
         No position, a transient longer than a log, a threshold for a signal that is not compared.
     """
-    limits = dict((actuator.validation or {}).get("limits", {}))
-    for name in limits:
-        if name not in SIGNALS:
-            raise unknown("signal", name, SIGNALS, f"{actuator.name}: validation.limits")
+    limits, offsets = _promised(actuator, "limits"), _promised(actuator, "offsets")
     if not logs:
         raise InputError("validation needs at least one log")
     given = transient
@@ -179,19 +185,40 @@ def validate(
         shortest = min(log.duration for log in logs)
         given = given if given < shortest else 0.5 * shortest
     errors: list[SignalError] = []
-    traces, commands = [], {}
+    traces, commands, notes = [], {}, {}
     for k, log in enumerate(logs):
         if progress is not None and not progress(k / len(logs)):
             raise Interrupted("validation stopped")
         if not given < log.duration:
             raise InputError(f"transient of {given:g} s: {log.name} lasts {log.duration:g} s")
-        trace, commands[log.name] = _trace(log, actuator, fidelity, given)
+        trace, commands[log.name] = _trace(log, actuator, fidelity, given, offsets)
         traces.append(trace)
-        errors += _errors(trace, limits)
-    return Validation(actuator.name, fidelity, given, tuple(errors), commands, tuple(traces))
+        if log.brake.known in _UNMEASURED:
+            notes[log.name] = (
+                "the brake acted but its torque is not known: the run has none, nothing is judged"
+            )
+        errors += _errors(trace, {} if log.name in notes else limits)
+    return Validation(
+        actuator.name, fidelity, given, tuple(errors), commands, tuple(traces), offsets, notes
+    )
 
 
-def _trace(log: BenchLog, actuator: Actuator, fidelity: str, transient: float) -> tuple[Trace, str]:
+def _promised(actuator: Actuator, key: str) -> dict[str, float]:
+    """One table of the set's ``[validation]``, its signals checked."""
+    found = dict((actuator.validation or {}).get(key, {}))
+    for name in found:
+        if name not in SIGNALS:
+            raise unknown("signal", name, SIGNALS, f"{actuator.name}: validation.{key}")
+    return found
+
+
+def _trace(
+    log: BenchLog,
+    actuator: Actuator,
+    fidelity: str,
+    transient: float,
+    offsets: Mapping[str, float],
+) -> tuple[Trace, str]:
     from elevon.scenario import Scenario
     from elevon.simulate import simulate
 
@@ -201,6 +228,8 @@ def _trace(log: BenchLog, actuator: Actuator, fidelity: str, transient: float) -
             "and the play"
         )
     command, how = _command(log, actuator)
+    known = log.brake.known not in _UNMEASURED
+    brake = (log.brake.time, log.brake.level) if known else (log.time[[0, -1]], np.zeros(2))
     ratio = actuator.parameters.value("gear.ratio")
     offset = actuator.parameters.value("sensor.encoder.offset")
     # The model's own zero is the motor's; the encoder's offset moves the command along.
@@ -220,8 +249,8 @@ def _trace(log: BenchLog, actuator: Actuator, fidelity: str, transient: float) -
                     "terms": [
                         {
                             "kind": "table",
-                            "times": log.brake.time.tolist(),
-                            "values": log.brake.level.tolist(),
+                            "times": brake[0].tolist(),
+                            "values": brake[1].tolist(),
                         }
                     ]
                 }
@@ -241,11 +270,12 @@ def _trace(log: BenchLog, actuator: Actuator, fidelity: str, transient: float) -
     recording = simulate(model, scenario, fidelity=fidelity, record=_record(model, fidelity, rate))
     clock = recording["motor_speed"].time
     simulated = {name: np.interp(log.time, clock, recording[name].values) for name in SIGNALS}
-    measured = {
+    logged = {
         "encoder_position": log.user,
         "motor_speed": log.speed,
         "current_q_meas": log.current,
     }
+    measured = {name: values - offsets.get(name, 0.0) for name, values in logged.items()}
     used = log.good & (log.time >= transient)
     return Trace(log.name, log.time, measured, simulated, used), how
 

@@ -74,7 +74,7 @@ def thresholds(validation: Validation) -> dict[str, float]:
     """Return twice the largest error of each signal over the logs, two digits, rounded up."""
     found: dict[str, float] = {}
     for error in validation.errors:
-        if math.isfinite(error.of_range):
+        if math.isfinite(error.of_range) and error.log not in validation.notes:
             found[error.signal] = max(found.get(error.signal, 0.0), _MARGIN * error.of_range)
     return {name: _up(value) for name, value in found.items() if value > 0.0}
 
@@ -100,6 +100,12 @@ def set_text(result: Calibration, *, name: str, base: str, validation: Validatio
         for signal, limit in thresholds(validation).items():
             limits.add(signal, limit)
         table.add("limits", limits)
+        offsets = tomlkit.table()
+        offsets.comment("SI: what the bench's sensors add, taken off a log")
+        for signal, value in validation.offsets.items():
+            offsets.add(signal, float(f"{value:.6g}"))
+        if validation.offsets:
+            table.add("offsets", offsets)
         head.add("validation", table)
     return updated_set(tomlkit.dumps(head), calibrated_parameters(result))
 

@@ -72,5 +72,9 @@ def validate(
         print_table(
             ("log", "signal", "RMS", "max", "unit", "% of RMS", "% of range", "limit %", ""), rows
         )
+        for name, offset in result.offsets.items():
+            say(f"{name}: the sensor's offset of {offset:.4g} is taken off the logs")
         say(f"after {result.transient:g} s; {result.status}")
+    for name, text in result.notes.items():
+        say(f"{name}: {text}")
     return 1 if result.status == "fail" else 0

@@ -59,6 +59,10 @@ class Thresholds(_Strict):
         default_factory=dict,
         description="Signal to the largest RMS error, in percent of the signal's range",
     )
+    offsets: dict[str, Number] = Field(
+        default_factory=dict,
+        description="Signal to the constant offset [SI] its sensor adds, taken off a log",
+    )
 
 
 class Header(_Strict):
