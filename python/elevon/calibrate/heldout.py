@@ -111,6 +111,8 @@ def _one(
     values["friction.static"] = static / dynamic * values.get("friction.dynamic", dynamic)
     values["control.torque_constant"] = torque.believed
     offsets = {i.path: i.value for i in estimates if i.path == "sensor.current_offset"}
+    shown = (fitted.validation or {}).get("offsets", {})
+    offsets |= {"sensor.speed_offset": v for n, v in shown.items() if n == "motor_speed"}
     problem = Problem(fitted, [logs[k]], tied=False, masks=[test])
     runs = problem.simulate([values | offsets, offsets])
     pairs = []
