@@ -84,11 +84,11 @@ def test_positive_command_moves_everything_positive(name: str, fidelity: str) ->
 
 @pytest.mark.parametrize("name", ACTUATORS)
 def test_a_batch_equals_its_single_runs(name: str) -> None:
-    """Five seeds of every fidelity, bit for bit."""
+    """Three seeds of every fidelity, bit for bit."""
     actuator = elevon.Actuator.load(name)
     for fidelity in sets.fidelities(name):
         record = [",".join(sets.signals(name, fidelity)) + "@1 kHz"]
-        runs = [elevon.Run(actuator, sets.scenario(name), seed, str(seed)) for seed in range(5)]
+        runs = [elevon.Run(actuator, sets.scenario(name), seed, str(seed)) for seed in range(3)]
         together = elevon.simulate_batch(runs, fidelity=fidelity, record=record)
         for run, many in zip(runs, together, strict=True):
             one = elevon.simulate(

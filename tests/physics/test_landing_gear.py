@@ -158,7 +158,15 @@ def test_free_fall_against_more_friction_than_weight_stays() -> None:
     assert rec.final["nut_position"] < 0.01
 
 
-@pytest.mark.parametrize(("factor", "supply"), [(1.0, 28.0), (1.5, 22.0), (3.5, 20.5), (3.5, 32.2)])
+@pytest.mark.parametrize(
+    ("factor", "supply"),
+    [
+        (1.0, 28.0),
+        pytest.param(1.5, 22.0, marks=pytest.mark.long),
+        pytest.param(3.5, 20.5, marks=pytest.mark.long),
+        pytest.param(3.5, 32.2, marks=pytest.mark.long),
+    ],
+)
 def test_low_and_high_fidelity_agree_on_the_stroke(factor: float, supply: float) -> None:
     """Within 2 % of the time; the averaged current within the 6 % its resistance was fitted to."""
     values = {"load.factor": factor, "inverter.supply_voltage": supply}

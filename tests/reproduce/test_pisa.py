@@ -28,6 +28,7 @@ def test_functional_runs_meet_their_requirements() -> None:
     assert "limit" in functional_report(result, date="2000-01-01").html().lower()
 
 
+@pytest.mark.long
 def test_friction_tests_recover_what_was_put_in() -> None:
     """Every kind within 3 % of its largest, from logs with noise."""
     result = reproduce_friction(seed=3)
@@ -50,6 +51,7 @@ def test_other_seed_other_noise() -> None:
     assert first.rows[0].recovered != second.rows[0].recovered
 
 
+@pytest.mark.long
 def test_hydraulic_speed_follows_load_and_temperature() -> None:
     """P eq. (1) at constant loss, stall below zero pressure, controlled speed held."""
     ideal = HydraulicActuator(restrictor_reynolds=0.0)

@@ -47,6 +47,7 @@ def _recover(time, encoder, blank, gain):
     return play_from_encoder(time, encoder, blank, frequency=FREQUENCY, loop_gain=gain, start=START)
 
 
+@pytest.mark.long
 @settings(max_examples=12)
 @given(
     gain=st.floats(8.0, 25.0),
