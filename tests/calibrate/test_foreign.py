@@ -12,7 +12,7 @@ from elevon.cli.runner import run as elevon
 from tests.calibrate.foreign import COUNT, LOADED, NOLOAD, Trial, draw, truth, unrest
 from tests.calibrate.foreign import run as carry_out
 from tests.calibrate.foreign_benches import CASES
-from tests.calibrate.foreign_files import Style, write_campaign, write_trial
+from tests.calibrate.foreign_files import CAMPAIGN, Style, write_campaign, write_trial
 
 #: What a campaign with a load cell must tell; the rest may be left out, but never be wrong.
 TOLD = {
@@ -41,7 +41,8 @@ def allowed(path, true):
     if path == "sensor.encoder.gain":
         return 1e-3
     if true == 0.0:
-        return {"sensor.current_offset": 5e-3, "control.derivative_time": 1e-4}[path]
+        return {"sensor.current_offset": 5e-3, "control.derivative_time": 1e-4,
+                "control.integral_time": 0.0}[path]  # fmt: skip
     return 0.02 * abs(true)
 
 
@@ -220,6 +221,43 @@ def test_a_force_without_an_arm_is_not_taken_for_a_torque(tmp_path):
     if code == 0:  # or it is refused: the brake's torque is in no file
         rows = {row["signal"]: row["max"] for row in json.loads(text)["signals"]}
         assert rows.get("current_q_meas", 0.0) < 2.0 * np.abs(done.rows["current"]).max()
+
+
+#: Campaigns that lack something: seed, changes of the bench, columns missing, logs.
+LACKING = {
+    "no-load sine alone": (40, {}, (), ["noload"]),
+    "chirp alone": (42, {}, (), ["chirp"]),
+    "no set point of the current": (47, {}, ("current_ref",), ["noload", "chirp", "loaded"]),
+    "no measured current": (44, {}, ("current",), ["noload", "chirp", "loaded"]),
+    "no integral action": (51, {"integral_time": 0.0}, (), ["noload", "chirp", "loaded"]),
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", LACKING)
+def test_what_a_campaign_lacks_is_not_made_up(name, tmp_path):
+    """What is told is right, and the model follows the logs far better than before."""
+    seed, changes, missing, logs = LACKING[name]
+    bench, sensors = draw(seed, changes)
+    trials = {trial: CAMPAIGN[trial] for trial in logs}
+    paths, true = write_campaign(
+        tmp_path, bench, sensors, Style(missing=missing), trials, seed=seed
+    )
+    out = tmp_path / "found.toml"
+    common = ["--actuator", "torino-rotary", "--out", str(out), "--json"]
+    code, said, text = _spoken(["calibrate", *map(str, paths), *common])
+    assert code == 0, said[-500:]
+    document = json.loads(text)
+    told = set(document["parameters"])
+    if "motor.emf_constant" not in told:
+        scale = 1.5 * 0.900383 / bench.torque_constant
+        true = {p: v * scale if p in SCALED else v for p, v in true.items()}
+    if missing == ("current",):
+        assert "sensor.current_offset" not in told
+    wrong = misses(document["parameters"], true, set())
+    assert not wrong, "\n".join(wrong)
+    before, after = (pooled(document["validation"][when]) for when in ("before", "after"))
+    assert {s: (before[s], after[s]) for s in after if after[s] > 0.5 * before[s]} == {}
 
 
 @pytest.mark.long

@@ -21,7 +21,7 @@ from elevon.calibrate.plant import (
     Torque,
 )
 from elevon.calibrate.regression import Regression
-from elevon.calibrate.signals import signal_stage
+from elevon.calibrate.signals import Signals, signal_stage
 from elevon.calibrate.taking import asked, missing, shortened, undetermined, with_values
 from elevon.errors import InputError, Interrupted
 from elevon.parameters.records import record_of
@@ -199,14 +199,16 @@ def calibrate(
         dynamic = dynamic_stage(
             logs,
             keeps,
-            actuator.with_values(dict(signals.followed), source="calibration"),
+            _started(actuator, signals, found),
             found,
             free,
             fidelity=fidelity,
             progress=part(progress, 0.35, 0.8),
         )
     if dynamic is not None:
-        found += dynamic.estimates(actuator, [item.path for item in found], free)
+        told = [item.path for item in signals.estimates if item.path not in (free or ())]
+        known = [*told, *(item.path for item in found)]
+        found += dynamic.estimates(actuator, known, free)
     missing(free, found, torque)
     if not any(item.in_set for item in found):
         raise InputError("the logs determine no parameter: nothing in them moves enough")
@@ -235,6 +237,12 @@ def calibrate(
         findings=findings,
         wall_s=clock.perf_counter() - begin,
     )
+
+
+def _started(actuator: Actuator, signals: Signals, found: Sequence[Estimate]) -> Actuator:
+    """Return what model runs start from: what followed, and branches the signals do not show."""
+    none = {item.path: 0.0 for item in found if item.in_set and item.value == 0.0}
+    return actuator.with_values({**signals.followed, **none}, source="calibration")
 
 
 def _check(

@@ -101,21 +101,15 @@ def candidates(
     speed = max(float(abs(log.speed).max()) for log in logs)
     if not current > 0.0 or not speed > 0.0:
         raise InputError("the logs hold no motion and no current: nothing can be calibrated")
+    offsets = [
+        ("sensor.speed_offset", "rad/s", speed, 0.01 * speed),
+        ("sensor.speed_delay", "s", _DELAY, 1e-3),
+    ]
+    if all(log.current_signal == "current_q_meas" for log in logs):
+        offsets.insert(0, ("sensor.current_offset", "A", current, 0.01 * current))
     found += [
-        Candidate(
-            "sensor.current_offset",
-            "output",
-            "sensor",
-            "A",
-            False,
-            -current,
-            current,
-            0.01 * current,
-        ),
-        Candidate(
-            "sensor.speed_offset", "output", "sensor", "rad/s", False, -speed, speed, 0.01 * speed
-        ),
-        Candidate("sensor.speed_delay", "output", "sensor", "s", False, -_DELAY, _DELAY, 1e-3),
+        Candidate(path, "output", "sensor", unit, False, -reach, reach, size)
+        for path, unit, reach, size in offsets
     ]
     return found + _brakes(logs)
 

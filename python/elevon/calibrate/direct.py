@@ -49,7 +49,8 @@ def direct_estimate(logs: Sequence[BenchLog]) -> DirectEstimate:
     """Regress the current on motion, brake and control error over all logs."""
     plant = _plant(logs)
     control = _control(logs)
-    brake = plant[3] if len(plant) > 3 else 0.0
+    cell = any(log.brake.measured for log in logs)
+    brake = plant[3] if cell else 0.0  # without a cell the next column is the first log's offset
     return DirectEstimate(
         inertia=float(plant[0]),
         viscous=float(plant[1]),

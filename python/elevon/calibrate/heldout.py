@@ -97,7 +97,8 @@ def _one(
 ) -> HeldOut | None:
     rest = [j for j in range(len(logs)) if train[j].any()]
     some, masks = [logs[j] for j in rest], [train[j] for j in rest]
-    plant, law = torque_balance(some, masks), controller_law(some, masks)
+    plant = torque_balance(some, masks)
+    law = controller_law(some, masks, 0.0 if plant is None else plant["lag"])
     if plant is None or law is None:
         return None
     torque = torque_scale(fitted, plant)
@@ -112,7 +113,7 @@ def _one(
     values["control.torque_constant"] = torque.believed
     offsets = {i.path: i.value for i in estimates if i.path == "sensor.current_offset"}
     shown = (fitted.validation or {}).get("offsets", {})
-    offsets |= {"sensor.speed_offset": v for n, v in shown.items() if n == "motor_speed"}
+    offsets["sensor.speed_offset"] = shown.get("motor_speed", 0.0)
     problem = Problem(fitted, [logs[k]], tied=False, masks=[test])
     runs = problem.simulate([values | offsets, offsets])
     pairs = []

@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from elevon.calibrate.direct import saturated_speed
 from elevon.calibrate.log import BenchLog
-from elevon.calibrate.motion import acceleration_of, dilated, integral, kernel, smoothed
+from elevon.calibrate.motion import acceleration_of, dilated, integral, kernel, lagged, smoothed
 from elevon.calibrate.regression import Regression, robust_regression, with_deviations
 
 __all__ = ["controller_law"]
@@ -29,6 +29,7 @@ Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 _SETTLED = 0.25  # s around a saturated set point in which anti-windup may act
 _LEAST = 200  # samples
+_LOOP = 1.5e-3  # s: a current loop's lag that a measured current hides (200 Hz and faster)
 _NARROWEST = 3.0  # samples, deviation of the kernel: stairs of the set point are averaged over it
 _TERMS = ("proportional", "integral", "derivative", "slope", "motion")
 
@@ -73,7 +74,9 @@ class _Law:
         return robust_regression(np.vstack(rows), np.concatenate(data))
 
 
-def controller_law(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regression | None:
+def controller_law(
+    logs: Sequence[BenchLog], keeps: Sequence[Bools], lag: float = 0.0
+) -> Regression | None:
     """Regress the current's set point on the speed error, its integral and its derivative.
 
     Parameters
@@ -82,6 +85,9 @@ def controller_law(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
         All of them count: the law holds whatever the load.
     keeps : sequence of ndarray of bool
         Samples that may be used, one a log.
+    lag : float
+        Of the measured current behind the torque [s]: where no set point was logged, the measured
+        current stands for it.
 
     Returns
     -------
@@ -96,7 +102,7 @@ def controller_law(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
     integral one weight for set point and motion in the place of two, for the derivative one gain
     in the place of two, and slopes that come late as a filter or a slow tick would have them.
     """
-    law, present, times = _ready(logs, keeps)
+    law, present, times = _ready(logs, keeps, lag)
     design = np.vstack([c[good] for c, good in zip(law.columns, law.inside, strict=True)])
     size = np.linalg.norm(design, axis=0)
     if len(design) < _LEAST or not np.all(size > 0.0):
@@ -114,6 +120,7 @@ def controller_law(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
         np.where(sloped, beta, law.without(_TERMS.index("motion"))),
         np.where(sloped, law.joint(), beta),
         np.where(sloped, law.late(), beta),
+        *((_slower(beta),) if any(_stands_for(log) for log in logs) else ()),
     ):
         gap = other - beta
         covariance = covariance + np.outer(gap, gap)
@@ -121,7 +128,7 @@ def controller_law(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
 
 
 def _ready(
-    logs: Sequence[BenchLog], keeps: Sequence[Bools]
+    logs: Sequence[BenchLog], keeps: Sequence[Bools], lag: float
 ) -> tuple[_Law, list[int], list[tuple[Floats, Floats, float]]]:
     """Columns of every log, which logs have any sample, and the times of the samples used."""
     inside = [_inside(log, keep) for log, keep in zip(logs, keeps, strict=True)]
@@ -130,13 +137,27 @@ def _ready(
     for k, log in enumerate(logs):
         sigma = _sigma(log)
         starts = [np.full(len(log.time), float(j == k)) for j in present]
-        columns.append(np.column_stack((*_columns(log, sigma), *starts)))
+        table = np.column_stack((*_columns(log, sigma), *starts))
+        columns.append(lagged(table, lag, log.period) if _stands_for(log) else table)
         targets.append(smoothed(log.current_target, sigma))
     times = [
         (log.time[good], log.speed[good], log.period)
         for log, good in zip(logs, inside, strict=True)
     ]
     return _Law(columns, targets, inside, [log.period for log in logs]), present, times
+
+
+def _stands_for(log: BenchLog) -> bool:
+    """Whether the measured current stands for a set point that was not logged."""
+    return log.current_target is log.current and log.current_signal == "current_q_meas"
+
+
+def _slower(beta: Floats) -> Floats:
+    """What a current loop of `_LOOP` hides of the slopes: it comes late by P and D alike."""
+    other = beta.copy()
+    at = [_TERMS.index("derivative"), _TERMS.index("slope")]
+    other[at] += _LOOP * beta[_TERMS.index("proportional")]
+    return other
 
 
 def _sigma(log: BenchLog) -> float:

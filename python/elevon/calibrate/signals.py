@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -81,7 +81,12 @@ def signal_stage(
     """
     found = position_estimates(logs, actuator)
     advance(0.25)
-    plant, law = _telling(torque_balance(logs, keeps)), _telling(controller_law(logs, keeps))
+    plant = _telling(torque_balance(logs, keeps))
+    advance(0.5)
+    lag = plant["lag"] if plant is not None else 0.0
+    law = _telling(controller_law(logs, keeps, lag))
+    if plant is not None and law is not None and "constant" in plant.names:
+        plant = _sampled(plant, law, logs, keeps)
     advance(0.7)
     torque = torque_scale(actuator, plant)
     followed: dict[str, float] = {}
@@ -104,6 +109,23 @@ def signal_stage(
 def _telling(regression: Regression | None) -> Regression | None:
     """Drop a regression that explains nothing: its coefficients are noise."""
     return regression if regression and regression.explained > _DOUBTFUL else None
+
+
+def _sampled(
+    plant: Regression, law: Regression, logs: Sequence[BenchLog], keeps: Sequence[Bools]
+) -> Regression:
+    """Add to the deviations what a set point in the current's place may owe to its samples.
+
+    Samples in step with the drive catch the derivative's spikes too often or too seldom. The
+    controller's law shows how much of that goes with the motion; friction would take it up, the
+    viscous part one way and the dry part the other.
+    """
+    speeds = [log.speed[keep & log.good] for log, keep in zip(logs, keeps, strict=True)]
+    spread = float(np.sqrt(np.mean(np.concatenate(speeds) ** 2)))
+    gap = np.zeros(len(plant.names))
+    gap[plant.names.index("viscous")] = law.std("motion")
+    gap[plant.names.index("dry")] = -spread * law.std("motion")
+    return replace(plant, covariance=plant.covariance + np.outer(gap, gap))
 
 
 def _commands(
