@@ -257,7 +257,9 @@ def test_what_a_campaign_lacks_is_not_made_up(name, tmp_path):
     wrong = misses(document["parameters"], true, set())
     assert not wrong, "\n".join(wrong)
     before, after = (pooled(document["validation"][when]) for when in ("before", "after"))
-    assert {s: (before[s], after[s]) for s in after if after[s] > 0.5 * before[s]} == {}
+    # A set point shows the derivative's spikes, which the low model has not.
+    share = {"current_q_meas": 1.0} if missing == ("current",) else {}
+    assert {s: after[s] for s in after if after[s] > share.get(s, 0.5) * before[s]} == {}
 
 
 @pytest.mark.long
