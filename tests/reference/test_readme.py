@@ -10,8 +10,13 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ["README.md", "docs/reproduce.md"]
-LONG = ("reproduce torino-backlash", "--faults-table")
-"""These take tens of seconds; the short ones run with every `make test`, once."""
+LONG = (
+    "reproduce torino-backlash",
+    "reproduce torino-compliance",
+    "compare torino-rotary",
+    "--faults-table",
+)
+"""These take ten seconds and more; the short ones run with every `make test`, once."""
 
 
 def _blocks(page, language):
