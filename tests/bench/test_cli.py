@@ -120,3 +120,16 @@ def test_design_spring(capsys):
     code, out, _ = run(capsys, "design", "spring", "--wire", "3.2 mm", "--coil", "3.6 cm")
     assert code == 0
     assert "feasible" in out
+
+
+def test_companions_named_by_a_glob_are_read_with_their_log(tmp_path, capsys):
+    logs = tmp_path / "logs"
+    words = ["bench", "run", "stall", "--actuator", "torino-rotary", "--fidelity", "low"]
+    assert run(capsys, *words, "--out", logs, "--json")[0] == 0
+    named = sorted(logs.glob("stall*.csv"))
+    assert len(named) == 2
+    out = tmp_path / "one.parquet"
+    code, printed, said = run(capsys, "import", *named, "--out", out, "--json")
+    assert code == 0
+    assert "read with its log" in said
+    assert len(json.loads(printed)["logs"]) == 1

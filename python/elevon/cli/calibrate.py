@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from elevon.cli.calibrate_drops import is_drop_table, run_drops
-from elevon.cli.common import ForceOption, JsonOption, SetOption, check_outputs, read_actuator
+from elevon.cli.common import (
+    ForceOption,
+    JsonOption,
+    SetOption,
+    check_outputs,
+    read_actuator,
+    without_companions,
+)
 from elevon.cli.output import print_json, print_table, progress_bar, say
 from elevon.errors import InputError
 
@@ -74,6 +81,7 @@ def read(
     """Import logs with their companions; warnings of the import go to stderr."""
     from elevon.calibrate.log import read_logs
 
+    logs = without_companions(logs)
     found = read_logs(
         logs,
         loadcells=one_each("--loadcell", loadcell, len(logs)),

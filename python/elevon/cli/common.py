@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from elevon.cli.output import say
 from elevon.errors import InputError
 from elevon.files import check_output
 
@@ -110,3 +111,18 @@ def _number(text: str) -> float | str:
         return float(text)
     except ValueError:
         return text
+
+
+def without_companions(logs: list[Path]) -> list[Path]:
+    """Leave out load-cell files and command notes that stand beside another log of the list.
+
+    A shell's ``DIR/*.csv`` names them too; they are read with their log.
+    """
+    from elevon.bench.logs.importing import find_sidecars
+
+    beside = {path for log in logs for path in find_sidecars(log) if path is not None}
+    kept = [log for log in logs if log.expanduser() not in beside]
+    for log in logs:
+        if log not in kept:
+            say(f"{log}: read with its log, not as one")
+    return kept

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from elevon.cli.common import without_companions
 from elevon.cli.output import print_json, print_table, say
 from elevon.errors import InputError
 
@@ -61,6 +62,7 @@ def import_(
         raise unknown("format", log_format, FORMATS, "--format")
     if log_format == "cranfield":
         return _cranfield(logs, out, force=force, json=json)
+    logs = without_companions(logs) if sidecars else logs
     cells = _one_each("--loadcell", loadcell, len(logs))
     notes = _one_each("--command", command, len(logs), shared=True)
     targets = _targets(logs, out)
