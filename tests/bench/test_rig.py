@@ -160,13 +160,25 @@ def test_a_tripped_run_stays_tripped_when_its_log_is_kept(tmp_path, capsys):
             assert log["message"] == same["message"] != ""
 
 
-def test_a_half_done_tripped_procedure_agrees_with_one_made_in_one_go(tmp_path, actuator):
+def test_a_half_done_tripped_procedure_agrees_with_one_made_in_one_go(
+    tmp_path, actuator, monkeypatch
+):
+    from elevon.bench import run as bench_run
+
     pair = load_procedure(two_logs(tmp_path))
     once = run_procedure(pair, actuator, tmp_path / "once", faults=[TRIPS])
-    with pytest.raises(Interrupted):
-        run_procedure(
-            pair, actuator, tmp_path / "halves", faults=[TRIPS], progress=lambda f: f < 0.6
-        )
+
+    def first_only(setup, *arguments, **options):
+        if setup.trace.name == "two":
+            raise Interrupted("stopped between the logs")
+        return whole(setup, *arguments, **options)
+
+    # A run that trips early is over before anyone asks for its progress: stop between the logs.
+    whole = bench_run._one
+    with monkeypatch.context() as patch:
+        patch.setattr(bench_run, "_one", first_only)
+        with pytest.raises(Interrupted):
+            run_procedure(pair, actuator, tmp_path / "halves", faults=[TRIPS])
     state = json.loads((tmp_path / "halves" / "bench-pair.json").read_text())
     assert list(state["logs"]) == ["one"]
     later = run_procedure(pair, actuator, tmp_path / "halves", faults=[TRIPS])

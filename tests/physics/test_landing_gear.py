@@ -96,7 +96,9 @@ def test_lever_is_the_triangle_and_virtual_work_is_an_identity() -> None:
 
 
 @pytest.mark.parametrize("fidelity", ["high", "low"])
-@pytest.mark.parametrize(("factor", "supply"), [(1.0, 28.0), (3.5, 20.5)])
+@pytest.mark.parametrize(
+    ("factor", "supply"), [(1.0, 28.0), pytest.param(3.5, 20.5, marks=pytest.mark.long)]
+)
 def test_energy_balances_over_a_cycle_with_the_lock(
     fidelity: str, factor: float, supply: float
 ) -> None:
