@@ -154,12 +154,15 @@ def test_deviations_cover_the_truth_over_many_seeds(many, monkeypatch, trigger):
             sync = report.synchronisation
             if sync["method"] == "none":  # a motion that repeats, without a trigger
                 assert not trigger
+                assert report.has("not-synchronised")
                 continue
             found.append(scores(sync, true))
             if name == "compliance":
                 hung.append(sync["drift"] - true["cell"]["clock_drift"])
-    assert len(found) >= (4 * SEEDS if trigger else 3 * SEEDS)
-    assert len(hung) == SEEDS
+    # Without a trigger the sine of 0.15 Hz repeats; some stairs of weights repeat by a step.
+    assert len(found) >= (4 * SEEDS if trigger else 2 * SEEDS)
+    assert len(hung) == SEEDS or not trigger
+    assert hung
     assert np.max(np.abs(found)) < 3.5
     assert np.mean(np.abs(found) < 1.645, axis=0).min() > 0.85
     assert np.sqrt(np.mean(np.square(hung))) < 5e-4

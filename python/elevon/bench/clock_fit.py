@@ -8,7 +8,8 @@ current passes a filter). Without the last the trigger would turn every such del
 
 The residuals of such a fit are anything but white: how much less the logs tell than white noise
 would let them is estimated, and both the weight against what is known beforehand and the deviations
-follow it.
+follow it. The weights and the clock take their share of the few independent samples that they are
+worth; where none are left there is no fit.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from elevon.bench.covariance import long_run_covariance
+from elevon.bench.covariance import correlated, long_run_covariance
 
 __all__ = ["RESONATOR_STD", "RESONATOR_TOLERANCE", "Estimate", "SharedLogs", "fit_clock"]
 
@@ -36,12 +37,17 @@ _DELAY = 2.0
 so what it shows is late by about two."""
 
 _DETERMINED = 1.0 / 3.0  # of a resonator's deviation: a drift known no better is not used
+_APART = 2e-3
+"""Seconds: the drive passes its current through a filter (100 Hz: 1.6 ms) and its speed not, so
+its signals are late by different amounts, and whichever counts most decides when."""
+
 _RANK = 1e-6  # of the largest singular value: a combination below it says nothing of its own
 _ROUNDS = 6  # of estimating how coloured the residuals are
 _STEPS = 25
 _DONE = 1e-8  # s
 _LONGEST = 0.05  # s a step: the filter's width, within which the derivative means something
 _FEWEST = 20  # samples
+_LEAST_FREEDOM = 2.0  # independent samples beyond the unknowns: Student's has no variance for fewer
 
 _TWICE = [0, 1, 0]  # the unknowns' columns: a delay moves the prediction as the offset does
 _DRIFT = np.array([0.0, 1.0, 0.0])
@@ -64,6 +70,8 @@ class SharedLogs:
         What is explained by the signals and a constant.
     period : float
         Of the slower log [s].
+    width : float
+        Standard deviation of the filter [s].
     """
 
     time: FloatArray
@@ -71,6 +79,7 @@ class SharedLogs:
     second: FloatArray
     value: FloatArray
     period: float
+    width: float
 
     def basis(self, at: FloatArray) -> FloatArray:
         """Return a constant and the signals at instants of the drive's clock, (len, 1 + m)."""
@@ -90,9 +99,23 @@ class SharedLogs:
         power = float(np.sum((target - target.mean()) ** 2))
         if power == 0.0:
             return 0.0
-        basis = self.basis(self.second[inside] + offset)
-        weights, *_ = np.linalg.lstsq(basis, target, rcond=_RANK)
-        return 1.0 - float(np.sum((target - basis @ weights) ** 2)) / power
+        rest, _ = self.rest(offset, inside)
+        return 1.0 - float(rest @ rest) / power
+
+    def rest(self, offset: float, among: npt.NDArray[np.bool_]) -> tuple[FloatArray, int]:
+        """Return what the signals leave of some samples for an offset [s], and their rank."""
+        basis = self.basis(self.second[among] + offset)
+        weights, _, rank, _ = np.linalg.lstsq(basis, self.value[among], rcond=_RANK)
+        return self.value[among] - basis @ weights, int(rank)
+
+    def alike(self) -> float:
+        """How many samples of the second log one filter makes one of."""
+        step = float(np.median(np.diff(self.second)))
+        return max(1.0, 2.0 * math.sqrt(math.pi) * self.width / step)
+
+    def independent(self, rest: FloatArray) -> float:
+        """Return how many independent samples residuals in the order of time are worth."""
+        return len(rest) / max(self.alike(), correlated(rest))
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,8 +159,8 @@ class _Frame:
     known: FloatArray
     guess: FloatArray
 
-    def linear(self, unknown: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return residual, and derivative of the prediction by the first two unknowns."""
+    def linear(self, unknown: FloatArray) -> tuple[FloatArray, FloatArray, int]:
+        """Return residual, derivative of the prediction by the first two unknowns, and rank."""
         turn = (self.second - self.middle) / self.half
         at = self.second + unknown[0] + unknown[1] * turn + unknown[2]
         basis = self.logs.basis(at)
@@ -145,11 +168,11 @@ class _Frame:
         rest = self.value - space @ (space.T @ self.value)
         rate = _columns(self.logs.time, self.rates, at, 0.0) @ weights
         jacobian = np.column_stack((rate, rate * turn))
-        return rest, jacobian - space @ (space.T @ jacobian)
+        return rest, jacobian - space @ (space.T @ jacobian), space.shape[1]
 
     def cost(self, unknown: FloatArray, noise: float) -> float:
         """Misfit to minimise, for a variance of the residuals."""
-        rest, _ = self.linear(unknown)
+        rest, *_ = self.linear(unknown)
         off = unknown - self.guess
         return float(rest @ rest) / noise + float(off @ self.known @ off)
 
@@ -169,24 +192,37 @@ def fit_clock(logs: SharedLogs, guess: float, edge: tuple[float, float] | None) 
     Returns
     -------
     Estimate or None
-        None where the logs hardly overlap or hold nothing that moves in time.
+        None where the logs hardly overlap, hold nothing that moves in time, or are worth hardly
+        more independent samples than there are unknowns.
     """
     frame = _frame(logs, guess, edge)
     if frame is None:
         return None
     unknown = frame.guess
-    inflation = 1.0
+    inflation, few = logs.alike(), 1.0  # of a guess that is off the residuals are no noise
     for _ in range(_ROUNDS):
-        rest, jacobian = frame.linear(unknown)
-        noise = _noise(frame, rest)
+        rest, jacobian, rank = frame.linear(unknown)
         normal = jacobian.T @ jacobian
         if not np.all(np.isfinite(normal)) or normal[0, 0] <= 0.0:
             return None
-        scores = long_run_covariance(jacobian * rest[:, None])
-        colour = np.linalg.pinv(normal, rcond=_RANK) @ scores / noise
-        inflation = max(1.0, 0.5 * float(np.trace(colour)))
-        unknown = _descend(frame, unknown, noise * inflation)
-    return _estimate(frame, unknown, inflation)
+        unknown = _descend(frame, unknown, _noise(frame, rest) * inflation)
+        rest, jacobian, rank = frame.linear(unknown)
+        worth = logs.independent(rest)
+        free = worth - rank - jacobian.shape[1] - _LEAST_FREEDOM
+        if free <= 0.0:
+            return None
+        few = worth / free
+        inflation = few * max(len(rest) / worth, _coloured(jacobian, rest))
+    return _estimate(frame, unknown, inflation, few)
+
+
+def _coloured(jacobian: FloatArray, rest: FloatArray) -> float:
+    """How many times white noise's variance is theirs, of the residuals or of their scores."""
+    power = max(float(rest @ rest), 1e-300)
+    scores = long_run_covariance(jacobian * rest[:, None])
+    normal = np.linalg.pinv(jacobian.T @ jacobian, rcond=_RANK)
+    of_scores = 0.5 * float(np.trace(normal @ scores)) * len(rest) / power
+    return max(float(long_run_covariance(rest[:, None])[0, 0]) / power, of_scores)
 
 
 def _frame(logs: SharedLogs, guess: float, edge: tuple[float, float] | None) -> _Frame | None:
@@ -219,7 +255,7 @@ def _descend(frame: _Frame, unknown: FloatArray, noise: float) -> FloatArray:
     """Gauss-Newton with halved steps."""
     cost = frame.cost(unknown, noise)
     for _ in range(_STEPS):
-        rest, jacobian = frame.linear(unknown)
+        rest, jacobian, _ = frame.linear(unknown)
         jacobian = jacobian[:, _TWICE]
         pull = jacobian.T @ rest / noise - frame.known @ (unknown - frame.guess)
         step = np.linalg.solve(jacobian.T @ jacobian / noise + frame.known, pull)
@@ -235,15 +271,16 @@ def _descend(frame: _Frame, unknown: FloatArray, noise: float) -> FloatArray:
     return unknown
 
 
-def _estimate(frame: _Frame, unknown: FloatArray, inflation: float) -> Estimate:
-    """Deviations: of the scores as they are, and of what was known beforehand."""
-    rest, two = frame.linear(unknown)
+def _estimate(frame: _Frame, unknown: FloatArray, inflation: float, few: float) -> Estimate:
+    """Deviations: of the scores as they are, `few` times for so few, and of what was known."""
+    rest, two, _ = frame.linear(unknown)
     noise = _noise(frame, rest) * inflation
     jacobian = two[:, _TWICE]
     information = jacobian.T @ jacobian / noise + frame.known
     inverse = np.asarray(np.linalg.inv(information), dtype=np.float64)
-    scores = long_run_covariance(two * rest[:, None])[np.ix_(_TWICE, _TWICE)] / noise**2
-    covariance = inverse @ (scores + frame.known) @ inverse
+    scores = few * long_run_covariance(two * rest[:, None])[np.ix_(_TWICE, _TWICE)] / noise**2
+    astray = (information - frame.known) @ np.diag([0.0, _APART, _APART])
+    covariance = inverse @ (scores + frame.known + astray @ astray.T) @ inverse
     drift = _pair(_DRIFT / frame.half, unknown, covariance)
     refused = None
     if drift[1] > _DETERMINED * RESONATOR_STD:

@@ -12,7 +12,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["long_run_covariance", "robust_covariance"]
+__all__ = ["correlated", "long_run_covariance", "robust_covariance"]
 
 FloatArray = npt.NDArray[np.float64]
 _SLOWEST = 0.97  # bound on the fitted persistence, as Andrews and Monahan advise
@@ -72,6 +72,32 @@ def long_run_covariance(scores: FloatArray) -> FloatArray:
     colour = 1.0 / (1.0 - rho)
     grown = total * np.outer(colour, colour) * (len(scores) / max(count, 1))
     return np.asarray(grown, dtype=np.float64)
+
+
+def correlated(series: FloatArray) -> float:
+    """Return how many samples of a series are worth one independent sample.
+
+    Parameters
+    ----------
+    series : ndarray, shape (n,)
+        In the order of time.
+
+    Returns
+    -------
+    float
+        The autocorrelation summed over both signs of the lag, up to where it first vanishes: what
+        comes beyond is an oscillation's, which would only make the sum smaller, or noise. 1 for
+        white noise.
+    """
+    centred = series - series.mean()
+    power = float(centred @ centred)
+    if power == 0.0:
+        return 1.0
+    size = 2 * len(centred)
+    spectrum = np.abs(np.fft.rfft(centred, size)) ** 2
+    at = np.fft.irfft(spectrum, size)[: len(centred)] / power
+    end = int(np.argmax(at <= 0.0)) or len(at)
+    return float(2.0 * np.sum(at[:end]) - 1.0)
 
 
 def _persistence(series: FloatArray) -> float:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from elevon.bench.clock_fit import SharedLogs, fit_clock
+from elevon.bench.clock_fit import Estimate, SharedLogs, fit_clock
 from elevon.bench.offset_search import LEAST_R2, Guess, search_offset
 from elevon.errors import InputError
 
@@ -28,6 +28,7 @@ __all__ = ["ClockFit", "TriggerEdge", "align_clocks", "find_trigger"]
 FloatArray = npt.NDArray[np.float64]
 _MOST_DRIFT = 0.02  # an RC oscillator's worst: a fit beyond it is none of two clocks
 _SMOOTHING = 3.0  # periods of the slower log
+_ENDS = 2.0  # of the filter's width: what it makes of a log's ends is not used
 _FEWEST = 20  # samples of each
 _STILL = 1e-12  # of a signal's size: rounding, no motion
 
@@ -166,11 +167,7 @@ def align_clocks(
     if guess is None or fit is None or fit.explained < LEAST_R2 or abs(fit.drift[0]) > _MOST_DRIFT:
         if edge is not None:
             return ClockFit(edge.time, edge.std, 0.0, math.inf, "trigger", math.nan)
-        seen = 0.0 if fit is None else fit.explained
-        raise InputError(
-            "synchronisation: the trigger never changes, and the drive's signals explain only "
-            f"{100 * seen:.0f} % of the load cell's variance ({100 * LEAST_R2:.0f} % needed)"
-        )
+        raise InputError(f"synchronisation: the trigger never changes, and {_why_not(guess, fit)}")
     return ClockFit(
         *fit.offset,
         *fit.drift,
@@ -179,6 +176,26 @@ def align_clocks(
         *fit.residual,
         guess.set_aside,
         fit.refused,
+    )
+
+
+def _why_not(guess: Guess | None, fit: Estimate | None) -> str:
+    """Say why there is no offset to be had from what both logs saw."""
+    seen = 0.0
+    if fit is not None:
+        seen = fit.explained
+    elif guess is not None:
+        seen = guess.logs.explained(guess.offset)
+    if seen < LEAST_R2:
+        return (
+            f"the drive's signals explain only {100 * seen:.0f} % of the load cell's variance "
+            f"({100 * LEAST_R2:.0f} % needed)"
+        )
+    if fit is None:
+        return "the two logs share too short a motion to tell an offset from chance"
+    return (
+        f"what both saw gives a clock drift of {fit.drift[0]:.3g}, more than any two clocks have "
+        f"(limit {_MOST_DRIFT:g})"
     )
 
 
@@ -247,6 +264,16 @@ def _shared(t: FloatArray, x: FloatArray, s: FloatArray, y: FloatArray) -> Share
 
     steps = float(np.median(np.diff(t))), float(np.median(np.diff(s)))
     period = max(steps)
-    smooth_x = gaussian_filter1d(x, _SMOOTHING * period / steps[0], axis=0, mode="nearest")
-    smooth_y = gaussian_filter1d(y, _SMOOTHING * period / steps[1], mode="nearest")
-    return SharedLogs(t, smooth_x, s, smooth_y, period)
+    width = _SMOOTHING * period
+    smooth_x = gaussian_filter1d(x, width / steps[0], axis=0, mode="nearest")
+    smooth_y = gaussian_filter1d(y, width / steps[1], mode="nearest")
+    first, second = (
+        (clock >= clock[0] + _ENDS * width) & (clock <= clock[-1] - _ENDS * width)
+        for clock in (t, s)
+    )
+    if min(int(first.sum()), int(second.sum())) < _FEWEST:
+        raise InputError(
+            f"synchronisation: {np.ptp(t):.3g} and {np.ptp(s):.3g} s of log are too short: "
+            f"{_FEWEST} samples of each must lie {_ENDS * width:.3g} s from its ends"
+        )
+    return SharedLogs(t[first], smooth_x[first], s[second], smooth_y[second], period, width)

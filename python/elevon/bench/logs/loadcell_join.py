@@ -151,36 +151,56 @@ def _fit_findings(fit: ClockFit, report: ImportReport) -> None:
             "load_cell",
             "offset-assumed",
             f"no trigger: {fit.offset:.3f} s has the load cell begin within the drive's trace; "
-            f"{fit.set_aside:.3f} s, before it, would explain it as well",
+            f"{fit.set_aside:.3f} s, before it, cannot be told from it by what both saw",
         )
 
 
 def _shared(recording: Recording, gear_ratio: float, note: CommandNote | None) -> list[FloatArray]:
     """Return the sets of signals that may show what the load cell saw.
 
-    A brake acts on the fast shaft: torque current, its size, direction of motion. Weights and
-    springs act on the user: what they wind up between the two positions. Where the operator says
-    whether the brake was on, only one of them is meant.
+    A brake acts on the fast shaft, weights and springs on the user: these show in what they wind up
+    between the two positions. Where the operator says whether the brake was on, only one of them is
+    meant.
     """
-    brake = []
-    for name in ("current_q_meas", "current_ref"):
-        if name in recording:
-            current = recording[name].values
-            brake += [current, np.abs(current)]
-            break
-    if "motor_speed" in recording:
-        speed = recording["motor_speed"].values
-        size = float(np.nanstd(speed))
-        if size > 0.0:
-            brake.append(np.tanh(speed / (0.1 * size)))
+    brake = _braked(recording)
     wound = []
     if "resolver_position" in recording and "encoder_position" in recording:
         motor, user = (recording[f"{name}_position"].values for name in ("resolver", "encoder"))
-        wound.append(motor / gear_ratio - user)
-    sets = [np.column_stack(columns) for columns in (brake, wound) if columns]
-    if len(sets) == 2 and note is not None and note.brake is not None:
-        return sets[:1] if note.brake else sets[1:]
-    return sets
+        wound.append((motor / gear_ratio - user)[:, None])
+    if brake and wound and note is not None and note.brake is not None:
+        return brake if note.brake else wound
+    return [*brake, *wound]
+
+
+def _braked(recording: Recording) -> list[FloatArray]:
+    """Return the sets of signals that tell a brake's torque on the fast shaft.
+
+    What is left of the motor's torque when friction and inertia took their share: torque current,
+    direction of motion, speed and acceleration. Without the last two a brake that turns its sign
+    with the motion would seem early by the angle by which the accelerating current leads. A load
+    cell that shows a size alone follows the same four times the direction of motion; where the
+    shaft hardly moves, the current's size.
+    """
+    names = [name for name in ("current_q_meas", "current_ref") if name in recording]
+    current = [recording[name].values for name in names[:1]]
+    sets = [np.column_stack((i, np.abs(i))) for i in current]
+    speed = _speed(recording)
+    size = 0.0 if speed is None else float(np.nanstd(speed))
+    if speed is None or not size > 0.0:
+        return sets
+    direction = np.tanh(speed / (0.1 * size))
+    rate = np.gradient(speed, recording.clocks["drive"].time)
+    signed = np.column_stack((*current, direction, speed, rate))
+    return [signed, signed * direction[:, None], *sets]
+
+
+def _speed(recording: Recording) -> FloatArray | None:
+    if "motor_speed" in recording:
+        return recording["motor_speed"].values
+    if "resolver_position" not in recording:
+        return None
+    position = recording["resolver_position"].values
+    return np.asarray(np.gradient(position, recording.clocks["drive"].time), dtype=np.float64)
 
 
 def _check_overlap(recording: Recording, time: FloatArray, report: ImportReport) -> None:
