@@ -4,13 +4,15 @@ use super::block::{structure, Block, Lift, Plain};
 use super::spec::{Clock, RunOutput, RunSpec};
 use super::width::Width;
 use crate::actuator::{Tick, Wiring, MAX_CHUNKS};
-use crate::scalar::{Dual, Portable, Scalar};
+#[cfg(not(feature = "physics"))]
+use crate::scalar::Portable;
+use crate::scalar::{Dual, Scalar};
 use crate::time::Steps;
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(feature = "physics")))]
 use crate::scalar::{Avx2x4, Avx512x8};
 
 /// Progress out, interruption in; shared between threads.
@@ -77,11 +79,16 @@ fn run_block<W: Wiring, S: Scalar>(runs: &[&RunSpec], clocks: &[Clock], recorded
 
 fn run_width<W: Wiring>(width: Width, runs: &[&RunSpec], clocks: &[Clock], recorded: &[usize], monitor: &Monitor) -> Vec<RunOutput> {
     match width {
+        // A build for work on physics knows single runs only (`Width::detect`).
+        #[cfg(feature = "physics")]
+        _ => run_block::<W, f64>(runs, clocks, recorded, monitor),
+        #[cfg(not(feature = "physics"))]
         Width::Single => run_block::<W, f64>(runs, clocks, recorded, monitor),
-        #[cfg(target_arch = "x86_64")]
+        #[cfg(all(target_arch = "x86_64", not(feature = "physics")))]
         Width::Avx2 => run_block::<W, Avx2x4>(runs, clocks, recorded, monitor),
-        #[cfg(target_arch = "x86_64")]
+        #[cfg(all(target_arch = "x86_64", not(feature = "physics")))]
         Width::Avx512 => run_block::<W, Avx512x8>(runs, clocks, recorded, monitor),
+        #[cfg(not(feature = "physics"))]
         _ => run_block::<W, Portable<2>>(runs, clocks, recorded, monitor),
     }
 }

@@ -12,6 +12,9 @@ pub enum Width {
 impl Width {
     /// The widest of this processor.
     pub fn detect() -> Self {
+        if cfg!(feature = "physics") {
+            return Self::Single;
+        }
         #[cfg(target_arch = "x86_64")]
         {
             let wide = is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") && is_x86_feature_detected!("avx512vl");
