@@ -1,5 +1,7 @@
 //! One record per parameter and signal. Documentation, bindings, error texts and validation all come from it.
 
+mod macros;
+
 /// Which register of numbers a parameter belongs to: what the plant is, what the controller
 /// believes, what the sensors do to a signal, how the run is loaded and solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,6 +23,10 @@ impl Register {
             Self::Solver => "solver",
         }
     }
+}
+
+crate::choices! {
+    Switch { Off "off", On "on" }
 }
 
 /// Admissible values.
@@ -106,6 +112,51 @@ pub const fn offset(groups: &[Group], index: usize) -> usize {
     sum
 }
 
+/// The parameters of group `index` in the vector of a wiring.
+#[inline(always)]
+pub fn slice<'a, S>(groups: &[Group], index: usize, raw: &'a [S]) -> &'a [S] {
+    let begin = offset(groups, index);
+    &raw[begin..begin + groups[index].variables.len()]
+}
+
+/// `first`, then `further`.
+pub const fn followed<const N: usize>(first: &[Group], further: &[Group]) -> [Group; N] {
+    let mut all = [first[0]; N];
+    let mut i = 0;
+    while i < N {
+        all[i] = if i < first.len() { first[i] } else { further[i - first.len()] };
+        i += 1;
+    }
+    all
+}
+
+/// A group of parameters under a prefix.
+pub const fn group(prefix: &'static str, variables: &'static [Variable]) -> Group {
+    Group { prefix, variables }
+}
+
+/// Is `variant` the last part of the dotted `path` in the spelling of Rust? Underscores apart.
+pub const fn named(variant: &str, path: &str) -> bool {
+    let (variant, path) = (variant.as_bytes(), path.as_bytes());
+    let (mut v, mut p) = (variant.len(), path.len());
+    loop {
+        while v > 0 && variant[v - 1] == b'_' {
+            v -= 1;
+        }
+        while p > 0 && path[p - 1] == b'_' {
+            p -= 1;
+        }
+        let begun = p == 0 || path[p - 1] == b'.';
+        if v == 0 || begun {
+            return v == 0 && begun;
+        }
+        if variant[v - 1].to_ascii_lowercase() != path[p - 1] {
+            return false;
+        }
+        (v, p) = (v - 1, p - 1);
+    }
+}
+
 /// A recordable quantity.
 #[derive(Clone, Copy, Debug)]
 pub struct Signal {
@@ -168,45 +219,4 @@ const fn or(given: &'static str, other: &'static str) -> &'static str {
     } else {
         given
     }
-}
-
-/// Declares an enum of parameters and the table of their records, in one place.
-#[macro_export]
-macro_rules! variables {
-    ($(#[$meta:meta])* $id:ident, $table:ident {
-        $($variant:ident => $path:literal, $symbol:literal, $unit:literal, $range:expr, $register:ident, $default:expr, $text:literal;)*
-    }) => {
-        $(#[$meta])*
-        // Rows of one kind are reached by counting from the first: not every name is written out.
-        #[allow(dead_code)]
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[repr(usize)]
-        pub enum $id { $($variant),* }
-        pub const $table: &[$crate::variable::Variable] = {
-            #[allow(unused_imports)]
-            use $crate::variable::Range::*;
-            &[$($crate::variable::Variable {
-                path: $path, symbol: $symbol, unit: $unit, range: $range,
-                register: $crate::variable::Register::$register, default: $default, text: $text,
-            }),*]
-        };
-    };
-}
-
-/// Declares an enum of signals and the table of their records.
-#[macro_export]
-macro_rules! signals {
-    ($(#[$meta:meta])* $id:ident, $table:ident {
-        $($variant:ident => $name:literal, $symbol:literal, $unit:literal, $text:literal;)*
-    }) => {
-        $(#[$meta])*
-        // Phases b and c are reached by counting from a: not every name is written out.
-        #[allow(dead_code)]
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[repr(usize)]
-        pub enum $id { $($variant),* }
-        pub const $table: &[$crate::variable::Signal] = &[$($crate::variable::Signal {
-            name: $name, symbol: $symbol, unit: $unit, text: $text,
-        }),*];
-    };
 }

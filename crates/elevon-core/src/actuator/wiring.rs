@@ -1,6 +1,7 @@
 //! What the solver asks of a wiring. The model is constant, all of a run lives in its state.
 
 use crate::command::Source;
+use crate::control::position_speed::Mode;
 use crate::fault::FaultKind;
 use crate::scalar::Scalar;
 use crate::time::Steps;
@@ -88,7 +89,7 @@ pub trait Wiring: Sized + Send + Sync + 'static {
     /// Signals whose initial value a scenario may set.
     const INITIAL: &'static [&'static str];
     /// What a command may ask for.
-    const MODES: &'static [&'static str] = &["position", "speed", "torque"];
+    const MODES: &'static [&'static str] = Mode::NAMES;
     /// Names of the values of a command that is a sequence of actions (mode `gear`).
     const ACTIONS: &'static [&'static str] = &[];
 

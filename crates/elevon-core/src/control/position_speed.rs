@@ -1,12 +1,22 @@
 //! Position P and speed PID with limits and anti-windup (T2, T3; reference sheet 1.3).
 
 use crate::scalar::Scalar;
-use crate::variables;
+use crate::variable::Switch;
+use crate::{choices, variables};
+
+choices! {
+    /// What a command asks for.
+    Mode { Position "position", Speed "speed", Torque "torque" }
+    /// When the position error freezes the integrator.
+    ErrorHold { Off "off", Below "below", Above "above" }
+    /// What closes the position loop.
+    Feedback { User "user", Encoder "encoder", Resolver "resolver" }
+}
 
 variables! {
     /// What the actuator control electronics believe and do.
     ControlParameter, CONTROL {
-        Mode => "mode", "-", "1", Choice(&["position", "speed", "torque"]), Controller, Some(0.0), "what the command is: a position, a speed (bypasses the position loop) or a torque (bypasses both loops)";
+        Mode => "mode", "-", "1", Choice(Mode::NAMES), Controller, Some(0.0), "what the command is: a position, a speed (bypasses the position loop) or a torque (bypasses both loops)";
         PositionGain => "position_gain", "G", "1/s", NonNegative, Controller, None, "user position error to fast-shaft speed reference";
         PositionGainScale => "position_gain_scale", "-", "1", NonNegative, Controller, Some(1.0), "healthy 1; drift of the position gain";
         SpeedFeedforward => "speed_feedforward", "g_ff", "1", Between(0.0, 1.5), Controller, Some(0.0), "share of the commanded speed (difference of the command over one tick) added to the speed reference";
@@ -18,23 +28,16 @@ variables! {
         SpeedLimit => "speed_limit", "omega_max", "rad/s", Positive, Controller, None, "limit of the speed reference";
         CurrentLimit => "current_limit", "I_max", "A", Positive, Controller, None, "limit of the quadrature current reference, peak";
         TorqueConstant => "torque_constant", "k_t", "N m/A", Positive, Controller, None, "torque per peak ampere that the controller believes, 1.5 k when it knows the motor";
-        AntiWindupRest => "anti_windup_rest", "AW1", "1", Choice(&["off", "on"]), Controller, Some(0.0), "freeze the integrator while the speed is zero for more than one step";
-        AntiWindupError => "anti_windup_error", "AW2", "1", Choice(&["off", "below", "above"]), Controller, Some(0.0), "freeze the integrator while the position error is below (T2) or above (T3) the threshold";
+        AntiWindupRest => "anti_windup_rest", "AW1", "1", Choice(Switch::NAMES), Controller, Some(0.0), "freeze the integrator while the speed is zero for more than one step";
+        AntiWindupError => "anti_windup_error", "AW2", "1", Choice(ErrorHold::NAMES), Controller, Some(0.0), "freeze the integrator while the position error is below (T2) or above (T3) the threshold";
         AntiWindupThreshold => "anti_windup_threshold", "-", "rad", NonNegative, Controller, Some(0.0), "position error threshold of anti_windup_error, at the user";
-        BackCalculation => "anti_windup_back_calculation", "AW3", "1/s", NonNegative, Controller, Some(0.0), "gain from (saturated - demanded) torque back to the integrator; 0: off";
-        ConditionalIntegration => "conditional_integration", "-", "1", Choice(&["off", "on"]), Controller, Some(0.0), "integrate only while the torque reference is not limited";
+        AntiWindupBackCalculation => "anti_windup_back_calculation", "AW3", "1/s", NonNegative, Controller, Some(0.0), "gain from (saturated - demanded) torque back to the integrator; 0: off";
+        ConditionalIntegration => "conditional_integration", "-", "1", Choice(Switch::NAMES), Controller, Some(0.0), "integrate only while the torque reference is not limited";
         SampleTime => "sample_time", "T_s", "s", NonNegative, Controller, Some(0.0), "sample time of the controller; 0: every solver step";
         NoiseDeviation => "noise_deviation", "-", "rad", NonNegative, Controller, Some(0.0), "standard deviation of the band-limited noise on the command line (unit of the user position)";
         NoiseSampleTime => "noise_sample_time", "-", "s", Positive, Controller, Some(1e-3), "the noise is held over this time, which sets its band";
-        PositionFeedback => "position_feedback", "-", "1", Choice(&["user", "encoder", "resolver"]), Controller, Some(0.0), "what closes the position loop: the user position itself (the papers' model), the user encoder's counts, or the motor resolver divided by the ratio";
+        PositionFeedback => "position_feedback", "-", "1", Choice(Feedback::NAMES), Controller, Some(0.0), "what closes the position loop: the user position itself (the papers' model), the user encoder's counts, or the motor resolver divided by the ratio";
     }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Mode {
-    Position,
-    Speed,
-    Torque,
 }
 
 /// The switches that give a controller its structure.
@@ -43,32 +46,27 @@ pub struct ControlStructure {
     pub mode: Mode,
     pub derivative: bool,
     pub hold_at_rest: bool,
-    /// 0 off, 1 below, 2 above.
-    pub hold_on_error: u8,
+    pub hold_on_error: ErrorHold,
     pub back_calculation: bool,
     pub feedforward: bool,
     pub conditional: bool,
-    /// 0 user, 1 encoder, 2 resolver.
-    pub feedback: u8,
+    pub feedback: Feedback,
 }
 
 impl ControlStructure {
     pub fn read(raw: &[f64]) -> Self {
         use ControlParameter as P;
         let on = |p: P| raw[p as usize] != 0.0;
+        let switched = |p: P| Switch::read(raw[p as usize]) == Switch::On;
         Self {
-            mode: match raw[P::Mode as usize] as u8 {
-                0 => Mode::Position,
-                1 => Mode::Speed,
-                _ => Mode::Torque,
-            },
+            mode: Mode::read(raw[P::Mode as usize]),
             derivative: on(P::DerivativeTime),
-            hold_at_rest: on(P::AntiWindupRest),
-            hold_on_error: raw[P::AntiWindupError as usize] as u8,
-            back_calculation: on(P::BackCalculation),
+            hold_at_rest: switched(P::AntiWindupRest),
+            hold_on_error: ErrorHold::read(raw[P::AntiWindupError as usize]),
+            back_calculation: on(P::AntiWindupBackCalculation),
             feedforward: on(P::SpeedFeedforward),
-            conditional: on(P::ConditionalIntegration),
-            feedback: raw[P::PositionFeedback as usize] as u8,
+            conditional: switched(P::ConditionalIntegration),
+            feedback: Feedback::read(raw[P::PositionFeedback as usize]),
         }
     }
 }
@@ -125,7 +123,7 @@ impl<S: Scalar> PositionSpeed<S> {
             torque_limit: g(P::TorqueConstant) * g(P::CurrentLimit),
             per_torque_constant: S::one() / g(P::TorqueConstant),
             threshold: g(P::AntiWindupThreshold),
-            back_step: g(P::BackCalculation) * dt,
+            back_step: g(P::AntiWindupBackCalculation) * dt,
             feedforward: g(P::SpeedFeedforward) * ratio / dt,
         }
     }
@@ -181,9 +179,9 @@ impl<S: Scalar> PositionSpeed<S> {
             change = S::select(held, S::zero(), change);
             s.rested = S::indicator(rest);
         }
-        if structure.hold_on_error != 0 {
+        if structure.hold_on_error != ErrorHold::Off {
             let below = position_error.abs().lt(self.threshold);
-            let held = if structure.hold_on_error == 1 { below } else { !below };
+            let held = if structure.hold_on_error == ErrorHold::Below { below } else { !below };
             change = S::select(held, S::zero(), change);
         }
         s.integral = s.integral + change;

@@ -1,7 +1,12 @@
 //! Supply with current and power limit behind a resistance, feeding the link capacitor.
 
 use crate::scalar::Scalar;
-use crate::variables;
+use crate::{choices, variables};
+
+choices! {
+    /// What a source does with current that comes back.
+    Regeneration { Accept "accept", Block "block" }
+}
 
 variables! {
     /// The source and the link.
@@ -10,7 +15,7 @@ variables! {
         PowerLimit => "power_limit", "P_max", "W", Positive, Plant, None, "largest power the source gives";
         Resistance => "resistance", "R_s", "ohm", Positive, Plant, None, "source and harness";
         Capacitance => "capacitance", "C", "F", Positive, Plant, None, "link capacitor";
-        Regeneration => "regeneration", "-", "1", Choice(&["accept", "block"]), Plant, Some(0.0), "does the source take current back, or does the link charge up to the dump resistor";
+        Regeneration => "regeneration", "-", "1", Choice(Regeneration::NAMES), Plant, Some(0.0), "does the source take current back, or does the link charge up to the dump resistor";
         DumpVoltage => "dump_voltage", "-", "V", Positive, Plant, None, "link voltage above which the dump resistor conducts (regeneration = block)";
         DumpResistance => "dump_resistance", "-", "ohm", Positive, Plant, None, "dump resistor";
     }
@@ -39,7 +44,7 @@ impl<S: Scalar> Supply<S> {
     pub fn derive(raw: &[S], dt: S) -> Self {
         use SupplyParameter as P;
         let g = |p: P| raw[p as usize];
-        let block = S::splat(0.5).lt(g(P::Regeneration));
+        let block = S::mask(Regeneration::read(g(P::Regeneration)) == Regeneration::Block);
         Self {
             per_resistance: S::one() / g(P::Resistance),
             current_limit: g(P::CurrentLimit),

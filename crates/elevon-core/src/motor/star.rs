@@ -3,18 +3,23 @@
 
 use crate::scalar::Scalar;
 use crate::three;
-use crate::variables;
+use crate::{choices, variables};
+
+choices! {
+    EmfShape { Sinusoidal "sinusoidal", Trapezoidal "trapezoidal" }
+    ShortModel { Reduced "reduced", Loop "loop" }
+}
 
 variables! {
     /// The motor.
     MotorParameter, MOTOR {
         PolePairs => "pole_pairs", "p", "1", AtLeast(1.0), Plant, None, "pole pairs";
         Inertia => "inertia", "J_m", "kg m2", Positive, Plant, None, "rotor inertia";
-        Resistance => "winding_resistance", "R", "ohm", Positive, Plant, None, "phase resistance at the reference temperature";
-        Inductance => "winding_inductance", "L", "H", Positive, Plant, None, "phase inductance, mutual part included";
+        WindingResistance => "winding_resistance", "R", "ohm", Positive, Plant, None, "phase resistance at the reference temperature";
+        WindingInductance => "winding_inductance", "L", "H", Positive, Plant, None, "phase inductance, mutual part included";
         EmfConstant => "emf_constant", "k", "V s/rad", Positive, Plant, None, "peak phase EMF per mechanical rad/s; torque per peak ampere is 1.5 k";
         TorqueLimit => "torque_limit", "T_max", "N m", Positive, Plant, None, "the flux saturates the torque at this value";
-        EmfShape => "emf_shape", "-", "1", Choice(&["sinusoidal", "trapezoidal"]), Plant, Some(0.0), "shape of the EMF over the electrical angle";
+        EmfShape => "emf_shape", "-", "1", Choice(EmfShape::NAMES), Plant, Some(0.0), "shape of the EMF over the electrical angle";
         EmfFlatWidth => "emf_flat_width", "beta", "rad", Between(0.0, 3.0), Plant, Some(2.094_395_102_393_195_3), "width of the trapezoid's flat";
         TurnsA => "turns_a", "N_a", "1", Fraction, Plant, Some(1.0), "healthy fraction of the turns of phase a";
         TurnsB => "turns_b", "N_b", "1", Fraction, Plant, Some(1.0), "healthy fraction of the turns of phase b";
@@ -27,9 +32,9 @@ variables! {
         OpenA => "open_a", "-", "1", Unit, Plant, Some(0.0), "1: phase a is interrupted (from its next current zero on)";
         OpenB => "open_b", "-", "1", Unit, Plant, Some(0.0), "1: phase b is interrupted (from its next current zero on)";
         OpenC => "open_c", "-", "1", Unit, Plant, Some(0.0), "1: phase c is interrupted (from its next current zero on)";
-        ShortModel => "short_model", "-", "1", Choice(&["reduced", "loop"]), Plant, Some(0.0), "shorted turns only missing (the paper), or a loop of their own with circulating current";
+        ShortModel => "short_model", "-", "1", Choice(ShortModel::NAMES), Plant, Some(0.0), "shorted turns only missing (the paper), or a loop of their own with circulating current";
         ShortCoupling => "short_coupling", "kappa", "1", Between(0.0, 0.99), Plant, Some(0.9), "magnetic coupling of shorted and healthy turns of a phase";
-        ShortContact => "short_contact_resistance", "R_c", "ohm", NonNegative, Plant, Some(0.0), "resistance of the short itself";
+        ShortContactResistance => "short_contact_resistance", "R_c", "ohm", NonNegative, Plant, Some(0.0), "resistance of the short itself";
         WindingTemperature => "winding_temperature", "T_w", "K", Positive, Plant, Some(293.15), "temperature of the winding, an input unless a thermal network drives it";
         ReferenceTemperature => "reference_temperature", "T_0", "K", Positive, Plant, Some(293.15), "temperature at which the resistance is given";
         TemperatureCoefficient => "temperature_coefficient", "alpha", "1/K", NonNegative, Plant, Some(0.0), "relative rise of the resistance per kelvin";
@@ -97,7 +102,7 @@ impl<S: Scalar> Star<S> {
         let has_loop = three!(|j| zero.lt(shorted[j]));
         let guarded: [S; 3] = three!(|j| S::select(has_loop[j], shorted[j], one));
         let factor: [S; 3] = three!(|j| S::select(has_loop[j], one - coupling * coupling, one));
-        let per_inductance: [S; 3] = three!(|j| one / (turns[j] * turns[j] * g(P::Inductance) * factor[j]));
+        let per_inductance: [S; 3] = three!(|j| one / (turns[j] * turns[j] * g(P::WindingInductance) * factor[j]));
         let total = per_inductance[0] + per_inductance[1] + per_inductance[2];
         let (sin_s, cos_s) = g(P::EccentricityStaticPhase).sin_cos();
         let (sin_d, cos_d) = g(P::EccentricityDynamicPhase).sin_cos();
@@ -106,7 +111,7 @@ impl<S: Scalar> Star<S> {
             pole_pairs: g(P::PolePairs),
             offset: g(P::ElectricalOffset),
             emf_constant: three!(|j| turns[j] * k),
-            resistance: three!(|j| turns[j] * g(P::Resistance)),
+            resistance: three!(|j| turns[j] * g(P::WindingResistance)),
             per_inductance,
             dt_per_inductance: three!(|j| dt * per_inductance[j]),
             neutral_weight: three!(|j| per_inductance[j] / total),
@@ -118,8 +123,8 @@ impl<S: Scalar> Star<S> {
             flat_slope: pi / (pi - g(P::EmfFlatWidth)),
             open: phases(raw, P::OpenA),
             loop_ratio: three!(|j| S::select(has_loop[j], coupling * turns[j] / guarded[j], zero)),
-            loop_resistance: three!(|j| shorted[j] * g(P::Resistance) + g(P::ShortContact)),
-            loop_per_inductance: three!(|j| S::select(has_loop[j], one / (guarded[j] * guarded[j] * g(P::Inductance)), zero)),
+            loop_resistance: three!(|j| shorted[j] * g(P::WindingResistance) + g(P::ShortContactResistance)),
+            loop_per_inductance: three!(|j| S::select(has_loop[j], one / (guarded[j] * guarded[j] * g(P::WindingInductance)), zero)),
             loop_turns: three!(|j| shorted[j] * k),
         }
     }

@@ -11,10 +11,10 @@ use crate::variables;
 variables! {
     /// Resistors between terminals and centre tap.
     TapParameter, TAP {
-        LevelA => "tap_level_a", "f_a", "1", Between(0.0, 0.9), Plant, Some(0.0), "healthy 0; level f of the resistor R = ref (1 - f)/f from terminal a to the centre";
-        LevelB => "tap_level_b", "f_b", "1", Between(0.0, 0.9), Plant, Some(0.0), "healthy 0; level f of the resistor R = ref (1 - f)/f from terminal b to the centre";
-        LevelC => "tap_level_c", "f_c", "1", Between(0.0, 0.9), Plant, Some(0.0), "healthy 0; level f of the resistor R = ref (1 - f)/f from terminal c to the centre";
-        Reference => "tap_reference", "ref", "ohm", Positive, Plant, Some(25.0), "resistance that stands for a level of one half";
+        TapLevelA => "tap_level_a", "f_a", "1", Between(0.0, 0.9), Plant, Some(0.0), "healthy 0; level f of the resistor R = ref (1 - f)/f from terminal a to the centre";
+        TapLevelB => "tap_level_b", "f_b", "1", Between(0.0, 0.9), Plant, Some(0.0), "healthy 0; level f of the resistor R = ref (1 - f)/f from terminal b to the centre";
+        TapLevelC => "tap_level_c", "f_c", "1", Between(0.0, 0.9), Plant, Some(0.0), "healthy 0; level f of the resistor R = ref (1 - f)/f from terminal c to the centre";
+        TapReference => "tap_reference", "ref", "ohm", Positive, Plant, Some(25.0), "resistance that stands for a level of one half";
     }
 }
 
@@ -27,9 +27,9 @@ pub struct Tap<S> {
 impl<S: Scalar> Tap<S> {
     pub fn derive(raw: &[S], dt: S) -> Self {
         use TapParameter as P;
-        let reference = raw[P::Reference as usize];
+        let reference = raw[P::TapReference as usize];
         let conductance = three!(|j| {
-            let level = raw[P::LevelA as usize + j];
+            let level = raw[P::TapLevelA as usize + j];
             level / (reference * (S::one() - level))
         });
         Self { conductance, per_dt: S::one() / dt }

@@ -5,17 +5,21 @@
 //! closes to rounding at any tick.
 
 use crate::scalar::Scalar;
-use crate::variables;
+use crate::{choices, variables};
 
 /// Stefan-Boltzmann constant, W/(m2 K4).
 const STEFAN_BOLTZMANN: f64 = 5.670_374_419e-8;
 /// Newton steps on the surface temperature; the function is convex, so they converge from any start.
 const NEWTON: usize = 12;
 
+choices! {
+    ThermalModel { Off "off", QuasiStatic "quasi_static", Dynamic "dynamic" }
+}
+
 variables! {
     /// The thermal network of a motor.
     ThermalParameter, THERMAL {
-        Model => "model", "-", "1", Choice(&["off", "quasi_static", "dynamic"]), Plant, Some(0.0), "off: the winding's temperature is an input; quasi_static: surface without capacity, as printed; dynamic: a housing with capacity";
+        Model => "model", "-", "1", Choice(ThermalModel::NAMES), Plant, Some(0.0), "off: the winding's temperature is an input; quasi_static: surface without capacity, as printed; dynamic: a housing with capacity";
         WindingMass => "winding_mass", "m", "kg", Positive, Plant, Some(1.0), "mass of the winding";
         WindingHeat => "winding_heat", "c", "J/(kg K)", Positive, Plant, Some(385.0), "specific heat of the winding";
         HousingCapacity => "housing_capacity", "C_h", "J/K", Positive, Plant, Some(1000.0), "heat capacity of the housing (dynamic)";
@@ -68,7 +72,7 @@ impl<S: Scalar> Network<S> {
     pub fn derive(raw: &[S], temperature: [S; 3], period: f64) -> Self {
         use ThermalParameter as P;
         let g = |p: P| raw[p as usize];
-        let dynamic = S::splat(1.5).lt(g(P::Model));
+        let dynamic = S::mask(ThermalModel::read(g(P::Model)) == ThermalModel::Dynamic);
         Self {
             winding_capacity: g(P::WindingMass) * g(P::WindingHeat),
             housing_capacity: S::select(dynamic, g(P::HousingCapacity), S::zero()),

@@ -8,11 +8,11 @@ const GRAVITY: f64 = 9.806_65;
 variables! {
     /// Excess mass of the rotor.
     UnbalanceParameter, UNBALANCE {
-        Inertia => "unbalance_inertia", "J_x", "kg m2", NonNegative, Plant, Some(0.0), "healthy 0; inertia of the excess mass";
-        Radius => "unbalance_radius", "-", "1/m", NonNegative, Plant, Some(22.94), "mass times eccentricity of the excess mass per its inertia (half ring of 16 to 35 mm)";
-        Phase => "unbalance_phase", "phi_x", "rad", Any, Plant, Some(0.0), "mechanical angle of the excess mass";
-        GapShare => "unbalance_gap_share", "-", "1", NonNegative, Plant, Some(1.0), "dynamic eccentricity per share of excess inertia";
-        Tilt => "shaft_tilt", "-", "rad", Between(0.0, 1.570_796_326_794_896_7), Plant, Some(0.0), "angle of the shaft above the horizontal: a vertical shaft feels no gravity";
+        UnbalanceInertia => "unbalance_inertia", "J_x", "kg m2", NonNegative, Plant, Some(0.0), "healthy 0; inertia of the excess mass";
+        UnbalanceRadius => "unbalance_radius", "-", "1/m", NonNegative, Plant, Some(22.94), "mass times eccentricity of the excess mass per its inertia (half ring of 16 to 35 mm)";
+        UnbalancePhase => "unbalance_phase", "phi_x", "rad", Any, Plant, Some(0.0), "mechanical angle of the excess mass";
+        UnbalanceGapShare => "unbalance_gap_share", "-", "1", NonNegative, Plant, Some(1.0), "dynamic eccentricity per share of excess inertia";
+        ShaftTilt => "shaft_tilt", "-", "rad", Between(0.0, 1.570_796_326_794_896_7), Plant, Some(0.0), "angle of the shaft above the horizontal: a vertical shaft feels no gravity";
     }
 }
 
@@ -28,12 +28,12 @@ impl<S: Scalar> Unbalance<S> {
     pub fn derive(raw: &[S]) -> Self {
         use UnbalanceParameter as P;
         let g = |p: P| raw[p as usize];
-        let (_, level) = g(P::Tilt).sin_cos();
+        let (_, level) = g(P::ShaftTilt).sin_cos();
         Self {
-            inertia: g(P::Inertia),
-            weight: g(P::Inertia) * g(P::Radius) * S::splat(GRAVITY) * level,
-            phase: g(P::Phase),
-            gap_share: g(P::GapShare),
+            inertia: g(P::UnbalanceInertia),
+            weight: g(P::UnbalanceInertia) * g(P::UnbalanceRadius) * S::splat(GRAVITY) * level,
+            phase: g(P::UnbalancePhase),
+            gap_share: g(P::UnbalanceGapShare),
         }
     }
 

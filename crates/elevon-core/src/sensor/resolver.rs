@@ -4,7 +4,12 @@
 //! converter shows a shaft at rest: the held angle or zero, and no speed.
 
 use crate::scalar::Scalar;
-use crate::variables;
+use crate::{choices, variables};
+
+choices! {
+    /// What a converter shows without power.
+    LossShows { Held "held", Zero "zero" }
+}
 
 variables! {
     /// The resolver on the motor shaft.
@@ -13,7 +18,7 @@ variables! {
         Offset => "resolver.offset", "-", "rad", Any, Sensor, Some(0.0), "offset of the shown motor angle";
         Gain => "resolver.gain", "-", "1", Any, Sensor, Some(1.0), "gain of the shown motor position and speed (not of the commutation angle)";
         PowerOff => "resolver.power_off", "-", "1", Unit, Sensor, Some(0.0), "1 while the resolver has no power";
-        LossShows => "resolver.loss_shows", "-", "1", Choice(&["held", "zero"]), Sensor, Some(0.0), "what the converter shows without power";
+        LossShows => "resolver.loss_shows", "-", "1", Choice(LossShows::NAMES), Sensor, Some(0.0), "what the converter shows without power";
     }
 }
 
@@ -46,7 +51,7 @@ impl<S: Scalar> Resolver<S> {
             offset: g(P::Offset),
             gain: g(P::Gain),
             power_off: g(P::PowerOff),
-            zero_when_off: g(P::LossShows),
+            zero_when_off: S::indicator(S::mask(LossShows::read(g(P::LossShows)) == LossShows::Zero)),
         }
     }
 

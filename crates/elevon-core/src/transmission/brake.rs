@@ -1,7 +1,12 @@
 //! Spring-applied electromagnetic brake on the motor shaft, with the delays of its coil.
 
 use crate::scalar::Scalar;
-use crate::variables;
+use crate::{choices, variables};
+
+choices! {
+    /// What powers the coil.
+    Powered { ByDrive "by_drive", Always "always" }
+}
 
 variables! {
     /// The brake.
@@ -10,7 +15,7 @@ variables! {
         ReleaseDelay => "release_delay", "-", "s", NonNegative, Plant, None, "from power on to free";
         EngageDelay => "engage_delay", "-", "s", NonNegative, Plant, None, "from power off to set";
         Drag => "drag", "-", "N m", NonNegative, Plant, Some(0.0), "torque left when released; healthy 0";
-        Powered => "powered", "-", "1", Choice(&["by_drive", "always"]), Plant, Some(0.0), "always: the bench holds the brake open whatever the drive does (modified free-fall test)";
+        Powered => "powered", "-", "1", Choice(Powered::NAMES), Plant, Some(0.0), "always: the bench holds the brake open whatever the drive does (modified free-fall test)";
     }
 }
 

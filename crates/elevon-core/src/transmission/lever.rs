@@ -2,6 +2,7 @@
 //! lever arm of the leg carries the rod end (P eqs. 13 to 17; the triangle is solved, not its tangent).
 
 use crate::scalar::Scalar;
+use crate::variable::Switch;
 use crate::variables;
 
 variables! {
@@ -19,7 +20,7 @@ variables! {
     /// What hangs on the lever.
     LegParameter, LEG {
         Inertia => "inertia", "J_c", "kg m2", NonNegative, Load, None, "inertia of the leg about its pivot";
-        RateTerm => "inertia_rate_term", "-", "1", Choice(&["off", "on"]), Plant, Some(0.0), "the term -(1/2)(dJ_tot/dtheta) w^2 of a varying inertia, which P omits";
+        InertiaRateTerm => "inertia_rate_term", "-", "1", Choice(Switch::NAMES), Plant, Some(0.0), "the term -(1/2)(dJ_tot/dtheta) w^2 of a varying inertia, which P omits";
     }
 }
 

@@ -1,7 +1,7 @@
 //! Two planetary stages with the free-fall release between them, and the governor that limits the fall.
 
 use crate::scalar::Scalar;
-use crate::variables;
+use crate::{choices, variables};
 
 variables! {
     /// The gearbox; inertias stand at its output.
@@ -15,13 +15,18 @@ variables! {
     }
 }
 
+choices! {
+    /// The stages at the start.
+    ReleaseOpen { No "no", Yes "yes" }
+}
+
 variables! {
     /// The manual release between the stages.
     ReleaseParameter, RELEASE {
         Time => "time", "-", "s", NonNegative, Plant, None, "from the command until the stages are apart";
         GovernorSpeed => "governor_speed", "v_0", "m/s", NonNegative, Plant, None, "ram speed above which the governor brakes a released extension";
         GovernorCoefficient => "governor_coefficient", "c", "N s2/m2", NonNegative, Plant, None, "governor force c (v^2 - v_0^2)";
-        Open => "open", "-", "1", Choice(&["no", "yes"]), Plant, Some(0.0), "yes: released from the start";
+        Open => "open", "-", "1", Choice(ReleaseOpen::NAMES), Plant, Some(0.0), "yes: released from the start";
     }
 }
 

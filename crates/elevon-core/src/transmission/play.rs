@@ -1,14 +1,18 @@
 //! Backlash: the play operator (T1 eq. 3) and the elastic, damped dead zone between two masses.
 
 use crate::scalar::Scalar;
-use crate::variables;
+use crate::{choices, variables};
+
+choices! {
+    PlayModel { Operator "operator", Elastic "elastic" }
+}
 
 variables! {
     /// Play between motor and user, measured at the user.
     PlayParameter, PLAY {
         Total => "total", "2 BLK", "rad", NonNegative, Plant, None, "total play, twice the half amplitude BLK of the papers";
         Extra => "extra", "-", "rad", NonNegative, Plant, Some(0.0), "healthy 0; play added by wear";
-        Model => "model", "-", "1", Choice(&["operator", "elastic"]), Plant, Some(0.0), "the play operator, or two masses with an elastic, damped dead zone";
+        Model => "model", "-", "1", Choice(PlayModel::NAMES), Plant, Some(0.0), "the play operator, or two masses with an elastic, damped dead zone";
         Stiffness => "stiffness", "K", "N m/rad", Positive, Plant, Some(1e4), "contact stiffness at the user (elastic model)";
         Damping => "damping", "C", "N m s/rad", NonNegative, Plant, Some(0.0), "contact damping at the user (elastic model)";
     }

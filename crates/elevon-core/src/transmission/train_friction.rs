@@ -53,47 +53,47 @@ variables! {
         FfRetraction6 => "ff_retraction_6", "F_ff", "N", NonNegative, Plant, None, "mean friction of screw and second stage alone, retracting, at knot 6";
         FfRetraction7 => "ff_retraction_7", "F_ff", "N", NonNegative, Plant, None, "mean friction of screw and second stage alone, retracting, at knot 7";
         FfRetraction8 => "ff_retraction_8", "F_ff", "N", NonNegative, Plant, None, "mean friction of screw and second stage alone, retracting, at knot 8";
-        Harmonic1At1 => "harmonic_1_1", "A_1", "N", NonNegative, Plant, None, "amplitude of harmonic 1 of the pitch, at knot 1";
-        Harmonic1At2 => "harmonic_1_2", "A_1", "N", NonNegative, Plant, None, "amplitude of harmonic 1 of the pitch, at knot 2";
-        Harmonic1At3 => "harmonic_1_3", "A_1", "N", NonNegative, Plant, None, "amplitude of harmonic 1 of the pitch, at knot 3";
-        Harmonic1At4 => "harmonic_1_4", "A_1", "N", NonNegative, Plant, None, "amplitude of harmonic 1 of the pitch, at knot 4";
-        Harmonic1At5 => "harmonic_1_5", "A_1", "N", NonNegative, Plant, None, "amplitude of harmonic 1 of the pitch, at knot 5";
-        Harmonic1At6 => "harmonic_1_6", "A_1", "N", NonNegative, Plant, None, "amplitude of harmonic 1 of the pitch, at knot 6";
-        Harmonic1At7 => "harmonic_1_7", "A_1", "N", NonNegative, Plant, None, "amplitude of harmonic 1 of the pitch, at knot 7";
-        Harmonic1At8 => "harmonic_1_8", "A_1", "N", NonNegative, Plant, None, "amplitude of harmonic 1 of the pitch, at knot 8";
-        Harmonic2At1 => "harmonic_2_1", "A_2", "N", NonNegative, Plant, None, "amplitude of harmonic 2 of the pitch, at knot 1";
-        Harmonic2At2 => "harmonic_2_2", "A_2", "N", NonNegative, Plant, None, "amplitude of harmonic 2 of the pitch, at knot 2";
-        Harmonic2At3 => "harmonic_2_3", "A_2", "N", NonNegative, Plant, None, "amplitude of harmonic 2 of the pitch, at knot 3";
-        Harmonic2At4 => "harmonic_2_4", "A_2", "N", NonNegative, Plant, None, "amplitude of harmonic 2 of the pitch, at knot 4";
-        Harmonic2At5 => "harmonic_2_5", "A_2", "N", NonNegative, Plant, None, "amplitude of harmonic 2 of the pitch, at knot 5";
-        Harmonic2At6 => "harmonic_2_6", "A_2", "N", NonNegative, Plant, None, "amplitude of harmonic 2 of the pitch, at knot 6";
-        Harmonic2At7 => "harmonic_2_7", "A_2", "N", NonNegative, Plant, None, "amplitude of harmonic 2 of the pitch, at knot 7";
-        Harmonic2At8 => "harmonic_2_8", "A_2", "N", NonNegative, Plant, None, "amplitude of harmonic 2 of the pitch, at knot 8";
-        Harmonic3At1 => "harmonic_3_1", "A_3", "N", NonNegative, Plant, None, "amplitude of harmonic 3 of the pitch, at knot 1";
-        Harmonic3At2 => "harmonic_3_2", "A_3", "N", NonNegative, Plant, None, "amplitude of harmonic 3 of the pitch, at knot 2";
-        Harmonic3At3 => "harmonic_3_3", "A_3", "N", NonNegative, Plant, None, "amplitude of harmonic 3 of the pitch, at knot 3";
-        Harmonic3At4 => "harmonic_3_4", "A_3", "N", NonNegative, Plant, None, "amplitude of harmonic 3 of the pitch, at knot 4";
-        Harmonic3At5 => "harmonic_3_5", "A_3", "N", NonNegative, Plant, None, "amplitude of harmonic 3 of the pitch, at knot 5";
-        Harmonic3At6 => "harmonic_3_6", "A_3", "N", NonNegative, Plant, None, "amplitude of harmonic 3 of the pitch, at knot 6";
-        Harmonic3At7 => "harmonic_3_7", "A_3", "N", NonNegative, Plant, None, "amplitude of harmonic 3 of the pitch, at knot 7";
-        Harmonic3At8 => "harmonic_3_8", "A_3", "N", NonNegative, Plant, None, "amplitude of harmonic 3 of the pitch, at knot 8";
-        Harmonic4At1 => "harmonic_4_1", "A_4", "N", NonNegative, Plant, None, "amplitude of harmonic 4 of the pitch, at knot 1";
-        Harmonic4At2 => "harmonic_4_2", "A_4", "N", NonNegative, Plant, None, "amplitude of harmonic 4 of the pitch, at knot 2";
-        Harmonic4At3 => "harmonic_4_3", "A_4", "N", NonNegative, Plant, None, "amplitude of harmonic 4 of the pitch, at knot 3";
-        Harmonic4At4 => "harmonic_4_4", "A_4", "N", NonNegative, Plant, None, "amplitude of harmonic 4 of the pitch, at knot 4";
-        Harmonic4At5 => "harmonic_4_5", "A_4", "N", NonNegative, Plant, None, "amplitude of harmonic 4 of the pitch, at knot 5";
-        Harmonic4At6 => "harmonic_4_6", "A_4", "N", NonNegative, Plant, None, "amplitude of harmonic 4 of the pitch, at knot 6";
-        Harmonic4At7 => "harmonic_4_7", "A_4", "N", NonNegative, Plant, None, "amplitude of harmonic 4 of the pitch, at knot 7";
-        Harmonic4At8 => "harmonic_4_8", "A_4", "N", NonNegative, Plant, None, "amplitude of harmonic 4 of the pitch, at knot 8";
-        Harmonic5At1 => "harmonic_5_1", "A_5", "N", NonNegative, Plant, None, "amplitude of harmonic 5 of the pitch, at knot 1";
-        Harmonic5At2 => "harmonic_5_2", "A_5", "N", NonNegative, Plant, None, "amplitude of harmonic 5 of the pitch, at knot 2";
-        Harmonic5At3 => "harmonic_5_3", "A_5", "N", NonNegative, Plant, None, "amplitude of harmonic 5 of the pitch, at knot 3";
-        Harmonic5At4 => "harmonic_5_4", "A_5", "N", NonNegative, Plant, None, "amplitude of harmonic 5 of the pitch, at knot 4";
-        Harmonic5At5 => "harmonic_5_5", "A_5", "N", NonNegative, Plant, None, "amplitude of harmonic 5 of the pitch, at knot 5";
-        Harmonic5At6 => "harmonic_5_6", "A_5", "N", NonNegative, Plant, None, "amplitude of harmonic 5 of the pitch, at knot 6";
-        Harmonic5At7 => "harmonic_5_7", "A_5", "N", NonNegative, Plant, None, "amplitude of harmonic 5 of the pitch, at knot 7";
-        Harmonic5At8 => "harmonic_5_8", "A_5", "N", NonNegative, Plant, None, "amplitude of harmonic 5 of the pitch, at knot 8";
-        Breakaway => "breakaway_ratio", "-", "1", AtLeast(1.0), Plant, Some(1.0), "static over kinetic friction at rest";
+        Harmonic1_1 => "harmonic_1_1", "A_1", "N", NonNegative, Plant, None, "amplitude of harmonic 1 of the pitch, at knot 1";
+        Harmonic1_2 => "harmonic_1_2", "A_1", "N", NonNegative, Plant, None, "amplitude of harmonic 1 of the pitch, at knot 2";
+        Harmonic1_3 => "harmonic_1_3", "A_1", "N", NonNegative, Plant, None, "amplitude of harmonic 1 of the pitch, at knot 3";
+        Harmonic1_4 => "harmonic_1_4", "A_1", "N", NonNegative, Plant, None, "amplitude of harmonic 1 of the pitch, at knot 4";
+        Harmonic1_5 => "harmonic_1_5", "A_1", "N", NonNegative, Plant, None, "amplitude of harmonic 1 of the pitch, at knot 5";
+        Harmonic1_6 => "harmonic_1_6", "A_1", "N", NonNegative, Plant, None, "amplitude of harmonic 1 of the pitch, at knot 6";
+        Harmonic1_7 => "harmonic_1_7", "A_1", "N", NonNegative, Plant, None, "amplitude of harmonic 1 of the pitch, at knot 7";
+        Harmonic1_8 => "harmonic_1_8", "A_1", "N", NonNegative, Plant, None, "amplitude of harmonic 1 of the pitch, at knot 8";
+        Harmonic2_1 => "harmonic_2_1", "A_2", "N", NonNegative, Plant, None, "amplitude of harmonic 2 of the pitch, at knot 1";
+        Harmonic2_2 => "harmonic_2_2", "A_2", "N", NonNegative, Plant, None, "amplitude of harmonic 2 of the pitch, at knot 2";
+        Harmonic2_3 => "harmonic_2_3", "A_2", "N", NonNegative, Plant, None, "amplitude of harmonic 2 of the pitch, at knot 3";
+        Harmonic2_4 => "harmonic_2_4", "A_2", "N", NonNegative, Plant, None, "amplitude of harmonic 2 of the pitch, at knot 4";
+        Harmonic2_5 => "harmonic_2_5", "A_2", "N", NonNegative, Plant, None, "amplitude of harmonic 2 of the pitch, at knot 5";
+        Harmonic2_6 => "harmonic_2_6", "A_2", "N", NonNegative, Plant, None, "amplitude of harmonic 2 of the pitch, at knot 6";
+        Harmonic2_7 => "harmonic_2_7", "A_2", "N", NonNegative, Plant, None, "amplitude of harmonic 2 of the pitch, at knot 7";
+        Harmonic2_8 => "harmonic_2_8", "A_2", "N", NonNegative, Plant, None, "amplitude of harmonic 2 of the pitch, at knot 8";
+        Harmonic3_1 => "harmonic_3_1", "A_3", "N", NonNegative, Plant, None, "amplitude of harmonic 3 of the pitch, at knot 1";
+        Harmonic3_2 => "harmonic_3_2", "A_3", "N", NonNegative, Plant, None, "amplitude of harmonic 3 of the pitch, at knot 2";
+        Harmonic3_3 => "harmonic_3_3", "A_3", "N", NonNegative, Plant, None, "amplitude of harmonic 3 of the pitch, at knot 3";
+        Harmonic3_4 => "harmonic_3_4", "A_3", "N", NonNegative, Plant, None, "amplitude of harmonic 3 of the pitch, at knot 4";
+        Harmonic3_5 => "harmonic_3_5", "A_3", "N", NonNegative, Plant, None, "amplitude of harmonic 3 of the pitch, at knot 5";
+        Harmonic3_6 => "harmonic_3_6", "A_3", "N", NonNegative, Plant, None, "amplitude of harmonic 3 of the pitch, at knot 6";
+        Harmonic3_7 => "harmonic_3_7", "A_3", "N", NonNegative, Plant, None, "amplitude of harmonic 3 of the pitch, at knot 7";
+        Harmonic3_8 => "harmonic_3_8", "A_3", "N", NonNegative, Plant, None, "amplitude of harmonic 3 of the pitch, at knot 8";
+        Harmonic4_1 => "harmonic_4_1", "A_4", "N", NonNegative, Plant, None, "amplitude of harmonic 4 of the pitch, at knot 1";
+        Harmonic4_2 => "harmonic_4_2", "A_4", "N", NonNegative, Plant, None, "amplitude of harmonic 4 of the pitch, at knot 2";
+        Harmonic4_3 => "harmonic_4_3", "A_4", "N", NonNegative, Plant, None, "amplitude of harmonic 4 of the pitch, at knot 3";
+        Harmonic4_4 => "harmonic_4_4", "A_4", "N", NonNegative, Plant, None, "amplitude of harmonic 4 of the pitch, at knot 4";
+        Harmonic4_5 => "harmonic_4_5", "A_4", "N", NonNegative, Plant, None, "amplitude of harmonic 4 of the pitch, at knot 5";
+        Harmonic4_6 => "harmonic_4_6", "A_4", "N", NonNegative, Plant, None, "amplitude of harmonic 4 of the pitch, at knot 6";
+        Harmonic4_7 => "harmonic_4_7", "A_4", "N", NonNegative, Plant, None, "amplitude of harmonic 4 of the pitch, at knot 7";
+        Harmonic4_8 => "harmonic_4_8", "A_4", "N", NonNegative, Plant, None, "amplitude of harmonic 4 of the pitch, at knot 8";
+        Harmonic5_1 => "harmonic_5_1", "A_5", "N", NonNegative, Plant, None, "amplitude of harmonic 5 of the pitch, at knot 1";
+        Harmonic5_2 => "harmonic_5_2", "A_5", "N", NonNegative, Plant, None, "amplitude of harmonic 5 of the pitch, at knot 2";
+        Harmonic5_3 => "harmonic_5_3", "A_5", "N", NonNegative, Plant, None, "amplitude of harmonic 5 of the pitch, at knot 3";
+        Harmonic5_4 => "harmonic_5_4", "A_5", "N", NonNegative, Plant, None, "amplitude of harmonic 5 of the pitch, at knot 4";
+        Harmonic5_5 => "harmonic_5_5", "A_5", "N", NonNegative, Plant, None, "amplitude of harmonic 5 of the pitch, at knot 5";
+        Harmonic5_6 => "harmonic_5_6", "A_5", "N", NonNegative, Plant, None, "amplitude of harmonic 5 of the pitch, at knot 6";
+        Harmonic5_7 => "harmonic_5_7", "A_5", "N", NonNegative, Plant, None, "amplitude of harmonic 5 of the pitch, at knot 7";
+        Harmonic5_8 => "harmonic_5_8", "A_5", "N", NonNegative, Plant, None, "amplitude of harmonic 5 of the pitch, at knot 8";
+        BreakawayRatio => "breakaway_ratio", "-", "1", AtLeast(1.0), Plant, Some(1.0), "static over kinetic friction at rest";
         Growth => "growth", "-", "N", NonNegative, Plant, Some(0.0), "force added to both tables by wear; healthy 0";
     }
 }
@@ -126,8 +126,8 @@ impl<S: Scalar> TrainFriction<S> {
             knots,
             connected: [curve(P::FfmExtension1 as usize), curve(P::FfmRetraction1 as usize)],
             screw: [curve(P::FfExtension1 as usize), curve(P::FfRetraction1 as usize)],
-            harmonics: std::array::from_fn(|h| curve(P::Harmonic1At1 as usize + h * SPEEDS)),
-            breakaway: raw[P::Breakaway as usize],
+            harmonics: std::array::from_fn(|h| curve(P::Harmonic1_1 as usize + h * SPEEDS)),
+            breakaway: raw[P::BreakawayRatio as usize],
             growth: raw[P::Growth as usize],
         }
     }

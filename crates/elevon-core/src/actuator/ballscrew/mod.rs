@@ -13,7 +13,6 @@ use crate::transmission::gear::GearParameter;
 use crate::transmission::screw::{Screw, ScrewParameter};
 use crate::variable::{Group, Signal};
 use layout::At;
-use records::At as _;
 
 pub struct Ballscrew;
 
@@ -28,18 +27,18 @@ impl Form for Ballscrew {
         faults::catalogue()
     }
     fn ratio<S: Scalar>(raw: &[S]) -> S {
-        raw[GearParameter::Ratio.at()] / raw[ScrewParameter::Lead.place()]
+        raw[GearParameter::Ratio.at()] / raw[ScrewParameter::Lead.at()]
     }
     fn screw_inertia<S: Scalar>(raw: &[S]) -> S {
         let ratio = raw[GearParameter::Ratio.at()];
-        raw[ScrewParameter::Inertia.place()] / (ratio * ratio)
+        raw[ScrewParameter::Inertia.at()] / (ratio * ratio)
     }
     fn screw<S: Scalar>(raw: &[S]) -> Screw<S> {
         Screw::derive(records::screw(raw), raw[GearParameter::Ratio.at()])
     }
     fn worn(departs: &dyn Fn(usize, f64) -> bool) -> (bool, bool) {
         let spalls = [ScrewParameter::SpallGroove, ScrewParameter::SpallNut, ScrewParameter::SpallBall];
-        (spalls.into_iter().any(|p| departs(p.place(), 0.0)), departs(ScrewParameter::Debris.place(), 0.0))
+        (spalls.into_iter().any(|p| departs(p.at(), 0.0)), departs(ScrewParameter::Debris.at(), 0.0))
     }
     fn check(raw: &[f64]) -> Vec<Finding> {
         records::check(raw)

@@ -1,15 +1,16 @@
 //! The records of the ballscrew actuator: those of a servo in the units of a travelling output, and the screw's own.
 
-use crate::actuator::servo::layout::{self, group, At as _, COMMAND};
+use crate::actuator::servo::layout::{self, At as _, COMMAND};
 use crate::actuator::servo::signals::{self, HighSignal as H, LowSignal as L};
 use crate::actuator::{Finding, Port};
 use crate::control::position_speed::{ControlParameter as C, CONTROL};
+use crate::groups;
 use crate::sensor::encoder::{EncoderParameter as E, ENCODER};
 use crate::transmission::friction::{FrictionParameter as F, FRICTION};
 use crate::transmission::gear::{GearParameter, LoadParameter as D, StopParameter as T, GEAR, LOAD, STOP};
 use crate::transmission::play::{PlayParameter as P, PLAY};
 use crate::transmission::screw::{RatingParameter, ScrewParameter, RATING, SCREW};
-use crate::variable::{extended, offset, relabelled, Group, Relabel, Signal, Variable};
+use crate::variable::{extended, relabelled, Relabel, Signal, Variable};
 
 const fn change(index: usize, name: &'static str, unit: &'static str, text: &'static str) -> Relabel {
     Relabel { index, name, unit, text }
@@ -53,49 +54,18 @@ const RAM_ENCODER: [Variable; ENCODER.len()] = relabelled(
     ],
 );
 
-pub const GROUPS: &[Group] = &{
-    let mut all = [layout::GROUPS[0]; layout::GROUPS.len() + 2];
-    let mut i = 0;
-    while i < layout::GROUPS.len() {
-        all[i] = layout::GROUPS[i];
-        i += 1;
+groups! {
+    over layout {
+        gear: &RAM_GEAR;
+        friction: &RAM_FRICTION;
+        play: &RAM_PLAY;
+        stop: &RAM_STOP;
+        load: &RAM_LOAD;
+        control: &RAM_CONTROL;
+        encoder: &RAM_ENCODER;
     }
-    all[1] = group("gear", &RAM_GEAR);
-    all[2] = group("friction", &RAM_FRICTION);
-    all[3] = group("play", &RAM_PLAY);
-    all[4] = group("stop", &RAM_STOP);
-    all[5] = group("load", &RAM_LOAD);
-    all[9] = group("control", &RAM_CONTROL);
-    all[11] = group("sensor", &RAM_ENCODER);
-    all[layout::GROUPS.len()] = group("screw", SCREW);
-    all[layout::GROUPS.len() + 1] = group("rating", RATING);
-    all
-};
-
-const AT_SCREW: usize = offset(GROUPS, layout::GROUPS.len());
-const AT_RATING: usize = offset(GROUPS, layout::GROUPS.len() + 1);
-
-// The shared components stand where the servo looks for them.
-const _: () = assert!(AT_SCREW == offset(layout::GROUPS, layout::GROUPS.len()));
-
-/// Place in the whole parameter vector.
-pub trait At {
-    fn place(self) -> usize;
-}
-impl At for ScrewParameter {
-    fn place(self) -> usize {
-        AT_SCREW + self as usize
-    }
-}
-impl At for RatingParameter {
-    fn place(self) -> usize {
-        AT_RATING + self as usize
-    }
-}
-
-/// The screw's own parameters.
-pub fn screw<S>(raw: &[S]) -> &[S] {
-    &raw[AT_SCREW..AT_SCREW + SCREW.len()]
+    screw: "screw", SCREW, ScrewParameter;
+    rating: "rating", RATING, RatingParameter;
 }
 
 pub const PORTS: &[Port] = &[
@@ -170,7 +140,7 @@ fn finding(path: &str, value: f64, limit: f64, message: String) -> Finding {
 
 /// What a screw cannot be.
 pub fn check(raw: &[f64]) -> Vec<Finding> {
-    let g = |p: ScrewParameter| raw[p.place()];
+    let g = |p: ScrewParameter| raw[p.at()];
     let mut out = Vec::new();
     let (ball, pitch) = (g(ScrewParameter::BallDiameter), g(ScrewParameter::PitchDiameter));
     if ball >= pitch {

@@ -9,7 +9,7 @@ use crate::control::pi_rate::PiRateParameter;
 use crate::inverter::bridge::{BridgeStructure, InverterParameter as Inverter};
 use crate::inverter::six_step::SixStep;
 use crate::inverter::supply::{Link, Supply};
-use crate::motor::star::{MotorParameter, MotorStructure, Star};
+use crate::motor::star::{EmfShape, MotorParameter, MotorStructure, Star};
 use crate::scalar::{three_phase, Scalar};
 use crate::sensor::hall::{Hall, HallState};
 use crate::sensor::proximity::ProximityParameter;
@@ -31,7 +31,7 @@ impl Structure {
         let departs = |p: MotorParameter| setup.departs(p.at(), 0.0);
         Self {
             motor: MotorStructure {
-                trapezoidal: setup.raw[MotorParameter::EmfShape.at()] == 1.0,
+                trapezoidal: EmfShape::read(setup.raw[MotorParameter::EmfShape.at()]) == EmfShape::Trapezoidal,
                 shorted_loop: false,
                 static_eccentricity: departs(MotorParameter::EccentricityStatic),
                 dynamic_eccentricity: departs(MotorParameter::EccentricityDynamic),
@@ -121,7 +121,7 @@ impl<S: Scalar> Constants<S> {
             flux_factor: S::one() + at(MotorParameter::FluxTemperatureCoefficient.at()) * rise,
             temperature: at(MotorParameter::WindingTemperature.at()),
             per_control_period: S::one() / at(PiRateParameter::Period.at()),
-            cell_noise: at(CellParameter::Noise.at()),
+            cell_noise: at(CellParameter::LoadCellNoise.at()),
             raw: (0..S::LANES).map(|lane| raw.iter().map(|x| x.lane(lane)).collect()).collect(),
         }
     }

@@ -7,7 +7,7 @@ use crate::control::sequence::SequenceParameter as Sequence;
 use crate::inverter::bridge::InverterParameter as Inverter;
 use crate::inverter::six_step::SixStepParameter;
 use crate::inverter::supply::SupplyParameter;
-use crate::motor::star::MotorParameter as Motor;
+use crate::motor::star::{MotorParameter as Motor, ShortModel};
 use crate::sensor::proximity::ProximityParameter as Proximity;
 use crate::transmission::lever::{opens_at, LeverParameter};
 use crate::transmission::lock::LockParameter as Lock;
@@ -111,7 +111,7 @@ fn common(out: &mut Vec<Finding>, raw: &[f64]) {
         let limit = if v < low { low } else { high };
         out.push(finding("inverter.supply_voltage", v, limit, format!("inverter.supply_voltage: {v} V is outside control.undervoltage = {low} V to control.overvoltage = {high} V: every move would be refused")));
     }
-    if raw[Motor::ShortModel.at()] != 0.0 {
+    if ShortModel::read(raw[Motor::ShortModel.at()]) != ShortModel::Reduced {
         out.push(finding(
             "motor.short_model",
             1.0,
@@ -151,7 +151,7 @@ pub fn high(raw: &[f64]) -> Vec<Finding> {
     whole_multiple(&mut out, raw, (SolverParameter::MechanicalStep.at(), "solver.mechanical_step"), step);
     whole_multiple(&mut out, raw, (PiRateParameter::Period.at(), "control.period"), step);
     let turns = (0..3).map(|j| raw[Motor::TurnsA.at() + j]).fold(1.0, f64::min);
-    let (l, r) = (turns * raw[Motor::Inductance.at()], raw[Motor::Resistance.at()] + raw[Inverter::OnResistance.at()]);
+    let (l, r) = (turns * raw[Motor::WindingInductance.at()], raw[Motor::WindingResistance.at()] + raw[Inverter::OnResistance.at()]);
     step_limit(&mut out, "solver.step", dt, l / r, "electrical pole R / L of motor.winding_resistance and motor.winding_inductance");
     step_limit(&mut out, "solver.step", dt, link(raw), "pole of supply.resistance and supply.capacitance");
     step_limit(
@@ -170,7 +170,7 @@ pub fn low(raw: &[f64]) -> Vec<Finding> {
     let dt = raw[LowParameter::Step.at()];
     whole_multiple(&mut out, raw, (PiRateParameter::Period.at(), "control.period"), (LowParameter::Step.at(), "low.step"));
     step_limit(&mut out, "low.step", dt, link(raw), "pole of supply.resistance and supply.capacitance");
-    let (k, r) = (2.0 * raw[Motor::EmfConstant.at()], 2.0 * (raw[Motor::Resistance.at()] + raw[Inverter::OnResistance.at()]));
+    let (k, r) = (2.0 * raw[Motor::EmfConstant.at()], 2.0 * (raw[Motor::WindingResistance.at()] + raw[Inverter::OnResistance.at()]));
     step_limit(
         &mut out,
         "low.step",

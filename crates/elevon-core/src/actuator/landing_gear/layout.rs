@@ -15,8 +15,7 @@ use crate::transmission::lock::{LockParameter, LOCK};
 use crate::transmission::planetary::{PlanetaryParameter, ReleaseParameter, PLANETARY, RELEASE};
 use crate::transmission::roller_screw::{ScrewParameter, SCREW};
 use crate::transmission::train_friction::{TrainFrictionParameter, TRAIN_FRICTION};
-use crate::variable::{offset, Group};
-use crate::variables;
+use crate::{groups, variables};
 
 variables! {
     /// The shaft of the motor.
@@ -51,7 +50,7 @@ variables! {
 variables! {
     /// The load cell of the friction rig.
     CellParameter, CELL {
-        Noise => "load_cell_noise", "-", "N", NonNegative, Sensor, Some(0.0), "standard deviation of the load cell's noise, held over a control period";
+        LoadCellNoise => "load_cell_noise", "-", "N", NonNegative, Sensor, Some(0.0), "standard deviation of the load cell's noise, held over a control period";
     }
 }
 
@@ -59,7 +58,7 @@ variables! {
     /// The low fidelity.
     LowParameter, LOW {
         Step => "step", "dt_low", "s", Positive, Solver, Some(2e-5), "solver step of the low fidelity";
-        Commutation => "commutation_factor", "c", "1", NonNegative, Plant, Some(1.1), "mean torque loss of the commutations as a resistance c p |w| L";
+        CommutationFactor => "commutation_factor", "c", "1", NonNegative, Plant, Some(1.1), "mean torque loss of the commutations as a resistance c p |w| L";
     }
 }
 
@@ -72,69 +71,29 @@ variables! {
     }
 }
 
-const fn group(prefix: &'static str, variables: &'static [crate::variable::Variable]) -> Group {
-    Group { prefix, variables }
+groups! {
+    motor: "motor", MOTOR, MotorParameter;
+    shaft: "motor", SHAFT, ShaftParameter;
+    inverter: "inverter", INVERTER, InverterParameter;
+    six_step: "inverter", SIX_STEP, SixStepParameter;
+    supply: "supply", LINK, SupplyParameter;
+    gear: "gear", PLANETARY, PlanetaryParameter;
+    screw: "screw", SCREW, ScrewParameter;
+    lever: "lever", LEVER, LeverParameter;
+    leg: "leg", LEG, LegParameter;
+    load: "load", LOAD_CURVE, LoadCurveParameter;
+    friction: "friction", TRAIN_FRICTION, TrainFrictionParameter;
+    brake: "brake", BRAKE, BrakeParameter;
+    lock: "lock", LOCK, LockParameter;
+    release: "release", RELEASE, ReleaseParameter;
+    pi_rate: "control", PI_RATE, PiRateParameter;
+    sequence: "control", SEQUENCE, SequenceParameter;
+    proximity: "proximity", PROXIMITY, ProximityParameter;
+    hall: "hall", HALL, HallParameter;
+    cell: "sensor", CELL, CellParameter;
+    low: "low", LOW, LowParameter;
+    solver: "solver", SOLVER, SolverParameter;
 }
-
-pub const GROUPS: &[Group] = &[
-    group("motor", MOTOR),
-    group("motor", SHAFT),
-    group("inverter", INVERTER),
-    group("inverter", SIX_STEP),
-    group("supply", LINK),
-    group("gear", PLANETARY),
-    group("screw", SCREW),
-    group("lever", LEVER),
-    group("leg", LEG),
-    group("load", LOAD_CURVE),
-    group("friction", TRAIN_FRICTION),
-    group("brake", BRAKE),
-    group("lock", LOCK),
-    group("release", RELEASE),
-    group("control", PI_RATE),
-    group("control", SEQUENCE),
-    group("proximity", PROXIMITY),
-    group("hall", HALL),
-    group("sensor", CELL),
-    group("low", LOW),
-    group("solver", SOLVER),
-];
-
-/// A view of the parameter vector by component.
-#[derive(Clone, Copy)]
-pub struct Raw<'a, S>(pub &'a [S]);
-
-/// Index in the whole parameter vector.
-pub trait At {
-    fn at(self) -> usize;
-}
-
-macro_rules! views {
-    ($($name:ident $index:literal $id:ident),*) => {
-        // Every group has its view, also where single parameters are looked up by `At` alone.
-        #[allow(dead_code)]
-        impl<'a, S> Raw<'a, S> {
-            $(pub fn $name(self) -> &'a [S] {
-                const AT: usize = offset(GROUPS, $index);
-                &self.0[AT..AT + GROUPS[$index].variables.len()]
-            })*
-        }
-        $(impl At for $id {
-            fn at(self) -> usize {
-                const AT: usize = offset(GROUPS, $index);
-                AT + self as usize
-            }
-        })*
-    };
-}
-
-views!(
-    motor 0 MotorParameter, shaft 1 ShaftParameter, inverter 2 InverterParameter, six_step 3 SixStepParameter,
-    supply 4 SupplyParameter, gear 5 PlanetaryParameter, screw 6 ScrewParameter, lever 7 LeverParameter, leg 8 LegParameter,
-    load 9 LoadCurveParameter, friction 10 TrainFrictionParameter, brake 11 BrakeParameter, lock 12 LockParameter,
-    release 13 ReleaseParameter, pi_rate 14 PiRateParameter, sequence 15 SequenceParameter, proximity 16 ProximityParameter,
-    hall 17 HallParameter, cell 18 CellParameter, low 19 LowParameter, solver 20 SolverParameter
-);
 
 pub const PORTS: &[Port] = &[
     Port { name: "command", unit: "1", text: "0 stop, 1 extend, 2 retract, 3 free fall, held until the next one", parameter: "" },

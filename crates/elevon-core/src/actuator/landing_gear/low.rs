@@ -173,7 +173,7 @@ impl Wiring for Low {
             on_resistance: raw[InverterParameter::OnResistance.at()],
             diode_drop: raw[InverterParameter::DiodeDrop.at()],
             inductance: three!(|j| S::one() / c.star.per_inductance[j]),
-            commutation: raw[LowParameter::Commutation.at()] * c.star.pole_pairs,
+            commutation: raw[LowParameter::CommutationFactor.at()] * c.star.pole_pairs,
             c,
         }
     }

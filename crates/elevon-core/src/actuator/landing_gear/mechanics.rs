@@ -12,6 +12,7 @@ use crate::transmission::lock::Lock;
 use crate::transmission::planetary::{Governor, Planetary, PlanetaryParameter};
 use crate::transmission::roller_screw::{RollerScrew, ScrewParameter};
 use crate::transmission::train_friction::TrainFriction;
+use crate::variable::Switch;
 
 const GRAVITY: f64 = 9.80665;
 
@@ -138,7 +139,7 @@ impl<S: Scalar> Mechanics<S> {
             mass_screw: mass + (turning + second) * screw.turns * screw.turns,
             mass,
             leg: at(LegParameter::Inertia.at()),
-            rate_term: S::splat(0.5) * at(LegParameter::RateTerm.at()),
+            rate_term: S::splat(0.5) * S::indicator(S::mask(Switch::read(at(LegParameter::InertiaRateTerm.at())) == Switch::On)),
             load_curve: Curve::new(&load_knots, &view.load()[LoadCurveParameter::Force0 as usize..]),
             load_knots,
             factor: at(LoadCurveParameter::Factor.at()),

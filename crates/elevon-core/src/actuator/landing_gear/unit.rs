@@ -4,10 +4,10 @@ use super::layout::Raw;
 use crate::control::pi_rate::{PiRate, PiRateParameter};
 use crate::control::sequence::{Phase, Seen, Sequence, SequenceParameter, COMMANDS, FAULTS, REFUSALS};
 use crate::sensor::proximity::{ProximityParameter, Switches};
-use crate::transmission::brake::{BrakeParameter, Coil};
+use crate::transmission::brake::{BrakeParameter, Coil, Powered};
 use crate::transmission::lever::LeverParameter;
 use crate::transmission::lock::LockParameter;
-use crate::transmission::planetary::ReleaseParameter;
+use crate::transmission::planetary::{ReleaseOpen, ReleaseParameter};
 
 #[derive(Clone, Copy, Debug)]
 pub struct Unit {
@@ -43,7 +43,7 @@ impl Unit {
         let raw = Raw(raw);
         let stroke = raw.lever()[LeverParameter::Stroke as usize];
         let locked = nut - stroke >= raw.lock()[LockParameter::EngageTravel as usize];
-        let released = raw.release()[ReleaseParameter::Open as usize] > 0.5;
+        let released = ReleaseOpen::read(raw.release()[ReleaseParameter::Open as usize]) == ReleaseOpen::Yes;
         let switches = Switches::start(raw.proximity(), nut.min(stroke), locked);
         let phase = match switches.shown {
             [_, _, _, true] => Phase::Locked,
@@ -51,7 +51,7 @@ impl Unit {
             [true, ..] => Phase::Retracted,
             _ => Phase::Stopped,
         };
-        let coil = Coil::new(raw.brake()[BrakeParameter::Powered as usize] > 0.5);
+        let coil = Coil::new(Powered::read(raw.brake()[BrakeParameter::Powered as usize]) == Powered::Always);
         Self {
             sequence: Sequence::start(phase, released),
             speed: PiRate::default(),
@@ -103,7 +103,7 @@ impl Unit {
             self.speed = PiRate::default();
         }
         let brake = raw.brake();
-        let powered = orders.brake_powered || brake[BrakeParameter::Powered as usize] > 0.5;
+        let powered = orders.brake_powered || Powered::read(brake[BrakeParameter::Powered as usize]) == Powered::Always;
         self.coil.step(powered, brake[BrakeParameter::ReleaseDelay as usize], brake[BrakeParameter::EngageDelay as usize], dt);
     }
 

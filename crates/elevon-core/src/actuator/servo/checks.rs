@@ -7,18 +7,22 @@ use crate::control::current_dq::PwmParameter;
 use crate::control::position_speed::ControlParameter as Control;
 use crate::inverter::bridge::InverterParameter as Inverter;
 use crate::motor::equivalent::LowParameter;
-use crate::motor::star::MotorParameter as Motor;
+use crate::motor::star::{MotorParameter as Motor, ShortModel};
 use crate::motor::tap::TapParameter as Tap;
-use crate::motor::thermal::ThermalParameter as Thermal;
+use crate::motor::thermal::{ThermalModel, ThermalParameter as Thermal};
 use crate::motor::unbalance::UnbalanceParameter;
 use crate::sensor::current::CurrentSensorParameter;
 use crate::sensor::resolver::ResolverParameter;
 use crate::transmission::friction::FrictionParameter;
 use crate::transmission::gear::{GearParameter, LoadParameter, StopParameter};
-use crate::transmission::play::PlayParameter;
+use crate::transmission::play::{PlayModel, PlayParameter};
 
 pub fn finding(path: &str, value: f64, limit: f64, message: String) -> Finding {
     Finding { path: path.to_string(), value, limit, message }
+}
+
+fn drive(raw: &[f64]) -> DriveKind {
+    DriveKind::read(raw[DriveParameter::Kind.at()])
 }
 
 fn step_limit(out: &mut Vec<Finding>, dt: f64, limit: f64, pole: &str) {
@@ -57,7 +61,7 @@ fn common<F: Form>(out: &mut Vec<Finding>, raw: &[f64]) {
 
 /// Temperatures that no motor can have.
 fn thermal(out: &mut Vec<Finding>, raw: &[f64]) {
-    if raw[Thermal::Model.at()] == 0.0 {
+    if ThermalModel::read(raw[Thermal::Model.at()]) == ThermalModel::Off {
         return;
     }
     let [convection, emissivity] = [Thermal::Convection, Thermal::Emissivity].map(|p| raw[p.at()]);
@@ -97,13 +101,14 @@ pub fn faulted<F: Form>(raw: &[f64]) -> Vec<Finding> {
 
 /// A resistor at the centre tap needs legs that always hold their terminals.
 fn tapped(out: &mut Vec<Finding>, raw: &[f64]) {
-    let Some(level) = [Tap::LevelA, Tap::LevelB, Tap::LevelC].map(|p| raw[p.at()]).into_iter().find(|&f| f > 0.0) else {
+    let Some(level) = [Tap::TapLevelA, Tap::TapLevelB, Tap::TapLevelC].map(|p| raw[p.at()]).into_iter().find(|&f| f > 0.0) else {
         return;
     };
     let base = Inverter::SupplyVoltage.at();
     let detailed = Inverter::DETAIL.clone().any(|i| raw[base + i] != 0.0) || (0..3).any(|j| raw[Motor::OpenA.at() + j] != 0.0);
-    let drops = raw[DriveParameter::FeedbackLoss.at()] == 1.0 && raw[ResolverParameter::PowerOff.at()] != 0.0;
-    if detailed || drops || raw[DriveParameter::Kind.at()] == 2.0 {
+    let drops =
+        FeedbackLoss::read(raw[DriveParameter::FeedbackLoss.at()]) == FeedbackLoss::Stop && raw[ResolverParameter::PowerOff.at()] != 0.0;
+    if detailed || drops || drive(raw) == DriveKind::Off {
         let message = format!("motor.tap_level: {level} cannot go with an open phase, a drive that is off, or the details of the bridge (inverter.on_resistance, diode_drop, dead_time, trip_current, open or shorted switches): a floating terminal at a resistor is not modelled; at most 0");
         out.push(finding("motor.tap_level", level, 0.0, message));
     }
@@ -122,15 +127,18 @@ pub fn high<F: Form>(raw: &[f64]) -> Vec<Finding> {
     common::<F>(&mut out, raw);
     tapped(&mut out, raw);
     let dt = raw[SolverParameter::Step.at()];
-    let (r, l) = (raw[Motor::Resistance.at()], raw[Motor::Inductance.at()]);
+    let (r, l) = (raw[Motor::WindingResistance.at()], raw[Motor::WindingInductance.at()]);
     let turns = (0..3).map(|j| raw[Motor::TurnsA.at() + j]).fold(1.0, f64::min);
     step_limit(&mut out, dt, turns * l / r, "electrical pole R / L of motor.winding_resistance and motor.winding_inductance");
     shorted_loops(&mut out, raw, dt);
     relay_band(&mut out, raw, dt, turns * turns * l);
-    let rotor = raw[Motor::Inertia.at()] + raw[GearParameter::Inertia.at()] + F::screw_inertia(raw) + raw[UnbalanceParameter::Inertia.at()];
+    let rotor = raw[Motor::Inertia.at()]
+        + raw[GearParameter::Inertia.at()]
+        + F::screw_inertia(raw)
+        + raw[UnbalanceParameter::UnbalanceInertia.at()];
     let user = raw[LoadParameter::Inertia.at()];
     let ratio = F::ratio(raw);
-    let elastic = raw[PlayParameter::Model.at()] == 1.0;
+    let elastic = PlayModel::read(raw[PlayParameter::Model.at()]) == PlayModel::Elastic;
     let inertia = if elastic { rotor } else { rotor + user / (ratio * ratio) };
     derivative_inertia(&mut out, raw, inertia);
     let td = raw[Control::DerivativeTime.at()];
@@ -149,7 +157,7 @@ pub fn high<F: Form>(raw: &[f64]) -> Vec<Finding> {
     if elastic {
         contact::<F>(&mut out, raw, dt, rotor * ratio * ratio, user);
     }
-    if raw[DriveParameter::Commutation.at()] == 1.0 && raw[DriveParameter::Kind.at()] == 1.0 {
+    if Commutation::read(raw[DriveParameter::Commutation.at()]) == Commutation::SixStep && drive(raw) == DriveKind::Pwm {
         out.push(finding(
             "drive.commutation",
             1.0,
@@ -167,8 +175,8 @@ pub fn high<F: Form>(raw: &[f64]) -> Vec<Finding> {
         let used = match path {
             "control.noise_sample_time" => raw[Control::NoiseDeviation.at()] > 0.0,
             "sensor.current.noise_sample_time" => raw[CurrentSensorParameter::NoiseDeviation.at()] > 0.0,
-            "thermal.sample_time" => raw[Thermal::Model.at()] != 0.0,
-            "pwm.sample_time" => raw[DriveParameter::Kind.at()] == 1.0,
+            "thermal.sample_time" => ThermalModel::read(raw[Thermal::Model.at()]) != ThermalModel::Off,
+            "pwm.sample_time" => drive(raw) == DriveKind::Pwm,
             _ => true,
         };
         if used {
@@ -179,22 +187,22 @@ pub fn high<F: Form>(raw: &[f64]) -> Vec<Finding> {
 }
 
 fn shorted_loops(out: &mut Vec<Finding>, raw: &[f64], dt: f64) {
-    if raw[Motor::ShortModel.at()] != 1.0 {
+    if ShortModel::read(raw[Motor::ShortModel.at()]) != ShortModel::Loop {
         return;
     }
     for j in 0..3 {
         let mu = 1.0 - raw[Motor::TurnsA.at() + j];
         if mu > 0.0 {
             let kappa = raw[Motor::ShortCoupling.at()];
-            let inductance = mu * mu * raw[Motor::Inductance.at()] * (1.0 - kappa * kappa);
-            let resistance = mu * raw[Motor::Resistance.at()] + raw[Motor::ShortContact.at()];
+            let inductance = mu * mu * raw[Motor::WindingInductance.at()] * (1.0 - kappa * kappa);
+            let resistance = mu * raw[Motor::WindingResistance.at()] + raw[Motor::ShortContactResistance.at()];
             step_limit(out, dt, inductance / resistance, "pole of the shorted turns (motor.short_model = loop)");
         }
     }
 }
 
 fn relay_band(out: &mut Vec<Finding>, raw: &[f64], dt: f64, inductance: f64) {
-    if raw[DriveParameter::Kind.at()] == 0.0 {
+    if drive(raw) == DriveKind::Hysteresis {
         let slew = raw[Inverter::SupplyVoltage.at()] * (2.0 / 3.0) / inductance;
         step_limit(
             out,
@@ -216,7 +224,7 @@ fn contact<F: Form>(out: &mut Vec<Finding>, raw: &[f64], dt: f64, motor: f64, us
     let per_mass = 1.0 / motor + 1.0 / user;
     let omega = (k * per_mass).sqrt();
     let damped = if c > 0.0 { 1.0 / (c * per_mass) } else { f64::INFINITY };
-    let semi = raw[SolverParameter::Method.at()] == 1.0;
+    let semi = Method::read(raw[SolverParameter::Method.at()]) == Method::SemiImplicit;
     let limit = if semi { 1.0 / omega } else { c / k };
     step_limit(out, dt, limit.min(damped), "contact stiffness play.stiffness and damping play.damping");
 }
@@ -228,7 +236,7 @@ pub fn low<F: Form>(raw: &[f64]) -> Vec<Finding> {
     let inertia = raw[Motor::Inertia.at()]
         + raw[GearParameter::Inertia.at()]
         + F::screw_inertia(raw)
-        + raw[UnbalanceParameter::Inertia.at()]
+        + raw[UnbalanceParameter::UnbalanceInertia.at()]
         + raw[LoadParameter::Inertia.at()] / (ratio * ratio);
     derivative_inertia(&mut out, raw, inertia);
     let dt = raw[LowParameter::Step.at()];

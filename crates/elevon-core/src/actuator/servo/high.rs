@@ -6,7 +6,7 @@ use super::march::March;
 use super::model::{Model, State};
 use super::start;
 use super::step::{control_step, park, seen_current, shaft_reading, HighStep};
-use super::structure::{sample_steps, Drive, Structure};
+use super::structure::{sample_steps, Structure};
 use crate::actuator::{Finding, Inputs, Overheat, Port, Setup, Tick, Watch, Wiring, WATCHED};
 use crate::control::current_dq::{CurrentSample, PwmParameter};
 use crate::control::position_speed::ControlParameter;
@@ -67,7 +67,7 @@ impl<F: Form> Wiring for High<F> {
         add(raw[ControlParameter::NoiseDeviation.at()] != 0.0, ControlParameter::NoiseSampleTime.at(), TICK_COMMAND_NOISE);
         add(raw[CurrentSensorParameter::NoiseDeviation.at()] != 0.0, CurrentSensorParameter::NoiseSampleTime.at(), TICK_CURRENT_NOISE);
         add(!structure.control_every_step, ControlParameter::SampleTime.at(), TICK_CONTROL);
-        add(structure.drive == Drive::Pwm, PwmParameter::SampleTime.at(), TICK_CURRENT_CONTROL);
+        add(structure.drive == DriveKind::Pwm, PwmParameter::SampleTime.at(), TICK_CURRENT_CONTROL);
         add(structure.heat, ThermalParameter::SampleTime.at(), TICK_THERMAL);
         add(structure.debris, ControlParameter::SampleTime.at(), TICK_DEBRIS);
         ticks
@@ -143,7 +143,7 @@ impl<F: Form> Wiring for High<F> {
         count: Steps,
     ) {
         let x = March { structure, models, inputs, states, from, count };
-        match (structure.full, structure.extra, structure.drive == Drive::Pwm) {
+        match (structure.full, structure.extra, structure.drive == DriveKind::Pwm) {
             (false, _, false) => x.run::<HighStep<false, false, false>>(),
             (false, _, true) => x.run::<HighStep<false, false, true>>(),
             (true, false, _) => x.run::<HighStep<true, false, false>>(),

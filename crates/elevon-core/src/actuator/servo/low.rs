@@ -9,12 +9,12 @@ use super::observe::low_screw;
 use super::signals::{LowSignal as Q, LOW};
 use crate::actuator::{Finding, Inputs, Overheat, Port, Setup, Tick, Watch, Wiring, WATCHED};
 use crate::control::current_dq::PwmParameter;
-use crate::control::position_speed::{ControlParameter, Mode};
+use crate::control::position_speed::{ControlParameter, Feedback, Mode};
 use crate::fault::FaultKind;
 use crate::inverter::bridge::InverterParameter;
 use crate::motor::equivalent::{equivalent, imposed_shape, Circuit, LowParameter};
 use crate::motor::star::{MotorParameter, MotorStructure, Star, StarState};
-use crate::motor::thermal::{Network, NetworkState, ThermalParameter};
+use crate::motor::thermal::{Network, NetworkState, ThermalModel, ThermalParameter};
 use crate::motor::unbalance::{Unbalance, UnbalanceParameter};
 use crate::scalar::{three_phase, Scalar};
 use crate::sensor::current::CurrentSensorParameter;
@@ -39,9 +39,8 @@ const TICK_DEBRIS: u8 = 1;
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Structure {
     mode: Mode,
-    feedback: u8,
-    /// 0 hysteresis, 1 PWM, 2 off.
-    drive: u8,
+    feedback: Feedback,
+    drive: DriveKind,
     integral: bool,
     resolver: bool,
     /// The resolver commutates, too.
@@ -191,9 +190,9 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, x: &Moment<S>, s: &mut S
         (angle, shown_speed, shown_position) = (reading.angle, reading.speed, reading.position);
     }
     let position = match structure.feedback {
-        0 => s.user_position,
-        1 => m.encoder.read(s.user_position),
-        _ => shown_position * m.gear.per_ratio,
+        Feedback::User => s.user_position,
+        Feedback::Encoder => m.encoder.read(s.user_position),
+        Feedback::Resolver => shown_position * m.gear.per_ratio,
     };
 
     // Control electronics: P and PID; the derivative of the measured speed is solved with the acceleration.
@@ -263,9 +262,9 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, x: &Moment<S>, s: &mut S
     let circuit = &p.circuit;
     let target = match structure.drive {
         // The relays act only at the edges of their band; inside it the EMF drives the current.
-        0 => circuit.current(s.current, -emf).clamp(current_ref - m.band, current_ref + m.band),
-        1 => s.current + m.tracking * (current_ref - s.current),
-        _ => zero,
+        DriveKind::Hysteresis => circuit.current(s.current, -emf).clamp(current_ref - m.band, current_ref + m.band),
+        DriveKind::Pwm => s.current + m.tracking * (current_ref - s.current),
+        DriveKind::Off => zero,
     };
     let driving = circuit.voltage(s.current, target);
     let supply = x.supply * m.supply_scale;
@@ -356,27 +355,27 @@ impl<F: Form> Wiring for Low<F> {
     fn structure(setup: &Setup) -> Structure {
         let raw = setup.raw;
         let departs = |i: usize, healthy: f64| setup.departs(i, healthy);
-        let feedback = raw[ControlParameter::PositionFeedback.at()] as u8;
+        let feedback = Feedback::read(raw[ControlParameter::PositionFeedback.at()]);
         let first = ResolverParameter::Mismatch.at();
         let resolver = !Resolver::<f64>::ideal(Raw(raw).resolver()) || (0..5).any(|i| setup.touched[first + i]);
         let phases = MotorParameter::TurnsA.at()..=MotorParameter::TurnsC.at();
         let opens = MotorParameter::OpenA.at()..=MotorParameter::OpenC.at();
-        let unbalance = departs(UnbalanceParameter::Inertia.at(), 0.0);
+        let unbalance = departs(UnbalanceParameter::UnbalanceInertia.at(), 0.0);
         let dynamic_eccentricity = unbalance || departs(MotorParameter::EccentricityDynamic.at(), 0.0);
-        let commutated = raw[DriveParameter::CommutationSource.at()] == 0.0;
+        let commutated = CommutationSource::read(raw[DriveParameter::CommutationSource.at()]) == CommutationSource::Resolver;
         let (spall, debris) = F::worn(&departs);
         let mut turns = phases.map(|i| departs(i, 1.0));
         Structure {
             mode: crate::control::position_speed::ControlStructure::read(Raw(raw).control()).mode,
             feedback,
-            drive: raw[DriveParameter::Kind.at()] as u8,
+            drive: DriveKind::read(raw[DriveParameter::Kind.at()]),
             integral: raw[ControlParameter::IntegralTime.at()] > 0.0,
             resolver,
             commutated,
             feedforward: raw[ControlParameter::SpeedFeedforward.at()] != 0.0,
             linear: F::LINEAR,
             load_side: F::LINEAR || departs(LoadParameter::Damping.at(), 0.0) || departs(LoadParameter::Friction.at(), 0.0),
-            heat: raw[ThermalParameter::Model.at()] != 0.0,
+            heat: ThermalModel::read(raw[ThermalParameter::Model.at()]) != ThermalModel::Off,
             unbalance,
             spall,
             debris,
@@ -429,7 +428,6 @@ impl<F: Form> Wiring for Low<F> {
         let gain = at(ControlParameter::SpeedGain.at()) * at(ControlParameter::SpeedGainScale.at());
         let ti = at(ControlParameter::IntegralTime.at());
         let has_integral = S::zero().lt(ti);
-        let drive = at(DriveParameter::Kind.at()).lane(0);
         let first_shorted = InverterParameter::ShortedAHigh.at();
         let shorted = (0..6).fold(S::zero(), |sum, i| sum + at(first_shorted + i));
         let per_torque_constant = one / at(ControlParameter::TorqueConstant.at());
@@ -437,7 +435,7 @@ impl<F: Form> Wiring for Low<F> {
         let torque_mode = structure.mode == Mode::Torque;
         let derivative_inertia = if torque_mode { S::zero() } else { gain * at(ControlParameter::DerivativeTime.at()) };
         let constant = S::splat(1.5) * at(MotorParameter::EmfConstant.at()) * at(MotorParameter::FluxFraction.at());
-        let cold = [constant, at(MotorParameter::Resistance.at()), at(MotorParameter::Inductance.at())];
+        let cold = [constant, at(MotorParameter::WindingResistance.at()), at(MotorParameter::WindingInductance.at())];
         let rise = at(MotorParameter::WindingTemperature.at()) - at(MotorParameter::ReferenceTemperature.at());
         let resistance_factor = one + at(MotorParameter::TemperatureCoefficient.at()) * rise;
         let flux_factor = one + at(MotorParameter::FluxTemperatureCoefficient.at()) * rise;
@@ -450,12 +448,12 @@ impl<F: Form> Wiring for Low<F> {
             inductance: three!(|j| one / star.per_inductance[j]),
             healthy,
             cold,
-            electrical_inductance: at(MotorParameter::PolePairs.at()) * at(MotorParameter::Inductance.at()),
+            electrical_inductance: at(MotorParameter::PolePairs.at()) * at(MotorParameter::WindingInductance.at()),
             star,
             voltage_ratio: at(LowParameter::VoltageRatio.at()),
             band: at(LowParameter::BandRatio.at()) * at(InverterParameter::HysteresisBand.at()),
-            tracking: if drive == 1.0 {
-                one - (-(at(PwmParameter::ProportionalGain.at()) / at(MotorParameter::Inductance.at()) * dt)).exp()
+            tracking: if structure.drive == DriveKind::Pwm {
+                one - (-(at(PwmParameter::ProportionalGain.at()) / at(MotorParameter::WindingInductance.at()) * dt)).exp()
             } else {
                 one
             },
@@ -629,7 +627,7 @@ impl<F: Form> Wiring for Low<F> {
 
 /// Factors of the winding's resistance and of the flux.
 fn heat<S: Scalar>(raw: &[S], warm: &NetworkState<S>) -> (S, S) {
-    if raw[ThermalParameter::Model.at()].lane(0) == 0.0 {
+    if ThermalModel::read(raw[ThermalParameter::Model.at()]) == ThermalModel::Off {
         let mut star = StarState::rest();
         star.heat(Raw(raw).motor(), raw[MotorParameter::WindingTemperature.at()]);
         return (star.resistance_factor, star.flux_factor);

@@ -6,7 +6,7 @@ use crate::control::current_dq::CurrentControlState;
 use crate::control::position_speed::PositionSpeedState;
 use crate::inverter::bridge::BridgeState;
 use crate::motor::star::{MotorParameter, StarState};
-use crate::motor::thermal::{NetworkState, ThermalParameter};
+use crate::motor::thermal::{NetworkState, ThermalModel, ThermalParameter};
 use crate::scalar::Scalar;
 use crate::three;
 use crate::transmission::friction::FrictionParameter;
@@ -59,7 +59,7 @@ pub(super) fn refresh<S: Scalar>(raw: &[S], state: &mut State<S>) {
 
 /// Temperature factors: of the network where there is one, else of the given winding temperature.
 fn heat<S: Scalar>(raw: &[S], star: &mut StarState<S>, warm: &NetworkState<S>) {
-    if raw[ThermalParameter::Model.at()].lane(0) == 0.0 {
+    if ThermalModel::read(raw[ThermalParameter::Model.at()]) == ThermalModel::Off {
         star.heat(Raw(raw).motor(), raw[MotorParameter::WindingTemperature.at()]);
     } else {
         let dt = raw[SolverParameter::Step.at()].lane(0);

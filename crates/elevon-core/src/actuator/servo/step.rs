@@ -3,10 +3,12 @@
 //! that only some servos have; a detail at its healthy value changes no bit, so the forms agree exactly where both apply.
 
 use super::electrical::{coupling, electric_step, motor_torque};
+use super::layout::DriveKind;
 use super::march::{Moment, Stepper};
 use super::mechanical::mechanical_step;
 use super::model::{Model, State};
-use super::structure::{Drive, Structure};
+use super::structure::Structure;
+use crate::control::position_speed::Feedback;
 use crate::inverter::hysteresis::{count_transitions, relays, six_step};
 use crate::scalar::{three_phase, Scalar};
 use crate::sensor::filter::low_pass;
@@ -32,8 +34,8 @@ pub(super) fn control_step<S: Scalar, const FULL: bool>(
     reading: &Reading<S>,
 ) {
     let position = match structure.control.feedback {
-        1 if FULL => m.encoder.read(s.user_position),
-        2 if FULL => reading.position * m.gear.per_ratio,
+        Feedback::Encoder if FULL => m.encoder.read(s.user_position),
+        Feedback::Resolver if FULL => reading.position * m.gear.per_ratio,
         _ => s.user_position,
     };
     let command = command + s.command_noise;
@@ -110,9 +112,9 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     // Power electronics.
     let half_supply = S::splat(0.5) * (x.supply * m.supply_scale);
     let old_legs = s.legs;
-    if PWM || (FULL && structure.drive == Drive::Pwm) {
+    if PWM || (FULL && structure.drive == DriveKind::Pwm) {
         s.legs = m.current_control.compare(&s.current_control, x.t);
-    } else if FULL && structure.drive == Drive::Off {
+    } else if FULL && structure.drive == DriveKind::Off {
         s.legs = [S::zero(); 3];
     } else {
         let shape = if EXTRA && structure.six_step { six_step(sin_phases) } else { sin_phases };

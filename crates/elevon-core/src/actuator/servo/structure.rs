@@ -4,30 +4,23 @@ use super::form::Form;
 use super::layout::*;
 use super::signals::HighSignal;
 use crate::actuator::Setup;
-use crate::control::position_speed::{ControlParameter, ControlStructure};
+use crate::control::position_speed::{ControlParameter, ControlStructure, Feedback};
 use crate::inverter::bridge::{BridgeStructure, InverterParameter};
-use crate::motor::star::{MotorParameter, MotorStructure};
+use crate::motor::star::{EmfShape, MotorParameter, MotorStructure, ShortModel};
 use crate::motor::tap::TapParameter;
-use crate::motor::thermal::ThermalParameter;
+use crate::motor::thermal::{ThermalModel, ThermalParameter};
 use crate::motor::unbalance::UnbalanceParameter;
 use crate::sensor::current::{CurrentSensor, CurrentSensorParameter};
 use crate::sensor::resolver::{Resolver, ResolverParameter};
 use crate::time::Steps;
 use crate::transmission::friction::FrictionParameter;
 use crate::transmission::gear::{GearParameter, LoadParameter};
-use crate::transmission::play::PlayParameter;
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) enum Drive {
-    Hysteresis,
-    Pwm,
-    Off,
-}
+use crate::transmission::play::{PlayModel, PlayParameter};
 
 /// Everything that decides which code runs; equal over a lane block.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Structure {
-    pub(super) drive: Drive,
+    pub(super) drive: DriveKind,
     pub(super) control: ControlStructure,
     pub(super) motor: MotorStructure,
     pub(super) control_every_step: bool,
@@ -65,18 +58,14 @@ pub struct Structure {
 impl Structure {
     pub(super) fn read<F: Form>(setup: &Setup) -> Self {
         let raw = Raw(setup.raw);
-        let choice = |i: usize| setup.raw[i] as u8;
+        let at = |i: usize| setup.raw[i];
         let departs = |i: usize, healthy: f64| setup.departs(i, healthy);
-        let drive = match choice(DriveParameter::Kind.at()) {
-            0 => Drive::Hysteresis,
-            1 => Drive::Pwm,
-            _ => Drive::Off,
-        };
+        let drive = DriveKind::read(at(DriveParameter::Kind.at()));
         let control = ControlStructure::read(raw.control());
-        let unbalance = departs(UnbalanceParameter::Inertia.at(), 0.0);
+        let unbalance = departs(UnbalanceParameter::UnbalanceInertia.at(), 0.0);
         let motor = MotorStructure {
-            trapezoidal: choice(MotorParameter::EmfShape.at()) == 1,
-            shorted_loop: choice(MotorParameter::ShortModel.at()) == 1,
+            trapezoidal: EmfShape::read(at(MotorParameter::EmfShape.at())) == EmfShape::Trapezoidal,
+            shorted_loop: ShortModel::read(at(MotorParameter::ShortModel.at())) == ShortModel::Loop,
             static_eccentricity: departs(MotorParameter::EccentricityStatic.at(), 0.0),
             dynamic_eccentricity: unbalance || departs(MotorParameter::EccentricityDynamic.at(), 0.0),
         };
@@ -84,13 +73,13 @@ impl Structure {
         let open_phase = (MotorParameter::OpenA.at()..=MotorParameter::OpenC.at()).any(|i| departs(i, 0.0));
         let base = InverterParameter::SupplyVoltage.at();
         let detailed = InverterParameter::DETAIL.clone().any(|i| departs(base + i, 0.0));
-        let stops = resolver_lost && choice(DriveParameter::FeedbackLoss.at()) == 1;
-        let bridge = open_phase || detailed || drive == Drive::Off || stops;
+        let stops = resolver_lost && FeedbackLoss::read(at(DriveParameter::FeedbackLoss.at())) == FeedbackLoss::Stop;
+        let bridge = open_phase || detailed || drive == DriveKind::Off || stops;
         let switches = InverterParameter::OpenAHigh as usize..=InverterParameter::ShortedCLow as usize;
         let switch_faults = switches.into_iter().any(|i| departs(base + i, 0.0));
         let trips = switch_faults || departs(InverterParameter::TripCurrent.at(), 0.0);
         let bridge_structure = BridgeStructure { switch_faults, open_phases: open_phase, trips };
-        let elastic = choice(PlayParameter::Model.at()) == 1;
+        let elastic = PlayModel::read(at(PlayParameter::Model.at())) == PlayModel::Elastic;
         let first_gain = CurrentSensorParameter::GainA.at();
         let measured_current = !CurrentSensor::<f64>::ideal(raw.current_sensor()) || (0..9).any(|i| setup.touched[first_gain + i]);
         let first_resolver = ResolverParameter::Mismatch.at();
@@ -102,13 +91,13 @@ impl Structure {
         let mechanical = loaded || sloped || jams;
         let thermal =
             departs(MotorParameter::TemperatureCoefficient.at(), 0.0) || departs(MotorParameter::FluxTemperatureCoefficient.at(), 0.0);
-        let told = control.feedback != 0;
-        let heat = choice(ThermalParameter::Model.at()) != 0;
-        let tap = (TapParameter::LevelA.at()..=TapParameter::LevelC.at()).any(|i| departs(i, 0.0));
+        let told = control.feedback != Feedback::User;
+        let heat = ThermalModel::read(at(ThermalParameter::Model.at())) != ThermalModel::Off;
+        let tap = (TapParameter::TapLevelA.at()..=TapParameter::TapLevelC.at()).any(|i| departs(i, 0.0));
         let load_side = F::LINEAR || departs(LoadParameter::Damping.at(), 0.0) || departs(LoadParameter::Friction.at(), 0.0);
         let current_filter = setup.raw[CurrentSensorParameter::Bandwidth.at()] > 0.0;
-        let six_step = choice(DriveParameter::Commutation.at()) == 1;
-        let commutated = choice(DriveParameter::CommutationSource.at()) == 0;
+        let six_step = Commutation::read(at(DriveParameter::Commutation.at())) == Commutation::SixStep;
+        let commutated = CommutationSource::read(at(DriveParameter::CommutationSource.at())) == CommutationSource::Resolver;
         let (spall, debris) = F::worn(&departs);
         let separate = resolver && !commutated;
         let extra = load_side || heat || tap || unbalance || spall || debris || current_filter || six_step || separate || stops;
@@ -129,7 +118,7 @@ impl Structure {
             control,
             motor,
             control_every_step: sample_steps(setup.raw, ControlParameter::SampleTime.at()) <= 1,
-            semi_implicit: choice(SolverParameter::Method.at()) == 1,
+            semi_implicit: Method::read(at(SolverParameter::Method.at())) == Method::SemiImplicit,
             acquisition: setup
                 .recorded
                 .iter()

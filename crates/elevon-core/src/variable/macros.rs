@@ -1,0 +1,140 @@
+//! Declarations in one place: parameters and their records, choices and their names, groups and where each begins.
+
+/// Declares an enum of parameters and the table of their records, in one place.
+#[macro_export]
+macro_rules! variables {
+    ($(#[$meta:meta])* $id:ident, $table:ident {
+        $($variant:ident => $path:literal, $symbol:literal, $unit:literal, $range:expr, $register:ident, $default:expr, $text:literal;)*
+    }) => {
+        $(#[$meta])*
+        // Rows of one kind are reached by counting from the first: not every name is written out.
+        #[allow(dead_code)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(usize)]
+        pub enum $id { $($variant),* }
+        $(const _: () = assert!($crate::variable::named(stringify!($variant), $path), concat!("the variant of ", $path, " carries its name"));)*
+        pub const $table: &[$crate::variable::Variable] = {
+            #[allow(unused_imports)]
+            use $crate::variable::Range::*;
+            &[$($crate::variable::Variable {
+                path: $path, symbol: $symbol, unit: $unit, range: $range,
+                register: $crate::variable::Register::$register, default: $default, text: $text,
+            }),*]
+        };
+    };
+}
+
+/// Declares an enum of signals and the table of their records.
+#[macro_export]
+macro_rules! signals {
+    ($(#[$meta:meta])* $id:ident, $table:ident {
+        $($variant:ident => $name:literal, $symbol:literal, $unit:literal, $text:literal;)*
+    }) => {
+        $(#[$meta])*
+        // Phases b and c are reached by counting from a: not every name is written out.
+        #[allow(dead_code)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(usize)]
+        pub enum $id { $($variant),* }
+        pub const $table: &[$crate::variable::Signal] = &[$($crate::variable::Signal {
+            name: $name, symbol: $symbol, unit: $unit, text: $text,
+        }),*];
+    };
+}
+
+/// Declares the enums of parameters that are choices: their names in the order of their indices, and the enum itself.
+#[macro_export]
+macro_rules! choices {
+    ($($(#[$meta:meta])* $id:ident { $($variant:ident $name:literal),* $(,)? })*) => {$(
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[repr(u8)]
+        pub enum $id { $($variant),* }
+        // Not every choice is asked for both by name and by index.
+        #[allow(dead_code)]
+        impl $id {
+            pub const NAMES: &'static [&'static str] = &[$($name),*];
+            const ALL: &'static [Self] = &[$(Self::$variant),*];
+
+            /// The choice that a parameter holds as its index; runs of a block share their choices.
+            #[inline(always)]
+            pub fn read<S: $crate::scalar::Scalar>(raw: S) -> Self {
+                Self::ALL[(raw.lane(0) as usize).min(Self::ALL.len() - 1)]
+            }
+            /// The index as a parameter holds it.
+            pub const fn index(self) -> f64 {
+                self as u8 as f64
+            }
+        }
+    )*};
+}
+
+/// Declares the groups of a wiring in the order of its parameter vector: `GROUPS`, a view of the vector by component, and
+/// where each parameter stands in it (`At`). With `over`, the groups of another layout (some with other names and units,
+/// none with other lengths) and further ones behind them.
+#[macro_export]
+macro_rules! groups {
+    ($($view:ident: $prefix:literal, $table:expr, $id:ident;)*) => {
+        pub const GROUPS: &[$crate::variable::Group] = &[$($crate::variable::group($prefix, $table)),*];
+
+        /// The groups by their view's name.
+        #[allow(non_camel_case_types, dead_code)]
+        #[derive(Clone, Copy)]
+        pub enum Part { $($view),* }
+
+        /// A view of the parameter vector by component.
+        #[derive(Clone, Copy)]
+        pub struct Raw<'a, S>(pub &'a [S]);
+
+        // Some components are read by single numbers only.
+        #[allow(dead_code)]
+        impl<'a, S> Raw<'a, S> {
+            $(pub fn $view(self) -> &'a [S] {
+                $crate::variable::slice(GROUPS, Part::$view as usize, self.0)
+            })*
+        }
+
+        /// Index in the whole parameter vector.
+        pub trait At {
+            fn at(self) -> usize;
+        }
+        $(impl At for $id {
+            #[inline(always)]
+            fn at(self) -> usize {
+                const BEGIN: usize = $crate::variable::offset(GROUPS, Part::$view as usize);
+                BEGIN + self as usize
+            }
+        })*
+    };
+    (over $base:ident { $($view:ident: $table:expr;)* } $($more:ident: $prefix:literal, $further:expr, $id:ident;)*) => {
+        /// The further groups by their view's name.
+        #[allow(non_camel_case_types, dead_code)]
+        #[derive(Clone, Copy)]
+        pub enum Part { $($more),* }
+
+        pub const GROUPS: &[$crate::variable::Group] = &{
+            const FURTHER: &[$crate::variable::Group] = &[$($crate::variable::group($prefix, $further)),*];
+            let mut all = $crate::variable::followed::<{ $base::GROUPS.len() + FURTHER.len() }>($base::GROUPS, FURTHER);
+            $(
+                assert!($table.len() == all[$base::Part::$view as usize].variables.len());
+                all[$base::Part::$view as usize].variables = $table;
+            )*
+            all
+        };
+
+        $(
+            #[doc = concat!("The parameters of the group `", $prefix, "`.")]
+            #[allow(dead_code)]
+            pub fn $more<S>(raw: &[S]) -> &[S] {
+                $crate::variable::slice(GROUPS, $base::GROUPS.len() + Part::$more as usize, raw)
+            }
+            impl $base::At for $id {
+                #[inline(always)]
+                fn at(self) -> usize {
+                    const BEGIN: usize = $crate::variable::offset(GROUPS, $base::GROUPS.len() + Part::$more as usize);
+                    BEGIN + self as usize
+                }
+            }
+        )*
+    };
+}
