@@ -1,6 +1,8 @@
 //! Motor electromagnetics.
 
+pub mod cogging;
 pub mod equivalent;
+pub mod magnetic_pull;
 pub mod star;
 pub mod tap;
 pub mod thermal;

@@ -140,6 +140,9 @@ impl<const N: usize> Scalar for Dual<N> {
         let value = libm::exp(self.value);
         self.chain(value, value)
     }
+    fn ln(self) -> Self {
+        self.chain(libm::log(self.value), 1.0 / self.value)
+    }
     fn powf(self, exponent: f64) -> Self {
         let value = libm::pow(self.value, exponent);
         self.chain(value, exponent * libm::pow(self.value, exponent - 1.0))

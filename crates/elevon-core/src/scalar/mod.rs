@@ -65,6 +65,10 @@ pub trait Scalar:
     fn round(self) -> Self;
     fn floor(self) -> Self;
     fn exp(self) -> Self;
+    /// Natural logarithm.
+    fn ln(self) -> Self {
+        Self::from_fn(|i| libm::log(self.lane(i)))
+    }
     fn powf(self, exponent: f64) -> Self;
     /// Nearest integer (ties to even) as a number and as quarter turns; for magnitudes below 2^51.
     fn quarters(self) -> (Self, Self::Quarters);

@@ -1,7 +1,9 @@
 //! Mechanics between the motor shaft and the user.
 
+pub mod bearing;
 pub mod brake;
 pub mod friction;
+pub mod friction_law;
 pub mod gear;
 pub mod lever;
 pub mod lock;
@@ -9,4 +11,6 @@ pub mod planetary;
 pub mod play;
 pub mod roller_screw;
 pub mod screw;
+pub mod stop;
+pub mod tooth;
 pub mod train_friction;
