@@ -79,8 +79,9 @@ impl FaultLanes {
         self.soonest
     }
 
-    pub fn labels(&self, lane: usize) -> impl Iterator<Item = f64> + '_ {
-        self.held[lane].iter().map(|h| h.label)
+    /// The label of a fault of a lane; 0 where the lane has no such fault.
+    pub fn label(&self, lane: usize, fault: usize) -> f64 {
+        self.held[lane].get(fault).map_or(0.0, |held| held.label)
     }
 
     pub fn count(&self, lane: usize) -> usize {

@@ -1,6 +1,7 @@
 //! One block of lanes from start to end: events cut the run, the inner loop runs between them.
 
 use super::batch::Monitor;
+use super::rows::Rows;
 use super::spec::{Clock, RunOutput, RunSpec, Status};
 use crate::actuator::{Inputs, Overheat, Setup, Tick, Watch, Wiring};
 use crate::command::SourceLanes;
@@ -93,43 +94,26 @@ impl<W: Wiring, S: Scalar> Kernel for Observe<'_, W, S> {
     }
 }
 
-/// Observes one chunk and keeps a row of each of its lanes on every clock that is due.
-struct Keep<'a, W: Wiring, S: Scalar, L: Lift<S>> {
-    structure: &'a W::Structure,
-    model: &'a W::Model<S>,
-    inputs: &'a Inputs<S>,
-    state: &'a W::State<S>,
-    t: f64,
-    out: &'a mut [S],
-    lift: &'a L,
+/// Observes one chunk and appends a row to every clock that is due.
+struct Record<'a, W: Wiring, S: Scalar, L: Lift<S>> {
+    observe: Observe<'a, W, S>,
     clocks: &'a [Clock],
     due: &'a [Steps],
     k: Steps,
-    first: usize,
-    stopped: &'a [Option<Steps>],
     faults: &'a FaultLanes,
-    kept: &'a mut [Vec<Vec<f64>>],
+    lift: &'a L,
+    rows: &'a mut Rows<S>,
 }
 
-impl<W: Wiring, S: Scalar, L: Lift<S>> Kernel for Keep<'_, W, S, L> {
+impl<W: Wiring, S: Scalar, L: Lift<S>> Kernel for Record<'_, W, S, L> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        W::observe(self.structure, self.model, self.inputs, self.state, S::splat(self.t), self.out);
-        for ((i, kept), stopped) in self.kept.iter_mut().enumerate().zip(self.stopped) {
-            if stopped.is_some() {
-                continue;
-            }
-            for ((clock, kept), &due) in self.clocks.iter().zip(kept).zip(self.due) {
-                if self.k < due {
-                    continue;
-                }
-                for &signal in &clock.signals {
-                    self.lift.emit(self.out[signal], i, kept);
-                }
-                for label in self.faults.labels(self.first + i) {
-                    self.lift.emit(S::splat(label), i, kept);
-                }
+        let Observe { structure, model, inputs, state, t, out } = self.observe;
+        W::observe(structure, model, inputs, state, S::splat(t), out);
+        for (i, (clock, &due)) in self.clocks.iter().zip(self.due).enumerate() {
+            if due <= self.k {
+                self.rows.append(i, clock, out, self.faults, self.lift);
             }
         }
     }
@@ -175,7 +159,7 @@ pub struct Block<'a, W: Wiring, S: Scalar, L: Lift<S>> {
     clock_due: Vec<Steps>,
     status: Vec<Status>,
     stopped: Vec<Option<Steps>>,
-    kept: Vec<Vec<Vec<f64>>>,
+    rows: Vec<Rows<S>>,
     wall: f64,
 }
 
@@ -193,11 +177,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         let faults = FaultLanes::new(runs.iter().map(|r| r.faults.clone()).collect(), grid);
         let sources = (0..W::PORTS.len()).map(|p| SourceLanes::new(runs.iter().map(|r| r.ports[p].clone()).collect())).collect();
         let ticks = W::ticks(&first.parameters, &structure);
-        let kept = (0..real)
-            .map(|r| {
-                clocks.iter().map(|c| Vec::with_capacity((steps / c.period + 1) as usize * (c.signals.len() + faults.count(r)))).collect()
-            })
-            .collect();
+        let rows = (0..chunks).map(|c| Rows::new(c * S::LANES, real, clocks, &faults, steps, &lift)).collect();
         let mut block = Self {
             tick_due: vec![0; ticks.len()],
             clock_due: vec![0; clocks.len()],
@@ -211,7 +191,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             faults,
             sources,
             ticks,
-            kept,
+            rows,
             models: Vec::new(),
             states: Vec::new(),
             inputs: vec![Vec::new(); chunks],
@@ -331,26 +311,22 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             return;
         }
         for chunk in 0..self.states.len() {
-            let first = chunk * S::LANES;
-            let last = (first + S::LANES).min(self.real);
-            if first < last {
-                S::vectorize(Keep::<W, S, L> {
+            S::vectorize(Record::<W, S, L> {
+                observe: Observe {
                     structure: &self.structure,
                     model: &self.models[chunk],
                     inputs: &self.inputs[chunk],
                     state: &self.states[chunk],
                     t: k as f64 * self.dt,
                     out,
-                    lift: &self.lift,
-                    clocks: self.clocks,
-                    due: &self.clock_due,
-                    k,
-                    first,
-                    stopped: &self.stopped[first..last],
-                    faults: &self.faults,
-                    kept: &mut self.kept[first..last],
-                });
-            }
+                },
+                clocks: self.clocks,
+                due: &self.clock_due,
+                k,
+                faults: &self.faults,
+                lift: &self.lift,
+                rows: &mut self.rows[chunk],
+            });
         }
         for (due, clock) in self.clock_due.iter_mut().zip(self.clocks) {
             if k >= *due {
@@ -394,15 +370,21 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             let beyond = watched.iter().find(|w| w.value.lane(i).is_nan() || w.value.lane(i).abs() > w.limit);
             if let Some(watch) = beyond {
                 self.status[lane] = Status::Diverged { time, signal: watch.name };
-                self.stopped[lane] = Some(k);
+                self.stop(lane, k);
             } else if let Some(heat) = heat.filter(|h| h.over.lane(i) > 0.0) {
                 self.status[lane] = Status::Overheated { time, temperature: heat.temperature.lane(i) };
-                self.stopped[lane] = Some(k);
+                self.stop(lane, k);
             } else if self.status[lane] == Status::Ok && tripped.lane(i) > 0.0 {
                 let reason = W::trip_reason(&self.models[chunk], &self.states[chunk], i).unwrap_or_default();
                 self.status[lane] = Status::Tripped { time, reason };
             }
         }
+    }
+
+    /// The lane neither moves nor records from step `k` on.
+    fn stop(&mut self, lane: usize, k: Steps) {
+        self.stopped[lane] = Some(k);
+        self.rows[lane / S::LANES].end(lane % S::LANES, &self.lift);
     }
 
     fn next_event(&self, k: Steps) -> Steps {
@@ -419,7 +401,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         for lane in 0..self.real {
             if self.stopped[lane].is_none() {
                 self.status[lane] = Status::Interrupted;
-                self.stopped[lane] = Some(k);
+                self.stop(lane, k);
             }
         }
     }
@@ -443,7 +425,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
                 time: steps as f64 * self.dt,
                 wall: self.wall / self.real as f64,
                 columns: self.clocks.iter().map(|c| (c.signals.len() + labels) * width).collect(),
-                clocks: std::mem::take(&mut self.kept[lane]),
+                clocks: self.rows[lane / S::LANES].take(lane % S::LANES, &self.lift),
                 last,
             });
         }

@@ -2,6 +2,7 @@
 
 mod batch;
 mod block;
+mod rows;
 mod spec;
 mod width;
 

@@ -1,0 +1,98 @@
+//! What the clocks of one chunk of lanes recorded. Rows gather as whole vectors while the run goes on and are sorted into
+//! one table a lane some hundred rows at a time: a store a signal instead of one a signal and lane.
+
+use super::block::Lift;
+use super::spec::Clock;
+use crate::fault::FaultLanes;
+use crate::scalar::Scalar;
+use crate::time::Steps;
+
+/// Rows that gather before they are sorted by lane.
+const GATHERED: usize = 256;
+
+/// One clock of one chunk: rows of the clock's signals, then of the fault labels (as many as the lane with most of them has).
+#[derive(Clone, Debug)]
+struct Table<S> {
+    columns: usize,
+    gathered: Vec<S>,
+    /// Row-major tables of the lanes that are recorded.
+    lanes: Vec<Vec<f64>>,
+}
+
+/// The tables of one chunk, one a clock.
+#[derive(Clone, Debug)]
+pub(super) struct Rows<S> {
+    first: usize,
+    /// Fault labels of each lane.
+    labels: Vec<usize>,
+    most_labels: usize,
+    /// Lanes that have stopped, and padding.
+    ended: Vec<bool>,
+    tables: Vec<Table<S>>,
+}
+
+impl<S: Scalar> Rows<S> {
+    /// For the lanes `first..first + S::LANES`, of which those from `real` on are padding; room for a run of `steps`.
+    pub fn new<L: Lift<S>>(first: usize, real: usize, clocks: &[Clock], faults: &FaultLanes, steps: Steps, lift: &L) -> Self {
+        let all = first..first + S::LANES;
+        let labels: Vec<usize> = all.clone().map(|lane| faults.count(lane)).collect();
+        let most_labels = labels.iter().copied().max().unwrap_or(0);
+        let ended: Vec<bool> = all.map(|lane| lane >= real).collect();
+        let table = |clock: &Clock| {
+            let rows = (steps / clock.period + 1) as usize;
+            let room = |(labels, &ended): (&usize, &bool)| if ended { 0 } else { rows * (clock.signals.len() + labels) * lift.width() };
+            let columns = clock.signals.len() + most_labels;
+            Table {
+                columns,
+                gathered: Vec::with_capacity(rows.min(GATHERED) * columns),
+                lanes: labels.iter().zip(&ended).map(|lane| Vec::with_capacity(room(lane))).collect(),
+            }
+        };
+        let tables = clocks.iter().map(table).collect();
+        Self { first, labels, most_labels, ended, tables }
+    }
+
+    /// Appends a row to the table of clock `index`.
+    #[inline(always)]
+    pub fn append<L: Lift<S>>(&mut self, index: usize, clock: &Clock, observed: &[S], faults: &FaultLanes, lift: &L) {
+        let gathered = &mut self.tables[index].gathered;
+        gathered.extend(clock.signals.iter().map(|&signal| observed[signal]));
+        for label in 0..self.most_labels {
+            gathered.push(S::from_fn(|lane| faults.label(self.first + lane, label)));
+        }
+        if gathered.len() >= GATHERED * self.tables[index].columns {
+            self.sort(index, lift);
+        }
+    }
+
+    /// The gathered rows of clock `index` go to the tables of the lanes that still record.
+    #[inline(never)]
+    fn sort<L: Lift<S>>(&mut self, index: usize, lift: &L) {
+        let Table { columns, gathered, lanes } = &mut self.tables[index];
+        for (lane, out) in lanes.iter_mut().enumerate().filter(|(lane, _)| !self.ended[*lane]) {
+            let used = *columns - self.most_labels + self.labels[lane];
+            for row in gathered.chunks_exact((*columns).max(1)) {
+                for &value in &row[..used] {
+                    lift.emit(value, lane, out);
+                }
+            }
+        }
+        gathered.clear();
+    }
+
+    /// The lane records nothing from now on.
+    pub fn end<L: Lift<S>>(&mut self, lane: usize, lift: &L) {
+        for index in 0..self.tables.len() {
+            self.sort(index, lift);
+        }
+        self.ended[lane] = true;
+    }
+
+    /// The tables of one lane, row-major: its signals, then its fault labels.
+    pub fn take<L: Lift<S>>(&mut self, lane: usize, lift: &L) -> Vec<Vec<f64>> {
+        for index in 0..self.tables.len() {
+            self.sort(index, lift);
+        }
+        self.tables.iter_mut().map(|table| std::mem::take(&mut table.lanes[lane])).collect()
+    }
+}
