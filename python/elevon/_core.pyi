@@ -10,6 +10,7 @@ __all__ = [
     "check",
     "faults",
     "initial",
+    "not_acting",
     "parameters",
     "ports",
     "profiles",
@@ -34,6 +35,12 @@ def profiles() -> list[dict[str, Any]]: ...
 def check(
     wiring: str, fidelity: str, parameters: npt.NDArray[np.float64]
 ) -> list[dict[str, Any]]: ...
+def not_acting(
+    wiring: str,
+    fidelity: str,
+    parameters: npt.NDArray[np.float64],
+    faults: list[dict[str, Any]],
+) -> list[dict[str, str]]: ...
 def widths() -> dict[str, Any]: ...
 def simulate(
     wiring: str,

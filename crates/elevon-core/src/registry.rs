@@ -1,8 +1,9 @@
 //! The wirings by name, and one entry for each thing a caller may ask of any of them.
 
 use crate::actuator::{ballscrew, landing_gear, rotary, Finding, Port, Wiring};
-use crate::fault::FaultKind;
+use crate::fault::{FaultKind, FaultSpec};
 use crate::solver::{self, Clock, Monitor, RunOutput, RunSpec, Width};
+use crate::variable::acts::{Fidelity, Standing};
 use crate::variable::{Group, Signal};
 
 /// A wiring of one fidelity.
@@ -97,8 +98,28 @@ impl Model {
     pub fn actions(self) -> &'static [&'static str] {
         dispatch!(self, W => W::ACTIONS)
     }
-    pub fn faults(self) -> Vec<FaultKind> {
+    pub fn fidelity(self) -> Fidelity {
+        match self {
+            Self::RotaryHigh | Self::BallscrewHigh | Self::LandingGearHigh => Fidelity::High,
+            Self::RotaryLow | Self::BallscrewLow | Self::LandingGearLow => Fidelity::Low,
+        }
+    }
+    /// The faults of the actuator, whatever the fidelity.
+    pub fn catalogue(self) -> Vec<FaultKind> {
         dispatch!(self, W => W::faults())
+    }
+    /// The faults that this fidelity carries.
+    pub fn faults(self) -> Vec<FaultKind> {
+        let (groups, fidelity) = (self.groups(), self.fidelity());
+        self.catalogue().into_iter().filter(|f| f.declined(groups, fidelity).is_none()).collect()
+    }
+    /// The parameters that do not act in a run with these values and faults, and why.
+    pub fn not_acting(self, raw: &[f64], faults: &[FaultSpec]) -> Vec<(String, String)> {
+        let mut touched = vec![false; raw.len()];
+        for index in faults.iter().flat_map(FaultSpec::moved) {
+            touched[index] = true;
+        }
+        Standing { groups: self.groups(), raw, touched: &touched, fidelity: self.fidelity() }.not_acting()
     }
     pub fn check(self, raw: &[f64]) -> Vec<Finding> {
         dispatch!(self, W => W::check(raw))

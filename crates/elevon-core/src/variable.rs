@@ -1,5 +1,6 @@
 //! One record per parameter and signal. Documentation, bindings, error texts and validation all come from it.
 
+pub mod acts;
 mod macros;
 
 /// Which register of numbers a parameter belongs to: what the plant is, what the controller
@@ -79,6 +80,8 @@ pub struct Variable {
     /// Value of a healthy, plain component; `None` where a parameter set must say.
     pub default: Option<f64>,
     pub text: &'static str,
+    /// In which fidelities, and under which values of others.
+    pub acts: acts::Acts,
 }
 
 /// The parameters of one component of a wiring, under a prefix.
@@ -173,6 +176,14 @@ pub struct Relabel {
     pub name: &'static str,
     pub unit: &'static str,
     pub text: &'static str,
+    /// Where it acts in this form, if elsewhere than in others.
+    pub acts: Option<acts::Acts>,
+}
+
+impl Relabel {
+    pub const fn acts(index: usize, acts: acts::Acts) -> Self {
+        Self { index, name: "", unit: "", text: "", acts: Some(acts) }
+    }
 }
 
 /// A copy of a table of parameters with other names, units or texts.
@@ -187,8 +198,16 @@ pub const fn relabelled<const N: usize>(table: &[Variable], changes: &[Relabel])
     while i < changes.len() {
         let change = changes[i];
         let old = all[change.index];
-        all[change.index] =
-            Variable { path: or(change.name, old.path), unit: or(change.unit, old.unit), text: or(change.text, old.text), ..old };
+        all[change.index] = Variable {
+            path: or(change.name, old.path),
+            unit: or(change.unit, old.unit),
+            text: or(change.text, old.text),
+            acts: match change.acts {
+                Some(acts) => acts,
+                None => old.acts,
+            },
+            ..old
+        };
         i += 1;
     }
     all

@@ -1,10 +1,11 @@
 //! What the core knows of its actuators, as plain dictionaries.
 
-use crate::spec::{model, vector};
+use crate::spec::{model, vector, Resolver};
 use elevon_core::command;
 use elevon_core::fault::{profiles as fault_profiles, Attribute};
 use elevon_core::registry::KINDS;
 use elevon_core::solver::Width;
+use elevon_core::variable::acts::{records, Fidelity};
 use elevon_core::variable::Range;
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
@@ -54,11 +55,23 @@ pub fn wirings(py: Python<'_>) -> Dicts<'_> {
     })
 }
 
+/// The fidelities that carry something, and why the others decline it.
+fn carried(d: &Bound<'_, PyDict>, declined: impl Fn(Fidelity) -> Option<&'static str>) -> PyResult<()> {
+    let both = [Fidelity::High, Fidelity::Low];
+    let name = |f: &Fidelity| Fidelity::NAMES[*f as usize];
+    d.set_item("fidelities", both.iter().filter(|f| declined(**f).is_none()).map(name).collect::<Vec<_>>())?;
+    let reasons = PyDict::new(d.py());
+    for fidelity in both {
+        if let Some(reason) = declined(fidelity) {
+            reasons.set_item(name(&fidelity), reason)?;
+        }
+    }
+    d.set_item("declined", reasons)
+}
+
 #[pyfunction]
 pub fn parameters<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
-    let groups = model(wiring, "high")?.groups();
-    let all = groups.iter().flat_map(|g| g.variables.iter().enumerate().map(move |(i, v)| (g.path(i), v)));
-    dicts(py, all, |d, (path, v)| {
+    dicts(py, records(model(wiring, "high")?.groups()), |d, (path, v)| {
         let (minimum, maximum, open) = v.range.bounds();
         d.set_item("path", path)?;
         d.set_item("symbol", v.symbol)?;
@@ -71,7 +84,9 @@ pub fn parameters<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
         d.set_item("register", v.register.name())?;
         d.set_item("default", v.default)?;
         let choices = if let Range::Choice(names) = v.range { Some(names.to_vec()) } else { None };
-        d.set_item("choices", choices)
+        d.set_item("choices", choices)?;
+        d.set_item("when", v.acts.when.iter().map(ToString::to_string).collect::<Vec<_>>())?;
+        carried(d, |fidelity| v.acts.declined(fidelity))
     })
 }
 
@@ -109,9 +124,8 @@ fn attribute<'py>(d: &Bound<'py, PyDict>, a: &Attribute) -> PyResult<()> {
 
 #[pyfunction]
 pub fn faults<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
-    let low: Vec<(&str, &str)> =
-        model(wiring, "low").map(|m| m.faults().iter().map(|f| (f.kind, f.places[0].name)).collect()).unwrap_or_default();
-    dicts(py, model(wiring, "high")?.faults(), |d, f| {
+    let model = model(wiring, "high")?;
+    dicts(py, model.catalogue(), |d, f| {
         let (minimum, maximum, open) = f.range.bounds();
         d.set_item("kind", f.kind)?;
         d.set_item("places", f.places.iter().map(|p| p.name).collect::<Vec<_>>())?;
@@ -122,8 +136,12 @@ pub fn faults<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
         d.set_item("effect", f.effect)?;
         d.set_item("source", f.source)?;
         d.set_item("attributes", dicts(py, f.attributes, attribute)?)?;
-        let seen = low.contains(&(f.kind, f.places[0].name));
-        d.set_item("fidelities", if seen { vec!["high", "low"] } else { vec!["high"] })
+        let targets = PyDict::new(py);
+        for place in f.places {
+            targets.set_item(place.name, place.targets.iter().map(|t| t.path).collect::<Vec<_>>())?;
+        }
+        d.set_item("targets", targets)?;
+        carried(d, |fidelity| f.declined(model.groups(), fidelity))
     })
 }
 
@@ -165,5 +183,23 @@ pub fn check<'py>(py: Python<'py>, wiring: &str, fidelity: &str, parameters: PyR
         d.set_item("value", f.value)?;
         d.set_item("limit", f.limit)?;
         d.set_item("message", f.message)
+    })
+}
+
+/// Why parameters of a run do not act: over all parameters of the wiring, with what its faults move.
+#[pyfunction]
+pub fn not_acting<'py>(
+    py: Python<'py>,
+    wiring: &str,
+    fidelity: &str,
+    parameters: PyReadonlyArray1<'py, f64>,
+    faults: &Bound<'py, PyList>,
+) -> Dicts<'py> {
+    let resolver = Resolver::new(wiring, fidelity)?;
+    let raw = vector(resolver.model, &parameters)?;
+    let faults = resolver.faults(faults)?;
+    dicts(py, resolver.model.not_acting(&raw, &faults), |d, (path, reason)| {
+        d.set_item("path", path)?;
+        d.set_item("reason", reason)
     })
 }

@@ -19,6 +19,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(describe::waveforms, m)?)?;
     m.add_function(wrap_pyfunction!(describe::profiles, m)?)?;
     m.add_function(wrap_pyfunction!(describe::check, m)?)?;
+    m.add_function(wrap_pyfunction!(describe::not_acting, m)?)?;
     m.add_function(wrap_pyfunction!(describe::widths, m)?)?;
     m.add_function(wrap_pyfunction!(run::simulate, m)?)?;
     m.add_function(wrap_pyfunction!(run::sensitivities, m)?)?;

@@ -145,7 +145,7 @@ impl Resolver {
             return Err(bad(format!("no initial value {unknown:?}")));
         }
         let faults = need(d, "faults")?.cast_into::<PyList>()?;
-        let faults = faults.iter().map(|f| fault(&self.faults, &self.places, &f.cast_into::<PyDict>()?)).collect::<PyResult<Vec<_>>>()?;
+        let faults = self.faults(&faults)?;
         if let Some(finding) = self.model.check_faulted(&whole(&parameters, &faults)).into_iter().next() {
             return Err(bad(format!("the faults at their whole severity: {}", finding.message)));
         }
@@ -163,6 +163,10 @@ impl Resolver {
             seed: need(d, "seed")?.extract()?,
             run: need(d, "run")?.extract()?,
         })
+    }
+
+    pub fn faults(&self, given: &Bound<'_, PyList>) -> PyResult<Vec<FaultSpec>> {
+        given.iter().map(|f| fault(&self.faults, &self.places, &f.cast_into::<PyDict>()?)).collect()
     }
 
     fn ports(&self, parameters: &[f64], inputs: &Bound<'_, PyDict>) -> PyResult<(Vec<SourcePlan>, Vec<bool>)> {

@@ -9,12 +9,18 @@ use crate::variables;
 variables! {
     /// The current controller and its carrier.
     PwmParameter, PWM {
-        Frequency => "frequency", "f_pwm", "Hz", Positive, Controller, Some(4000.0), "frequency of the triangular carrier";
-        SampleTime => "sample_time", "T_i", "s", Positive, Controller, Some(125e-6), "sample time of the current controller, half a carrier period: sampled at its peaks and valleys";
-        ProportionalGain => "proportional_gain", "K_pi", "V/A", NonNegative, Controller, Some(0.0), "proportional gain of the current PI; L / tau gives the closed-loop time constant tau";
-        IntegralGain => "integral_gain", "K_ii", "V/(A s)", NonNegative, Controller, Some(0.0), "integral gain of the current PI; R / tau cancels the motor's pole";
-        Inductance => "inductance", "L_hat", "H", NonNegative, Controller, Some(0.0), "phase inductance the decoupling believes";
-        EmfConstant => "emf_constant", "k_hat", "V s/rad", NonNegative, Controller, Some(0.0), "phase EMF constant (peak) the feed-forward believes";
+        Frequency => "frequency", "f_pwm", "Hz", Positive, Controller, Some(4000.0), "frequency of the triangular carrier",
+            high_only("a first-order lag stands for carrier, sampling and integral").when(&[Chosen("drive.kind", &["pwm"])]);
+        SampleTime => "sample_time", "T_i", "s", Positive, Controller, Some(125e-6), "sample time of the current controller, half a carrier period: sampled at its peaks and valleys",
+            high_only("a first-order lag stands for carrier, sampling and integral").when(&[Chosen("drive.kind", &["pwm"])]);
+        ProportionalGain => "proportional_gain", "K_pi", "V/A", NonNegative, Controller, Some(0.0), "proportional gain of the current PI; L / tau gives the closed-loop time constant tau",
+            when(&[Chosen("drive.kind", &["pwm"])]);
+        IntegralGain => "integral_gain", "K_ii", "V/(A s)", NonNegative, Controller, Some(0.0), "integral gain of the current PI; R / tau cancels the motor's pole",
+            high_only("a first-order lag stands for carrier, sampling and integral").when(&[Chosen("drive.kind", &["pwm"])]);
+        Inductance => "inductance", "L_hat", "H", NonNegative, Controller, Some(0.0), "phase inductance the decoupling believes",
+            high_only("a first-order lag stands for carrier, sampling and integral").when(&[Chosen("drive.kind", &["pwm"])]);
+        EmfConstant => "emf_constant", "k_hat", "V s/rad", NonNegative, Controller, Some(0.0), "phase EMF constant (peak) the feed-forward believes",
+            high_only("a first-order lag stands for carrier, sampling and integral").when(&[Chosen("drive.kind", &["pwm"])]);
     }
 }
 

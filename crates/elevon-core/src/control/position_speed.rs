@@ -17,26 +17,44 @@ variables! {
     /// What the actuator control electronics believe and do.
     ControlParameter, CONTROL {
         Mode => "mode", "-", "1", Choice(Mode::NAMES), Controller, Some(0.0), "what the command is: a position, a speed (bypasses the position loop) or a torque (bypasses both loops)";
-        PositionGain => "position_gain", "G", "1/s", NonNegative, Controller, None, "user position error to fast-shaft speed reference";
-        PositionGainScale => "position_gain_scale", "-", "1", NonNegative, Controller, Some(1.0), "healthy 1; drift of the position gain";
-        SpeedFeedforward => "speed_feedforward", "g_ff", "1", Between(0.0, 1.5), Controller, Some(0.0), "share of the commanded speed (difference of the command over one tick) added to the speed reference";
-        SpeedGain => "speed_gain", "K_p", "N m s/rad", NonNegative, Controller, None, "proportional gain of the speed PID, on all branches";
-        SpeedGainScale => "speed_gain_scale", "-", "1", NonNegative, Controller, Some(1.0), "healthy 1; drift of the speed gain";
-        IntegralTime => "integral_time", "T_i", "s", NonNegative, Controller, Some(0.0), "K_i = K_p / T_i; 0: no integral action";
-        DerivativeTime => "derivative_time", "T_d", "s", NonNegative, Controller, Some(0.0), "derivative time; 0: no derivative action";
-        DerivativeFilter => "derivative_filter", "N", "1", Positive, Controller, Some(1000.0), "the derivative's filter pole stands at N / T_d";
-        SpeedLimit => "speed_limit", "omega_max", "rad/s", Positive, Controller, None, "limit of the speed reference";
+        PositionGain => "position_gain", "G", "1/s", NonNegative, Controller, None, "user position error to fast-shaft speed reference",
+            when(&[Chosen("control.mode", &["position"])]);
+        PositionGainScale => "position_gain_scale", "-", "1", NonNegative, Controller, Some(1.0), "healthy 1; drift of the position gain",
+            when(&[Chosen("control.mode", &["position"])]);
+        SpeedFeedforward => "speed_feedforward", "g_ff", "1", Between(0.0, 1.5), Controller, Some(0.0), "share of the commanded speed (difference of the command over one tick) added to the speed reference",
+            when(&[Chosen("control.mode", &["position"])]);
+        SpeedGain => "speed_gain", "K_p", "N m s/rad", NonNegative, Controller, None, "proportional gain of the speed PID, on all branches",
+            when(&[Chosen("control.mode", &["position", "speed"])]);
+        SpeedGainScale => "speed_gain_scale", "-", "1", NonNegative, Controller, Some(1.0), "healthy 1; drift of the speed gain",
+            when(&[Chosen("control.mode", &["position", "speed"])]);
+        IntegralTime => "integral_time", "T_i", "s", NonNegative, Controller, Some(0.0), "K_i = K_p / T_i; 0: no integral action",
+            when(&[Chosen("control.mode", &["position", "speed"])]);
+        DerivativeTime => "derivative_time", "T_d", "s", NonNegative, Controller, Some(0.0), "derivative time; 0: no derivative action",
+            when(&[Chosen("control.mode", &["position", "speed"])]);
+        DerivativeFilter => "derivative_filter", "N", "1", Positive, Controller, Some(1000.0), "the derivative's filter pole stands at N / T_d",
+            high_only("its derivative acts as inertia, without a filter").when(&[Chosen("control.mode", &["position", "speed"]), Away("control.derivative_time", 0.0)]);
+        SpeedLimit => "speed_limit", "omega_max", "rad/s", Positive, Controller, None, "limit of the speed reference",
+            when(&[Chosen("control.mode", &["position", "speed"])]);
         CurrentLimit => "current_limit", "I_max", "A", Positive, Controller, None, "limit of the quadrature current reference, peak";
         TorqueConstant => "torque_constant", "k_t", "N m/A", Positive, Controller, None, "torque per peak ampere that the controller believes, 1.5 k when it knows the motor";
-        AntiWindupRest => "anti_windup_rest", "AW1", "1", Choice(Switch::NAMES), Controller, Some(0.0), "freeze the integrator while the speed is zero for more than one step";
-        AntiWindupError => "anti_windup_error", "AW2", "1", Choice(ErrorHold::NAMES), Controller, Some(0.0), "freeze the integrator while the position error is below (T2) or above (T3) the threshold";
-        AntiWindupThreshold => "anti_windup_threshold", "-", "rad", NonNegative, Controller, Some(0.0), "position error threshold of anti_windup_error, at the user";
-        AntiWindupBackCalculation => "anti_windup_back_calculation", "AW3", "1/s", NonNegative, Controller, Some(0.0), "gain from (saturated - demanded) torque back to the integrator; 0: off";
-        ConditionalIntegration => "conditional_integration", "-", "1", Choice(Switch::NAMES), Controller, Some(0.0), "integrate only while the torque reference is not limited";
-        SampleTime => "sample_time", "T_s", "s", NonNegative, Controller, Some(0.0), "sample time of the controller; 0: every solver step";
-        NoiseDeviation => "noise_deviation", "-", "rad", NonNegative, Controller, Some(0.0), "standard deviation of the band-limited noise on the command line (unit of the user position)";
-        NoiseSampleTime => "noise_sample_time", "-", "s", Positive, Controller, Some(1e-3), "the noise is held over this time, which sets its band";
-        PositionFeedback => "position_feedback", "-", "1", Choice(Feedback::NAMES), Controller, Some(0.0), "what closes the position loop: the user position itself (the papers' model), the user encoder's counts, or the motor resolver divided by the ratio";
+        AntiWindupRest => "anti_windup_rest", "AW1", "1", Choice(Switch::NAMES), Controller, Some(0.0), "freeze the integrator while the speed is zero for more than one step",
+            high_only("its PID integrates without anti-windup").when(&[Chosen("control.mode", &["position", "speed"]), Away("control.integral_time", 0.0)]);
+        AntiWindupError => "anti_windup_error", "AW2", "1", Choice(ErrorHold::NAMES), Controller, Some(0.0), "freeze the integrator while the position error is below (T2) or above (T3) the threshold",
+            high_only("its PID integrates without anti-windup").when(&[Chosen("control.mode", &["position", "speed"]), Away("control.integral_time", 0.0)]);
+        AntiWindupThreshold => "anti_windup_threshold", "-", "rad", NonNegative, Controller, Some(0.0), "position error threshold of anti_windup_error, at the user",
+            high_only("its PID integrates without anti-windup").when(&[Chosen("control.mode", &["position", "speed"]), Away("control.integral_time", 0.0), Chosen("control.anti_windup_error", &["below", "above"])]);
+        AntiWindupBackCalculation => "anti_windup_back_calculation", "AW3", "1/s", NonNegative, Controller, Some(0.0), "gain from (saturated - demanded) torque back to the integrator; 0: off",
+            high_only("its PID integrates without anti-windup").when(&[Chosen("control.mode", &["position", "speed"]), Away("control.integral_time", 0.0)]);
+        ConditionalIntegration => "conditional_integration", "-", "1", Choice(Switch::NAMES), Controller, Some(0.0), "integrate only while the torque reference is not limited",
+            high_only("its PID integrates without anti-windup").when(&[Chosen("control.mode", &["position", "speed"]), Away("control.integral_time", 0.0)]);
+        SampleTime => "sample_time", "T_s", "s", NonNegative, Controller, Some(0.0), "sample time of the controller; 0: every solver step",
+            when(&[In(Low, &[Away("screw.debris", 0.0)])]);
+        NoiseDeviation => "noise_deviation", "-", "rad", NonNegative, Controller, Some(0.0), "standard deviation of the band-limited noise on the command line (unit of the user position)",
+            high_only("its command has no noise");
+        NoiseSampleTime => "noise_sample_time", "-", "s", Positive, Controller, Some(1e-3), "the noise is held over this time, which sets its band",
+            high_only("its command has no noise").when(&[Away("control.noise_deviation", 0.0)]);
+        PositionFeedback => "position_feedback", "-", "1", Choice(Feedback::NAMES), Controller, Some(0.0), "what closes the position loop: the user position itself (the papers' model), the user encoder's counts, or the motor resolver divided by the ratio",
+            when(&[Chosen("control.mode", &["position"])]);
     }
 }
 

@@ -1,6 +1,7 @@
 //! The form in which a wiring lists its faults.
 
-use crate::variable::Range;
+use crate::variable::acts::{records, Fidelity};
+use crate::variable::{Group, Range};
 
 /// What a severity `s` does to a parameter `x`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,6 +52,13 @@ pub struct FaultKind {
     pub attributes: &'static [Attribute],
     pub effect: &'static str,
     pub source: &'static str,
-    /// Does the low fidelity see it?
-    pub low: bool,
+}
+
+impl FaultKind {
+    /// Why a fidelity of an actuator of these parameters does not carry the fault, if so: it acts where the parameters act
+    /// that it moves.
+    pub fn declined(&self, groups: &[Group], fidelity: Fidelity) -> Option<&'static str> {
+        let moved = |path: &str| self.places.iter().flat_map(|p| p.targets).any(|t| t.path == path);
+        records(groups).filter(|(path, _)| moved(path)).find_map(|(_, v)| v.acts.declined(fidelity))
+    }
 }

@@ -31,6 +31,12 @@ impl FaultSpec {
         self.writes.iter().filter(move |_| live).map(|w| w.index)
     }
 
+    /// Parameters that the fault or its attributes move at some time; none when the severity is zero.
+    pub fn moved(&self) -> impl Iterator<Item = usize> + '_ {
+        let live = self.severity != 0.0;
+        self.touched().chain(self.settings.iter().filter(move |_| live).map(|s| s.0))
+    }
+
     /// Held (label, profile factor, pulse state) at step `k` and the step of the next change.
     fn at(&self, k: Steps, dt: f64, grid: Steps) -> (Held, Steps) {
         let t = (k as f64 + 0.5) * dt;

@@ -13,17 +13,28 @@ variables! {
     InverterParameter, INVERTER {
         SupplyVoltage => "supply_voltage", "V_dc", "V", Positive, Plant, None, "DC link voltage, unless the scenario drives it";
         SupplyScale => "supply_scale", "-", "1", Unit, Plant, Some(1.0), "healthy 1; less: the supply sags";
-        HysteresisBand => "hysteresis_band", "h", "A", Positive, Controller, Some(0.5), "half band of the relays around the commanded phase current";
-        OnResistance => "on_resistance", "R_on", "ohm", NonNegative, Plant, Some(0.0), "resistance of a conducting switch";
-        DiodeDrop => "diode_drop", "V_d", "V", NonNegative, Plant, Some(0.0), "forward voltage of a free-wheeling diode";
-        DeadTime => "dead_time", "t_d", "s", NonNegative, Plant, Some(0.0), "both switches of a leg are off for this time at each transition";
-        TripCurrent => "trip_current", "I_trip", "A", NonNegative, Controller, Some(0.0), "the drive trips when a phase current exceeds it; 0: no over-current trip";
-        OpenAHigh => "open_a_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg a never closes";
-        OpenALow => "open_a_low", "-", "1", Unit, Plant, Some(0.0), "1: the lower switch of leg a never closes";
-        OpenBHigh => "open_b_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg b never closes";
-        OpenBLow => "open_b_low", "-", "1", Unit, Plant, Some(0.0), "1: the lower switch of leg b never closes";
-        OpenCHigh => "open_c_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg c never closes";
-        OpenCLow => "open_c_low", "-", "1", Unit, Plant, Some(0.0), "1: the lower switch of leg c never closes";
+        HysteresisBand => "hysteresis_band", "h", "A", Positive, Controller, Some(0.5), "half band of the relays around the commanded phase current",
+            when(&[Chosen("drive.kind", &["hysteresis"])]);
+        OnResistance => "on_resistance", "R_on", "ohm", NonNegative, Plant, Some(0.0), "resistance of a conducting switch",
+            high_only("its voltages have no switches");
+        DiodeDrop => "diode_drop", "V_d", "V", NonNegative, Plant, Some(0.0), "forward voltage of a free-wheeling diode",
+            high_only("its voltages have no switches");
+        DeadTime => "dead_time", "t_d", "s", NonNegative, Plant, Some(0.0), "both switches of a leg are off for this time at each transition",
+            high_only("its voltages have no switches");
+        TripCurrent => "trip_current", "I_trip", "A", NonNegative, Controller, Some(0.0), "the drive trips when a phase current exceeds it; 0: no over-current trip",
+            high_only("it has no phase currents to trip on");
+        OpenAHigh => "open_a_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg a never closes",
+            high_only("half waves of one phase are missing: its one phase has none");
+        OpenALow => "open_a_low", "-", "1", Unit, Plant, Some(0.0), "1: the lower switch of leg a never closes",
+            high_only("half waves of one phase are missing: its one phase has none");
+        OpenBHigh => "open_b_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg b never closes",
+            high_only("half waves of one phase are missing: its one phase has none");
+        OpenBLow => "open_b_low", "-", "1", Unit, Plant, Some(0.0), "1: the lower switch of leg b never closes",
+            high_only("half waves of one phase are missing: its one phase has none");
+        OpenCHigh => "open_c_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg c never closes",
+            high_only("half waves of one phase are missing: its one phase has none");
+        OpenCLow => "open_c_low", "-", "1", Unit, Plant, Some(0.0), "1: the lower switch of leg c never closes",
+            high_only("half waves of one phase are missing: its one phase has none");
         ShortedAHigh => "shorted_a_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg a is always closed";
         ShortedALow => "shorted_a_low", "-", "1", Unit, Plant, Some(0.0), "1: the lower switch of leg a is always closed";
         ShortedBHigh => "shorted_b_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg b is always closed";

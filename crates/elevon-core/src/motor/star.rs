@@ -3,12 +3,21 @@
 
 use crate::scalar::Scalar;
 use crate::three;
+use crate::variable::acts::When;
 use crate::{choices, variables};
 
 choices! {
     EmfShape { Sinusoidal "sinusoidal", Trapezoidal "trapezoidal" }
     ShortModel { Reduced "reduced", Loop "loop" }
 }
+
+/// Some phase has lost turns.
+const SHORTED: When = When::Either(&[When::Away("motor.turns_a", 1.0), When::Away("motor.turns_b", 1.0), When::Away("motor.turns_c", 1.0)]);
+/// The winding may leave its reference temperature.
+const WARM: When = When::Either(&[
+    When::Chosen("thermal.model", &["quasi_static", "dynamic"]),
+    When::Differ("motor.winding_temperature", "motor.reference_temperature"),
+]);
 
 variables! {
     /// The motor.
@@ -19,27 +28,42 @@ variables! {
         WindingInductance => "winding_inductance", "L", "H", Positive, Plant, None, "phase inductance, mutual part included";
         EmfConstant => "emf_constant", "k", "V s/rad", Positive, Plant, None, "peak phase EMF per mechanical rad/s; torque per peak ampere is 1.5 k";
         TorqueLimit => "torque_limit", "T_max", "N m", Positive, Plant, None, "the flux saturates the torque at this value";
-        EmfShape => "emf_shape", "-", "1", Choice(EmfShape::NAMES), Plant, Some(0.0), "shape of the EMF over the electrical angle";
-        EmfFlatWidth => "emf_flat_width", "beta", "rad", Between(0.0, 3.0), Plant, Some(2.094_395_102_393_195_3), "width of the trapezoid's flat";
+        EmfShape => "emf_shape", "-", "1", Choice(EmfShape::NAMES), Plant, Some(0.0), "shape of the EMF over the electrical angle",
+            high_only("its one phase has sinusoidal coefficients");
+        EmfFlatWidth => "emf_flat_width", "beta", "rad", Between(0.0, 3.0), Plant, Some(2.094_395_102_393_195_3), "width of the trapezoid's flat",
+            high_only("its one phase has sinusoidal coefficients").when(&[Chosen("motor.emf_shape", &["trapezoidal"])]);
         TurnsA => "turns_a", "N_a", "1", Fraction, Plant, Some(1.0), "healthy fraction of the turns of phase a";
         TurnsB => "turns_b", "N_b", "1", Fraction, Plant, Some(1.0), "healthy fraction of the turns of phase b";
         TurnsC => "turns_c", "N_c", "1", Fraction, Plant, Some(1.0), "healthy fraction of the turns of phase c";
         FluxFraction => "flux_fraction", "-", "1", Fraction, Plant, Some(1.0), "healthy 1; less: the magnets have lost flux";
         EccentricityStatic => "eccentricity_static", "zeta", "1", Unit, Plant, Some(0.0), "amplitude of the static eccentricity";
-        EccentricityStaticPhase => "eccentricity_static_phase", "phi", "rad", Any, Plant, Some(0.0), "its electrical phase angle";
+        EccentricityStaticPhase => "eccentricity_static_phase", "phi", "rad", Any, Plant, Some(0.0), "its electrical phase angle",
+            when(&[Away("motor.eccentricity_static", 0.0)]);
         EccentricityDynamic => "eccentricity_dynamic", "zeta_d", "1", Unit, Plant, Some(0.0), "dynamic eccentricity, fraction of the air gap; its modulation turns with the shaft";
-        EccentricityDynamicPhase => "eccentricity_dynamic_phase", "phi_d", "rad", Any, Plant, Some(0.0), "its mechanical phase angle";
+        EccentricityDynamicPhase => "eccentricity_dynamic_phase", "phi_d", "rad", Any, Plant, Some(0.0), "its mechanical phase angle",
+            when(&[Away("motor.eccentricity_dynamic", 0.0)]);
         OpenA => "open_a", "-", "1", Unit, Plant, Some(0.0), "1: phase a is interrupted (from its next current zero on)";
         OpenB => "open_b", "-", "1", Unit, Plant, Some(0.0), "1: phase b is interrupted (from its next current zero on)";
         OpenC => "open_c", "-", "1", Unit, Plant, Some(0.0), "1: phase c is interrupted (from its next current zero on)";
-        ShortModel => "short_model", "-", "1", Choice(ShortModel::NAMES), Plant, Some(0.0), "shorted turns only missing (the paper), or a loop of their own with circulating current";
-        ShortCoupling => "short_coupling", "kappa", "1", Between(0.0, 0.99), Plant, Some(0.9), "magnetic coupling of shorted and healthy turns of a phase";
-        ShortContactResistance => "short_contact_resistance", "R_c", "ohm", NonNegative, Plant, Some(0.0), "resistance of the short itself";
+        ShortModel => "short_model", "-", "1", Choice(ShortModel::NAMES), Plant, Some(0.0), "shorted turns only missing (the paper), or a loop of their own with circulating current",
+            high_only("shorted turns are only missing in its one phase").when(&[SHORTED]);
+        ShortCoupling => "short_coupling", "kappa", "1", Between(0.0, 0.99), Plant, Some(0.9), "magnetic coupling of shorted and healthy turns of a phase",
+            high_only("shorted turns are only missing in its one phase").when(&[SHORTED, Chosen("motor.short_model", &["loop"])]);
+        ShortContactResistance => "short_contact_resistance", "R_c", "ohm", NonNegative, Plant, Some(0.0), "resistance of the short itself",
+            high_only("shorted turns are only missing in its one phase").when(&[SHORTED, Chosen("motor.short_model", &["loop"])]);
         WindingTemperature => "winding_temperature", "T_w", "K", Positive, Plant, Some(293.15), "temperature of the winding, an input unless a thermal network drives it";
-        ReferenceTemperature => "reference_temperature", "T_0", "K", Positive, Plant, Some(293.15), "temperature at which the resistance is given";
-        TemperatureCoefficient => "temperature_coefficient", "alpha", "1/K", NonNegative, Plant, Some(0.0), "relative rise of the resistance per kelvin";
-        FluxTemperatureCoefficient => "flux_temperature_coefficient", "alpha_k", "1/K", Any, Plant, Some(0.0), "relative change of the EMF constant per kelvin of winding temperature";
-        ElectricalOffset => "electrical_offset", "theta_0", "rad", Any, Plant, Some(0.0), "electrical angle at the rotor's zero";
+        ReferenceTemperature => "reference_temperature", "T_0", "K", Positive, Plant, Some(293.15), "temperature at which the resistance is given",
+            when(&[Either(&[Away("motor.temperature_coefficient", 0.0), Away("motor.flux_temperature_coefficient", 0.0)])]);
+        TemperatureCoefficient => "temperature_coefficient", "alpha", "1/K", NonNegative, Plant, Some(0.0), "relative rise of the resistance per kelvin",
+            when(&[WARM]);
+        FluxTemperatureCoefficient => "flux_temperature_coefficient", "alpha_k", "1/K", Any, Plant, Some(0.0), "relative change of the EMF constant per kelvin of winding temperature",
+            when(&[WARM]);
+        ElectricalOffset => "electrical_offset", "theta_0", "rad", Any, Plant, Some(0.0), "electrical angle at the rotor's zero",
+            when(&[In(Low, &[Either(&[
+                SHORTED, Away("motor.open_a", 0.0), Away("motor.open_b", 0.0), Away("motor.open_c", 0.0),
+                Away("motor.eccentricity_static", 0.0), Away("motor.eccentricity_dynamic", 0.0), Away("motor.unbalance_inertia", 0.0),
+                Away("sensor.resolver.mismatch", 0.0), Away("sensor.resolver.offset", 0.0), Away("sensor.resolver.power_off", 0.0),
+            ])])]);
     }
 }
 

@@ -11,10 +11,16 @@ use crate::variables;
 variables! {
     /// Resistors between terminals and centre tap.
     TapParameter, TAP {
-        TapLevelA => "tap_level_a", "f_a", "1", Between(0.0, 0.9), Plant, Some(0.0), "healthy 0; level f of the resistor R = ref (1 - f)/f from terminal a to the centre";
-        TapLevelB => "tap_level_b", "f_b", "1", Between(0.0, 0.9), Plant, Some(0.0), "healthy 0; level f of the resistor R = ref (1 - f)/f from terminal b to the centre";
-        TapLevelC => "tap_level_c", "f_c", "1", Between(0.0, 0.9), Plant, Some(0.0), "healthy 0; level f of the resistor R = ref (1 - f)/f from terminal c to the centre";
-        TapReference => "tap_reference", "ref", "ohm", Positive, Plant, Some(25.0), "resistance that stands for a level of one half";
+        TapLevelA => "tap_level_a", "f_a", "1", Between(0.0, 0.9), Plant, Some(0.0), "healthy 0; level f of the resistor R = ref (1 - f)/f from terminal a to the centre",
+            high_only("the resistor draws its own current from the link and leaves the winding's alone");
+        TapLevelB => "tap_level_b", "f_b", "1", Between(0.0, 0.9), Plant, Some(0.0), "healthy 0; level f of the resistor R = ref (1 - f)/f from terminal b to the centre",
+            high_only("the resistor draws its own current from the link and leaves the winding's alone");
+        TapLevelC => "tap_level_c", "f_c", "1", Between(0.0, 0.9), Plant, Some(0.0), "healthy 0; level f of the resistor R = ref (1 - f)/f from terminal c to the centre",
+            high_only("the resistor draws its own current from the link and leaves the winding's alone");
+        TapReference => "tap_reference", "ref", "ohm", Positive, Plant, Some(25.0), "resistance that stands for a level of one half",
+            high_only("the resistor draws its own current from the link and leaves the winding's alone").when(&[Either(&[
+                Away("motor.tap_level_a", 0.0), Away("motor.tap_level_b", 0.0), Away("motor.tap_level_c", 0.0),
+            ])]);
     }
 }
 

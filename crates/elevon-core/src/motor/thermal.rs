@@ -20,17 +20,27 @@ variables! {
     /// The thermal network of a motor.
     ThermalParameter, THERMAL {
         Model => "model", "-", "1", Choice(ThermalModel::NAMES), Plant, Some(0.0), "off: the winding's temperature is an input; quasi_static: surface without capacity, as printed; dynamic: a housing with capacity";
-        WindingMass => "winding_mass", "m", "kg", Positive, Plant, Some(1.0), "mass of the winding";
-        WindingHeat => "winding_heat", "c", "J/(kg K)", Positive, Plant, Some(385.0), "specific heat of the winding";
-        HousingCapacity => "housing_capacity", "C_h", "J/K", Positive, Plant, Some(1000.0), "heat capacity of the housing (dynamic)";
-        WindingToSurface => "winding_to_surface", "R_th", "K/W", Positive, Plant, Some(1.0), "thermal resistance from the winding to the surface";
-        Convection => "convection", "h", "W/(m2 K)", NonNegative, Plant, Some(10.0), "heat transfer coefficient of the surface";
-        Area => "area", "A", "m2", Positive, Plant, Some(0.1), "cooled surface";
-        Emissivity => "emissivity", "epsilon", "1", Unit, Plant, Some(0.9), "emissivity of the surface; 0: no radiation";
-        Ambient => "ambient", "T_a", "K", Positive, Plant, Some(293.15), "temperature of the air";
+        WindingMass => "winding_mass", "m", "kg", Positive, Plant, Some(1.0), "mass of the winding",
+            when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);
+        WindingHeat => "winding_heat", "c", "J/(kg K)", Positive, Plant, Some(385.0), "specific heat of the winding",
+            when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);
+        HousingCapacity => "housing_capacity", "C_h", "J/K", Positive, Plant, Some(1000.0), "heat capacity of the housing (dynamic)",
+            when(&[Chosen("thermal.model", &["dynamic"])]);
+        WindingToSurface => "winding_to_surface", "R_th", "K/W", Positive, Plant, Some(1.0), "thermal resistance from the winding to the surface",
+            when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);
+        Convection => "convection", "h", "W/(m2 K)", NonNegative, Plant, Some(10.0), "heat transfer coefficient of the surface",
+            when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);
+        Area => "area", "A", "m2", Positive, Plant, Some(0.1), "cooled surface",
+            when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);
+        Emissivity => "emissivity", "epsilon", "1", Unit, Plant, Some(0.9), "emissivity of the surface; 0: no radiation",
+            when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);
+        Ambient => "ambient", "T_a", "K", Positive, Plant, Some(293.15), "temperature of the air",
+            when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);
         Warning => "warning", "-", "K", Positive, Controller, Some(403.15), "winding temperature above which the warning is set";
-        Trip => "trip", "-", "K", Positive, Controller, Some(428.15), "winding temperature at which the drive opens its bridge and the run ends";
-        SampleTime => "sample_time", "-", "s", Positive, Solver, Some(0.01), "tick of the network";
+        Trip => "trip", "-", "K", Positive, Controller, Some(428.15), "winding temperature at which the drive opens its bridge and the run ends",
+            when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);
+        SampleTime => "sample_time", "-", "s", Positive, Solver, Some(0.01), "tick of the network",
+            when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);
     }
 }
 

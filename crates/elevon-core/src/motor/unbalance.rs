@@ -9,10 +9,14 @@ variables! {
     /// Excess mass of the rotor.
     UnbalanceParameter, UNBALANCE {
         UnbalanceInertia => "unbalance_inertia", "J_x", "kg m2", NonNegative, Plant, Some(0.0), "healthy 0; inertia of the excess mass";
-        UnbalanceRadius => "unbalance_radius", "-", "1/m", NonNegative, Plant, Some(22.94), "mass times eccentricity of the excess mass per its inertia (half ring of 16 to 35 mm)";
-        UnbalancePhase => "unbalance_phase", "phi_x", "rad", Any, Plant, Some(0.0), "mechanical angle of the excess mass";
-        UnbalanceGapShare => "unbalance_gap_share", "-", "1", NonNegative, Plant, Some(1.0), "dynamic eccentricity per share of excess inertia";
-        ShaftTilt => "shaft_tilt", "-", "rad", Between(0.0, 1.570_796_326_794_896_7), Plant, Some(0.0), "angle of the shaft above the horizontal: a vertical shaft feels no gravity";
+        UnbalanceRadius => "unbalance_radius", "-", "1/m", NonNegative, Plant, Some(22.94), "mass times eccentricity of the excess mass per its inertia (half ring of 16 to 35 mm)",
+            when(&[Away("motor.unbalance_inertia", 0.0)]);
+        UnbalancePhase => "unbalance_phase", "phi_x", "rad", Any, Plant, Some(0.0), "mechanical angle of the excess mass",
+            when(&[Away("motor.unbalance_inertia", 0.0)]);
+        UnbalanceGapShare => "unbalance_gap_share", "-", "1", NonNegative, Plant, Some(1.0), "dynamic eccentricity per share of excess inertia",
+            when(&[Away("motor.unbalance_inertia", 0.0)]);
+        ShaftTilt => "shaft_tilt", "-", "rad", Between(0.0, 1.570_796_326_794_896_7), Plant, Some(0.0), "angle of the shaft above the horizontal: a vertical shaft feels no gravity",
+            when(&[Away("motor.unbalance_inertia", 0.0)]);
     }
 }
 

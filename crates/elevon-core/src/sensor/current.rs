@@ -7,17 +7,28 @@ use crate::variables;
 variables! {
     /// The three phase current sensors and the acquisition filter.
     CurrentSensorParameter, CURRENT_SENSOR {
-        GainA => "current.gain_a", "-", "1", Any, Sensor, Some(1.0), "gain of the sensor of phase a";
-        GainB => "current.gain_b", "-", "1", Any, Sensor, Some(1.0), "gain of the sensor of phase b";
-        GainC => "current.gain_c", "-", "1", Any, Sensor, Some(1.0), "gain of the sensor of phase c";
-        OffsetA => "current.offset_a", "-", "A", Any, Sensor, Some(0.0), "offset of the sensor of phase a";
-        OffsetB => "current.offset_b", "-", "A", Any, Sensor, Some(0.0), "offset of the sensor of phase b";
-        OffsetC => "current.offset_c", "-", "A", Any, Sensor, Some(0.0), "offset of the sensor of phase c";
-        NoiseDeviation => "current.noise_deviation", "-", "A", NonNegative, Sensor, Some(0.0), "standard deviation of the noise of each sensor";
-        NoiseSampleTime => "current.noise_sample_time", "-", "s", Positive, Sensor, Some(5e-5), "the noise is held over this time, which sets its band";
-        Bits => "current.bits", "-", "1", Between(0.0, 32.0), Sensor, Some(0.0), "resolution over twice the range; 0: not quantised";
-        FullScale => "current.full_scale", "-", "A", Positive, Sensor, Some(40.0), "largest current the quantised sensor shows";
-        Bandwidth => "current.bandwidth", "-", "Hz", NonNegative, Sensor, Some(0.0), "first-order filter of the current that the drive controls; 0: none";
+        GainA => "current.gain_a", "-", "1", Any, Sensor, Some(1.0), "gain of the sensor of phase a",
+            high_only("its drive controls the equivalent current itself");
+        GainB => "current.gain_b", "-", "1", Any, Sensor, Some(1.0), "gain of the sensor of phase b",
+            high_only("its drive controls the equivalent current itself");
+        GainC => "current.gain_c", "-", "1", Any, Sensor, Some(1.0), "gain of the sensor of phase c",
+            high_only("its drive controls the equivalent current itself");
+        OffsetA => "current.offset_a", "-", "A", Any, Sensor, Some(0.0), "offset of the sensor of phase a",
+            high_only("the offset of one sensor is a ripple of the torque at the electrical frequency");
+        OffsetB => "current.offset_b", "-", "A", Any, Sensor, Some(0.0), "offset of the sensor of phase b",
+            high_only("the offset of one sensor is a ripple of the torque at the electrical frequency");
+        OffsetC => "current.offset_c", "-", "A", Any, Sensor, Some(0.0), "offset of the sensor of phase c",
+            high_only("the offset of one sensor is a ripple of the torque at the electrical frequency");
+        NoiseDeviation => "current.noise_deviation", "-", "A", NonNegative, Sensor, Some(0.0), "standard deviation of the noise of each sensor",
+            high_only("the noise of single phase currents is none of its one");
+        NoiseSampleTime => "current.noise_sample_time", "-", "s", Positive, Sensor, Some(5e-5), "the noise is held over this time, which sets its band",
+            high_only("the noise of single phase currents is none of its one").when(&[Away("sensor.current.noise_deviation", 0.0)]);
+        Bits => "current.bits", "-", "1", Between(0.0, 32.0), Sensor, Some(0.0), "resolution over twice the range; 0: not quantised",
+            high_only("single phase currents are quantised, not its one");
+        FullScale => "current.full_scale", "-", "A", Positive, Sensor, Some(40.0), "largest current the quantised sensor shows",
+            high_only("single phase currents are quantised, not its one").when(&[Away("sensor.current.bits", 0.0)]);
+        Bandwidth => "current.bandwidth", "-", "Hz", NonNegative, Sensor, Some(0.0), "first-order filter of the current that the drive controls; 0: none",
+            high_only("the drive's own current filter is faster than its step");
         FilterCutoff => "filter_cutoff", "f_c", "Hz", Positive, Sensor, Some(100.0), "cut-off of the first-order filters of the logged d and q quantities";
     }
 }

@@ -18,7 +18,8 @@ variables! {
         Offset => "resolver.offset", "-", "rad", Any, Sensor, Some(0.0), "offset of the shown motor angle";
         Gain => "resolver.gain", "-", "1", Any, Sensor, Some(1.0), "gain of the shown motor position and speed (not of the commutation angle)";
         PowerOff => "resolver.power_off", "-", "1", Unit, Sensor, Some(0.0), "1 while the resolver has no power";
-        LossShows => "resolver.loss_shows", "-", "1", Choice(LossShows::NAMES), Sensor, Some(0.0), "what the converter shows without power";
+        LossShows => "resolver.loss_shows", "-", "1", Choice(LossShows::NAMES), Sensor, Some(0.0), "what the converter shows without power",
+            when(&[Away("sensor.resolver.power_off", 0.0)]);
     }
 }
 

@@ -8,13 +8,18 @@ variables! {
     FrictionParameter, FRICTION {
         Static => "static", "FSJ", "N m", NonNegative, Plant, None, "static friction limit";
         Dynamic => "dynamic", "FDJ", "N m", NonNegative, Plant, None, "dynamic dry friction";
-        DryScale => "dry_scale", "-", "1", NonNegative, Plant, Some(1.0), "healthy 1; growth of the dry friction";
+        DryScale => "dry_scale", "-", "1", NonNegative, Plant, Some(1.0), "healthy 1; growth of the dry friction",
+            when(&[Either(&[Away("friction.static", 0.0), Away("friction.dynamic", 0.0)])]);
         Viscous => "viscous", "C", "N m s/rad", NonNegative, Plant, None, "viscous coefficient at rest";
-        ViscousSlope => "viscous_slope", "-", "s/rad", Any, Plant, Some(0.0), "relative change of the viscous coefficient per rad/s: C(w) = C (1 + slope |w|), not below zero";
-        ViscousScale => "viscous_scale", "-", "1", NonNegative, Plant, Some(1.0), "healthy 1; change of the lubricant";
+        ViscousSlope => "viscous_slope", "-", "s/rad", Any, Plant, Some(0.0), "relative change of the viscous coefficient per rad/s: C(w) = C (1 + slope |w|), not below zero",
+            high_only("its viscous friction is linear").when(&[Away("friction.viscous", 0.0)]);
+        ViscousScale => "viscous_scale", "-", "1", NonNegative, Plant, Some(1.0), "healthy 1; change of the lubricant",
+            when(&[Away("friction.viscous", 0.0)]);
         JamTorque => "jam_torque", "T_jam", "N m", NonNegative, Plant, Some(0.0), "resistive torque once the mechanism has seized; 0: none";
-        JamPosition => "jam_position", "-", "rad", Any, Plant, Some(0.0), "user position at which it seizes when first reached";
-        JamAnywhere => "jam_anywhere", "-", "1", Unit, Plant, Some(1.0), "1: seized wherever it is, 0: only from jam_position on";
+        JamPosition => "jam_position", "-", "rad", Any, Plant, Some(0.0), "user position at which it seizes when first reached",
+            when(&[Away("friction.jam_torque", 0.0), Away("friction.jam_anywhere", 1.0)]);
+        JamAnywhere => "jam_anywhere", "-", "1", Unit, Plant, Some(1.0), "1: seized wherever it is, 0: only from jam_position on",
+            when(&[Away("friction.jam_torque", 0.0)]);
     }
 }
 

@@ -26,7 +26,8 @@ variables! {
     LoadParameter, LOAD {
         Inertia => "inertia", "J_u", "kg m2", NonNegative, Load, Some(0.0), "inertia on the user side";
         Stiffness => "stiffness", "K_s", "N m/rad", NonNegative, Load, Some(0.0), "spring on the user side, torque proportional to the user position";
-        SpringZero => "spring_zero", "-", "rad", Any, Load, Some(0.0), "user position at which the spring is relaxed";
+        SpringZero => "spring_zero", "-", "rad", Any, Load, Some(0.0), "user position at which the spring is relaxed",
+            when(&[Away("load.stiffness", 0.0)]);
         Damping => "damping", "c_L", "N m s/rad", NonNegative, Load, Some(0.0), "viscous damping on the user side";
         Friction => "friction", "F_L", "N m", NonNegative, Load, Some(0.0), "dry friction on the user side";
     }

@@ -12,9 +12,12 @@ variables! {
     PlayParameter, PLAY {
         Total => "total", "2 BLK", "rad", NonNegative, Plant, None, "total play, twice the half amplitude BLK of the papers";
         Extra => "extra", "-", "rad", NonNegative, Plant, Some(0.0), "healthy 0; play added by wear";
-        Model => "model", "-", "1", Choice(PlayModel::NAMES), Plant, Some(0.0), "the play operator, or two masses with an elastic, damped dead zone";
-        Stiffness => "stiffness", "K", "N m/rad", Positive, Plant, Some(1e4), "contact stiffness at the user (elastic model)";
-        Damping => "damping", "C", "N m s/rad", NonNegative, Plant, Some(0.0), "contact damping at the user (elastic model)";
+        Model => "model", "-", "1", Choice(PlayModel::NAMES), Plant, Some(0.0), "the play operator, or two masses with an elastic, damped dead zone",
+            high_only("it keeps the play operator: two masses on a contact need the steps of the high one");
+        Stiffness => "stiffness", "K", "N m/rad", Positive, Plant, Some(1e4), "contact stiffness at the user (elastic model)",
+            high_only("it keeps the play operator: two masses on a contact need the steps of the high one").when(&[Chosen("play.model", &["elastic"])]);
+        Damping => "damping", "C", "N m s/rad", NonNegative, Plant, Some(0.0), "contact damping at the user (elastic model)",
+            high_only("it keeps the play operator: two masses on a contact need the steps of the high one").when(&[Chosen("play.model", &["elastic"])]);
     }
 }
 

@@ -12,34 +12,55 @@ variables! {
     /// The ball screw and its nut.
     ScrewParameter, SCREW {
         Lead => "lead", "-", "m/rad", Positive, Plant, None, "travel of the nut per radian of the screw";
-        PitchDiameter => "pitch_diameter", "d_m", "m", Positive, Plant, Some(0.032), "diameter of the circle on which the balls run";
-        BallDiameter => "ball_diameter", "d_b", "m", Positive, Plant, Some(0.00635), "diameter of a ball";
-        ContactAngle => "contact_angle", "alpha", "rad", Between(0.1, 1.5), Plant, Some(std::f64::consts::FRAC_PI_4), "contact angle of the balls";
-        BallsPerTurn => "balls_per_turn", "Z", "1", AtLeast(1.0), Plant, Some(15.0), "balls in one turn";
-        Circuits => "circuits", "n", "1", AtLeast(1.0), Plant, Some(4.0), "return channels, each with one turn of balls";
-        NutLength => "nut_length", "-", "m", Positive, Plant, Some(0.05), "length of the nut: a defect of the screw's groove is felt while it is covered";
+        PitchDiameter => "pitch_diameter", "d_m", "m", Positive, Plant, Some(0.032), "diameter of the circle on which the balls run",
+            when(&[Either(&[
+                Away("screw.blocked_circuits", 0.0), Away("screw.lubricant_lost", 0.0), Away("screw.debris", 0.0),
+                Away("screw.spall_groove", 0.0), Away("screw.spall_nut", 0.0), Away("screw.spall_ball", 0.0),
+            ])]);
+        BallDiameter => "ball_diameter", "d_b", "m", Positive, Plant, Some(0.00635), "diameter of a ball",
+            when(&[Either(&[Away("screw.spall_groove", 0.0), Away("screw.spall_nut", 0.0), Away("screw.spall_ball", 0.0)])]);
+        ContactAngle => "contact_angle", "alpha", "rad", Between(0.1, 1.5), Plant, Some(std::f64::consts::FRAC_PI_4), "contact angle of the balls",
+            when(&[Either(&[Away("screw.spall_groove", 0.0), Away("screw.spall_nut", 0.0), Away("screw.spall_ball", 0.0)])]);
+        BallsPerTurn => "balls_per_turn", "Z", "1", AtLeast(1.0), Plant, Some(15.0), "balls in one turn",
+            when(&[Either(&[Away("screw.spall_groove", 0.0), Away("screw.spall_nut", 0.0), Away("screw.spall_ball", 0.0)])]);
+        Circuits => "circuits", "n", "1", AtLeast(1.0), Plant, Some(4.0), "return channels, each with one turn of balls",
+            when(&[Either(&[
+                Away("screw.blocked_circuits", 0.0),
+                Away("screw.spall_groove", 0.0), Away("screw.spall_nut", 0.0), Away("screw.spall_ball", 0.0),
+            ])]);
+        NutLength => "nut_length", "-", "m", Positive, Plant, Some(0.05), "length of the nut: a defect of the screw's groove is felt while it is covered",
+            when(&[Away("screw.spall_groove", 0.0)]);
         Efficiency => "efficiency", "eta", "1", Fraction, Plant, None, "efficiency under a load that opposes motion";
         EfficiencyAiding => "efficiency_aiding", "eta_prime", "1", Between(-1e3, 1.0), Plant, None, "efficiency under a load that aids motion; 0 or less: the load cannot back-drive";
         Preload => "preload", "F_pr", "N", NonNegative, Plant, Some(0.0), "force between the two nut halves";
         Inertia => "inertia", "J_s", "kg m2", NonNegative, Plant, Some(0.0), "inertia of the screw";
-        FrictionSliding => "friction_sliding", "mu_s", "1", Unit, Plant, Some(0.10), "friction coefficient of balls that slide (blocked return, spalled track)";
-        FrictionDry => "friction_dry", "mu_dry", "1", Unit, Plant, Some(0.05), "friction coefficient without lubricant";
+        FrictionSliding => "friction_sliding", "mu_s", "1", Unit, Plant, Some(0.10), "friction coefficient of balls that slide (blocked return, spalled track)",
+            when(&[Either(&[
+                Away("screw.blocked_circuits", 0.0),
+                Away("screw.spall_groove", 0.0), Away("screw.spall_nut", 0.0), Away("screw.spall_ball", 0.0),
+            ])]);
+        FrictionDry => "friction_dry", "mu_dry", "1", Unit, Plant, Some(0.05), "friction coefficient without lubricant",
+            when(&[Away("screw.lubricant_lost", 0.0)]);
         BlockedCircuits => "blocked_circuits", "b", "1", NonNegative, Plant, Some(0.0), "healthy 0; return channels that are jammed";
         LubricantLost => "lubricant_lost", "s", "1", Unit, Plant, Some(0.0), "healthy 0; fraction of the lubricant lost";
         Debris => "debris", "c", "1", Between(0.0, 0.05), Plant, Some(0.0), "healthy 0; mass of debris over mass of grease";
         SpallGroove => "spall_groove", "w", "m", Between(0.0, 5e-3), Plant, Some(0.0), "healthy 0; length of a spall in the screw's groove";
         SpallNut => "spall_nut", "w", "m", Between(0.0, 5e-3), Plant, Some(0.0), "healthy 0; length of a spall in the nut's groove";
         SpallBall => "spall_ball", "w", "m", Between(0.0, 5e-3), Plant, Some(0.0), "healthy 0; length of a spall on a ball";
-        SpallDepth => "spall_depth", "d", "m", Between(0.0, 1e-3), Plant, Some(2e-4), "depth of the spalls, unless their chord is shallower";
-        SpallPosition => "spall_position", "-", "m", Any, Plant, Some(0.0), "ram position at which the nut's middle stands over the groove's spall";
+        SpallDepth => "spall_depth", "d", "m", Between(0.0, 1e-3), Plant, Some(2e-4), "depth of the spalls, unless their chord is shallower",
+            when(&[Either(&[Away("screw.spall_groove", 0.0), Away("screw.spall_nut", 0.0), Away("screw.spall_ball", 0.0)])]);
+        SpallPosition => "spall_position", "-", "m", Any, Plant, Some(0.0), "ram position at which the nut's middle stands over the groove's spall",
+            when(&[Away("screw.spall_groove", 0.0)]);
     }
 }
 
 variables! {
     /// What the maker allows; feeds flags and scaling only.
     RatingParameter, RATING {
-        Current => "current", "-", "A", Positive, Load, Some(1e9), "continuous phase current, peak";
-        Load => "load", "-", "N", Positive, Load, Some(1e9), "largest continuous load";
+        Current => "current", "-", "A", Positive, Load, Some(1e9), "continuous phase current, peak",
+            nowhere("a maker's rating scales and flags, it moves nothing");
+        Load => "load", "-", "N", Positive, Load, Some(1e9), "largest continuous load",
+            nowhere("a maker's rating scales and flags, it moves nothing");
     }
 }
 

@@ -4,7 +4,7 @@
 #[macro_export]
 macro_rules! variables {
     ($(#[$meta:meta])* $id:ident, $table:ident {
-        $($variant:ident => $path:literal, $symbol:literal, $unit:literal, $range:expr, $register:ident, $default:expr, $text:literal;)*
+        $($variant:ident => $path:literal, $symbol:literal, $unit:literal, $range:expr, $register:ident, $default:expr, $text:literal $(, $acts:expr)?;)*
     }) => {
         $(#[$meta])*
         // Rows of one kind are reached by counting from the first: not every name is written out.
@@ -15,10 +15,13 @@ macro_rules! variables {
         $(const _: () = assert!($crate::variable::named(stringify!($variant), $path), concat!("the variant of ", $path, " carries its name"));)*
         pub const $table: &[$crate::variable::Variable] = {
             #[allow(unused_imports)]
-            use $crate::variable::Range::*;
+            use $crate::variable::{acts::{Fidelity::*, When::*, *}, Range::{self, *}};
+            const fn or_always(given: &[Acts]) -> Acts {
+                if given.is_empty() { ALWAYS } else { given[0] }
+            }
             &[$($crate::variable::Variable {
                 path: $path, symbol: $symbol, unit: $unit, range: $range,
-                register: $crate::variable::Register::$register, default: $default, text: $text,
+                register: $crate::variable::Register::$register, default: $default, text: $text, acts: or_always(&[$($acts)?]),
             }),*]
         };
     };

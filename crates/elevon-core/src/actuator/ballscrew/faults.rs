@@ -25,31 +25,31 @@ pub fn catalogue() -> Vec<FaultKind> {
     let mut all = common(LINEAR);
     all.extend([
         FaultKind {
-            kind: "return_jam", unit: "1", range: Range::Between(0.0, 64.0), low: true, attributes: &[],
+            kind: "return_jam", unit: "1", range: Range::Between(0.0, 64.0), attributes: &[],
             places: places!("screw.return_channel": "screw.blocked_circuits" Add),
             effect: "whole number of circuits whose balls slide instead of rolling: efficiency falls, preload friction grows; the position follows, the current rises",
             source: "N 5.3",
         },
         FaultKind {
-            kind: "lubrication_loss", unit: "1", range: Range::Unit, low: true, attributes: &[],
+            kind: "lubrication_loss", unit: "1", range: Range::Unit, attributes: &[],
             places: places!("screw": "screw.lubricant_lost" Add),
             effect: "fraction of the lubricant lost: friction coefficient up as the film thins, viscous drag down (laws ASSUMED)",
             source: "N 4.1",
         },
         FaultKind {
-            kind: "contamination", unit: "1", range: Range::Between(0.0, 0.05), low: true, attributes: &[],
+            kind: "contamination", unit: "1", range: Range::Between(0.0, 0.05), attributes: &[],
             places: places!("screw": "screw.debris" Add),
             effect: "mass of debris over mass of grease: friction coefficient up, dry friction scatters (slopes ASSUMED)",
             source: "N 4.1",
         },
         FaultKind {
-            kind: "spall", unit: "m", range: Range::Between(0.0, 5e-3), low: true, attributes: &[DEPTH, POSITION],
+            kind: "spall", unit: "m", range: Range::Between(0.0, 5e-3), attributes: &[DEPTH, POSITION],
             places: places!("screw.groove": "screw.spall_groove" Add, "screw.nut": "screw.spall_nut" Add, "screw.ball": "screw.spall_ball" Add),
             effect: "length of a spall: torque locked to the ball passes and added friction, growing with size and load",
             source: "N 4.2",
         },
         FaultKind {
-            kind: "adapter_gap", unit: "m", range: Range::Between(0.0, 5e-3), low: true, attributes: &[],
+            kind: "adapter_gap", unit: "m", range: Range::Between(0.0, 5e-3), attributes: &[],
             places: places!("adapter": "play.extra" Add),
             effect: "gap between load cell and ram: impacts at each reversal",
             source: "N 4.1",

@@ -13,7 +13,7 @@ use crate::transmission::screw::{RatingParameter, ScrewParameter, RATING, SCREW}
 use crate::variable::{extended, relabelled, Relabel, Signal, Variable};
 
 const fn change(index: usize, name: &'static str, unit: &'static str, text: &'static str) -> Relabel {
-    Relabel { index, name, unit, text }
+    Relabel { index, name, unit, text, acts: None }
 }
 const fn unit(index: usize, unit: &'static str) -> Relabel {
     change(index, "", unit, "")

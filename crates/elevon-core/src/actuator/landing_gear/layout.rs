@@ -15,6 +15,8 @@ use crate::transmission::lock::{LockParameter, LOCK};
 use crate::transmission::planetary::{PlanetaryParameter, ReleaseParameter, PLANETARY, RELEASE};
 use crate::transmission::roller_screw::{ScrewParameter, SCREW};
 use crate::transmission::train_friction::{TrainFrictionParameter, TRAIN_FRICTION};
+use crate::variable::acts::{self, Acts, When};
+use crate::variable::{relabelled, Relabel, Variable};
 use crate::{groups, variables};
 
 variables! {
@@ -57,24 +59,64 @@ variables! {
 variables! {
     /// The low fidelity.
     LowParameter, LOW {
-        Step => "step", "dt_low", "s", Positive, Solver, Some(2e-5), "solver step of the low fidelity";
-        CommutationFactor => "commutation_factor", "c", "1", NonNegative, Plant, Some(1.1), "mean torque loss of the commutations as a resistance c p |w| L";
+        Step => "step", "dt_low", "s", Positive, Solver, Some(2e-5), "solver step of the low fidelity",
+            low_only("it has solver.step");
+        CommutationFactor => "commutation_factor", "c", "1", NonNegative, Plant, Some(1.1), "mean torque loss of the commutations as a resistance c p |w| L",
+            low_only("it has the commutations themselves");
     }
 }
 
 variables! {
     /// The fixed-step solver of the high fidelity.
     SolverParameter, SOLVER {
-        Step => "step", "dt", "s", Positive, Solver, Some(1e-6), "solver step of the electrical part";
-        MechanicalStep => "mechanical_step", "-", "s", Positive, Solver, Some(1e-5), "step of speeds, friction and lock: a whole number of electrical steps";
+        Step => "step", "dt", "s", Positive, Solver, Some(1e-6), "solver step of the electrical part",
+            high_only("it has low.step");
+        MechanicalStep => "mechanical_step", "-", "s", Positive, Solver, Some(1e-5), "step of speeds, friction and lock: a whole number of electrical steps",
+            high_only("it has low.step for all");
         FaultGrid => "fault_grid", "-", "s", Positive, Solver, Some(1e-3), "smooth fault profiles are held over this time";
     }
 }
 
+/// What this actuator's motor and bridge have otherwise than a servo's.
+const GEAR_MOTOR: [Variable; MOTOR.len()] = relabelled(
+    MOTOR,
+    &[
+        Relabel::acts(MotorParameter::EmfShape as usize, acts::ALWAYS),
+        Relabel::acts(MotorParameter::EmfFlatWidth as usize, acts::when(&[When::Chosen("motor.emf_shape", &["trapezoidal"])])),
+        Relabel::acts(MotorParameter::ElectricalOffset as usize, acts::ALWAYS),
+        Relabel::acts(MotorParameter::ShortModel as usize, REDUCED),
+        Relabel::acts(MotorParameter::ShortCoupling as usize, REDUCED),
+        Relabel::acts(MotorParameter::ShortContactResistance as usize, REDUCED),
+    ],
+);
+const REDUCED: Acts = acts::nowhere("this actuator has the reduced model of shorted turns only");
+
+const GEAR_INVERTER: [Variable; INVERTER.len()] = {
+    use InverterParameter as P;
+    const SHORTED: Acts = acts::high_only("its conducting pair has no single switches");
+    relabelled(
+        INVERTER,
+        &[
+            Relabel::acts(
+                P::HysteresisBand as usize,
+                acts::nowhere("its bridge is commutated by Hall sensors and a carrier, not by relays"),
+            ),
+            Relabel::acts(P::OnResistance as usize, acts::ALWAYS),
+            Relabel::acts(P::DiodeDrop as usize, acts::ALWAYS),
+            Relabel::acts(P::ShortedAHigh as usize, SHORTED),
+            Relabel::acts(P::ShortedALow as usize, SHORTED),
+            Relabel::acts(P::ShortedBHigh as usize, SHORTED),
+            Relabel::acts(P::ShortedBLow as usize, SHORTED),
+            Relabel::acts(P::ShortedCHigh as usize, SHORTED),
+            Relabel::acts(P::ShortedCLow as usize, SHORTED),
+        ],
+    )
+};
+
 groups! {
-    motor: "motor", MOTOR, MotorParameter;
+    motor: "motor", &GEAR_MOTOR, MotorParameter;
     shaft: "motor", SHAFT, ShaftParameter;
-    inverter: "inverter", INVERTER, InverterParameter;
+    inverter: "inverter", &GEAR_INVERTER, InverterParameter;
     six_step: "inverter", SIX_STEP, SixStepParameter;
     supply: "supply", LINK, SupplyParameter;
     gear: "gear", PLANETARY, PlanetaryParameter;

@@ -148,7 +148,7 @@ impl Wiring for Low {
         &ALL[..PHASES]
     }
     fn faults() -> Vec<FaultKind> {
-        super::faults::catalogue().into_iter().filter(|f| f.low).collect()
+        super::faults::catalogue()
     }
     fn step(raw: &[f64]) -> f64 {
         raw[LowParameter::Step.at()]

@@ -29,17 +29,24 @@ variables! {
     /// Which drive feeds the motor.
     DriveParameter, DRIVE {
         Kind => "kind", "-", "1", Choice(DriveKind::NAMES), Plant, Some(0.0), "three hysteresis relays (the papers' model), a carrier-PWM current controller (the real bench), or no drive: the motor is turned by torques on its shaft alone";
-        Commutation => "commutation", "-", "1", Choice(Commutation::NAMES), Controller, Some(0.0), "shape of the phase current references over the electrical angle (hysteresis drive)";
-        CommutationSource => "commutation_source", "-", "1", Choice(CommutationSource::NAMES), Controller, Some(0.0), "angle of the references: the resolver's, or a track of its own that a lost resolver does not touch";
-        FeedbackLoss => "feedback_loss", "-", "1", Choice(FeedbackLoss::NAMES), Controller, Some(0.0), "without resolver power the drive runs on with what it is shown, or opens its bridge until it returns";
+        Commutation => "commutation", "-", "1", Choice(Commutation::NAMES), Controller, Some(0.0), "shape of the phase current references over the electrical angle (hysteresis drive)",
+            high_only("its one phase has sinusoidal currents").when(&[Chosen("drive.kind", &["hysteresis"])]);
+        CommutationSource => "commutation_source", "-", "1", Choice(CommutationSource::NAMES), Controller, Some(0.0), "angle of the references: the resolver's, or a track of its own that a lost resolver does not touch",
+            when(&[Either(&[
+                Away("sensor.resolver.mismatch", 0.0), Away("sensor.resolver.offset", 0.0), Away("sensor.resolver.power_off", 0.0),
+            ])]);
+        FeedbackLoss => "feedback_loss", "-", "1", Choice(FeedbackLoss::NAMES), Controller, Some(0.0), "without resolver power the drive runs on with what it is shown, or opens its bridge until it returns",
+            high_only("its drive never opens").when(&[Away("sensor.resolver.power_off", 0.0)]);
     }
 }
 
 variables! {
     /// The fixed-step solver.
     SolverParameter, SOLVER {
-        Step => "step", "dt", "s", Positive, Solver, Some(1e-6), "solver step of the high fidelity";
-        Method => "method", "-", "1", Choice(Method::NAMES), Solver, Some(0.0), "explicit Euler (the papers), or semi-implicit: positions move with the new speed";
+        Step => "step", "dt", "s", Positive, Solver, Some(1e-6), "solver step of the high fidelity",
+            high_only("it has low.step");
+        Method => "method", "-", "1", Choice(Method::NAMES), Solver, Some(0.0), "explicit Euler (the papers), or semi-implicit: positions move with the new speed",
+            high_only("it is semi-implicit");
         FaultGrid => "fault_grid", "-", "s", Positive, Solver, Some(1e-3), "smooth fault profiles are held over this time";
     }
 }

@@ -343,7 +343,7 @@ impl<F: Form> Wiring for Low<F> {
         F::LOW
     }
     fn faults() -> Vec<FaultKind> {
-        F::faults().into_iter().filter(|f| f.low).collect()
+        F::faults()
     }
     fn step(raw: &[f64]) -> f64 {
         raw[LowParameter::Step.at()]

@@ -1,0 +1,198 @@
+//! Where a parameter acts: in which fidelities, and under which values of others. A fault acts where the parameters do
+//! that it moves, so neither is written twice.
+
+use super::{Group, Range, Variable};
+
+crate::choices! {
+    /// The fidelities of every actuator, in the order of their names.
+    Fidelity { High "high", Low "low" }
+}
+
+/// What must hold for a parameter to act. Paths are whole ones; of a path that a wiring lacks the condition holds.
+#[derive(Clone, Copy, Debug)]
+pub enum When {
+    /// The choice is one of these.
+    Chosen(&'static str, &'static [&'static str]),
+    /// The number is away from this value, now or by a fault.
+    Away(&'static str, f64),
+    /// The two numbers differ.
+    Differ(&'static str, &'static str),
+    Either(&'static [When]),
+    /// Asked of one fidelity only.
+    In(Fidelity, &'static [When]),
+}
+
+/// Where a parameter acts.
+#[derive(Clone, Copy, Debug)]
+pub struct Acts {
+    /// Why the fidelities do not carry it; empty: they do.
+    declined: [&'static str; 2],
+    /// All of these must hold.
+    pub when: &'static [When],
+}
+
+/// In both fidelities, whatever the other parameters are.
+pub const ALWAYS: Acts = Acts { declined: [""; 2], when: &[] };
+
+/// In the high fidelity only, and why not in the low one.
+pub const fn high_only(reason: &'static str) -> Acts {
+    Acts { declined: ["", reason], when: &[] }
+}
+
+/// In the low fidelity only, and why not in the high one.
+pub const fn low_only(reason: &'static str) -> Acts {
+    Acts { declined: [reason, ""], when: &[] }
+}
+
+/// In no fidelity, and why.
+pub const fn nowhere(reason: &'static str) -> Acts {
+    Acts { declined: [reason; 2], when: &[] }
+}
+
+/// In both fidelities while all of `conditions` hold.
+pub const fn when(conditions: &'static [When]) -> Acts {
+    ALWAYS.when(conditions)
+}
+
+impl Acts {
+    pub const fn when(self, conditions: &'static [When]) -> Self {
+        Self { when: conditions, ..self }
+    }
+
+    /// Why a fidelity does not carry the parameter, if so.
+    pub fn declined(&self, fidelity: Fidelity) -> Option<&'static str> {
+        Some(self.declined[fidelity as usize]).filter(|reason| !reason.is_empty())
+    }
+}
+
+/// The parameters of a wiring as they stand in a run.
+pub struct Standing<'a> {
+    pub groups: &'a [Group],
+    pub raw: &'a [f64],
+    /// Faults will move the parameter.
+    pub touched: &'a [bool],
+    pub fidelity: Fidelity,
+}
+
+/// The records of a wiring with their paths, in the order of its vector.
+pub fn records(groups: &[Group]) -> impl Iterator<Item = (String, &'static Variable)> + '_ {
+    groups.iter().flat_map(|g| g.variables.iter().enumerate().map(|(i, v)| (g.path(i), v)))
+}
+
+impl Standing<'_> {
+    fn find(&self, path: &str) -> Option<(usize, &'static Variable)> {
+        records(self.groups).enumerate().find(|(_, (p, _))| p == path).map(|(i, (_, v))| (i, v))
+    }
+
+    fn away(&self, path: &str, neutral: f64) -> bool {
+        self.find(path).is_none_or(|(i, _)| self.raw[i] != neutral || self.touched[i])
+    }
+
+    fn chosen(&self, path: &str, names: &[&str]) -> bool {
+        self.find(path).is_none_or(|(i, v)| v.range.choice(self.raw[i]).is_none_or(|name| names.contains(&name)))
+    }
+
+    fn holds(&self, condition: &When) -> bool {
+        match *condition {
+            When::Chosen(path, names) => self.chosen(path, names),
+            When::Away(path, neutral) => self.away(path, neutral),
+            When::Differ(a, b) => match (self.find(a), self.find(b)) {
+                (Some((i, _)), Some((j, _))) => self.raw[i] != self.raw[j] || self.touched[i] || self.touched[j],
+                _ => true,
+            },
+            When::Either(some) => some.iter().any(|c| self.holds(c)),
+            When::In(fidelity, all) => fidelity != self.fidelity || all.iter().all(|c| self.holds(c)),
+        }
+    }
+
+    /// Why the parameter of this record does not act in the run; `None`: it does.
+    pub fn idle(&self, variable: &Variable) -> Option<String> {
+        if let Some(reason) = variable.acts.declined(self.fidelity) {
+            return Some(format!("not carried at fidelity {}: {reason}", Fidelity::NAMES[self.fidelity as usize]));
+        }
+        let failed = variable.acts.when.iter().find(|c| !self.holds(c))?;
+        let here = match *failed {
+            When::Chosen(path, _) => self.find(path).and_then(|(i, v)| v.range.choice(self.raw[i])).map(|name| format!(" (here {name})")),
+            _ => None,
+        };
+        Some(format!("acts only with {failed}{}", here.unwrap_or_default()))
+    }
+
+    /// Every parameter that does not act in the run, and why.
+    pub fn not_acting(&self) -> Vec<(String, String)> {
+        records(self.groups).filter_map(|(path, v)| Some((path, self.idle(v)?))).collect()
+    }
+}
+
+fn joined(f: &mut std::fmt::Formatter<'_>, all: &[When], word: &str) -> std::fmt::Result {
+    for (i, one) in all.iter().enumerate() {
+        write!(f, "{}{one}", if i > 0 { word } else { "" })?;
+    }
+    Ok(())
+}
+
+impl std::fmt::Display for When {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match *self {
+            Self::Chosen(path, names) => write!(f, "{path} = {}", names.join(" or ")),
+            Self::Away(path, neutral) => write!(f, "{path} away from {neutral}"),
+            Self::Differ(a, b) => write!(f, "{a} away from {b}"),
+            Self::Either(some) => joined(f, some, " or "),
+            Self::In(fidelity, all) => {
+                joined(f, all, " and ")?;
+                write!(f, " (fidelity {})", Self::name(fidelity))
+            }
+        }
+    }
+}
+
+impl When {
+    fn name(fidelity: Fidelity) -> &'static str {
+        Fidelity::NAMES[fidelity as usize]
+    }
+}
+
+impl Range {
+    /// The name of a choice; `None` for a number.
+    pub fn choice(self, value: f64) -> Option<&'static str> {
+        match self {
+            Self::Choice(names) => names.get(value as usize).copied(),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registry::KINDS;
+
+    /// Paths and names that a condition asks for.
+    fn asked(all: &[When], out: &mut Vec<(&'static str, &'static [&'static str])>) {
+        for one in all {
+            match *one {
+                When::Chosen(path, names) => out.push((path, names)),
+                When::Away(path, _) => out.push((path, &[])),
+                When::Differ(a, b) => out.extend([(a, &[] as &[&str]), (b, &[])]),
+                When::Either(more) | When::In(_, more) => asked(more, out),
+            }
+        }
+    }
+
+    /// A misspelt path would hold everywhere: each stands in some wiring, and its choices there.
+    #[test]
+    fn conditions_ask_for_what_exists() {
+        let every: Vec<_> = KINDS.iter().flat_map(|k| records(k.fidelities[0].1.groups()).collect::<Vec<_>>()).collect();
+        let mut conditions = Vec::new();
+        every.iter().for_each(|(_, v)| asked(v.acts.when, &mut conditions));
+        assert!(!conditions.is_empty());
+        for (path, names) in conditions {
+            let found = every.iter().find(|(p, _)| p == path);
+            let (_, v) = found.unwrap_or_else(|| panic!("{path} stands in no wiring"));
+            match v.range {
+                Range::Choice(known) => assert!(names.iter().all(|n| known.contains(n)), "{path}: {names:?}"),
+                _ => assert!(names.is_empty(), "{path} is no choice"),
+            }
+        }
+    }
+}
