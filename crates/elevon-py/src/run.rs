@@ -6,6 +6,7 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
+use std::collections::HashMap;
 use std::sync::mpsc::{sync_channel, RecvTimeoutError};
 use std::time::Duration;
 
@@ -89,6 +90,17 @@ fn status(d: &Bound<'_, PyDict>, output: &RunOutput) -> PyResult<()> {
     d.set_item("message", message)
 }
 
+/// The instants of the clocks: runs that recorded at the same instants share one array.
+#[derive(Default)]
+struct Times<'py>(HashMap<(u64, u64, usize), Bound<'py, PyArray1<f64>>>);
+
+impl<'py> Times<'py> {
+    fn get(&mut self, py: Python<'py>, dt: f64, period: u64, rows: usize) -> Bound<'py, PyArray1<f64>> {
+        let instants = || PyArray1::from_iter(py, (0..rows).map(|i| (i as u64 * period) as f64 * dt));
+        self.0.entry((dt.to_bits(), period, rows)).or_insert_with(instants).clone()
+    }
+}
+
 /// A result as a dictionary. `width` numbers stand for each value (1, or 1 + derivatives).
 fn result<'py>(
     py: Python<'py>,
@@ -98,6 +110,7 @@ fn result<'py>(
     signals: &[&'static str],
     width: usize,
     output: RunOutput,
+    times: &mut Times<'py>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let d = PyDict::new(py);
     status(&d, &output)?;
@@ -112,9 +125,8 @@ fn result<'py>(
     let kept = PyDict::new(py);
     for (((clock, name), values), columns) in clocks.iter().zip(names).zip(output.clocks).zip(output.columns) {
         let rows = values.len().checked_div(columns).unwrap_or(0);
-        let time: Vec<f64> = (0..rows).map(|i| (i as u64 * clock.period) as f64 * dt).collect();
         let entry = PyDict::new(py);
-        entry.set_item("time", PyArray1::from_vec(py, time))?;
+        entry.set_item("time", times.get(py, dt, clock.period, rows))?;
         entry.set_item("values", PyArray1::from_vec(py, values).reshape([rows, columns])? as Bound<'py, PyArray2<f64>>)?;
         kept.set_item(name, entry)?;
     }
@@ -151,8 +163,9 @@ pub fn simulate<'py>(
     let outputs = polled(py, total, progress, |monitor| model.run_all(&specs, &clocks, threads, width, monitor))?;
     let signals: Vec<&'static str> = model.signals().iter().map(|s| s.name).collect();
     let list = PyList::empty(py);
+    let mut times = Times::default();
     for (output, dt) in outputs.into_iter().zip(steps) {
-        list.append(result(py, dt, &clocks, &names, &signals, 1, output)?)?;
+        list.append(result(py, dt, &clocks, &names, &signals, 1, output, &mut times)?)?;
     }
     Ok(list)
 }
@@ -190,9 +203,10 @@ pub fn sensitivities<'py>(
     })?;
     let signals: Vec<&'static str> = model.signals().iter().map(|s| s.name).collect();
     let list = PyList::empty(py);
+    let mut times = Times::default();
     for (i, output) in outputs.into_iter().enumerate() {
         let width = 1 + (chosen - 8 * i).min(8);
-        list.append(result(py, dt, &clocks, &names, &signals, width, output)?)?;
+        list.append(result(py, dt, &clocks, &names, &signals, width, output, &mut times)?)?;
     }
     Ok(list)
 }

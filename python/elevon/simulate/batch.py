@@ -8,7 +8,7 @@ from typing import Any
 from elevon.actuator import Actuator
 from elevon.errors import DivergedError, InputError, Interrupted
 from elevon.memory import check_memory
-from elevon.recording import Recording
+from elevon.recording import Clock, Recording
 from elevon.scenario import Scenario
 from elevon.simulate.prepare import Prepared, Record, Run, prepare_named
 from elevon.simulate.result import build_recording
@@ -120,10 +120,11 @@ def simulate_batch(
     for group in _groups(prepared):
         part = [prepared[index] for index in group]
         share = _share(progress, done, len(group), len(runs))
+        clocks: dict[tuple[str, float, int], Clock] = {}
         for index, result in zip(
             group, _run_core(part, fidelity, threads, lanes, share), strict=True
         ):
-            results[index] = build_recording(runs[index], prepared[index], fidelity, result)
+            results[index] = build_recording(runs[index], prepared[index], fidelity, result, clocks)
         done += len(group)
     return [item for item in results if item is not None]
 

@@ -18,14 +18,23 @@ __all__ = ["build_recording"]
 
 
 def build_recording(
-    run: Run, prepared: Prepared, fidelity: str, result: Mapping[str, Any]
+    run: Run,
+    prepared: Prepared,
+    fidelity: str,
+    result: Mapping[str, Any],
+    shared: dict[tuple[str, float, int], Clock],
 ) -> Recording:
-    """Return one result of the core with names, units, labels and what is known about it."""
+    """Return one result of the core with names, units, labels and what is known about it.
+
+    `shared` holds the clocks of earlier runs of the batch: the core gives runs that recorded at
+    the same instants one array of time, and they get one clock.
+    """
     channels: list[Channel] = []
     clocks: list[Clock] = []
     for index, plan in enumerate(prepared.plan):
         kept = result["clocks"][plan.name]
-        clock = Clock(plan.name, kept["time"], plan.rate)
+        key = (plan.name, plan.rate, id(kept["time"]))
+        clock = shared.get(key) or shared.setdefault(key, Clock(plan.name, kept["time"], plan.rate))
         clocks.append(clock)
         channels.extend(_channels(prepared, fidelity, plan, clock, kept["values"]))
         if index == 0:

@@ -155,4 +155,4 @@ def _assembled(
                 for place, name in enumerate(chosen):
                     derivatives[name][signal] = values[:, column, 1 + place]
     result = {**passes[0], "clocks": clocks}
-    return Sensitivities(build_recording(run, prepared, fidelity, result), derivatives)
+    return Sensitivities(build_recording(run, prepared, fidelity, result, {}), derivatives)
