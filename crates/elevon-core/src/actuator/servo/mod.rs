@@ -2,21 +2,16 @@
 //! friction and play, sensors. What turns and what travels are one machine: with the user's coordinate in metres and
 //! the ratio in radians per metre every equation holds. A `Form` says which of the two it is.
 
+mod advance;
 mod checks;
-mod electrical;
+mod details;
 pub mod faults;
 mod form;
 mod high;
 pub mod layout;
 mod low;
-mod march;
-mod mechanical;
-mod model;
-mod observe;
+mod shaft;
 pub mod signals;
-mod start;
-mod step;
-mod structure;
 
 pub use form::Form;
 pub use high::High;

@@ -1,7 +1,7 @@
 //! The state at the start of a run, and after a fault changed parameters.
 
-use super::layout::*;
 use super::model::{network, ExtraState, Model, State};
+use crate::actuator::servo::layout::*;
 use crate::control::current_dq::CurrentControlState;
 use crate::control::position_speed::PositionSpeedState;
 use crate::inverter::bridge::BridgeState;
@@ -12,10 +12,10 @@ use crate::three;
 use crate::transmission::friction::FrictionParameter;
 
 /// Signals whose initial value a scenario may set.
-pub(super) const INITIAL: &[&str] =
+pub(crate) const INITIAL: &[&str] =
     &["motor_position", "motor_speed", "user_position", "user_speed", "current_a", "current_b", "current_c"];
 
-pub(super) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
+pub(crate) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
     let or = |i: usize, other: S| S::select(initial[i].equals(initial[i]), initial[i], other);
     let zero = S::zero();
     let motor_position = or(0, zero);
@@ -49,7 +49,7 @@ pub(super) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> St
     }
 }
 
-pub(super) fn refresh<S: Scalar>(raw: &[S], state: &mut State<S>) {
+pub(crate) fn refresh<S: Scalar>(raw: &[S], state: &mut State<S>) {
     heat(raw, &mut state.star, &state.extra.network);
     let position = raw[FrictionParameter::JamPosition.at()];
     let free = state.jammed.equals(S::zero());

@@ -2,12 +2,12 @@
 //! motor, transmission, acquisition. With `FULL` false the optional details compile to nothing, with `EXTRA` false those
 //! that only some servos have; a detail at its healthy value changes no bit, so the forms agree exactly where both apply.
 
-use super::electrical::{coupling, electric_step, motor_torque};
-use super::layout::DriveKind;
-use super::march::{Moment, Stepper};
-use super::mechanical::mechanical_step;
+use super::electric::{coupling, electric_step, motor_torque};
 use super::model::{Model, State};
-use super::structure::Structure;
+use crate::actuator::servo::advance::{Instant, Stepper};
+use crate::actuator::servo::details::Structure;
+use crate::actuator::servo::layout::DriveKind;
+use crate::actuator::servo::shaft::mechanical_step;
 use crate::control::position_speed::Feedback;
 use crate::inverter::hysteresis::{count_transitions, relays, six_step};
 use crate::scalar::{three_phase, Scalar};
@@ -17,7 +17,7 @@ use crate::three;
 
 /// What the controller is told of the shaft.
 #[inline(always)]
-pub(super) fn shaft_reading<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &mut State<S>) -> Reading<S> {
+pub(crate) fn shaft_reading<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &mut State<S>) -> Reading<S> {
     if FULL && structure.resolver {
         m.resolver.read(s.motor_position, s.motor_speed, &mut s.held_angle)
     } else {
@@ -26,7 +26,7 @@ pub(super) fn shaft_reading<S: Scalar, const FULL: bool>(m: &Model<S>, structure
 }
 
 #[inline(always)]
-pub(super) fn control_step<S: Scalar, const FULL: bool>(
+pub(crate) fn control_step<S: Scalar, const FULL: bool>(
     m: &Model<S>,
     structure: &Structure,
     command: S,
@@ -57,7 +57,7 @@ fn measured_current<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>
 
 /// What the legs carry: the windings' currents and those of resistors at the centre tap.
 #[inline(always)]
-pub(super) fn leg_current<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>) -> [S; 3] {
+pub(crate) fn leg_current<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>) -> [S; 3] {
     if !structure.tap {
         return s.star.current;
     }
@@ -67,7 +67,7 @@ pub(super) fn leg_current<S: Scalar>(m: &Model<S>, structure: &Structure, s: &St
 
 /// Phase currents as the drive sees them.
 #[inline(always)]
-pub(super) fn seen_current<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>) -> [S; 3] {
+pub(crate) fn seen_current<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>) -> [S; 3] {
     if structure.current_filter {
         s.extra.sensed
     } else {
@@ -77,7 +77,7 @@ pub(super) fn seen_current<S: Scalar>(m: &Model<S>, structure: &Structure, s: &S
 
 /// Quadrature and direct components of three phase quantities (sheet 1.4).
 #[inline(always)]
-pub(super) fn park<S: Scalar>(x: [S; 3], sin: [S; 3], cos: [S; 3]) -> (S, S) {
+pub(crate) fn park<S: Scalar>(x: [S; 3], sin: [S; 3], cos: [S; 3]) -> (S, S) {
     let two_thirds = S::splat(2.0 / 3.0);
     let q = two_thirds * (x[0] * sin[0] + x[1] * sin[1] + x[2] * sin[2]);
     let d = -(two_thirds * (x[0] * cos[0] + x[1] * cos[1] + x[2] * cos[2]));
@@ -88,7 +88,7 @@ pub(super) fn park<S: Scalar>(x: [S; 3], sin: [S; 3], cos: [S; 3]) -> (S, S) {
 fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     m: &Model<S>,
     structure: &Structure,
-    x: &Moment<S>,
+    x: &Instant<S>,
     s: &mut State<S>,
 ) {
     // Sensors and control electronics.
@@ -146,7 +146,7 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
 
 /// The step of the inner loop with and without details, behind relays or a carrier. With details the drive is looked up in
 /// the structure, which spares the compiler two copies of the largest code.
-pub(super) struct HighStep<const FULL: bool, const EXTRA: bool, const PWM: bool>;
+pub(crate) struct HighStep<const FULL: bool, const EXTRA: bool, const PWM: bool>;
 
 impl<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool> Stepper<S> for HighStep<FULL, EXTRA, PWM> {
     type Model = Model<S>;
@@ -158,7 +158,7 @@ impl<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool> Stepper<S>
         model.dt
     }
     #[inline(always)]
-    fn step(model: &Model<S>, structure: &Structure, moment: &Moment<S>, state: &mut State<S>) {
-        step::<S, FULL, EXTRA, PWM>(model, structure, moment, state);
+    fn step(model: &Model<S>, structure: &Structure, instant: &Instant<S>, state: &mut State<S>) {
+        step::<S, FULL, EXTRA, PWM>(model, structure, instant, state);
     }
 }

@@ -1,8 +1,8 @@
 //! Shaft, transmission and load side of a step.
 
-use super::march::Moment;
-use super::model::*;
-use super::structure::Structure;
+use super::advance::Instant;
+use super::details::Structure;
+use super::high::model::*;
 use crate::scalar::Scalar;
 use crate::transmission::friction::Friction;
 
@@ -24,7 +24,7 @@ pub(super) struct ShaftLoads<S> {
 pub(super) fn shaft_loads<S: Scalar, const FULL: bool, const EXTRA: bool>(
     m: &Model<S>,
     structure: &Structure,
-    x: &Moment<S>,
+    x: &Instant<S>,
     s: &State<S>,
     torque: S,
 ) -> ShaftLoads<S> {
@@ -80,7 +80,7 @@ pub(super) fn shaft_loads<S: Scalar, const FULL: bool, const EXTRA: bool>(
 
 /// Dry friction of the load side, at the user.
 #[inline(always)]
-pub(super) fn load_side_friction<S: Scalar>(m: &Model<S>, structure: &Structure, x: &Moment<S>) -> S {
+pub(super) fn load_side_friction<S: Scalar>(m: &Model<S>, structure: &Structure, x: &Instant<S>) -> S {
     if structure.linear {
         m.extra.load_friction + x.brake
     } else {
@@ -113,7 +113,7 @@ pub(super) fn contact_torque<S: Scalar>(m: &Model<S>, s: &State<S>) -> S {
 pub(super) fn mechanical_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
     m: &Model<S>,
     structure: &Structure,
-    x: &Moment<S>,
+    x: &Instant<S>,
     s: &mut State<S>,
     torque: S,
 ) {
@@ -149,7 +149,7 @@ pub(super) fn mechanical_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
 
 /// The second mass of the elastic play.
 #[inline(always)]
-fn user_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structure, x: &Moment<S>, s: &mut State<S>, loads: &ShaftLoads<S>) {
+fn user_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structure, x: &Instant<S>, s: &mut State<S>, loads: &ShaftLoads<S>) {
     let through = loads.through;
     let speed = s.user_speed;
     let active = through - loads.user_torque;
@@ -187,7 +187,7 @@ fn account_mechanical<S: Scalar>(m: &Model<S>, s: &mut State<S>, loads: &ShaftLo
 }
 
 #[inline(always)]
-fn account_load_side<S: Scalar>(m: &Model<S>, structure: &Structure, x: &Moment<S>, s: &mut State<S>, active: S, middle: S) {
+fn account_load_side<S: Scalar>(m: &Model<S>, structure: &Structure, x: &Instant<S>, s: &mut State<S>, active: S, middle: S) {
     let limit = load_side_friction(m, structure, x);
     let dry = Friction::dry_torque(active, s.user_speed, limit, limit);
     let braked = if structure.linear { dry * (x.brake / limit.maximum(S::splat(1e-300))) } else { S::zero() };

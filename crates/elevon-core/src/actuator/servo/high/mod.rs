@@ -1,12 +1,17 @@
 //! High fidelity: three phases, switching inverter, fixed step (reference sheet 1.2 to 1.7).
 
-use super::form::Form;
-use super::layout::*;
-use super::march::March;
-use super::model::{Model, State};
-use super::start;
-use super::step::{control_step, park, seen_current, shaft_reading, HighStep};
-use super::structure::{sample_steps, Structure};
+mod electric;
+pub(crate) mod model;
+pub(crate) mod observe;
+mod start;
+mod step;
+
+use self::model::{Model, State};
+use self::step::{control_step, park, seen_current, shaft_reading, HighStep};
+use crate::actuator::servo::advance::Stretch;
+use crate::actuator::servo::details::{sample_steps, Structure};
+use crate::actuator::servo::form::Form;
+use crate::actuator::servo::layout::*;
 use crate::actuator::{Finding, Inputs, Overheat, Port, Setup, Tick, Watch, Wiring, WATCHED};
 use crate::control::current_dq::{CurrentSample, PwmParameter};
 use crate::control::position_speed::ControlParameter;
@@ -74,11 +79,11 @@ impl<F: Form> Wiring for High<F> {
     }
 
     fn check(raw: &[f64]) -> Vec<Finding> {
-        super::checks::high::<F>(raw)
+        crate::actuator::servo::checks::high::<F>(raw)
     }
 
     fn check_faulted(raw: &[f64]) -> Vec<Finding> {
-        super::checks::faulted::<F>(raw)
+        crate::actuator::servo::checks::faulted::<F>(raw)
     }
 
     fn derive<S: Scalar>(raw: &[S], structure: &Structure) -> Model<S> {
@@ -142,7 +147,7 @@ impl<F: Form> Wiring for High<F> {
         from: Steps,
         count: Steps,
     ) {
-        let x = March { structure, models, inputs, states, from, count };
+        let x = Stretch { structure, models, inputs, states, from, count };
         match (structure.full, structure.extra, structure.drive == DriveKind::Pwm) {
             (false, _, false) => x.run::<HighStep<false, false, false>>(),
             (false, _, true) => x.run::<HighStep<false, false, true>>(),
@@ -153,7 +158,7 @@ impl<F: Form> Wiring for High<F> {
 
     #[inline(always)]
     fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, state: &State<S>, t: S, out: &mut [S]) {
-        super::observe::high::<F, S>(structure, m, inputs, state, t, out);
+        observe::high::<F, S>(structure, m, inputs, state, t, out);
     }
 
     #[inline(always)]

@@ -1,12 +1,12 @@
 //! Low fidelity: one equivalent phase (reference sheet 1.9). Same blocks, same parameters where shared; PID
 //! without anti-windup and derivative filter, linear viscous friction; Borello friction and play kept.
 
-use super::form::Form;
-use super::layout::*;
-use super::march::{March, Moment, Stepper};
-use super::model::network;
-use super::observe::low_screw;
-use super::signals::{LowSignal as Q, LOW};
+use super::high::model::network;
+use super::high::observe::low_screw;
+use crate::actuator::servo::advance::{Instant, Stepper, Stretch};
+use crate::actuator::servo::form::Form;
+use crate::actuator::servo::layout::*;
+use crate::actuator::servo::signals::{LowSignal as Q, LOW};
 use crate::actuator::{Finding, Inputs, Overheat, Port, Setup, Tick, Watch, Wiring, WATCHED};
 use crate::control::current_dq::PwmParameter;
 use crate::control::position_speed::{ControlParameter, Feedback, Mode};
@@ -180,7 +180,7 @@ fn phase<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, commutati
 }
 
 #[inline(always)]
-fn step<S: Scalar>(m: &Model<S>, structure: &Structure, x: &Moment<S>, s: &mut State<S>) {
+fn step<S: Scalar>(m: &Model<S>, structure: &Structure, x: &Instant<S>, s: &mut State<S>) {
     let zero = S::zero();
     let speed = s.motor_speed;
     // Sensors.
@@ -323,8 +323,8 @@ impl<S: Scalar> Stepper<S> for LowStep {
         model.dt
     }
     #[inline(always)]
-    fn step(model: &Model<S>, structure: &Structure, moment: &Moment<S>, state: &mut State<S>) {
-        step(model, structure, moment, state);
+    fn step(model: &Model<S>, structure: &Structure, instant: &Instant<S>, state: &mut State<S>) {
+        step(model, structure, instant, state);
     }
 }
 
@@ -402,11 +402,11 @@ impl<F: Form> Wiring for Low<F> {
         ticks
     }
     fn check(raw: &[f64]) -> Vec<Finding> {
-        super::checks::low::<F>(raw)
+        crate::actuator::servo::checks::low::<F>(raw)
     }
 
     fn check_faulted(raw: &[f64]) -> Vec<Finding> {
-        super::checks::faulted::<F>(raw)
+        crate::actuator::servo::checks::faulted::<F>(raw)
     }
 
     fn derive<S: Scalar>(raw: &[S], structure: &Structure) -> Model<S> {
@@ -550,7 +550,7 @@ impl<F: Form> Wiring for Low<F> {
         from: Steps,
         count: Steps,
     ) {
-        March { structure, models, inputs, states, from, count }.run::<LowStep>();
+        Stretch { structure, models, inputs, states, from, count }.run::<LowStep>();
     }
 
     #[inline(always)]

@@ -1,14 +1,14 @@
 //! Windings and bridge of a step.
 
 use super::model::*;
-use super::structure::Structure;
+use crate::actuator::servo::details::Structure;
 use crate::inverter::bridge::{quench, Windings};
 use crate::scalar::{three_phase, Scalar};
 use crate::three;
 
 /// Electromagnetic coefficients of the present rotor angle.
 #[derive(Clone, Copy)]
-pub(super) struct Coupling<S> {
+pub(crate) struct Coupling<S> {
     /// k_j of the phases.
     pub k: [S; 3],
     /// k_j of the shorted turns.
@@ -16,7 +16,7 @@ pub(super) struct Coupling<S> {
 }
 
 #[inline(always)]
-pub(super) fn coupling<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &State<S>, sin: S, cos: S) -> Coupling<S> {
+pub(crate) fn coupling<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &State<S>, sin: S, cos: S) -> Coupling<S> {
     let (mut shape, _) = three_phase(sin, cos);
     let eccentric = structure.motor.static_eccentricity;
     if !FULL && !eccentric {
@@ -46,7 +46,7 @@ pub(super) fn coupling<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &St
 }
 
 #[inline(always)]
-pub(super) fn motor_torque<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &State<S>, c: &Coupling<S>) -> S {
+pub(crate) fn motor_torque<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &State<S>, c: &Coupling<S>) -> S {
     let mut torque = m.star.torque(c.k, s.star.current);
     if FULL && structure.motor.shorted_loop {
         torque = torque + m.star.torque(c.loop_k, s.star.loop_current);
@@ -56,7 +56,7 @@ pub(super) fn motor_torque<S: Scalar, const FULL: bool>(m: &Model<S>, structure:
 
 /// New phase currents and the phase-to-neutral voltages of this step.
 #[inline(always)]
-pub(super) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
+pub(crate) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
     m: &Model<S>,
     structure: &Structure,
     s: &mut State<S>,

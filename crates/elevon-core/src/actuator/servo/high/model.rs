@@ -1,8 +1,8 @@
 //! Constants and state of a run.
 
-use super::form::Form;
-use super::layout::*;
-use super::structure::Structure;
+use crate::actuator::servo::details::Structure;
+use crate::actuator::servo::form::Form;
+use crate::actuator::servo::layout::*;
 use crate::control::current_dq::{CurrentControl, CurrentControlState};
 use crate::control::position_speed::{ControlParameter, PositionSpeed, PositionSpeedState};
 use crate::inverter::bridge::{Bridge, BridgeState, InverterParameter};
@@ -23,32 +23,32 @@ use crate::transmission::screw::Screw;
 /// Constants of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Model<S> {
-    pub(super) dt: S,
-    pub(super) star: Star<S>,
-    pub(super) bridge: Bridge<S>,
-    pub(super) half_band: S,
-    pub(super) supply_scale: S,
-    pub(super) control: PositionSpeed<S>,
-    pub(super) current_control: CurrentControl<S>,
-    pub(super) friction: Friction<S>,
-    pub(super) gear: Gear<S>,
-    pub(super) play: Play<S>,
-    pub(super) sensor: CurrentSensor<S>,
-    pub(super) encoder: Encoder<S>,
-    pub(super) resolver: Resolver<S>,
-    pub(super) filter: S,
-    pub(super) inertia: S,
-    pub(super) dt_per_inertia: S,
-    pub(super) user_inertia: S,
-    pub(super) per_user_inertia: S,
-    pub(super) noise_deviation: S,
-    pub(super) temperature: S,
-    pub(super) extra: Extra<S>,
+    pub(crate) dt: S,
+    pub(crate) star: Star<S>,
+    pub(crate) bridge: Bridge<S>,
+    pub(crate) half_band: S,
+    pub(crate) supply_scale: S,
+    pub(crate) control: PositionSpeed<S>,
+    pub(crate) current_control: CurrentControl<S>,
+    pub(crate) friction: Friction<S>,
+    pub(crate) gear: Gear<S>,
+    pub(crate) play: Play<S>,
+    pub(crate) sensor: CurrentSensor<S>,
+    pub(crate) encoder: Encoder<S>,
+    pub(crate) resolver: Resolver<S>,
+    pub(crate) filter: S,
+    pub(crate) inertia: S,
+    pub(crate) dt_per_inertia: S,
+    pub(crate) user_inertia: S,
+    pub(crate) per_user_inertia: S,
+    pub(crate) noise_deviation: S,
+    pub(crate) temperature: S,
+    pub(crate) extra: Extra<S>,
 }
 
 /// Constants of what only some servos have.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Extra<S> {
+pub(crate) struct Extra<S> {
     pub screw: Screw<S>,
     pub unbalance: Unbalance<S>,
     pub tap: Tap<S>,
@@ -64,32 +64,32 @@ pub(super) struct Extra<S> {
 /// All that changes during a run.
 #[derive(Clone, Copy, Debug)]
 pub struct State<S> {
-    pub(super) star: StarState<S>,
-    pub(super) legs: [S; 3],
-    pub(super) bridge: BridgeState<S>,
-    pub(super) control: PositionSpeedState<S>,
-    pub(super) current_ref: S,
-    pub(super) current_control: CurrentControlState<S>,
-    pub(super) motor_position: S,
-    pub(super) motor_speed: S,
-    pub(super) user_position: S,
-    pub(super) user_speed: S,
-    pub(super) command_noise: S,
-    pub(super) current_noise: [S; 3],
-    pub(super) held_angle: S,
-    pub(super) jam_side: S,
-    pub(super) jammed: S,
-    pub(super) filtered: [S; 3],
-    pub(super) transitions: S,
+    pub(crate) star: StarState<S>,
+    pub(crate) legs: [S; 3],
+    pub(crate) bridge: BridgeState<S>,
+    pub(crate) control: PositionSpeedState<S>,
+    pub(crate) current_ref: S,
+    pub(crate) current_control: CurrentControlState<S>,
+    pub(crate) motor_position: S,
+    pub(crate) motor_speed: S,
+    pub(crate) user_position: S,
+    pub(crate) user_speed: S,
+    pub(crate) command_noise: S,
+    pub(crate) current_noise: [S; 3],
+    pub(crate) held_angle: S,
+    pub(crate) jam_side: S,
+    pub(crate) jammed: S,
+    pub(crate) filtered: [S; 3],
+    pub(crate) transitions: S,
     /// Phase-to-neutral voltages of the last step (detailed bridge).
-    pub(super) voltage: [S; 3],
-    pub(super) energy: [S; 8],
-    pub(super) extra: ExtraState<S>,
+    pub(crate) voltage: [S; 3],
+    pub(crate) energy: [S; 8],
+    pub(crate) extra: ExtraState<S>,
 }
 
 /// State of what only some servos have.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ExtraState<S> {
+pub(crate) struct ExtraState<S> {
     pub network: NetworkState<S>,
     /// Currents as the drive sees them.
     pub sensed: [S; 3],
@@ -97,18 +97,18 @@ pub(super) struct ExtraState<S> {
     pub scatter: S,
 }
 
-pub(super) const E_SUPPLY: usize = 0;
-pub(super) const E_COPPER: usize = 1;
-pub(super) const E_INVERTER: usize = 2;
-pub(super) const E_FRICTION: usize = 3;
-pub(super) const E_BRAKE: usize = 4;
-pub(super) const E_LOAD: usize = 5;
-pub(super) const E_IMPACT: usize = 6;
+pub(crate) const E_SUPPLY: usize = 0;
+pub(crate) const E_COPPER: usize = 1;
+pub(crate) const E_INVERTER: usize = 2;
+pub(crate) const E_FRICTION: usize = 3;
+pub(crate) const E_BRAKE: usize = 4;
+pub(crate) const E_LOAD: usize = 5;
+pub(crate) const E_IMPACT: usize = 6;
 
-pub(super) const E_TAP: usize = 7;
+pub(crate) const E_TAP: usize = 7;
 
 impl<S: Scalar> Model<S> {
-    pub(super) fn derive<F: Form>(raw: &[S], structure: &Structure) -> Self {
+    pub(crate) fn derive<F: Form>(raw: &[S], structure: &Structure) -> Self {
         let view = Raw(raw);
         let at = |i: usize| raw[i];
         let dt = at(SolverParameter::Step.at());
@@ -165,7 +165,7 @@ impl<S: Scalar> Model<S> {
 }
 
 /// The thermal network at the whole number of solver steps next to its sample time.
-pub(super) fn network<S: Scalar>(raw: &[S], dt: f64) -> Network<S> {
+pub(crate) fn network<S: Scalar>(raw: &[S], dt: f64) -> Network<S> {
     let at = |p: MotorParameter| raw[p.at()];
     let period = (raw[ThermalParameter::SampleTime.at()].lane(0) / dt).round().max(1.0) * dt;
     let temperature = [

@@ -1,14 +1,14 @@
 //! All signals of the high fidelity from its state. Nothing here feeds back.
 
-use super::electrical::{coupling, motor_torque};
-use super::form::Form;
-use super::layout::*;
-use super::march::Moment;
-use super::mechanical::{contact_torque, disturbance, load_side_friction, shaft_loads};
+use super::electric::{coupling, motor_torque};
 use super::model::*;
-use super::signals::{HighSignal as Q, HIGH};
 use super::step::{leg_current, park, seen_current};
-use super::structure::Structure;
+use crate::actuator::servo::advance::Instant;
+use crate::actuator::servo::details::Structure;
+use crate::actuator::servo::form::Form;
+use crate::actuator::servo::layout::*;
+use crate::actuator::servo::shaft::{contact_torque, disturbance, load_side_friction, shaft_loads};
+use crate::actuator::servo::signals::{HighSignal as Q, HIGH};
 use crate::actuator::Inputs;
 use crate::scalar::{three_phase, Scalar};
 use crate::sensor::resolver::Reading;
@@ -16,7 +16,7 @@ use crate::three;
 use crate::transmission::friction::Friction;
 
 #[inline(always)]
-pub(super) fn high<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
+pub(crate) fn high<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
     let mut set = |q: Q, x: S| out[q as usize] = x;
     set(Q::Command, inputs[COMMAND].at(t) + s.command_noise);
     set(Q::UserPosition, s.user_position);
@@ -54,7 +54,7 @@ pub(super) fn high<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, inpu
 /// What a ballscrew adds, in the order of its further signals.
 #[inline(always)]
 fn screw<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S) -> [S; 7] {
-    let x = Moment::at(inputs, t);
+    let x = Instant::at(inputs, t);
     let user = m.gear.stiffness.fma(s.user_position - m.gear.spring_zero, x.user);
     let through = if structure.elastic { contact_torque(m, s) } else { user };
     let unbalance = if structure.unbalance { m.extra.unbalance.torque(s.motor_position) } else { S::zero() };
@@ -73,7 +73,7 @@ fn screw<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: 
 
 /// The same for the low fidelity, and current and voltage of the printed L-R circuit.
 #[inline(always)]
-pub(super) fn low_screw<S: Scalar>(per_ratio: S, angle: S, speed: S, force: S, efficiency: [S; 2], current: S, voltage: S) -> [S; 7] {
+pub(crate) fn low_screw<S: Scalar>(per_ratio: S, angle: S, speed: S, force: S, efficiency: [S; 2], current: S, voltage: S) -> [S; 7] {
     let root = S::splat(1.5_f64.sqrt());
     [angle * per_ratio, speed * per_ratio, force * per_ratio, efficiency[0], efficiency[1], root * current, root * voltage]
 }
@@ -132,7 +132,7 @@ fn mechanical<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>
     let (sin, cos) = m.star.electrical_angle(s.motor_position).sin_cos();
     let c = coupling::<S, true>(m, structure, s, sin, cos);
     let torque = motor_torque::<S, true>(m, structure, s, &c);
-    let loads = shaft_loads::<S, true, true>(m, structure, &Moment::at(inputs, t), s, torque);
+    let loads = shaft_loads::<S, true, true>(m, structure, &Instant::at(inputs, t), s, torque);
     let dry = Friction::dry_torque(torque - loads.load, s.motor_speed, loads.static_limit, loads.dynamic);
     let mut set = |q: Q, x: S| out[q as usize] = x;
     set(Q::MotorTorque, torque);

@@ -10,7 +10,7 @@ const AHEAD: usize = 8;
 
 /// The inputs at one instant.
 #[derive(Clone, Copy)]
-pub(super) struct Moment<S> {
+pub(super) struct Instant<S> {
     pub t: S,
     pub command: S,
     /// A brake cannot push: negative values count as zero.
@@ -20,7 +20,7 @@ pub(super) struct Moment<S> {
     pub supply: S,
 }
 
-impl<S: Scalar> Moment<S> {
+impl<S: Scalar> Instant<S> {
     #[inline(always)]
     pub(super) fn at(inputs: &Inputs<S>, t: S) -> Self {
         let brake = inputs[BRAKE].at(t).maximum(S::zero());
@@ -59,11 +59,11 @@ pub(super) trait Stepper<S> {
     type Structure;
     type State: Copy;
     fn dt(model: &Self::Model) -> S;
-    fn step(model: &Self::Model, structure: &Self::Structure, moment: &Moment<S>, state: &mut Self::State);
+    fn step(model: &Self::Model, structure: &Self::Structure, instant: &Instant<S>, state: &mut Self::State);
 }
 
 /// A stretch of steps of a block. It depends on no form of servo, so that all forms share its code.
-pub(super) struct March<'a, M, Q, Z, S> {
+pub(super) struct Stretch<'a, M, Q, Z, S> {
     pub structure: &'a Q,
     pub models: &'a [M],
     pub inputs: &'a [Inputs<S>],
@@ -72,31 +72,31 @@ pub(super) struct March<'a, M, Q, Z, S> {
     pub count: Steps,
 }
 
-impl<M, Q, Z: Copy, S: Scalar> March<'_, M, Q, Z, S> {
+impl<M, Q, Z: Copy, S: Scalar> Stretch<'_, M, Q, Z, S> {
     pub fn run<T: Stepper<S, Model = M, Structure = Q, State = Z>>(self) {
-        S::vectorize(Stretch::<T, S>(self));
+        S::vectorize(Run::<T, S>(self));
     }
 }
 
-struct Stretch<'a, T: Stepper<S>, S: Scalar>(March<'a, T::Model, T::Structure, T::State, S>);
+struct Run<'a, T: Stepper<S>, S: Scalar>(Stretch<'a, T::Model, T::Structure, T::State, S>);
 
-impl<T: Stepper<S>, S: Scalar> Kernel for Stretch<'_, T, S> {
+impl<T: Stepper<S>, S: Scalar> Kernel for Run<'_, T, S> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        march::<T, S>(self.0);
+        advance::<T, S>(self.0);
     }
 }
 
 #[inline(always)]
-fn march<T: Stepper<S>, S: Scalar>(x: March<'_, T::Model, T::Structure, T::State, S>) {
-    let March { structure, models, inputs, states, from, count } = x;
+fn advance<T: Stepper<S>, S: Scalar>(x: Stretch<'_, T::Model, T::Structure, T::State, S>) {
+    let Stretch { structure, models, inputs, states, from, count } = x;
     // Commands depend on time alone: evaluated some steps ahead, they leave the chain from state to state.
     let mut commands = [[S::zero(); AHEAD]; MAX_CHUNKS];
-    let mut moments = [Moment::none(); MAX_CHUNKS];
+    let mut instants = [Instant::none(); MAX_CHUNKS];
     let mut steady = [false; MAX_CHUNKS];
-    for ((model, inputs), (moment, steady)) in models.iter().zip(inputs).zip(moments.iter_mut().zip(&mut steady)) {
-        *moment = Moment::at(inputs, S::splat(from as f64) * T::dt(model));
+    for ((model, inputs), (instant, steady)) in models.iter().zip(inputs).zip(instants.iter_mut().zip(&mut steady)) {
+        *instant = Instant::at(inputs, S::splat(from as f64) * T::dt(model));
         *steady = inputs[COMMAND + 1..].iter().all(|source| source.flat());
     }
     let mut k = from;
@@ -109,11 +109,11 @@ fn march<T: Stepper<S>, S: Scalar>(x: March<'_, T::Model, T::Structure, T::State
         }
         if let ([model], [inputs], [state]) = (models, inputs, &mut *states) {
             // One chunk: its state may stay in registers.
-            let (mut s, mut moment, steady) = (*state, moments[0], steady[0]);
+            let (mut s, mut instant, steady) = (*state, instants[0], steady[0]);
             for (i, &command) in commands[0][..some].iter().enumerate() {
                 let t = S::splat((k + i as Steps) as f64) * T::dt(model);
-                moment.move_to(inputs, steady, t, command);
-                T::step(model, structure, &moment, &mut s);
+                instant.move_to(inputs, steady, t, command);
+                T::step(model, structure, &instant, &mut s);
             }
             *state = s;
         } else {
@@ -121,8 +121,8 @@ fn march<T: Stepper<S>, S: Scalar>(x: March<'_, T::Model, T::Structure, T::State
             for i in 0..some {
                 let number = S::splat((k + i as Steps) as f64);
                 for (c, ((model, inputs), state)) in models.iter().zip(inputs).zip(states.iter_mut()).enumerate().take(MAX_CHUNKS) {
-                    moments[c].move_to(inputs, steady[c], number * T::dt(model), commands[c][i]);
-                    T::step(model, structure, &moments[c], state);
+                    instants[c].move_to(inputs, steady[c], number * T::dt(model), commands[c][i]);
+                    T::step(model, structure, &instants[c], state);
                 }
             }
         }
