@@ -23,10 +23,6 @@ from elevon.cli.reproduce import (
 
 __all__ = ["nasa_baseline", "nasa_separation", "nasa_thermal"]
 
-Picture = Annotated[
-    Path | None, typer.Option("--picture", help="File for the summary plot: .svg, .png, .pdf.")
-]
-
 
 def _finish(
     values: dict[str, Any], result: Any, out: Path | None, force: bool, date: str | None
@@ -83,8 +79,11 @@ def nasa_baseline(
     load_kind: Annotated[
         str, typer.Option("--load-kind", help="How the load acts: constant, step or spring.")
     ] = "constant",
+    replicates: Annotated[
+        int, typer.Option("--replicates", min=2, help="Blocks, each with its own reassembly.")
+    ] = 4,
 ) -> int:
-    """Run every profile of the test stand under every load."""
+    """Run every profile of the test stand under every load; the effects of rate, load and more."""
     from elevon.cli.output import progress_bar
     from elevon.errors import unknown
     from elevon.reproduce.nasa import reproduce_baseline
@@ -95,16 +94,23 @@ def nasa_baseline(
     if kind is None:
         raise unknown("load kind", load_kind, LOAD_KINDS, "--load-kind")
     with progress_bar("simulating the matrix") as advance:
-        result = reproduce_baseline(load_kind=kind, seed=seed, progress=advance)
+        result = reproduce_baseline(
+            load_kind=kind, replicates=replicates, seed=seed, folder=out, progress=advance
+        )
     values = result.to_dict()
     _finish(values, result, out, force, date)
     if as_json:
         print_json(values)
     else:
-        columns = ("profile", "amplitude_mm", "load_n", "direction", "rms_current_a",
-                   "peak_current_a", "tracking_rms_mm", "winding_k", "status")  # fmt: skip
+        columns = ("profile", "amplitude_mm", "rate_mm_s", "load_n", "direction", "rms_current_a",
+                   "peak_current_a", "tracking_rms_mm", "winding_rise_k", "status")  # fmt: skip
         rows = [[_shown(row[name]) for name in columns] for row in values["rows"]]
         print_table([name.replace("_", " ") for name in columns], rows)
+        terms = ("response", "unit", "term", "effect", "p")
+        chosen = [e for e in values["effects"] if " x " not in e["term"]]
+        if chosen:
+            effects = [[_shown(e[name]) for name in terms] for e in chosen]
+            print_table(list(terms), effects)
         print_checks(values)
     return exit_code(values)
 
@@ -118,24 +124,34 @@ def nasa_separation(
     seed: Seed = 0,
     date: Date = None,
     reassemblies: Annotated[
-        int, typer.Option("--reassemblies", min=2, help="Draws of friction, preload and noise.")
-    ] = 6,
+        int, typer.Option("--reassemblies", min=4, help="Units of each fault.")
+    ] = 24,
+    healthy: Annotated[int, typer.Option("--healthy", min=8, help="Healthy units.")] = 160,
 ) -> int:
-    """Find out which profile separates which fault best."""
+    """Find out which profile shows which fault best, over a population of units."""
     from elevon.cli.output import progress_bar
+    from elevon.errors import RangeError
     from elevon.reproduce.nasa import reproduce_separation
 
     check_folder(out, force)
+    if healthy < 2 * reassemblies:
+        raise RangeError(
+            f"--healthy {healthy}: at least twice --reassemblies, {2 * reassemblies}, are needed "
+            "to compare healthy with healthy"
+        )
     with progress_bar("simulating faults and profiles") as advance:
-        result = reproduce_separation(reassemblies=reassemblies, seed=seed, progress=advance)
+        result = reproduce_separation(
+            reassemblies=reassemblies, healthy=healthy, seed=seed, folder=out, progress=advance
+        )
     values = result.to_dict()
     _finish(values, result, out, force, date)
     if as_json:
         print_json(values)
     else:
-        columns = ("fault", "profile", "load", "feature", "healthy", "faulty", "separation")
+        columns = ("fault", "profile", "load_n", "effect_size", "interval", "winner",
+                   "draws_needed")  # fmt: skip
         rows = [[_shown(row[name]) for name in columns] for row in values["rows"]]
-        print_table(list(columns), rows)
+        print_table([name.replace("_", " ") for name in columns], rows)
         print_checks(values)
     return exit_code(values)
 
@@ -143,4 +159,6 @@ def nasa_separation(
 def _shown(value: Any) -> str:
     if value is None:
         return ""
+    if isinstance(value, list):
+        return " to ".join(_shown(item) for item in value)
     return f"{value:.4g}" if isinstance(value, float) else str(value)

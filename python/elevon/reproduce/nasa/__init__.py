@@ -1,9 +1,11 @@
 """Nominal behaviour and faults of the NASA test stand's ballscrew actuator."""
 
-from elevon.reproduce.nasa.baseline import BaselineResult, reproduce_baseline
+from elevon.reproduce.nasa.baseline import reproduce_baseline
+from elevon.reproduce.nasa.baseline_rows import BaselineResult
 from elevon.reproduce.nasa.capability import Capability
 from elevon.reproduce.nasa.profiles import PROFILES, Profile, profile_scenario
-from elevon.reproduce.nasa.separation import SeparationResult, reproduce_separation
+from elevon.reproduce.nasa.separation import reproduce_separation
+from elevon.reproduce.nasa.separation_rows import SeparationResult
 from elevon.reproduce.nasa.thermal import ThermalResult, reproduce_thermal
 
 __all__ = [

@@ -79,6 +79,16 @@ class Profile:
             return self.peak_rate**2 / self.amplitude
         return 0.0
 
+    @property
+    def period(self) -> float:
+        """Length of a cycle, s; infinite where no cycle is like the next."""
+        if self.amplitude == 0.0 or self.name == "sweep":
+            return math.inf
+        if self.name == "sinusoidal":
+            return 2.0 * math.pi * self.amplitude / self.rate
+        holds = 2.0 * HOLD if self.name == "trapezoidal" else 0.0
+        return 4.0 * self.amplitude / self.rate + holds
+
     def term(self) -> dict[str, Any]:
         """Return the waveform; every profile starts at mid-stroke."""
         a, v = self.amplitude, self.rate

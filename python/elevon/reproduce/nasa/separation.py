@@ -1,316 +1,284 @@
-"""Which profile shows which fault best, over reassemblies of the actuator."""
+"""Which profile shows which fault best: an experiment on a population of healthy and faulty units.
+
+The features are named beforehand, one a fault. A healthy population (`population`) gives the
+scale; every group of faulty units is a fresh draw from the same population with the fault seeded.
+Effects have intervals that hold together over the whole table, and a profile is called the best
+only where its interval lies above those of all others.
+"""
 
 from __future__ import annotations
 
-import zlib
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from itertools import product
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.progress import part
-from elevon.report.checks import Check, all_passed
+from elevon.report.checks import Check
+from elevon.reproduce.nasa.effect import Comparison, Effect, EffectScale, compare_profiles, welch_p
+from elevon.reproduce.nasa.features import FEATURES, PEAK, RECORD, RMS, UNITS, compared, features
+from elevon.reproduce.nasa.impact import GAP, gap_impacts, gap_traces, impact_checks
+from elevon.reproduce.nasa.population import draw_units
 from elevon.reproduce.nasa.profiles import Profile, profile_scenario
+from elevon.reproduce.nasa.separation_rows import Seeded, SeparationResult, SeparationRow
+from elevon.reproduce.nasa.store import CellStore, work_key
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.progress import Progress
-    from elevon.recording import Recording
+    from elevon.simulate import Run
 
-__all__ = ["FAULTS", "SeparationResult", "SeparationRow", "orders", "reproduce_separation"]
+__all__ = ["FAULTS", "Seeded", "SeparationResult", "SeparationRow", "reproduce_separation"]
 
 Array = npt.NDArray[np.float64]
 
 ACTUATOR = "nasa-ballscrew"
 SHAPES = ("trapezoidal", "sinusoidal", "triangular", "sweep")
-FAULTS = {
-    "jam 1 of 4": "return_jam@screw.return_channel=1",
-    "lubricant lost 0.8": "lubrication_loss@screw=0.8",
-    "debris 1 %": "contamination@screw=0.01",
-    "turn short 20 %": "short@motor.phase_a=0.2",
-    "resistor 25 %": "resistor_short@motor.phase_a=0.25",
-    "dynamic eccentricity 10 %": "eccentricity_dynamic@motor=0.1",
-    "unbalance 7.27 kg cm2": "unbalance@motor.rotor=7.27 kg cm2",
-    "spall 2 mm": "spall@screw.groove=2 mm",
-    "resolver channel 0.95": "mismatch@sensor.resolver=0.05",
-    "gap 0.5 mm": "adapter_gap@adapter=0.5 mm",
-}
-"""One severity of each fault, in the grammar of the command line."""
-GAP = "gap 0.5 mm"
-OPPOSING = {"loaded": 3950.0, "unloaded": 0.0}
-"""N, resisting both directions."""
-RECORD = "command,ram_position,motor_position,motor_speed,current_ref,joint_force@4 kHz"
-NOISE = {"sensor.current.noise_deviation": 0.02, "sensor.current.noise_sample_time": 2e-5}
-"""Current sensors of 0.02 A (ASSUMED: 0.1 % of a 20 A sensor)."""
-SPREAD = 0.05
-"""Friction and preload of a reassembly differ by this share at most."""
-SPREAD_PATHS = ("friction.static", "friction.dynamic", "screw.preload")
-SETTLE = 2.0
-PEAK = "load cell, peak [N]"
-ORDERS = {"order 1": 1.0, "order 2": 2.0, "order 8": 8.0, "order 8.55": 8.552, "order 9": 9.0}
-"""Lines of the current reference per motor turn: unbalance, channel mismatch, turn short, groove
-spall, dynamic eccentricity."""
-LEAST_SPEED = 10.0
-LEAST_TURNS = 4.0
+LOADS = (0.0, 500.0, 4500.0, 8500.0)
+"""N of the stand (N 2.4), as forces that oppose motion of either direction."""
+HALF_LOAD = 4500.0
+"""Load at which half the severity is run, too."""
+DURATION = 6.0
+"""Time of every run [s]: every profile has the same time to show a fault."""
+SOLVER = {"solver.step": 5e-6}
+FAMILY = 0.05
+"""Probability that any interval of a whole table misses."""
+SPLITS = 400
+CHUNK = 64
 
 
-@dataclass(frozen=True, slots=True)
-class SeparationRow:
-    """How far one fault stands from healthy in one profile: its best feature.
-
-    Attributes
-    ----------
-    fault, profile, load, feature : str
-        What; `load` is a key of `OPPOSING`.
-    healthy, faulty : float
-        Means of the feature, in its unit.
-    index : float
-        Separation |faulty - healthy| / pooled standard deviation over the reassemblies.
-    """
-
-    fault: str
-    profile: str
-    load: str
-    feature: str
-    healthy: float
-    faulty: float
-    index: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return one row of the command's JSON object."""
-        return {
-            "fault": self.fault,
-            "profile": self.profile,
-            "load": self.load,
-            "opposing_n": OPPOSING[self.load],
-            "feature": self.feature,
-            "healthy": self.healthy,
-            "faulty": self.faulty,
-            "separation": self.index,
-        }
-
-
-@dataclass(frozen=True)
-class SeparationResult:
-    """Everything `elevon reproduce nasa-separation` reports.
-
-    `impacts` holds, by load and profile, the excess of the load cell's peak [N] that the gap makes.
-    """
-
-    rows: list[SeparationRow]
-    checks: list[Check]
-    seed: int
-    reassemblies: int
-    impacts: dict[str, dict[str, float]] = field(default_factory=dict)
-    meta: dict[str, Any] = field(default_factory=dict)
-
-    def best(self) -> dict[str, SeparationRow]:
-        """Return the row of largest separation of each fault."""
-        found: dict[str, SeparationRow] = {}
-        for row in self.rows:
-            if row.fault not in found or row.index > found[row.fault].index:
-                found[row.fault] = row
-        return found
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object of the command."""
-        return {
-            "status": "pass" if all_passed(self.checks) else "fail",
-            "rows": [row.to_dict() for row in self.rows],
-            "impact_n": self.impacts,
-            "best": {name: row.profile for name, row in self.best().items()},
-            "checks": [check.to_dict() for check in self.checks],
-            "seed": self.seed,
-            "reassemblies": self.reassemblies,
-            **self.meta,
-        }
+FAULTS = (
+    Seeded("jam of 2 of 4 circuits", "return_jam@screw.return_channel", 2, "", RMS),
+    Seeded("lubricant lost 0.8", "lubrication_loss@screw", 0.8, "", RMS),
+    Seeded("debris 1 %", "contamination@screw", 0.01, "", RMS),
+    Seeded("turn short 20 %", "short@motor.phase_a", 0.2, "", FEATURES[3]),
+    Seeded("resistor 25 %", "resistor_short@motor.phase_a", 0.25, "", FEATURES[3]),
+    Seeded("dynamic eccentricity 10 %", "eccentricity_dynamic@motor", 0.1, "", FEATURES[5]),
+    Seeded("unbalance 7.27 kg cm2", "unbalance@motor.rotor", 7.27, "kg cm2", FEATURES[1]),
+    Seeded("spall 2 mm", "spall@screw.groove", 2.0, "mm", FEATURES[4]),
+    Seeded("resolver channel 0.95", "mismatch@sensor.resolver", 0.05, "", FEATURES[2]),
+    Seeded(GAP, "adapter_gap@adapter", 0.5, "mm", PEAK),
+)
+"""One severity of each fault; half of it is run at `HALF_LOAD`."""
 
 
 def reproduce_separation(
     *,
-    faults: Mapping[str, str] = FAULTS,
-    reassemblies: int = 6,
+    faults: Sequence[Seeded] = FAULTS,
+    shapes: Sequence[str] = SHAPES,
+    loads: Sequence[float] = LOADS,
+    reassemblies: int = 24,
+    healthy: int = 160,
     seed: int = 0,
+    folder: Path | None = None,
     progress: Progress | None = None,
 ) -> SeparationResult:
-    """Run healthy and faulty reassemblies in every profile and compare their features.
+    """Run healthy and faulty units in every profile under every load and compare one feature each.
 
     Parameters
     ----------
-    faults : mapping
-        Name to fault in the grammar of the command line.
-    reassemblies : int
-        Draws of friction, preload and noise, each used by every fault and profile.
+    faults : sequence of Seeded
+        Faults with their severities and features.
+    shapes, loads : sequence
+        Profiles, and opposing loads [N].
+    reassemblies, healthy : int
+        Units of each fault, and healthy ones; at least 4 and twice as many.
     seed : int
         Of the draws and the runs.
+    folder : Path, optional
+        Where finished cells are kept, so that an interrupted run goes on.
     progress : callable, optional
         As for `simulate_batch`.
 
     Returns
     -------
     SeparationResult
-        One row a fault, profile and load.
+
+    Raises
+    ------
+    Interrupted
+        `progress` returned False; what was finished is in the folder.
+    SimulationError
+        A run did not reach its end.
     """
     from elevon.actuator import Actuator
 
-    actuators = _reassembled(Actuator.load(ACTUATOR), reassemblies, seed)
-    cases = [(shape, load) for load in OPPOSING for shape in SHAPES]
-    rows: list[SeparationRow] = []
-    impacts: dict[str, dict[str, float]] = {load: {} for load in OPPOSING}
-    for index, (shape, load) in enumerate(cases):
-        span = part(progress, index / len(cases), (index + 1) / len(cases))
-        names = list(faults) if load == "loaded" else [n for n in faults if n == GAP]
-        if names:
-            found = _features_of(actuators, shape, load, {n: faults[n] for n in names},
-                                 seed=seed, progress=span)  # fmt: skip
-            rows += [_compare(name, shape, load, found["healthy"], found[name]) for name in names]
-        if GAP in names:
-            peaks = [np.mean([f[PEAK] for f in found[name]]) for name in (GAP, "healthy")]
-            impacts[load][shape] = float(peaks[0] - peaks[1])
-    return SeparationResult(rows, _checks(rows, faults, impacts), seed, reassemblies, impacts)
-
-
-def _reassembled(actuator: Actuator, count: int, seed: int) -> list[Actuator]:
-    draws = np.random.default_rng(seed).uniform(1 - SPREAD, 1 + SPREAD, (count, len(SPREAD_PATHS)))
-    value = actuator.parameters.value
-    return [
-        actuator.with_values(
-            NOISE | {p: value(p) * x for p, x in zip(SPREAD_PATHS, _ordered(row), strict=True)}
+    actuator = Actuator.load(ACTUATOR)
+    meta = _provenance(actuator)
+    key = work_key(seed=seed, faults=[f.text() for f in faults], healthy=healthy,
+                   reassemblies=reassemblies, **meta)  # fmt: skip
+    store = CellStore(folder, key)
+    nominal = actuator.with_values(SOLVER)
+    units = {"healthy": draw_units(nominal, "healthy", healthy, seed)}
+    units |= {f.name: draw_units(nominal, f.name, reassemblies, seed) for f in faults}
+    cells = [(shape, load) for load in loads for shape in shapes]
+    found: dict[tuple[str, float], dict[str, Array]] = {}
+    for index, (shape, load) in enumerate(cells):
+        span = part(progress, index / len(cells), (index + 1) / len(cells))
+        found[shape, load] = _cell(
+            units, faults, (shape, load), seed=seed, store=store, progress=span
         )
-        for row in draws
-    ]
+    level = 1.0 - FAMILY / (len(faults) * len(cells))
+    rows = _rows(found, faults, EffectScale(healthy, reassemblies, level), level)
+    rate, tables = _null(found, reassemblies, level, seed)
+    seeded = any(fault.name == GAP for fault in faults)
+    impacts = gap_impacts(found) if seeded else []
+    traces = gap_traces(nominal) if seeded else []
+    checks = [*_checks(rows, rate, tables), *impact_checks(found)]
+    return SeparationResult(rows, impacts, checks, rate, tables, seed, healthy, reassemblies, level,
+                            traces, meta)  # fmt: skip
 
 
-def _ordered(row: Array) -> list[float]:
-    """One factor for static and dynamic friction: a bearing is tighter or not."""
-    return [float(row[0]), float(row[0]), float(row[2])]
+def _provenance(actuator: Actuator) -> dict[str, Any]:
+    import elevon
+
+    return {"parameter_hash": actuator.parameters.hash, "version": elevon.__version__}
 
 
-def _features_of(
-    actuators: Sequence[Actuator],
-    shape: str,
-    load: str,
-    faults: Mapping[str, str],
-    *,
-    seed: int,
-    progress: Progress | None,
-) -> dict[str, list[dict[str, float]]]:
-    """Features of every reassembly, by fault; ``healthy`` is the one without."""
-    from elevon.scenario import Scenario
-    from elevon.simulate import Run, simulate_batch
-
-    profile = Profile(shape, 0.05, 0.06, 16.0 if shape == "sweep" else 9.0)
-    plain = Scenario.from_dict(profile_scenario(profile, opposing=OPPOSING[load]))
-    scenarios = {"healthy": plain} | {n: plain.with_faults([text]) for n, text in faults.items()}
-    found: dict[str, list[dict[str, float]]] = {}
-    for index, (name, scenario) in enumerate(scenarios.items()):
-        # Noise is drawn afresh for every fault, as on another day.
-        number = zlib.crc32(f"{shape} {load} {name}".encode())
-        runs = [Run(a, scenario, seed + i, name, number) for i, a in enumerate(actuators)]
-        span = part(progress, index / len(scenarios), (index + 1) / len(scenarios))
-        recordings = simulate_batch(runs, fidelity="high", record=RECORD, progress=span)
-        found[name] = [_features(recording) for recording in recordings]
+def _conditions(faults: Sequence[Seeded], load: float) -> dict[str, tuple[str, list[str]]]:
+    """Every condition of a load: its group of units and its faults."""
+    found: dict[str, tuple[str, list[str]]] = {"healthy": ("healthy", [])}
+    for fault in faults:
+        found[fault.name] = (fault.name, [fault.text()])
+        if load == HALF_LOAD:
+            # The same units: the fault has grown in them from half to whole.
+            found[f"half {fault.name}"] = (fault.name, [fault.text(0.5)])
     return found
 
 
-def _features(recording: Recording) -> dict[str, float]:
-    """Return what a stand sees of one run, by name with unit."""
-    late = recording["command"].time >= SETTLE
-    value = {name: recording[name].values[late] for name in recording.names}
-    # The actuator's own sensor sees the ram, not the load beyond the joint.
-    error = value["command"] - value["ram_position"]
-    angle, speed = value["motor_position"], value["motor_speed"]
-    spectrum = orders(angle, speed, value["current_ref"], list(ORDERS.values()))
-    force = np.abs(value["joint_force"])
-    return {
-        "current, rms [A]": float(np.sqrt(np.mean(value["current_ref"] ** 2))),
-        "tracking error, rms [mm]": 1e3 * float(np.sqrt(np.mean(error**2))),
-        PEAK: float(np.max(force)),
-        "load cell, largest change in 1 ms [N]": float(np.max(np.abs(force[4:] - force[:-4]))),
-        **{f"current, {n} [A]": x for n, x in zip(ORDERS, spectrum, strict=True)},
-    }
+def _cell(
+    units: Mapping[str, Sequence[Actuator]],
+    faults: Sequence[Seeded],
+    case: tuple[str, float],
+    *,
+    seed: int,
+    store: CellStore,
+    progress: Progress | None,
+) -> dict[str, Array]:
+    """Features of every unit of one profile and load, by condition; shape (units, features)."""
+    from elevon.scenario import Scenario
+    from elevon.simulate import Run
+
+    shape, load = case
+    profile = Profile(shape, 0.05, 0.06, DURATION)
+    plain = Scenario.from_dict(profile_scenario(profile, opposing=load))
+    conditions = _conditions(faults, load)
+    runs = [
+        Run(unit, plain.with_faults(texts) if texts else plain, seed + index,
+            f"{name}, {shape}, {load:g} N, unit {index}", place)
+        for place, (name, (group, texts)) in enumerate(conditions.items())
+        for index, unit in enumerate(units[group])
+    ]  # fmt: skip
+    values = _simulated(runs, f"{shape} {load:g}", store, progress)
+    counts = [len(units[group]) for group, _ in conditions.values()]
+    parts = np.split(values, np.cumsum(counts)[:-1])
+    return dict(zip(conditions, parts, strict=True))
 
 
-def orders(angle: Array, speed: Array, signal: Array, wanted: Sequence[float]) -> list[float]:
-    """Return the amplitude of a signal at some orders of the shaft, median over the strokes.
+def _simulated(
+    runs: Sequence[Run], name: str, store: CellStore, progress: Progress | None
+) -> Array:
+    """Features of all runs, a few at a time to bound the memory of their recordings."""
+    from elevon.errors import SimulationError
+    from elevon.simulate import simulate_batch
 
-    Parameters
-    ----------
-    angle, speed, signal : ndarray, shape (n,)
-        rad, rad/s, any unit.
-    wanted : sequence of float
-        Lines per turn.
+    found = []
+    for start in range(0, len(runs), CHUNK):
+        values = store.get(f"{name} {start}")
+        if values is None:
+            span = part(progress, start / len(runs), min((start + CHUNK) / len(runs), 1.0))
+            recordings = simulate_batch(
+                runs[start : start + CHUNK], fidelity="high", record=RECORD, progress=span
+            )
+            for recording in recordings:
+                if recording.status != "ok":
+                    meta = recording.meta
+                    raise SimulationError(f"{meta['label']}: {meta['message']}", recording.status)
+            values = np.array([features(recording) for recording in recordings])
+            store.put(f"{name} {start}", values)
+        found.append(values)
+    return np.concatenate(found)
 
-    Returns
-    -------
-    list of float
-        Peak amplitudes in the signal's unit; NaN where no stroke is long enough.
+
+def _rows(
+    found: Mapping[tuple[str, float], Mapping[str, Array]],
+    faults: Sequence[Seeded],
+    scale: EffectScale,
+    level: float,
+) -> list[SeparationRow]:
+    """Every fault under every load: the effects of all profiles, and whether one is the best."""
+    rows = []
+    loads = dict.fromkeys(load for _, load in found)
+    for fault, load in product(faults, loads):
+        cells = {shape: cell for (shape, at), cell in found.items() if at == load}
+        column = FEATURES.index(fault.feature)
+        whole = [_effect(scale, cell, fault.name, column) for cell in cells.values()]
+        best = compare_profiles(whole, level)
+        drawn = next(iter(cells.values()))[fault.name].shape[0]
+        for place, (shape, cell) in enumerate(cells.items()):
+            half = f"half {fault.name}"
+            rows.append(
+                SeparationRow(
+                    fault=fault.name,
+                    feature=fault.feature,
+                    unit=UNITS[fault.feature],
+                    profile=shape,
+                    load=load,
+                    healthy=float(cell["healthy"][:, column].mean()),
+                    faulty=float(cell[fault.name][:, column].mean()),
+                    effect=whole[place],
+                    half=_effect(scale, cell, half, column) if half in cell else None,
+                    winner=None if best.winner is None else place == best.winner,
+                    power=best.power,
+                    draws=_draws(best, whole, drawn),
+                )
+            )
+    return rows
+
+
+def _effect(scale: EffectScale, cell: Mapping[str, Array], name: str, column: int) -> Effect:
+    return scale.effect(compared(cell["healthy"])[:, column], compared(cell[name])[:, column])
+
+
+def _draws(best: Comparison, effects: Sequence[Effect], drawn: int) -> int | None:
+    if best.winner is not None or not any(effect.shown for effect in effects):
+        return None
+    needed = best.factor * drawn
+    return math.ceil(needed) if needed < 1e9 else None
+
+
+def _null(
+    found: Mapping[tuple[str, float], Mapping[str, Array]], group: int, level: float, seed: int
+) -> tuple[float, float]:
+    """Compare healthy units with healthy units over random splits of the population.
+
+    Returns the share of comparisons above the threshold and the share of tables that hold any.
     """
-    moving = np.flatnonzero(np.abs(speed) > LEAST_SPEED)
-    strokes = np.split(moving, np.flatnonzero(np.diff(moving) > 1) + 1)
-    found = [
-        _stroke_orders(angle[stroke], signal[stroke], wanted)
-        for stroke in strokes
-        if stroke.size > 2 and abs(angle[stroke[-1]] - angle[stroke[0]]) > 2 * np.pi * LEAST_TURNS
-    ]
-    if not found:
-        return [float("nan")] * len(wanted)
-    return [float(x) for x in np.median(np.array(found), axis=0)]
+    rng = np.random.default_rng([seed, 1])
+    pool = np.concatenate([compared(cell["healthy"]) for cell in found.values()], axis=1)
+    pool = pool[:, np.all(np.isfinite(pool), axis=0)]
+    above = []
+    for _ in range(SPLITS):
+        order = rng.permutation(pool.shape[0])
+        p = welch_p(pool[order[group:]], pool[order[:group]])
+        above.append(p < 1.0 - level)
+    exceeded = np.array(above)
+    return float(exceeded.mean()), float(exceeded.any(axis=1).mean())
 
 
-def _stroke_orders(angle: Array, signal: Array, wanted: Sequence[float]) -> list[float]:
-    """Least squares over one stroke: a slow cubic trend and a windowed line at each order."""
-    turned = np.abs(angle - angle[0])
-    # The first and the last turn hold the reversal's transient.
-    inner = (turned > 2 * np.pi) & (turned < turned[-1] - 2 * np.pi)
-    grid = np.linspace(turned[inner][0], turned[inner][-1], int(inner.sum()))
-    rising = np.concatenate([[True], np.diff(turned) > 0])
-    line = np.interp(grid, turned[rising], signal[rising])
-    scaled = (grid - grid.mean()) / np.ptp(grid)
-    line = line - np.polyval(np.polyfit(scaled, line, 3), scaled)
-    window = np.hanning(grid.size)
-    weight = 2.0 / window.sum()
-    return [float(abs(np.sum(window * line * np.exp(-1j * k * grid))) * weight) for k in wanted]
-
-
-def _compare(
-    fault: str,
-    shape: str,
-    load: str,
-    healthy: Sequence[Mapping[str, float]],
-    faulty: Sequence[Mapping[str, float]],
-) -> SeparationRow:
-    """Choose the feature in which the fault stands farthest from healthy."""
-    best = ("", 0.0, 0.0, -1.0)
-    for name in healthy[0]:
-        good = np.array([f[name] for f in healthy])
-        bad = np.array([f[name] for f in faulty])
-        if not (np.all(np.isfinite(good)) and np.all(np.isfinite(bad))):
-            continue
-        pooled = float(np.sqrt(0.5 * (np.var(good, ddof=1) + np.var(bad, ddof=1))))
-        change = float(abs(bad.mean() - good.mean()))
-        # A feature that never varies separates nothing when it does not change either.
-        index = change / pooled if pooled > 0.0 else 0.0
-        if index > best[3]:
-            best = (name, float(good.mean()), float(bad.mean()), index)
-    return SeparationRow(fault, shape, load, *best)
-
-
-def _checks(
-    rows: Sequence[SeparationRow],
-    faults: Mapping[str, str],
-    impacts: Mapping[str, Mapping[str, float]],
-) -> list[Check]:
-    best = [max(row.index for row in rows if row.fault == fault) for fault in faults]
-    checks = [Check("smallest best separation of a fault", min(best), 3.0, "1", at_least=True)]
-    gap = impacts["unloaded"]
-    if gap:
-        # N: the triangular profile shows backlash best; measured by the impact on the load cell.
-        others = max(excess for name, excess in gap.items() if name != "triangular")
-        checks.append(
-            Check("backlash without load: impact, triangular over the next profile",
-                  gap["triangular"] / others, 1.0, "1", at_least=True)
-        )  # fmt: skip
-    return checks
+def _checks(rows: Sequence[SeparationRow], rate: float, tables: float) -> list[Check]:
+    # One-sided 95 % of the sampling error of a share of one twentieth over the splits.
+    limit = FAMILY + 1.645 * math.sqrt(FAMILY * (1.0 - FAMILY) / SPLITS)
+    halved = [row for row in rows if row.half is not None and row.effect.shown]
+    wrong = sum(abs(row.half.size) >= abs(row.effect.size) for row in halved if row.half)
+    return [
+        Check("healthy against healthy: comparisons above the threshold", rate, limit, "1"),
+        Check("healthy against healthy: tables with any", tables, limit, "1"),
+        Check("faults of half severity that rank above the whole", float(wrong), 0.0),
+        Check("rows in which half the severity was compared", float(len(halved)), 1.0,
+              at_least=True),
+    ]  # fmt: skip

@@ -1,0 +1,89 @@
+"""Figures 5, 6 and 7 of the paper as the model gives them: time histories of nominal runs.
+
+The paper draws its curves and prints no numbers of them; the conditions are those of its captions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.errors import SimulationError
+from elevon.reproduce.nasa.profiles import Profile, profile_scenario
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.progress import Progress
+
+__all__ = ["History", "time_histories"]
+
+Array = npt.NDArray[np.float64]
+
+RECORD = (
+    "command,user_position,joint_force,current_ref,winding_temperature,surface_temperature@200 Hz"
+)
+POUND_FORCE = 4.4482216152605
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """One figure: time [s] and its curves by signal, SI.
+
+    Attributes
+    ----------
+    figure : int
+        Its number in the paper.
+    title : str
+        Its condition.
+    """
+
+    figure: int
+    title: str
+    time: Array
+    curves: dict[str, Array]
+
+
+def _conditions() -> list[tuple[int, str, dict[str, Any]]]:
+    sine = Profile("sinusoidal", 0.05, 0.06, 40.0)
+    stepped = profile_scenario(sine)
+    step = {"kind": "step", "initial": 500.0, "final": 4500.0, "time": 20.0}
+    stepped["load"] = {"user": {"terms": [step]}}
+    short = Profile("sinusoidal", 0.05, 0.06, 20.0)
+    opposed = profile_scenario(short, opposing=900.0 * POUND_FORCE)
+    triangle = Profile("triangular", 0.05, 0.06, 20.0)
+    sprung = profile_scenario(triangle, 1725.0 * POUND_FORCE, "spring")
+    return [
+        (5, "sine, load stepping from 500 to 4500 N at 20 s", stepped),
+        (6, "sine, opposing force of 900 lbf (4003 N)", opposed),
+        (7, "triangle, spring of 1725 lbf (7673 N) at 50 mm", sprung),
+    ]
+
+
+def time_histories(actuator: Actuator, progress: Progress | None = None) -> list[History]:
+    """Return the three figures, simulated at high fidelity.
+
+    Raises
+    ------
+    SimulationError
+        A run did not reach its end.
+    """
+    from elevon.scenario import Scenario
+    from elevon.simulate import Run, simulate_batch
+
+    wanted = _conditions()
+    runs = [
+        Run(actuator, Scenario.from_dict(data), label=f"figure {number}")
+        for number, _, data in wanted
+    ]
+    found = simulate_batch(runs, fidelity="high", record=RECORD, progress=progress)
+    for recording in found:
+        if recording.status != "ok":
+            raise SimulationError(f"{recording.meta['label']}: {recording.meta['message']}")
+    return [
+        History(number, title, recording["command"].time,
+                {name: recording[name].values for name in recording.names})
+        for (number, title, _), recording in zip(wanted, found, strict=True)
+    ]  # fmt: skip

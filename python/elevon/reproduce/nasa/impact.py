@@ -1,0 +1,124 @@
+"""The gap's impact on the load cell: the one claim of the paper about a profile and a fault."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.report.checks import Check
+from elevon.reproduce.nasa.features import FEATURES, PEAK
+from elevon.reproduce.nasa.profiles import Profile, profile_scenario
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["GAP", "Impact", "Trace", "gap_impacts", "gap_traces", "impact_checks"]
+
+Array = npt.NDArray[np.float64]
+Cells = Mapping[tuple[str, float], Mapping[str, Array]]
+
+GAP = "gap 0.5 mm"
+GAP_FAULT = "adapter_gap@adapter=0.5 mm"
+UNLOADED, LOADED = 0.0, 4500.0
+"""N, opposing: where triangle and trapezoid are compared."""
+COLUMN = FEATURES.index(PEAK)
+LEVEL = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class Impact:
+    """Excess of the load cell's peak under a gap over the healthy one, N, with its interval."""
+
+    profile: str
+    load: float
+    excess: float
+    low: float
+    high: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return one row of the command's JSON object."""
+        return {
+            "profile": self.profile,
+            "load_n": self.load,
+            "excess_n": self.excess,
+            "interval_n": [self.low, self.high],
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """Load-cell force of the nominal actuator about a reversal."""
+
+    profile: str
+    load: float
+    gap: bool
+    time: Array
+    force: Array
+
+
+def _difference(healthy: Array, faulty: Array) -> tuple[float, float, float]:
+    """Mean difference and its Welch interval."""
+    from scipy.stats import ttest_ind
+
+    found = ttest_ind(faulty, healthy, equal_var=False).confidence_interval(LEVEL)
+    return float(np.mean(faulty) - np.mean(healthy)), float(found.low), float(found.high)
+
+
+def gap_impacts(found: Cells) -> list[Impact]:
+    """Return the gap's excess of every profile and load."""
+    return [
+        Impact(shape, load, *_difference(cell["healthy"][:, COLUMN], cell[GAP][:, COLUMN]))
+        for (shape, load), cell in found.items()
+    ]
+
+
+def impact_checks(found: Cells) -> list[Check]:
+    """Unloaded the triangle hits harder than the trapezoid (N 2.3), loaded the trapezoid.
+
+    The units are the same in both profiles, so their differences are compared.
+    """
+    checks = []
+    for load, stronger, weaker in (
+        (UNLOADED, "triangular", "trapezoidal"),
+        (LOADED, "trapezoidal", "triangular"),
+    ):
+        pair = [found.get((shape, load), {}) for shape in (stronger, weaker)]
+        if not all(GAP in cell for cell in pair):
+            continue
+        more = [pair[0][name][:, COLUMN] - pair[1][name][:, COLUMN] for name in ("healthy", GAP)]
+        low = _difference(more[0], more[1])[1]
+        name = f"gap at {load:g} N: impact, {stronger} less {weaker}, lower end of the interval"
+        checks.append(Check(name, low, 0.0, "N", at_least=True))
+    return checks
+
+
+def gap_traces(actuator: Actuator) -> list[Trace]:
+    """Return the load cell's force about the second reversal, with and without the gap."""
+    from elevon.scenario import Scenario
+    from elevon.simulate import Run, simulate_batch
+
+    cases = [
+        (shape, load, gap)
+        for load in (UNLOADED, LOADED)
+        for shape in ("triangular", "trapezoidal")
+        for gap in (False, True)
+    ]
+    runs = []
+    for shape, load, gap in cases:
+        profile = Profile(shape, 0.05, 0.06, 4.0)
+        scenario = Scenario.from_dict(profile_scenario(profile, opposing=load))
+        runs.append(Run(actuator, scenario.with_faults([GAP_FAULT]) if gap else scenario))
+    recordings = simulate_batch(runs, fidelity="high", record="joint_force,command@4 kHz")
+    traces = []
+    for (shape, load, gap), recording in zip(cases, recordings, strict=True):
+        time, command = recording["command"].time, recording["command"].values
+        # The motion downwards begins where the command leaves its first peak.
+        leaves = time[np.flatnonzero(command >= command.max() - 1e-9)[-1]]
+        shown = (time >= leaves - 0.05) & (time <= leaves + 0.15)
+        force = recording["joint_force"].values[shown]
+        traces.append(Trace(shape, load, gap, time[shown] - leaves, force))
+    return traces

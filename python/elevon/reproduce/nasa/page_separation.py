@@ -1,0 +1,176 @@
+"""The report of `nasa-separation`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elevon.report import Report, Table
+from elevon.report.figures import COLOURS, new_figure
+from elevon.reproduce.nasa.population import spread_rows
+from elevon.reproduce.nasa.separation_rows import SeparationResult, SeparationRow
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["separation_page"]
+
+SHAPE_COLOURS = {
+    "trapezoidal": COLOURS["blue"],
+    "sinusoidal": COLOURS["orange"],
+    "triangular": COLOURS["green"],
+    "sweep": COLOURS["violet"],
+}
+
+
+def separation_page(result: SeparationResult, date: str | None) -> Report:
+    """Return the report, without its checks and its provenance."""
+    report = Report(
+        "Which profile shows which fault",
+        f"{result.healthy} healthy units and {result.reassemblies} of each fault, every one in "
+        "every profile under every load. One feature a fault, named beforehand. A profile is "
+        "called the best only where its interval lies above all others.",
+        date=date,
+    )
+    winners = result.winners()
+    named = sum(winner is not None for winner in winners.values())
+    report.fact("Best profile named", f"{named} of {len(winners)}", "pairs of fault and load")
+    report.fact("Null rate", f"{100 * result.null_rate:.2g} %", "healthy against healthy")
+    report.fact("Level", f"{100 * result.level:.3f} %", "of each interval; 95 % for the table")
+    report.section("Best profiles").table(_winners_table(result))
+    section = report.section("Effect sizes")
+    section.figure(
+        _effects_figure(result),
+        "Distance from healthy in healthy standard deviations, with the intervals that hold "
+        "together over the table. The load opposes motion.",
+    )
+    if result.impacts:
+        _impact_sections(report, result)
+    _population(report)
+    report.section("All rows").table(_rows_table(result))
+    return report
+
+
+def _groups(result: SeparationResult) -> dict[tuple[str, float], list[SeparationRow]]:
+    groups: dict[tuple[str, float], list[SeparationRow]] = {}
+    for row in result.rows:
+        groups.setdefault((row.fault, row.load), []).append(row)
+    return groups
+
+
+def _winners_table(result: SeparationResult) -> Table:
+    rows: list[list[object]] = []
+    for (fault, load), group in _groups(result).items():
+        largest = max(group, key=lambda row: abs(row.effect.size))
+        winner = next((row.profile for row in group if row.winner), None)
+        if winner is None and not any(row.effect.shown for row in group):
+            verdict = "not shown by any"
+        else:
+            verdict = winner or "none named"
+        rows.append(
+            [fault, f"{load:.0f}", largest.feature, verdict, f"{abs(largest.effect.size):.3g}",
+             f"{100 * largest.power:.0f} %",
+             "" if largest.draws is None else f"{largest.draws:d}"]
+        )  # fmt: skip
+    columns = ["Fault", "Load [N]", "Feature", "Best profile", "Largest effect", "Power",
+               "Draws that would name one"]  # fmt: skip
+    return Table(
+        columns, rows,
+        "Power: probability that another such experiment names the best of these profiles, were "
+        "the effects as estimated. Draws: of each fault, with as many times more healthy units.",
+    )  # fmt: skip
+
+
+def _effects_figure(result: SeparationResult) -> Figure:
+    faults = list(dict.fromkeys(row.fault for row in result.rows))
+    loads = sorted({row.load for row in result.rows})
+    shapes = list(dict.fromkeys(row.profile for row in result.rows))
+    lines = (len(faults) + 1) // 2
+    with new_figure(lines, 2, width=8.0, height=1.9 * lines, sharex=True, squeeze=False) as (
+        figure,
+        grid,
+    ):
+        for axes, fault in zip(grid.flat, faults, strict=False):
+            for place, shape in enumerate(shapes):
+                rows = [r for r in result.rows if r.fault == fault and r.profile == shape]
+                x = np.array([loads.index(r.load) for r in rows]) + 0.16 * (place - 1.5)
+                size = np.array([r.effect.size for r in rows])
+                ends = np.array([[r.effect.low, r.effect.high] for r in rows]).T
+                axes.errorbar(
+                    x, size, np.abs(ends - size), fmt="o", ms=3, lw=1,
+                    color=SHAPE_COLOURS.get(shape, COLOURS["grey"]), label=shape,
+                )  # fmt: skip
+            axes.axhline(0.0, color=COLOURS["grey"], lw=0.8)
+            axes.set_title(fault, fontsize=9)
+            axes.set_xticks(range(len(loads)), [f"{load:.0f} N" for load in loads])
+        grid.flat[0].legend(fontsize=7)
+        for axes in grid[:, 0]:
+            axes.set_ylabel("Effect size")
+    return figure
+
+
+def _impact_sections(report: Report, result: SeparationResult) -> None:
+    section = report.section(
+        "The gap's impact",
+        "The paper calls the triangular profile well suited for backlash. That holds without "
+        "load; under a load that opposes motion the trapezoid, whose rest lets the joint relax, "
+        "hits harder.",
+    )
+    section.figure(
+        _trace_figure(result),
+        "Load cell of the nominal actuator about the first reversal, healthy and with a gap of "
+        "0.5 mm; time from the corner of the command.",
+    )
+    rows = [
+        [impact.profile, impact.load, impact.excess, impact.low, impact.high]
+        for impact in result.impacts
+    ]
+    columns = ["Profile", "Load [N]", "Excess of the peak [N]", "from [N]", "to [N]"]
+    section.table(
+        Table(columns, rows, "Peak of the load cell with the gap less without, 95 % intervals.",
+              formats=("", ".0f", ".0f", ".0f", ".0f"))
+    )  # fmt: skip
+
+
+def _trace_figure(result: SeparationResult) -> Figure:
+    with new_figure(2, 2, width=8.0, height=4.6, sharex=True) as (figure, grid):
+        places = dict.fromkeys((t.load, t.profile) for t in result.traces)
+        for axes, (load, shape) in zip(grid.flat, places, strict=False):
+            for trace in result.traces:
+                if (trace.load, trace.profile) == (load, shape):
+                    colour = COLOURS["red" if trace.gap else "grey"]
+                    label = "gap 0.5 mm" if trace.gap else "healthy"
+                    axes.plot(1e3 * trace.time, trace.force, lw=1, color=colour, label=label)
+            axes.set_title(f"{shape}, {load:.0f} N", fontsize=9)
+        for axes in grid[-1]:
+            axes.set_xlabel("Time [ms]")
+        for axes in grid[:, 0]:
+            axes.set_ylabel("Load cell [N]")
+        grid.flat[0].legend(fontsize=8)
+    return figure
+
+
+def _population(report: Report) -> None:
+    rows = [[row["property"], row["deviation"], row["reason"]] for row in spread_rows()]
+    report.section(
+        "Healthy population",
+        "Nothing of it is printed: every spread is ASSUMED. Deviations are in SI units or shares "
+        "of the set's value; all groups, healthy and faulty, are drawn from it.",
+    ).table(Table(["Property", "Deviation", "Why this much"], rows))
+
+
+def _rows_table(result: SeparationResult) -> Table:
+    columns = ["Fault", "Profile", "Load [N]", "Feature", "Unit", "Healthy", "Faulty", "Effect",
+               "from", "to", "Half severity", "Best"]  # fmt: skip
+    rows = [
+        [row.fault, row.profile, row.load, row.feature, row.unit, row.healthy, row.faulty,
+         row.effect.size, row.effect.low, row.effect.high,
+         None if row.half is None else row.half.size, "yes" if row.winner else ""]
+        for row in result.rows
+    ]  # fmt: skip
+    two = "+.2f"
+    return Table(
+        columns, rows, "Every fault, load and profile.", digits=4,
+        formats=("", "", ".0f", "", "", "", "", two, two, two, two, ""),
+    )  # fmt: skip

@@ -1,0 +1,163 @@
+"""Healthy units: what differs between two articles, two reassemblies and two days.
+
+None of these spreads is printed. Each is ASSUMED with its reason in `SPREADS`; a normal one is cut
+at three deviations.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["NOISE", "SPREADS", "Spread", "draw_units", "spread_rows"]
+
+Kind = Literal["factor", "added", "vector", "range"]
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """How one property differs between healthy units.
+
+    Attributes
+    ----------
+    name : str
+        The property.
+    paths : tuple of str
+        Parameters that share the draw.
+    kind : str
+        ``factor``: 1 + size n on the set's values; ``added``: size n; ``vector``: the length
+        of two of them at a right angle; ``range``: even between `size` and `upper`. n is normal.
+    size : float
+        Deviation (of a range its lower end), in the parameter's SI unit or as a share.
+    reason : str
+        Why this much: nothing of it is printed.
+    upper : float
+        Upper end of a range.
+    """
+
+    name: str
+    paths: tuple[str, ...]
+    kind: Kind
+    size: float
+    reason: str
+    upper: float = 0.0
+
+    def draw(self, rng: np.random.Generator) -> float:
+        """Return one draw: a factor, or what is added, or the value itself."""
+        if self.kind == "range":
+            return float(rng.uniform(self.size, self.upper))
+        normal, other = np.clip(rng.standard_normal(2), -3.0, 3.0)
+        if self.kind == "vector":
+            return self.size * float(np.hypot(normal, other))
+        return self.size * float(normal) + (1.0 if self.kind == "factor" else 0.0)
+
+
+FRICTION_COEFFICIENT = "friction coefficient of the screw"
+AIR = "temperature of air and actuator"
+GREASE_PER_KELVIN = 0.03
+"""Share of the grease's viscosity lost per kelvin (ASSUMED: common greases halve in some 23 K)."""
+
+SPREADS = (
+    Spread("dry friction", ("friction.static", "friction.dynamic"), "factor", 0.10,
+           "seals and bearings seat anew with each reassembly"),
+    Spread("preload", ("screw.preload",), "factor", 0.10,
+           "makers hold the torque of a preload to 10 to 30 %"),
+    Spread(FRICTION_COEFFICIENT, (), "factor", 0.05, "grease, finish and run-in of the raceways"),
+    Spread("friction of the load side", ("load.friction",), "factor", 0.10, "guides and seals"),
+    Spread("play of the fixture", ("play.total",), "factor", 0.20, "pins are fitted anew"),
+    Spread("EMF constant", ("motor.emf_constant",), "factor", 0.01, "magnets of another article"),
+    Spread("gain of each current sensor",
+           ("sensor.current.gain_a",), "added", 0.005, "adjusted to 0.5 %"),
+    Spread("gain of each current sensor", ("sensor.current.gain_b",), "added", 0.005, ""),
+    Spread("gain of each current sensor", ("sensor.current.gain_c",), "added", 0.005, ""),
+    Spread("offset of each current sensor",
+           ("sensor.current.offset_a",), "added", 0.01, "0.05 % of a 20 A sensor"),
+    Spread("offset of each current sensor", ("sensor.current.offset_b",), "added", 0.01, ""),
+    Spread("offset of each current sensor", ("sensor.current.offset_c",), "added", 0.01, ""),
+    Spread("mismatch of the resolver's channels",
+           ("sensor.resolver.mismatch",), "range", 0.0, "up to 1 mrad, 3.4 arcmin", 0.002),
+    Spread("runout of the rotor", ("motor.eccentricity_dynamic",), "vector", 0.01,
+           "1 % of the gap: 5 um of 0.5 mm"),
+    Spread("bore out of centre", ("motor.eccentricity_static",), "vector", 0.02,
+           "fits of the end shields"),
+    Spread("unbalance left", ("motor.unbalance_inertia",), "vector", 1e-5,
+           "0.1 kg cm2, a seventieth of the seeded one"),
+    Spread(AIR, ("thermal.ambient",), "range", 288.15, "15 to 30 degC in a laboratory", 303.15),
+)  # fmt: skip
+"""What differs between healthy units, all ASSUMED."""
+
+NOISE = {"sensor.current.noise_deviation": 0.02, "sensor.current.noise_sample_time": 2.5e-4}
+"""Noise of the current sensors: 0.1 % of 20 A, held for a tick of the controller (ASSUMED)."""
+
+
+def draw_units(actuator: Actuator, group: str, count: int, seed: int) -> list[Actuator]:
+    """Return healthy units; the same group and seed give the same units.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        The nominal one.
+    group : str
+        Name of the group: another name, other units.
+    count : int
+        How many.
+    seed : int
+        Not negative.
+    """
+    number = zlib.crc32(group.encode())
+    return [
+        actuator.with_values(_values(actuator, np.random.default_rng([seed, number, index])))
+        for index in range(count)
+    ]
+
+
+def _values(actuator: Actuator, rng: np.random.Generator) -> dict[str, float]:
+    value = actuator.parameters.value
+    values: dict[str, float] = dict(NOISE)
+    for spread in SPREADS:
+        drawn = spread.draw(rng)
+        for path in spread.paths:
+            if spread.kind == "factor":
+                values[path] = value(path) * drawn
+            else:
+                values[path] = drawn + (0.0 if spread.kind == "range" else value(path))
+        if spread.name == FRICTION_COEFFICIENT:
+            values |= _efficiencies(actuator, drawn)
+        elif spread.name == AIR:
+            values["motor.winding_temperature"] = drawn
+            thinner = math.exp(-GREASE_PER_KELVIN * (drawn - 293.15))
+            values["friction.viscous"] = value("friction.viscous") * thinner
+    return values
+
+
+def _efficiencies(actuator: Actuator, factor: float) -> dict[str, float]:
+    """Both efficiencies of a screw whose friction coefficient is `factor` times the set's."""
+    value = actuator.parameters.value
+    slope = 2.0 * value("screw.lead") / value("screw.pitch_diameter")
+    eta, aiding = value("screw.efficiency"), value("screw.efficiency_aiding")
+    driving = factor * (1.0 - eta) * slope / (eta + slope**2)
+    back = factor * (1.0 - aiding) * slope / (1.0 + aiding * slope**2)
+    return {
+        "screw.efficiency": (1.0 - driving * slope) / (1.0 + driving / slope),
+        "screw.efficiency_aiding": (1.0 - back / slope) / (1.0 + back * slope),
+    }
+
+
+def spread_rows() -> list[dict[str, Any]]:
+    """Return the spreads as rows of a report: property, deviation and reason."""
+    shown: dict[str, dict[str, Any]] = {}
+    for spread in SPREADS:
+        if spread.kind == "range":
+            size = f"{spread.size:g} to {spread.upper:g}"
+        else:
+            size = f"{100 * spread.size:g} %" if spread.kind == "factor" else f"{spread.size:g}"
+        row = {"property": spread.name, "deviation": size, "reason": spread.reason}
+        shown.setdefault(spread.name, row)
+    return list(shown.values())

@@ -1,0 +1,143 @@
+"""What `nasa-separation` seeds and reports."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from elevon.report.checks import Check, all_passed
+from elevon.reproduce.nasa.effect import Effect
+from elevon.reproduce.nasa.impact import Impact, Trace
+
+__all__ = ["Seeded", "SeparationResult", "SeparationRow"]
+
+
+@dataclass(frozen=True, slots=True)
+class Seeded:
+    """A fault, the severity seeded, and the feature named for it beforehand."""
+
+    name: str
+    grammar: str
+    severity: float
+    unit: str
+    feature: str
+
+    def text(self, share: float = 1.0) -> str:
+        """Return the fault in the grammar of the command line, at a share of its severity."""
+        return f"{self.grammar}={share * self.severity:g}{self.unit and ' ' + self.unit}"
+
+
+@dataclass(frozen=True, slots=True)
+class SeparationRow:
+    """How far one fault stands from healthy in one profile under one load.
+
+    Attributes
+    ----------
+    fault, feature, unit, profile : str
+        What.
+    load : float
+        N, opposing.
+    healthy, faulty : float
+        Means of the feature, in its unit.
+    effect : Effect
+        In healthy standard deviations, with its interval.
+    half : Effect or None
+        Of half the severity, where it was run.
+    winner : bool or None
+        Whether this profile shows the fault best under this load; None: no profile can be named.
+    power : float
+        Probability that another such experiment names the best profile of this fault and load.
+    draws : int or None
+        Faulty draws (and as many times more healthy ones) that would name it, were the effects as
+        estimated; None where it is named or where the fault is not shown.
+    """
+
+    fault: str
+    feature: str
+    unit: str
+    profile: str
+    load: float
+    healthy: float
+    faulty: float
+    effect: Effect
+    half: Effect | None
+    winner: bool | None
+    power: float
+    draws: int | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return one row of the command's JSON object."""
+        return {
+            "fault": self.fault,
+            "profile": self.profile,
+            "load_n": self.load,
+            "feature": self.feature,
+            "unit": self.unit,
+            "healthy": self.healthy,
+            "faulty": self.faulty,
+            "effect_size": self.effect.size,
+            "interval": [self.effect.low, self.effect.high],
+            "half_severity": None if self.half is None else self.half.size,
+            "winner": self.winner,
+            "power": self.power,
+            "draws_needed": self.draws,
+        }
+
+
+@dataclass(frozen=True)
+class SeparationResult:
+    """Everything `elevon reproduce nasa-separation` reports.
+
+    Attributes
+    ----------
+    rows : list of SeparationRow
+        One a fault, load and profile.
+    impacts : list of Impact
+        Excess of the load cell's peak that the gap makes.
+    null_rate, null_tables : float
+        Share of the healthy-against-healthy comparisons above the threshold, and of the whole
+        tables that hold any.
+    healthy, reassemblies : int
+        Healthy units, and units of each fault.
+    level : float
+        Of every interval, so that all of them hold together with 95 %.
+    traces : list of Trace
+        Load-cell force of the nominal actuator about a reversal, with and without the gap.
+    """
+
+    rows: list[SeparationRow]
+    impacts: list[Impact]
+    checks: list[Check]
+    null_rate: float
+    null_tables: float
+    seed: int
+    healthy: int
+    reassemblies: int
+    level: float
+    traces: list[Trace] = field(default_factory=list)
+    meta: dict[str, Any] = field(default_factory=dict)
+
+    def winners(self) -> dict[tuple[str, float], str | None]:
+        """Return the best profile of each fault and load, None where none can be named."""
+        found: dict[tuple[str, float], str | None] = {}
+        for row in self.rows:
+            found.setdefault((row.fault, row.load), None)
+            if row.winner:
+                found[row.fault, row.load] = row.profile
+        return found
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object of the command."""
+        return {
+            "status": "pass" if all_passed(self.checks) else "fail",
+            "rows": [row.to_dict() for row in self.rows],
+            "impacts": [impact.to_dict() for impact in self.impacts],
+            "null_rate": self.null_rate,
+            "null_tables": self.null_tables,
+            "checks": [check.to_dict() for check in self.checks],
+            "seed": self.seed,
+            "healthy": self.healthy,
+            "reassemblies": self.reassemblies,
+            "level": self.level,
+            **self.meta,
+        }
