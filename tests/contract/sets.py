@@ -4,7 +4,9 @@ run over.
 
 from __future__ import annotations
 
+import copy
 import tomllib
+from functools import cache
 from importlib import resources
 from typing import Any
 
@@ -22,6 +24,12 @@ def shipped() -> dict[str, str]:
     }
 
 
+@cache
+def actuator(name: str) -> Any:
+    """A shipped actuator, read once."""
+    return elevon.Actuator.load(name)
+
+
 def names() -> list[str]:
     """Shipped sets whose wiring the core has; `test_every_shipped_set_loads` reports the others."""
     known = {wiring["name"] for wiring in _core.wirings()}
@@ -30,29 +38,34 @@ def names() -> list[str]:
 
 def fidelities(name: str) -> list[str]:
     """Fidelities of the wiring behind a set."""
-    wiring = elevon.Actuator.load(name).wiring
+    wiring = actuator(name).wiring
     return next(list(w["fidelities"]) for w in _core.wirings() if w["name"] == wiring)
 
 
 def signals(name: str, fidelity: str) -> list[str]:
     """Signal names of a set in a fidelity."""
-    return [record["name"] for record in _core.signals(elevon.Actuator.load(name).wiring, fidelity)]
+    return [record["name"] for record in _core.signals(actuator(name).wiring, fidelity)]
 
 
 def places(name: str) -> list[tuple[str, str, dict[str, Any]]]:
     """Kind, place and catalogue record of every fault that an actuator can have."""
-    records = _core.faults(elevon.Actuator.load(name).wiring)
+    records = _core.faults(actuator(name).wiring)
     return [(record["kind"], place, record) for record in records for place in record["places"]]
 
 
 def takes_actions(name: str) -> bool:
     """Is the actuator commanded by actions (a gear), not by waveforms?"""
-    wiring = elevon.Actuator.load(name).wiring
+    wiring = actuator(name).wiring
     return any("gear" in w["modes"] for w in _core.wirings() if w["name"] == wiring)
 
 
 def scenario(name: str, fault: dict[str, Any] | None = None) -> Any:
-    """A short run in which everything moves, with a fault if given.
+    """The short run of `motion`, with a fault if given."""
+    return elevon.Scenario.from_dict({**motion(name), **({"fault": [fault]} if fault else {})})
+
+
+def motion(name: str) -> dict[str, Any]:
+    """A short run in which everything moves, as data.
 
     A position swing, 0.03 in SI at 4 Hz, that takes up any play; a gear retracts from its
     down-lock and extends into it again.
@@ -67,16 +80,16 @@ def scenario(name: str, fault: dict[str, Any] | None = None) -> Any:
     if takes_actions(name):
         # A whole cycle of a short stroke: every switch and the lock change.
         data = {
-            "duration": "4 s",
-            "command": {"mode": "gear", "steps": [step(0.01, "retract"), step(2.3, "extend")]},
-            "initial": {"nut_position": "33 mm"},
+            "duration": "2.2 s",
+            "command": {"mode": "gear", "steps": [step(0.01, "retract"), step(1.15, "extend")]},
+            "initial": {"nut_position": "13 mm"},
             "parameters": {
-                "lever.stroke": "30 mm",
-                "proximity.position_25": "8 mm",
-                "proximity.position_75": "22 mm",
+                "lever.stroke": "10 mm",
+                "proximity.position_25": "3 mm",
+                "proximity.position_75": "7 mm",
             },
         }
-    return elevon.Scenario.from_dict({**data, "fault": [fault]} if fault else data)
+    return copy.deepcopy(data)
 
 
 def step(time: float, action: str) -> dict[str, Any]:

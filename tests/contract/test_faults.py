@@ -1,119 +1,100 @@
 """One suite over every fault of every actuator; a new one is covered the day its catalogue line
 exists.
+
+The variants of a cell run as one batch, so a test looks at a whole catalogue and names what fails.
 """
 
 from __future__ import annotations
 
+import math
 from functools import cache
-from typing import Any
 
-import numpy as np
 import pytest
 
 import elevon
 from tests.contract import sets
+from tests.contract.cells import Cell, Outcome, Variant, drives, fault, load, severe
 
-CASES = [
-    pytest.param(name, fidelity, kind, place, record, id=f"{name}-{fidelity}-{kind}@{place}")
-    for name in sets.names()
-    for fidelity in sets.fidelities(name)
-    for kind, place, record in sets.places(name)
-    if fidelity in record["fidelities"]
-]
-PROFILES = [
-    None,
-    {"kind": "step", "time": "5 ms"},
-]
+#: Parts of the severe severity: away from whole counts, so that rounding inside a fault shows.
+PARTS = (0.23, 0.61, 1.0)
+
+
+def cells(*, every: bool) -> list[Cell]:
+    """One drive and no load; or every drive, each with no load, an opposing and an aiding one."""
+    return [
+        Cell(name, fidelity, choices, push)
+        for name in sets.names()
+        for fidelity in sets.fidelities(name)
+        for choices in (drives(name) if every else [()])
+        for push in ((0.0, load(name), -load(name)) if every else (0.0,))
+    ]
+
+
+def titled(every: bool) -> pytest.MarkDecorator:
+    """The cells as parameters of a test, each named."""
+    return pytest.mark.parametrize("cell", cells(every=every), ids=lambda cell: cell.title)
 
 
 @cache
-def healthy(name: str, fidelity: str) -> Any:
-    """The run without any fault."""
-    return simulate(name, fidelity, None)
+def outcomes(cell: Cell, parts: tuple[float, ...]) -> dict[str, list[Outcome]]:
+    """Outcomes of each fault at each part of its severe severity; the healthy run first."""
+    names = [f"{kind}@{place}" for kind, place, _ in cell.faults()]
+    variants = [
+        Variant(
+            f"{kind}@{place}={part}", faults=(fault(kind, place, record, part * severe(record)),)
+        )
+        for kind, place, record in cell.faults()
+        for part in parts
+    ]
+    healthy, *broken = cell.run([Variant(), *variants])
+    size = len(parts)
+    rows = {name: broken[i * size : (i + 1) * size] for i, name in enumerate(names)}
+    return {"healthy": [healthy], **rows}
 
 
-def simulate(name: str, fidelity: str, fault: dict[str, Any] | None) -> Any:
-    """Every signal of a short run."""
-    chosen = ",".join(sets.signals(name, fidelity)) + "@1 kHz"
-    return elevon.simulate(
-        elevon.Actuator.load(name),
-        sets.scenario(name, fault),
-        fidelity=fidelity,
-        record=[chosen],
-        seed=5,
-    )
+def not_zero(cell: Cell, parts: tuple[float, ...]) -> list[str]:
+    """Faults whose severity of zero is not the healthy run to the bit, with the signals."""
+    found = dict(outcomes(cell, parts))
+    healthy = found.pop("healthy")[0]
+    assert healthy.status == "ok"
+    return [
+        f"{name}: {', '.join(changed)}"
+        for name, (zero, *_) in found.items()
+        if (changed := zero.differs(healthy))
+    ]
 
 
-def attributes(record: dict[str, Any]) -> dict[str, Any]:
-    """The attributes that have no default, at zero."""
-    return {a["name"]: 0.0 for a in record["attributes"] if a["default"] is None}
+def idle(cell: Cell, parts: tuple[float, ...]) -> list[str]:
+    """Faults that change nothing when severe, or end in another way than a drive may."""
+    found = dict(outcomes(cell, parts))
+    healthy = found.pop("healthy")[0]
+    return [
+        f"{name}: {broken[-1].status}"
+        for name, broken in found.items()
+        if broken[-1].status not in {"ok", "tripped"} or not broken[-1].differs(healthy)
+    ]
 
 
-def extreme(record: dict[str, Any]) -> float:
-    """A severity well inside the range but far from healthy."""
-    top = record["maximum"]
-    if record["unit"] in ("", "1", None) and top in (0.0, 1.0):
-        return 1.0 if "switch" in record["kind"] or "open" in record["kind"] else 0.5
-    return min(0.5 * top, 1.0) if top > 0 else 0.5 * record["minimum"]
-
-
-@pytest.mark.parametrize(
-    "profile",
-    [PROFILES[0], pytest.param(PROFILES[1], marks=pytest.mark.long)],
-    ids=["constant", "step"],
-)
-@pytest.mark.parametrize(("name", "fidelity", "kind", "place", "record"), CASES)
-def test_severity_zero_is_bit_identical_to_no_fault(
-    name: str,
-    fidelity: str,
-    kind: str,
-    place: str,
-    record: dict[str, Any],
-    profile: dict[str, Any] | None,
-) -> None:
+@titled(every=False)
+def test_severity_zero_is_bit_identical_to_no_fault(cell: Cell) -> None:
     """All signals, every sample, every bit."""
-    fault = {"kind": kind, "place": place, "severity": 0.0, **attributes(record)}
-    if profile:
-        fault["profile"] = profile
-    zero, none = simulate(name, fidelity, fault), healthy(name, fidelity)
-    assert zero.meta["status"] == none.meta["status"] == "ok"
-    for signal in sets.signals(name, fidelity):
-        if not signal.startswith("fault"):
-            assert np.array_equal(zero[signal].values, none[signal].values, equal_nan=True), signal
+    assert not_zero(cell, (0.0, 1.0)) == []
 
 
-@pytest.mark.parametrize(("name", "fidelity", "kind", "place", "record"), CASES)
-def test_every_fault_does_something(
-    name: str, fidelity: str, kind: str, place: str, record: dict[str, Any]
-) -> None:
-    """A severe one changes some signal, or trips the drive; its label records the severity
-    applied.
-    """
-    severity = extreme(record)
-    fault = {"kind": kind, "place": place, "severity": severity, **attributes(record)}
-    broken, none = simulate(name, fidelity, fault), healthy(name, fidelity)
-    assert broken.meta["status"] in {"ok", "tripped"}
-    assert broken.labels
-    changed = broken.meta["status"] == "tripped" or any(
-        not np.array_equal(broken[signal].values, none[signal].values, equal_nan=True)
-        for signal in sets.signals(name, fidelity)
-        if not signal.startswith("fault")
-    )
-    assert changed
+@titled(every=False)
+def test_every_fault_does_something(cell: Cell) -> None:
+    """A severe one changes some signal, or trips the drive."""
+    assert idle(cell, (0.0, 1.0)) == []
 
 
-@pytest.mark.parametrize(("name", "fidelity", "kind", "place", "record"), CASES)
-def test_severity_out_of_range_is_refused_by_name(
-    name: str, fidelity: str, kind: str, place: str, record: dict[str, Any]
-) -> None:
+@pytest.mark.parametrize("name", sets.names())
+def test_severity_out_of_range_is_refused_by_name(name: str) -> None:
     """Above the maximum (if there is one), below the minimum, and NaN."""
-    wrong = [float("nan")]
-    if np.isfinite(record["maximum"]):
-        wrong.append(record["maximum"] + 1.0)
-    if np.isfinite(record["minimum"]):
-        wrong.append(record["minimum"] - 1.0)
-    for severity in wrong:
-        fault = {"kind": kind, "place": place, "severity": severity, **attributes(record)}
-        with pytest.raises(elevon.InputError) as caught:
-            simulate(name, fidelity, fault)
-        assert kind in str(caught.value) or "severity" in str(caught.value)
+    for kind, place, record in sets.places(name):
+        ends = (record["maximum"] + 1.0, record["minimum"] - 1.0)
+        for severity in (math.nan, *(end for end in ends if math.isfinite(end))):
+            with pytest.raises(elevon.InputError) as caught:
+                elevon.simulate(
+                    sets.actuator(name), sets.scenario(name, dict(fault(kind, place, record, severity)))
+                )
+            assert kind in str(caught.value) or "severity" in str(caught.value)

@@ -1,0 +1,163 @@
+"""Many runs of one actuator in one batch: the healthy one and every variant of it.
+
+A cell is a shipped set at one fidelity, with some choices made otherwise and a load on its output.
+Its variants go through the core together, in lanes, so that a suite over every fault and every
+parameter costs seconds; that lanes change no bit is the contract of `test_actuators`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+import elevon
+from elevon.parameters import records
+from tests.contract import sets
+
+Values = Mapping[str, Any]
+RATE = "1 kHz"
+
+
+@dataclass(frozen=True)
+class Variant:
+    """What differs from the cell's healthy run."""
+
+    name: str = "healthy"
+    values: Values = field(default_factory=dict)
+    faults: tuple[Values, ...] = ()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One run: its status, every signal (severities apart), and what the labels said."""
+
+    status: str
+    message: str
+    signals: Mapping[str, np.ndarray]
+    severity: np.ndarray
+    time: np.ndarray
+
+    def differs(self, other: Outcome) -> list[str]:
+        """Signals in which two runs are not the same to the bit; the status is one of them."""
+        if self.status != other.status:
+            return ["status"]
+        return [
+            name
+            for name, values in self.signals.items()
+            if values.tobytes() != other.signals[name].tobytes()
+        ]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """An actuator at one fidelity, in one drive, under one load (SI, at its output)."""
+
+    name: str
+    fidelity: str
+    choices: tuple[tuple[str, str], ...] = ()
+    load: float = 0.0
+
+    @property
+    def title(self) -> str:
+        """The cell's name in the list of tests."""
+        chosen = [f"{path.rpartition('.')[2]}={choice}" for path, choice in self.choices]
+        push = [] if self.load == 0.0 else ["opposing" if self.load > 0.0 else "aiding"]
+        return "-".join([self.name, self.fidelity, *chosen, *push])
+
+    def actuator(self, values: Values | None = None) -> Any:
+        """The actuator of this cell with some values changed."""
+        return sets.actuator(self.name).with_values({**dict(self.choices), **(values or {})})
+
+    def scenario(self, faults: Sequence[Values] = (), duration: float | None = None) -> Any:
+        """The short motion in which everything moves, under the cell's load."""
+        data = sets.motion(self.name)
+        if self.load:
+            data["load"] = {"user": {"terms": [{"kind": "constant", "value": self.load}]}}
+        if duration is not None:
+            data["duration"] = duration
+        return elevon.Scenario.from_dict({**data, "fault": list(faults)})
+
+    def run(self, variants: Sequence[Variant], duration: float | None = None) -> list[Outcome]:
+        """Every variant's outcome, from one batch."""
+        runs = [
+            elevon.Run(
+                self.actuator(item.values), self.scenario(item.faults, duration), 5, item.name
+            )
+            for item in variants
+        ]
+        recordings = elevon.simulate_batch(
+            runs, fidelity=self.fidelity, record=f"all@{RATE}", threads=1
+        )
+        return [_outcome(recording) for recording in recordings]
+
+    def faults(self) -> list[tuple[str, str, dict[str, Any]]]:
+        """Kind, place and record of every fault that this fidelity carries."""
+        return [
+            item for item in sets.places(self.name) if self.fidelity in item[2]["fidelities"]
+        ]
+
+
+def _outcome(recording: Any) -> Outcome:
+    channels = {channel.name: channel.values for channel in recording.channels}
+    severity = channels.pop("fault_1", np.zeros(0))
+    return Outcome(
+        recording.status,
+        recording.meta["message"],
+        channels,
+        severity,
+        recording.channels[0].time,
+    )
+
+
+def fault(kind: str, place: str, record: Values, severity: float, **profile: Any) -> Values:
+    """A fault with its obligatory attributes at zero."""
+    own = {a["name"]: 0.0 for a in record["attributes"] if a["default"] is None}
+    given = {"kind": kind, "place": place, "severity": severity, **own}
+    return given | {"profile": profile} if profile else given
+
+
+def severe(record: Values) -> float:
+    """A severity well inside the range but far from healthy."""
+    top = record["maximum"]
+    if record["unit"] in ("", "1", None) and top in (0.0, 1.0):
+        return 1.0
+    return min(0.5 * top, 1.0) if top > 0 else 0.5 * record["minimum"]
+
+
+def drives(name: str) -> list[tuple[tuple[str, str], ...]]:
+    """Own drive of a set, then each other choice of each choice of the group ``drive``."""
+    actuator = sets.actuator(name)
+    others = [
+        ((path, choice),)
+        for path, record in records(actuator.wiring).items()
+        for choice in record.choices or ()
+        if path.startswith("drive.") and choice != actuator.parameters[path].value
+    ]
+    return [(), *others]
+
+
+@cache
+def load(name: str) -> float:
+    """A load at the output that the set feels and still moves, SI: searched by the low model.
+
+    The largest power of two that leaves the way gone within 5 % of that without a load, so that
+    no actuator's strength stands here by hand.
+    """
+    powers = [2.0**k for k in range(-4, 17)]
+    loads = [0.0, *powers, *(-force for force in powers)]
+    ways = {}
+    for force in loads:
+        cell = Cell(name, "low", load=force)
+        outcome = cell.run([Variant()])[0]
+        way = outcome.signals["user_position"]
+        ways[force] = np.max(np.abs(way - way[0])) if outcome.status == "ok" else 0.0
+    felt = [
+        force
+        for force in powers
+        if all(abs(ways[sign * force] / ways[0.0] - 1.0) < 0.05 for sign in (1.0, -1.0))
+    ]
+    return max(felt)
