@@ -16,6 +16,13 @@ settings.register_profile("ci", parent=settings.get_profile("elevon"), derandomi
 settings.load_profile("ci" if os.environ.get("CI") else "elevon")
 
 
+def pytest_report_header() -> str:
+    """Say which build is tested: that of the release, or that for work on physics."""
+    from elevon import _core
+
+    return f"extension: {_core.__file__} (lanes: {_core.widths()['auto']})"
+
+
 def shared_folder() -> Path:
     """The folder of reference data: ELEVON_SHARED, or `shared` beside the repository."""
     return Path(os.environ.get("ELEVON_SHARED", ROOT.parent / "shared"))

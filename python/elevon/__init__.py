@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from elevon.actuator import Actuator as Actuator
     from elevon.errors import ElevonError as ElevonError
+    from elevon.errors import ElevonWarning as ElevonWarning
     from elevon.errors import InputError as InputError
+    from elevon.errors import NotActingWarning as NotActingWarning
     from elevon.recording import Channel as Channel
     from elevon.recording import Clock as Clock
     from elevon.recording import Recording as Recording
@@ -28,7 +30,9 @@ _PUBLIC = {
     "Channel": "elevon.recording",
     "Clock": "elevon.recording",
     "ElevonError": "elevon.errors",
+    "ElevonWarning": "elevon.errors",
     "InputError": "elevon.errors",
+    "NotActingWarning": "elevon.errors",
     "Recording": "elevon.recording",
     "Run": "elevon.simulate",
     "Scenario": "elevon.scenario",

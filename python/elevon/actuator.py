@@ -78,6 +78,7 @@ class Actuator:
         *,
         source: str = "set by the caller",
         place: str = "",
+        asked: bool = True,
     ) -> Actuator:
         """Return an actuator with some values changed.
 
@@ -89,6 +90,8 @@ class Actuator:
             Kept as the source of the changed values.
         place : str
             Named in errors, such as the file the values come from.
+        asked : bool
+            These are the user's wishes: where one cannot act, that is said.
 
         Raises
         ------
@@ -98,7 +101,8 @@ class Actuator:
         if not values:
             return self
         return replace(
-            self, parameters=self.parameters.replaced(values, source=source, place=place)
+            self,
+            parameters=self.parameters.replaced(values, source=source, place=place, asked=asked),
         )
 
     @property

@@ -182,13 +182,17 @@ def run_pair(
     """Return the recordings of one scenario at high and at low fidelity; errors as `compare`."""
     from elevon.progress import part
     from elevon.simulate import simulate
+    from elevon.simulate.acting import together
 
     record = {name: f"{','.join(SIGNALS)}@{rate}" for name, rate in RATES.items()}
     spans = {"high": part(progress, 0.0, 0.95), "low": part(progress, 0.95, 1.0)}
-    high, low = (
-        simulate(actuator, scenario, fidelity=name, record=record[name], seed=seed, progress=span)
-        for name, span in spans.items()
-    )
+    with together((actuator, scenario, name) for name in RATES):
+        high, low = (
+            simulate(
+                actuator, scenario, fidelity=name, record=record[name], seed=seed, progress=span
+            )
+            for name, span in spans.items()
+        )
     for name, run in zip(spans, (high, low), strict=True):
         if run.status != "ok":
             raise SimulationError(

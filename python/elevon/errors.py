@@ -11,9 +11,13 @@ from typing import ClassVar
 __all__ = [
     "DivergedError",
     "ElevonError",
+    "ElevonWarning",
+    "FindingWarning",
     "FormatError",
     "InputError",
     "Interrupted",
+    "NotActingError",
+    "NotActingWarning",
     "OutputError",
     "OutputExistsError",
     "RangeError",
@@ -59,6 +63,10 @@ class UnknownNameError(InputError, LookupError):
         super().__init__(message)
         self.name = name
         self.nearest = list(near)
+
+
+class NotActingError(InputError):
+    """A parameter or fault was set where it cannot act, and the caller asked to be strict."""
 
 
 class UnitError(InputError):
@@ -116,6 +124,26 @@ class Interrupted(ElevonError):  # noqa: N818 - an interruption is asked for, it
     """The work was stopped by the user before its end."""
 
     exit_code: ClassVar[int] = 130
+
+
+class ElevonWarning(UserWarning):
+    """Base of every warning given on purpose by Elevon.
+
+    Attributes
+    ----------
+    exit_code : int
+        Exit status of the command line where warnings are errors.
+    """
+
+    exit_code: ClassVar[int] = 2
+
+
+class NotActingWarning(ElevonWarning):
+    """A parameter or fault was set away from neutral where it cannot act."""
+
+
+class FindingWarning(ElevonWarning):
+    """The core doubts these values together, but runs them."""
 
 
 def nearest(name: str, candidates: Iterable[str], count: int = 3) -> list[str]:

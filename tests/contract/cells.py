@@ -96,9 +96,7 @@ class Cell:
 
     def faults(self) -> list[tuple[str, str, dict[str, Any]]]:
         """Kind, place and record of every fault that this fidelity carries."""
-        return [
-            item for item in sets.places(self.name) if self.fidelity in item[2]["fidelities"]
-        ]
+        return [item for item in sets.places(self.name) if self.fidelity in item[2]["fidelities"]]
 
 
 def _outcome(recording: Any) -> Outcome:

@@ -95,6 +95,7 @@ def test_severity_out_of_range_is_refused_by_name(name: str) -> None:
         for severity in (math.nan, *(end for end in ends if math.isfinite(end))):
             with pytest.raises(elevon.InputError) as caught:
                 elevon.simulate(
-                    sets.actuator(name), sets.scenario(name, dict(fault(kind, place, record, severity)))
+                    sets.actuator(name),
+                    sets.scenario(name, dict(fault(kind, place, record, severity))),
                 )
             assert kind in str(caught.value) or "severity" in str(caught.value)

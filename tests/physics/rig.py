@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -71,6 +72,9 @@ PWM = {
 LOCKED = {"friction.static": 1e3, "friction.dynamic": 1e3}
 
 
+loaded = cache(elevon.Actuator.load)
+
+
 def term(kind: str, **parameters: Any) -> dict[str, Any]:
     """One waveform term as a scenario spells it."""
     return {"kind": kind, **parameters}
@@ -82,8 +86,19 @@ def constant(value: float | str) -> dict[str, Any]:
 
 
 def actuator(values: dict[str, Any] | None = None, name: str = "torino-rotary") -> Any:
-    """The set `name` with `values` written over it."""
-    return elevon.Actuator.load(name).with_values(values or {})
+    """The set `name` with `values` written over it.
+
+    What stands in this file is the rig's own set, carried for every drive and fidelity; the rest
+    is a test's wish, and must act.
+    """
+    wishes = values or {}
+    own = {
+        path: value
+        for path, value in wishes.items()
+        if any(value == given.get(path) for given in (FREE_SHAFT, MOTOR, PWM))
+    }
+    rest = {path: value for path, value in wishes.items() if path not in own}
+    return loaded(name).with_values(own, asked=False).with_values(rest)
 
 
 def run(

@@ -119,6 +119,7 @@ fn attribute<'py>(d: &Bound<'py, PyDict>, a: &Attribute) -> PyResult<()> {
     d.set_item("name", a.name)?;
     d.set_item("unit", a.unit)?;
     d.set_item("default", a.default)?;
+    d.set_item("parameter", a.path)?;
     d.set_item("text", a.text)
 }
 

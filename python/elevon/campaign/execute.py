@@ -89,7 +89,14 @@ def estimate(plan: Plan, planned: Sequence[PlannedRun]) -> Estimate:
     sizes = []
     for item in planned:
         try:
-            sizes.append(batch_bytes([item.run], fidelity=plan.fidelity, record=_record(plan)))
+            sizes.append(
+                batch_bytes(
+                    [item.run],
+                    fidelity=plan.fidelity,
+                    record=_record(plan),
+                    strict=not plan.allow_not_acting,
+                )
+            )
         except InputError as error:
             raise InputError(f"run {item.run.number}: {error}") from error
     free = available_bytes()

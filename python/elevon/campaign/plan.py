@@ -11,6 +11,7 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    StrictBool,
     StrictFloat,
     StrictInt,
     StrictStr,
@@ -130,7 +131,8 @@ class Case(_Strict):
 class Plan(_Strict):
     """A batch plan.
 
-    The runs are all combinations of the cases, the axes, the random draws and the seeds.
+    The runs are all combinations of the cases, the axes, the random draws and the seeds. What a
+    run sets where it cannot act is an error, unless `allow_not_acting` makes it a warning.
     """
 
     name: StrictStr = "batch"
@@ -146,6 +148,7 @@ class Plan(_Strict):
     random: Random | None = None
     split: dict[str, Number] = Field(default_factory=dict)
     split_seed: StrictInt = Field(0, ge=0)
+    allow_not_acting: StrictBool = False
     runs_per_file: StrictInt = Field(50, ge=1, le=50)
 
     @model_validator(mode="after")

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from elevon.cli import interrupt
-from elevon.cli.common import JsonOption
+from elevon.cli.common import JsonOption, StrictOption
 from elevon.cli.output import print_json, progress_bar, say
 
 app = typer.Typer(rich_markup_mode=None)
@@ -22,6 +22,7 @@ def batch(
         Path, typer.Option("--out", metavar="DIR", help="Folder of the results; resumed if begun.")
     ],
     threads: Annotated[int | None, typer.Option(min=1, help="Threads; default one a core.")] = None,
+    strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
     json: JsonOption = False,
 ) -> int:
     """Run a plan of many simulations into a folder; an interrupted one goes on where it was."""

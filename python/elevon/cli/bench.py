@@ -15,6 +15,7 @@ from elevon.cli.common import (
     JsonOption,
     SeedOption,
     SetOption,
+    StrictOption,
     read_actuator,
 )
 from elevon.cli.output import print_json, print_table, progress_bar, say
@@ -65,6 +66,7 @@ def run(
         Path | None, typer.Option(metavar="FILE", help="Write the hidden values (JSON).")
     ] = None,
     force: ForceOption = False,
+    strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
     json: JsonOption = False,
 ) -> None:
     """Carry out a procedure and write what the bench writes: traces, load cell, command notes."""

@@ -13,6 +13,7 @@ from elevon.cli.common import (
     ForceOption,
     JsonOption,
     SetOption,
+    StrictOption,
     check_outputs,
     read_actuator,
     without_companions,
@@ -111,6 +112,7 @@ def calibrate(
     transient: TransientOption = None,
     settings: SetOption = None,
     report: ReportOption = None,
+    strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
     json: JsonOption = False,
     force: ForceOption = False,
     date: DateOption = None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,12 +10,20 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from elevon.cli.output import say
-from elevon.errors import InputError
+from elevon.errors import ElevonWarning, InputError
 from elevon.files import check_output
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.scenario import Scenario
+
+
+def _strict(value: bool) -> bool:
+    """Turn Elevon's warnings into errors for the rest of this command."""
+    if value:
+        warnings.simplefilter("error", ElevonWarning)
+    return value
+
 
 ActuatorArgument = Annotated[
     str, typer.Argument(metavar="ACTUATOR", help="Name of a set (elevon list actuators) or a file.")
@@ -45,6 +54,14 @@ RecordOption = Annotated[
 ]
 SeedOption = Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")]
 ForceOption = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
+StrictOption = Annotated[
+    bool,
+    typer.Option(
+        "--strict",
+        callback=_strict,
+        help="What is set where it cannot act, and every other warning, is an error.",
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
 
 

@@ -15,6 +15,7 @@ from elevon.cli.common import (
     ScenarioOption,
     SeedOption,
     SetOption,
+    StrictOption,
     check_outputs,
     read_actuator,
 )
@@ -40,6 +41,7 @@ def compare(
         bool, typer.Option("--faults-table", help="What each fault changes in either model.")
     ] = False,
     seed: SeedOption = 0,
+    strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
     json: JsonOption = False,
     out: Annotated[Path | None, typer.Option(help="Folder for report.html.")] = None,
     force: ForceOption = False,

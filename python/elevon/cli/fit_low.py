@@ -14,6 +14,7 @@ from elevon.cli.common import (
     JsonOption,
     SeedOption,
     SetOption,
+    StrictOption,
     check_outputs,
     read_actuator,
 )
@@ -40,6 +41,7 @@ def fit_low(
     out: Annotated[Path | None, typer.Option(metavar="SET.toml", help="Write the set.")] = None,
     report: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a report.")] = None,
     seed: SeedOption = 0,
+    strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
     json: JsonOption = False,
     force: ForceOption = False,
     date: Annotated[str | None, typer.Option(help="Date printed in the report.")] = None,

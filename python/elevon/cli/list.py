@@ -44,7 +44,7 @@ def signals(
 
 @app.command()
 def parameters(actuator: ActuatorArgument, *, json: JsonOption = False) -> None:
-    """List the parameters an actuator's model has: unit, range, default, meaning."""
+    """List the parameters an actuator's model has: unit, range, meaning, where each acts."""
     from elevon.actuator import Actuator
     from elevon.parameters import records
 
@@ -56,11 +56,15 @@ def parameters(actuator: ActuatorArgument, *, json: JsonOption = False) -> None:
             "range": record.range_text,
             "default": record.default_value(),
             "register": record.register,
+            "fidelities": list(record.fidelities),
+            "declined": dict(record.declined),
+            "when": list(record.when),
+            "acts": record.acts_text,
             "text": record.text,
         }
         for record in records(Actuator.load(actuator).wiring).values()
     ]
-    _print("parameters", rows, json, ("path", "unit", "range", "text"))
+    _print("parameters", rows, json, ("path", "unit", "range", "text", "acts"))
 
 
 @app.command()
@@ -71,7 +75,7 @@ def faults(
     *,
     json: JsonOption = False,
 ) -> None:
-    """List the fault catalogue: kind, places, unit, range, effect, source."""
+    """List the fault catalogue: kind, places, unit, range, fidelities, effect, source."""
     from elevon.actuator import Actuator
     from elevon.faults import catalogue
     from elevon.parameters.records import wiring_names
@@ -86,6 +90,7 @@ def faults(
             "range": record.range_text,
             "attributes": [dict(item) for item in record.attributes],
             "fidelities": list(record.fidelities),
+            "declined": dict(record.declined),
             "effect": record.effect,
             "source": record.source,
         }
@@ -93,7 +98,8 @@ def faults(
         for record in catalogue(wiring)
     ]
     first = ("wiring",) if len(wirings) > 1 else ()
-    _print("faults", rows, json, (*first, "kind", "places", "unit", "range", "effect", "source"))
+    columns = ("kind", "places", "unit", "range", "fidelities", "effect", "source", "declined")
+    _print("faults", rows, json, (*first, *columns))
 
 
 @app.command()
@@ -133,4 +139,6 @@ def _print(what: str, rows: list[dict[str, Any]], json: bool, columns: tuple[str
 
 
 def _cell(value: Any) -> str:
+    if isinstance(value, dict):
+        return "; ".join(f"not {name}: {reason}" for name, reason in value.items())
     return " ".join(value) if isinstance(value, list) else str(value)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ import typer.core
 
 from elevon.cli import interrupt
 from elevon.cli.registry import COMMANDS
-from elevon.errors import ElevonError, Interrupted, nearest
+from elevon.errors import ElevonError, ElevonWarning, Interrupted, nearest
 from elevon.files import journal
 
 USAGE = 2
@@ -90,7 +92,7 @@ def _root(
 def run(argv: Sequence[str] | None = None) -> int:
     """Run the command line, turning every expected failure into a message and an exit code."""
     arguments = list(sys.argv[1:] if argv is None else argv)
-    with journal() as written:
+    with journal() as written, _warnings_in_words():
         try:
             code = _code(arguments)
         except (KeyboardInterrupt, Interrupted, typer.Abort):
@@ -113,7 +115,7 @@ def _code(arguments: list[str]) -> int:
         raise
     except _UsageError as error:
         return _usage(error)
-    except ElevonError as error:
+    except (ElevonError, ElevonWarning) as error:
         interrupt.check()
         return _fail(str(error), error.exit_code)
     except BrokenPipeError:
@@ -122,6 +124,30 @@ def _code(arguments: list[str]) -> int:
         interrupt.check()
         return _fail(str(error), FAILED)
     return outcome if isinstance(outcome, int) else 0
+
+
+@contextmanager
+def _warnings_in_words() -> Iterator[None]:
+    """Write Elevon's own warnings as a line on stderr; ``--strict`` makes errors of them."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("default", ElevonWarning)
+        usual = warnings.showwarning
+
+        def show(  # noqa: PLR0917 - the hook's own signature
+            message: Warning | str,
+            category: type[Warning],
+            filename: str,
+            lineno: int,
+            file: Any = None,
+            line: str | None = None,
+        ) -> None:
+            if issubclass(category, ElevonWarning):
+                typer.echo(f"elevon: warning: {message}", err=True)
+            else:
+                usual(message, category, filename, lineno, file, line)
+
+        warnings.showwarning = show
+        yield
 
 
 def _interrupted(written: Sequence[Path]) -> int:

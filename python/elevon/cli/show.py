@@ -61,12 +61,23 @@ def show(
 
 
 def _print_parameters(loaded: Any, notes: bool) -> None:
-    columns = ["parameter", "value", "confidence", "source", *(["note"] if notes else [])]
+    from elevon.parameters import records
+
+    known = records(loaded.wiring)
+    columns = ["parameter", "value", "confidence", "fidelities", "source"]
     rows = [
-        [p.path, p.text, p.confidence, p.source, *([p.note] if notes else [])]
+        [p.path, p.text, p.confidence, _carried(known[p.path]), p.source]
+        + ([p.note] if notes else [])
         for p in loaded.parameters.values()
     ]
+    columns += ["note"] if notes else []
     print_table(columns, rows)
+
+
+def _carried(record: Any) -> str:
+    """The fidelities that carry a parameter, and why the others do not."""
+    reasons = "; ".join(f"not {name}: {reason}" for name, reason in record.declined.items())
+    return " ".join(record.fidelities) + (f" ({reasons})" if reasons else "")
 
 
 def _write_schema(path: Path, wiring: str, *, force: bool) -> None:
@@ -104,6 +115,9 @@ def _as_json(loaded: Any, svg: Path | None) -> dict[str, Any]:
                 "note": p.note,
                 "old": p.old,
                 "text": known[p.path].text,
+                "fidelities": list(known[p.path].fidelities),
+                "declined": dict(known[p.path].declined),
+                "when": list(known[p.path].when),
             }
             for p in loaded.parameters.values()
         ],

@@ -18,6 +18,7 @@ from elevon.cli.common import (
     ScenarioOption,
     SeedOption,
     SetOption,
+    StrictOption,
     check_outputs,
     read_actuator,
     read_scenario,
@@ -48,6 +49,7 @@ def simulate(
     ] = None,
     seed: SeedOption = 0,
     force: ForceOption = False,
+    strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
     json: JsonOption = False,
 ) -> None:
     """Simulate one actuator and keep what it did."""

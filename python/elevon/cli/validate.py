@@ -17,7 +17,14 @@ from elevon.cli.calibrate import (
     _provenance,
     read,
 )
-from elevon.cli.common import ForceOption, JsonOption, SetOption, check_outputs, read_actuator
+from elevon.cli.common import (
+    ForceOption,
+    JsonOption,
+    SetOption,
+    StrictOption,
+    check_outputs,
+    read_actuator,
+)
 from elevon.cli.output import print_json, print_table, progress_bar, say
 
 app = typer.Typer(rich_markup_mode=None)
@@ -35,6 +42,7 @@ def validate(
     transient: TransientOption = None,
     settings: SetOption = None,
     report: ReportOption = None,
+    strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
     json: JsonOption = False,
     force: ForceOption = False,
     date: DateOption = None,

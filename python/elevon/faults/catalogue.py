@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
@@ -16,7 +16,11 @@ __all__ = ["FaultRecord", "catalogue", "find_record"]
 
 @dataclass(frozen=True)
 class FaultRecord:
-    """What the core's catalogue says about one kind of fault."""
+    """What the core's catalogue says about one kind of fault.
+
+    `declined` says for each fidelity without it why; `targets` which parameters it moves at each
+    place.
+    """
 
     kind: str
     places: tuple[str, ...]
@@ -28,6 +32,8 @@ class FaultRecord:
     source: str
     attributes: tuple[Mapping[str, Any], ...]
     fidelities: tuple[str, ...]
+    declined: Mapping[str, str] = field(default_factory=dict)
+    targets: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def range_text(self) -> str:
@@ -76,6 +82,8 @@ def catalogue(wiring: str) -> tuple[FaultRecord, ...]:
             source=item["source"],
             attributes=tuple(item["attributes"]),
             fidelities=tuple(item["fidelities"]),
+            declined=item["declined"],
+            targets={place: tuple(paths) for place, paths in item["targets"].items()},
         )
         for item in _core.faults(wiring)
     )

@@ -119,10 +119,23 @@ def fit_low(
     SimulationError
         A run did not reach its end.
     """
-    from elevon.progress import part
+    from elevon.simulate.acting import together
 
     free = _free(actuator)
     _check(cases)
+    with together((actuator, case.scenario, name) for case in cases for name in RATES):
+        return _fitted(actuator, cases, free, seed, progress)
+
+
+def _fitted(
+    actuator: Actuator,
+    cases: Sequence[Case],
+    free: Sequence[str],
+    seed: int,
+    progress: Progress | None,
+) -> LowFit:
+    from elevon.progress import part
+
     high = _signals(actuator, cases, "high", seed, part(progress, 0.0, 0.9))
     problem = _Problem(actuator, tuple(cases), tuple(high), seed)
     seen, kept = problem.split(free)
@@ -130,7 +143,7 @@ def fit_low(
     rows = range(len(cases))
     new = problem.solve(seen, rows)
     deviation = problem.jackknife(seen, new, progress)
-    after = actuator.with_values(new, source="fitted to the high model")
+    after = actuator.with_values(new, source="fitted to the high model", asked=False)
     errors = [problem.errors(values) for values in (old, new)]
     return LowFit(actuator, after, tuple(cases), old, new, deviation, kept, *errors)
 
@@ -145,7 +158,7 @@ class _Problem:
     seed: int
 
     def low(self, values: Mapping[str, float], rows: Sequence[int]) -> list[Mapping[str, Array]]:
-        changed = self.actuator.with_values(dict(values)) if values else self.actuator
+        changed = self.actuator.with_values(dict(values), asked=False) if values else self.actuator
         return _signals(changed, [self.cases[row] for row in rows], "low", self.seed, None)
 
     def errors(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from elevon.errors import InputError, unknown
 
-__all__ = ["VARIABLE", "find_set", "set_names", "set_paths"]
+__all__ = ["VARIABLE", "find_set", "is_shipped", "set_names", "set_paths"]
 
 #: Folders with more sets, separated like PATH.
 VARIABLE = "ELEVON_SETS"
@@ -24,6 +24,11 @@ def set_paths() -> dict[str, Path]:
 def set_names() -> list[str]:
     """Return the names of the sets that can be loaded by name, sorted."""
     return sorted(set_paths())
+
+
+def is_shipped(path: Path) -> bool:
+    """Tell whether a file is one of the package's own sets."""
+    return path.resolve().parent == _SHIPPED.resolve()
 
 
 def find_set(reference: str | os.PathLike[str], folder: Path | None = None) -> Path:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from elevon.documents import Document, read_toml, validated
 from elevon.errors import InputError, unknown
-from elevon.parameters.find import find_set
+from elevon.parameters.find import find_set, is_shipped
 from elevon.parameters.parameter import Parameter
 from elevon.parameters.records import Record, records, wiring_names
 from elevon.parameters.set import ParameterSet
@@ -92,7 +92,7 @@ def load_set(reference: str | os.PathLike[str]) -> SetFile:
     entries: dict[str, Parameter] = {}
     references: dict[str, str] = {}
     for layer in reversed(layers):
-        entries.update(_parameters(layer, wiring))
+        entries.update(_marked(_parameters(layer, wiring), entries, layer, wiring))
         references.update({item.key: item.text for item in layer.header.references})
     scenario = next((layer.header.scenario for layer in layers if layer.header.scenario), None)
     return SetFile(
@@ -105,6 +105,22 @@ def load_set(reference: str | os.PathLike[str]) -> SetFile:
         scenario=scenario,
         validation=_thresholds(layers),
     )
+
+
+def _marked(
+    found: Mapping[str, Parameter], base: Mapping[str, Parameter], layer: _Layer, wiring: str
+) -> dict[str, Parameter]:
+    """Mark what a set of the user's own changes in its base, or in the defaults the base leaves."""
+    if not layer.header.base or is_shipped(Path(layer.document.origin)):
+        return dict(found)
+    known = records(wiring)
+    marked = {}
+    for path, item in found.items():
+        below = base.get(path)
+        value = known[path].default_value() if below is None else below.value
+        changed = value is not None and value != item.value
+        marked[path] = replace(item, changed=changed or (below is not None and below.changed))
+    return marked
 
 
 def _thresholds(layers: list[_Layer]) -> Mapping[str, Any] | None:

@@ -38,6 +38,9 @@ class Parameter:
         SI value before calibration or override.
     interval : tuple of float, optional
         SI limits of the calibrated value's interval.
+    changed : bool
+        The user gave another value than the set (or, in a set of the user's own, than its base):
+        where it cannot act, that is said.
     """
 
     path: str
@@ -48,6 +51,7 @@ class Parameter:
     confidence: Confidence = "assumed"
     old: float | str | None = None
     interval: tuple[float, float] | None = None
+    changed: bool = False
 
     @property
     def text(self) -> str:

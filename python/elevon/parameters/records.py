@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
@@ -17,7 +17,11 @@ __all__ = ["Record", "positions", "record_of", "records", "wiring_names"]
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What the core says about one parameter; numbers are SI."""
+    """What the core says about one parameter; numbers are SI.
+
+    `fidelities` are those that carry it, `declined` says of the others why not, and `when` what
+    must hold (all of it) for it to act.
+    """
 
     path: str
     symbol: str
@@ -30,6 +34,16 @@ class Record:
     register: str
     default: float | None
     choices: tuple[str, ...] | None
+    fidelities: tuple[str, ...] = ()
+    declined: Mapping[str, str] = field(default_factory=dict)
+    when: tuple[str, ...] = ()
+
+    @property
+    def acts_text(self) -> str:
+        """Where it acts, such as ``high; drive.kind = hysteresis``; empty: everywhere, always."""
+        where = [" ".join(self.fidelities) or "nowhere"] if self.declined else []
+        reasons = [f"not {name}: {why}" for name, why in self.declined.items()]
+        return "; ".join([*where, *self.when, *reasons])
 
     @property
     def range_text(self) -> str:
@@ -150,4 +164,7 @@ def _record(item: Mapping[str, Any]) -> Record:
         register=item["register"],
         default=None if item["default"] is None else float(item["default"]),
         choices=None if not choices else tuple(choices),
+        fidelities=tuple(item["fidelities"]),
+        declined=item["declined"],
+        when=tuple(item["when"]),
     )

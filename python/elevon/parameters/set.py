@@ -103,6 +103,7 @@ class ParameterSet(Mapping[str, Parameter]):
         *,
         source: str = "set by the caller",
         place: str = "",
+        asked: bool = True,
     ) -> ParameterSet:
         """Return a set with some values changed; a number alone is SI, text may carry a unit.
 
@@ -125,6 +126,7 @@ class ParameterSet(Mapping[str, Parameter]):
                 confidence="override",
                 old=old.value,
                 interval=None,
+                changed=old.changed or (asked and value != old.value),
             )
         # Everything else was checked when this set was made.
         result = ParameterSet.__new__(ParameterSet)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -159,6 +159,7 @@ def fault_sensitivity(
     if scenario.seconds <= start:
         raise InputError(f"faults: the scenario lasts {scenario.seconds:g} s, not over {start:g} s")
     from elevon.progress import part
+    from elevon.simulate.acting import together
 
     parsed = [Fault.parse(text) for text in _default(actuator, faults)]
     in_low = [fault for fault in parsed if _low_has(actuator.wiring, fault)]
@@ -167,7 +168,21 @@ def fault_sensitivity(
     )
     spans = [part(progress, *span) for span in ((0.0, 0.05), (0.05, 0.95), (0.95, 1.0))]
     run = _Runner(actuator, scenario, start, seed)
-    floor_run = _Runner(other_step, scenario, start, seed)([], "high", spans[0])[0]
+    every = [(scenario, name) for name in RATES]
+    every += [(scenario.with_faults([fault]), "high") for fault in parsed]
+    every += [(scenario.with_faults([fault]), "low") for fault in in_low]
+    with together((actuator, asked, fidelity) for asked, fidelity in every):
+        return _rows(run, other_step, parsed, in_low, spans)
+
+
+def _rows(
+    run: _Runner,
+    other_step: Actuator,
+    parsed: Sequence[Fault],
+    in_low: Sequence[Fault],
+    spans: Sequence[Progress | None],
+) -> list[Sensitivity]:
+    floor_run = replace(run, actuator=other_step)([], "high", spans[0])[0]
     healthy, *broken = run(parsed, "high", spans[1])
     healthy_low, *broken_low = run(in_low, "low", spans[2])
     low = dict(zip((str(fault) for fault in in_low), broken_low, strict=True))

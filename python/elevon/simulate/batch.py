@@ -10,7 +10,8 @@ from elevon.errors import DivergedError, InputError, Interrupted
 from elevon.memory import check_memory
 from elevon.recording import Clock, Recording
 from elevon.scenario import Scenario
-from elevon.simulate.prepare import Prepared, Record, Run, prepare_named
+from elevon.simulate.acting import report
+from elevon.simulate.prepare import Prepared, Record, Run, prepare, prepare_named
 from elevon.simulate.result import build_recording
 
 __all__ = ["Progress", "batch_bytes", "simulate", "simulate_batch"]
@@ -27,6 +28,7 @@ def simulate(
     seed: int = 0,
     number: int = 0,
     lanes: str = "auto",
+    strict: bool = False,
     progress: Progress | None = None,
 ) -> Recording:
     """Simulate one run.
@@ -46,6 +48,8 @@ def simulate(
     lanes : str
         Vector width: ``auto``, ``single``, ``portable``, ``avx2``, ``avx512``, ... as this
         processor has them; the result does not depend on it.
+    strict : bool
+        What is set where it cannot act is an error, not a warning.
     progress : callable, optional
         Called some ten times a second with the done fraction; returning False interrupts.
 
@@ -58,14 +62,25 @@ def simulate(
     ------
     InputError
         Anything in actuator, scenario or record that cannot be; place, value, limit are named.
+    NotActingError
+        `strict`, and something set does not act.
     DivergedError
         The run left the finite numbers; time and signal are named.
     Interrupted
         `progress` returned False.
+
+    Warns
+    -----
+    NotActingWarning
+        A parameter or fault is set away from neutral where it cannot act.
+    FindingWarning
+        The core doubts the values together.
     """
     run = Run(actuator, scenario, seed, number=number)
-    recording = simulate_batch(
-        [run], fidelity=fidelity, record=record, threads=1, lanes=lanes, progress=progress
+    prepared = [prepare(run, fidelity, record)]
+    report([prepared[0].doubts], strict=strict)
+    recording = _simulated(
+        [run], prepared, fidelity=fidelity, threads=1, lanes=lanes, progress=progress
     )[0]
     if recording.status == "diverged":
         raise DivergedError(
@@ -83,6 +98,7 @@ def simulate_batch(
     record: Record = None,
     threads: int | None = None,
     lanes: str = "auto",
+    strict: bool = False,
     progress: Progress | None = None,
 ) -> list[Recording]:
     """Simulate many runs, one a lane, on several threads.
@@ -93,8 +109,8 @@ def simulate_batch(
     ----------
     runs : sequence of Run
         Any mix of actuators and scenarios.
-    fidelity, record, lanes, progress
-        As for `simulate`.
+    fidelity, record, lanes, strict, progress
+        As for `simulate`; what does not act is said once, however many runs set it.
     threads : int, optional
         Default: one a core.
 
@@ -114,6 +130,21 @@ def simulate_batch(
     if not runs:
         raise InputError("a batch needs at least one run")
     prepared = [prepare_named(run, fidelity, record, len(runs) > 1) for run in runs]
+    report([item.doubts for item in prepared], strict=strict)
+    return _simulated(
+        runs, prepared, fidelity=fidelity, threads=threads, lanes=lanes, progress=progress
+    )
+
+
+def _simulated(
+    runs: Sequence[Run],
+    prepared: Sequence[Prepared],
+    *,
+    fidelity: str,
+    threads: int | None,
+    lanes: str,
+    progress: Progress | None,
+) -> list[Recording]:
     check_memory(sum(item.bytes for item in prepared), f"the recordings of {len(runs)} run(s)")
     results: list[Recording | None] = [None] * len(runs)
     done = 0
@@ -129,9 +160,17 @@ def simulate_batch(
     return [item for item in results if item is not None]
 
 
-def batch_bytes(runs: Sequence[Run], *, fidelity: str = "high", record: Record = None) -> int:
-    """Return the memory the recordings of a batch will take, in bytes; errors as for the batch."""
-    return sum(prepare_named(run, fidelity, record, len(runs) > 1).bytes for run in runs)
+def batch_bytes(
+    runs: Sequence[Run], *, fidelity: str = "high", record: Record = None, strict: bool = False
+) -> int:
+    """Return the memory the recordings of a batch will take, in bytes.
+
+    Errors as for the batch; it does not warn.
+    """
+    prepared = [prepare_named(run, fidelity, record, len(runs) > 1) for run in runs]
+    if strict:
+        report([item.doubts for item in prepared], strict=True)
+    return sum(item.bytes for item in prepared)
 
 
 def _groups(prepared: Sequence[Prepared]) -> list[list[int]]:

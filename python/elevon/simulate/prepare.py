@@ -14,6 +14,7 @@ from elevon.parameters import records
 from elevon.record_plan import ClockPlan, record_plan
 from elevon.scenario import Scenario, compile_scenario
 from elevon.scenario.compile import signal_records
+from elevon.simulate.acting import Doubt, check_values, not_acting
 from elevon.simulate.stroke import check_stroke
 
 __all__ = [
@@ -65,6 +66,7 @@ class Prepared:
     step: float
     bytes: int
     command_unit: str
+    doubts: tuple[Doubt, ...] = ()
 
 
 #: A recording's own objects, whatever it holds (measured: 15 to 20 kB).
@@ -95,9 +97,7 @@ def prepare(run: Run, fidelity: str, record: Record) -> Prepared:
     actuator = actuator.with_values(
         run.scenario.parameters, source="scenario", place="scenario parameters"
     )
-    findings = actuator.findings(fidelity)
-    if findings:
-        raise InputError("\n".join(str(finding["message"]) for finding in findings))
+    doubts = check_values(actuator, fidelity)
     step = solver_step(actuator, fidelity)
     compiled = compile_scenario(run.scenario, actuator.wiring, fidelity)
     check_stroke(compiled, actuator)
@@ -124,6 +124,7 @@ def prepare(run: Run, fidelity: str, record: Record) -> Prepared:
         step,
         8 * sum(n * m for n, m in rows) + _RUN_BYTES,
         compiled.command_unit,
+        (*doubts, *not_acting(actuator, compiled, fidelity)),
     )
 
 

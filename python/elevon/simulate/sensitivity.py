@@ -14,6 +14,7 @@ from elevon.errors import InputError, Interrupted, RangeError
 from elevon.parameters.records import record_of
 from elevon.recording import Recording
 from elevon.scenario import Scenario
+from elevon.simulate.acting import report
 from elevon.simulate.prepare import Prepared, Record, Run, prepare
 from elevon.simulate.result import build_recording
 
@@ -56,6 +57,7 @@ def sensitivities(
     fidelity: str = "low",
     record: Record = None,
     seed: int = 0,
+    strict: bool = False,
     progress: Callable[[float], Any] | None = None,
 ) -> Sensitivities:
     """Simulate one run with exact derivatives.
@@ -70,7 +72,7 @@ def sensitivities(
         Indices of the scenario's faults whose severities are to be differentiated by.
     fidelity : str
         ``low``: the relays of the high fidelity have no useful derivative.
-    record, seed, progress
+    record, seed, strict, progress
         As for `simulate`.
 
     Returns
@@ -89,6 +91,7 @@ def sensitivities(
     from elevon import _core
 
     prepared = prepare(Run(actuator, scenario, seed), fidelity, record)
+    report([prepared.doubts], strict=strict)
     names = [*parameters, *(f"fault_{index + 1}" for index in faults)]
     _check(actuator, scenario, parameters, faults, names)
     clocks = [clock.to_core() for clock in prepared.plan]

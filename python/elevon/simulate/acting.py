@@ -1,0 +1,153 @@
+"""What the caller has set where it cannot act: said, never ignored."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.actuator import Actuator
+from elevon.errors import ElevonWarning, FindingWarning, NotActingError, NotActingWarning
+from elevon.faults import find_record
+from elevon.parameters import records
+from elevon.parameters.records import positions
+from elevon.scenario import Scenario
+from elevon.scenario.compile import CompiledScenario, compile_scenario
+from elevon.units import format_quantity
+
+__all__ = ["Doubt", "check_values", "not_acting", "report", "together"]
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Something to say about a run that can be simulated as it stands.
+
+    Attributes
+    ----------
+    category : type
+        `NotActingWarning`, or `FindingWarning` for a doubt of the core about values together.
+    text : str
+        Names the path or the fault, its value and the reason.
+    """
+
+    category: type[ElevonWarning]
+    text: str
+
+
+def check_values(actuator: Actuator, fidelity: str) -> list[Doubt]:
+    """Return the core's doubts about the values together.
+
+    Raises
+    ------
+    InputError
+        The core refuses them.
+    """
+    from elevon.errors import InputError
+
+    findings = actuator.findings(fidelity)
+    wrong = [item for item in findings if item.get("severity", "error") == "error"]
+    if wrong:
+        raise InputError("\n".join(str(finding["message"]) for finding in wrong))
+    return [Doubt(FindingWarning, str(finding["message"])) for finding in findings]
+
+
+def not_acting(actuator: Actuator, compiled: CompiledScenario, fidelity: str) -> list[Doubt]:
+    """Return what the caller set away from neutral where it cannot act in this run."""
+    found = _asked(actuator, compiled, fidelity)
+    return [
+        Doubt(NotActingWarning, f"{name} does not act: {reason}")
+        for name, reason in found.items()
+        if reason
+    ]
+
+
+def _asked(actuator: Actuator, compiled: CompiledScenario, fidelity: str) -> dict[str, str]:
+    """Return what the caller set, each with the reason why it does not act; empty where it does.
+
+    Of the parameters those count that the caller changed, not what a set carries for another
+    drive; of the faults those of a severity other than zero.
+    """
+    from elevon import _core
+
+    known = records(actuator.wiring)
+    changed = {
+        path: item
+        for path, item in actuator.parameters.items()
+        if item.changed and item.value != known[path].default_value()
+    }
+    faults = [fault for fault in compiled.faults if fault["severity"] != 0.0]
+    if not changed and not faults:
+        return {}
+    vector = _with_mode(actuator, compiled.command_mode)
+    rows = _core.not_acting(actuator.wiring, fidelity, vector, compiled.faults)
+    idle = {item["path"]: item["reason"] for item in rows}
+    asked = {f"{path} = {item.text}": idle.get(path, "") for path, item in changed.items()}
+    for fault in faults:
+        asked.update(_of_fault(fault, actuator.wiring, idle))
+    return asked
+
+
+def _with_mode(actuator: Actuator, mode: str) -> npt.NDArray[np.float64]:
+    """Return the parameters as the run uses them: the command's mode is the scenario's."""
+    vector = actuator.parameters.vector()
+    record = records(actuator.wiring).get("control.mode")
+    if record is None or record.choices is None or mode not in record.choices:
+        return vector
+    vector = vector.copy()
+    vector[positions(actuator.wiring)["control.mode"]] = record.number(mode)
+    return vector
+
+
+def _of_fault(
+    fault: Mapping[str, Any], wiring: str, idle: Mapping[str, str]
+) -> Iterator[tuple[str, str]]:
+    """Yield a fault and the attributes given with it, each with why it does not act."""
+    record = find_record(fault["kind"], fault["place"], wiring)
+    name = f"fault {fault['kind']}@{fault['place']}"
+    targets = record.targets[fault["place"]]
+    resting = bool(targets) and all(path in idle for path in targets)
+    reason = f"{targets[0]}: {idle[targets[0]]}" if resting else ""
+    yield f"{name}={format_quantity(fault['severity'], record.unit or '1')}", reason
+    for item in record.attributes:
+        path, neutral = item.get("parameter", ""), item["default"] or 0.0
+        if not resting and fault["attributes"].get(item["name"], neutral) != neutral:
+            yield f"{name}: {item['name']}", f"{path}: {idle[path]}" if path in idle else ""
+
+
+@contextmanager
+def together(runs: Iterable[tuple[Actuator, Scenario, str]]) -> Iterator[None]:
+    """Doubt only what acts in none of several runs (actuator, scenario, fidelity) that set it.
+
+    Such runs are compared with each other: what one model alone carries is asked of that one.
+    """
+    reasons: dict[str, list[str]] = {}
+    for actuator, scenario, fidelity in runs:
+        whole = actuator.with_values(scenario.parameters, place="scenario parameters")
+        compiled = compile_scenario(scenario, actuator.wiring, fidelity)
+        for name, reason in _asked(whole, compiled, fidelity).items():
+            reasons.setdefault(name, []).append(reason)
+    resting = [f"{name} does not act: {why[0]}" for name, why in reasons.items() if all(why)]
+    report([[Doubt(NotActingWarning, text) for text in resting]], strict=False, stacklevel=4)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotActingWarning)
+        yield
+
+
+def report(found: Iterable[Sequence[Doubt]], *, strict: bool, stacklevel: int = 3) -> None:
+    """Warn of every doubt of a batch once, or refuse.
+
+    Raises
+    ------
+    NotActingError
+        `strict`, and there is a doubt; all of them are in the message.
+    """
+    doubts = dict.fromkeys(doubt for run in found for doubt in run)
+    if strict and doubts:
+        raise NotActingError("\n".join(doubt.text for doubt in doubts))
+    for doubt in doubts:
+        warnings.warn(doubt.text, doubt.category, stacklevel=stacklevel)

@@ -1,0 +1,112 @@
+"""What is set where it cannot act is said on stderr, or refused with --strict."""
+
+import json
+
+import pytest
+
+SIMULATE = ("simulate", "torino-rotary", "--duration", "0.01")
+IDLE = {
+    "the fidelity": (("--fidelity", "low", "--set", "solver.step=2e-6"), "solver.step = 2 us"),
+    "the drive": (("--set", "pwm.frequency=5 kHz"), "pwm.frequency = 5 kHz"),
+    "an attribute": (
+        ("--fault", "short@motor.phase_a=0.1,contact_resistance=1"),
+        "contact_resistance",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", IDLE)
+def test_it_is_named_on_stderr_and_stdout_stays_json(elevon_cli, case):
+    options, name = IDLE[case]
+    result = elevon_cli(*SIMULATE, *options, "--json")
+    assert result.code == 0
+    assert result.json["status"] == "ok"
+    assert f"elevon: warning: {name}" in result.err.replace("fault short@motor.phase_a: ", "")
+    assert "does not act: " in result.err
+
+
+@pytest.mark.parametrize("case", IDLE)
+def test_strict_refuses_it(elevon_cli, case):
+    options, name = IDLE[case]
+    result = elevon_cli(*SIMULATE, *options, "--strict")
+    assert result.code == 2
+    assert name in result.err
+    assert "warning" not in result.err
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--fidelity", "low"),  # the set carries a PWM drive and a solver step: nobody asked here
+        ("--set", "drive.kind=pwm", "--set", "pwm.frequency=5 kHz"),
+        ("--set", "drive.kind=hysteresis"),  # as it is
+        ("--fidelity", "low", "--fault", "open_phase@motor.phase_a=0"),
+    ],
+)
+def test_what_acts_or_is_neutral_says_nothing(elevon_cli, options):
+    result = elevon_cli(*SIMULATE, *options, "--strict", "--json")
+    assert result.code == 0
+    assert "warning" not in result.err
+
+
+def test_a_set_of_the_users_own_counts_where_it_differs_from_its_base(elevon_cli, tmp_path):
+    entry = (
+        "[solver.step]\nvalue = {}\nunit = 'us'\nsource = 'ASSUMED: a test'\n"
+        "confidence = 'assumed'\n"
+    )
+    for value, code in ((1, 0), (2, 2)):
+        path = tmp_path / f"own-{value}.toml"
+        head = f'name = "own-{value}"\nbase = "torino-rotary"\n'
+        path.write_text(head + entry.format(value))
+        options = ("--duration", "0.01", "--fidelity", "low", "--strict")
+        assert elevon_cli("simulate", path, *options).code == code
+
+
+def test_a_plan_refuses_it_unless_it_allows_it(elevon_cli, tmp_path):
+    text = (
+        'actuator = "torino-rotary"\nfidelity = "low"\nrecord = "motor_speed@400 Hz"\n'
+        '[scenario]\nduration = "0.02 s"\n'
+        '[[vary]]\nparameter = "solver.step"\nvalues = ["1 us", "2 us"]\n'
+    )
+    plan = tmp_path / "plan.toml"
+    plan.write_text(text)
+    refused = elevon_cli("batch", plan, "--out", "refused")
+    assert refused.code == 2
+    assert "run 1: solver.step = 2 us does not act" in refused.err
+    assert not (tmp_path / "refused").exists()
+    plan.write_text("allow_not_acting = true\n" + text)
+    allowed = elevon_cli("batch", plan, "--out", "allowed", "--json")
+    assert allowed.code == 0
+    assert json.loads(allowed.out)["runs"] == 2
+    assert allowed.err.count("elevon: warning: solver.step = 2 us does not act") == 1
+
+
+def test_lists_say_where_it_acts(elevon_cli):
+    rows = {
+        row["path"]: row
+        for row in elevon_cli("list", "parameters", "torino-rotary", "--json").json["parameters"]
+    }
+    assert rows["solver.step"]["fidelities"] == ["high"]
+    assert rows["solver.step"]["declined"]["low"] in elevon_cli("show", "torino-rotary").out
+    assert rows["pwm.frequency"]["when"] == ["drive.kind = pwm"]
+    faults = elevon_cli("list", "faults", "torino-rotary")
+    declined = [
+        row
+        for row in elevon_cli("list", "faults", "torino-rotary", "--json").json["faults"]
+        if row["declined"]
+    ]
+    assert declined
+    assert all(row["declined"]["low"] in faults.out for row in declined)
+
+
+def test_a_comparison_names_what_neither_model_carries(elevon_cli, tmp_path):
+    scenario = tmp_path / "short.toml"
+    scenario.write_text(
+        'duration = "1.2 s"\n[[command.terms]]\nkind = "sine"\namplitude = "7 deg"\n'
+        'frequency = "2 Hz"\n'
+    )
+    asked = ("compare", "torino-rotary", "--scenario", scenario, "--after", "0.5", "--strict")
+    assert elevon_cli(*asked, "--set", "solver.step=2e-6").code == 0
+    refused = elevon_cli(*asked, "--set", "pwm.frequency=5 kHz")
+    assert refused.code == 2
+    assert "pwm.frequency = 5 kHz does not act" in refused.err
