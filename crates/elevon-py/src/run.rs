@@ -84,6 +84,7 @@ fn status(d: &Bound<'_, PyDict>, output: &RunOutput) -> PyResult<()> {
             d.set_item("diverged_signal", *signal)?;
             ("diverged", format!("{signal} diverged at {time} s"))
         }
+        Status::Broken => ("diverged", "the core panicked in this run; this is a defect of elevon, please report it".to_string()),
         Status::Interrupted => ("interrupted", format!("interrupted at {} s", output.time)),
     };
     d.set_item("status", name)?;

@@ -2,7 +2,7 @@
 //! core never sees a name or a length it does not expect.
 
 use elevon_core::command::{catalogue, SourcePlan, Term, Wave};
-use elevon_core::fault::{whole, FaultKind, FaultSpec, Profile, Write};
+use elevon_core::fault::{whole, FaultKind, FaultSpec, Op, Profile, Write};
 use elevon_core::registry::Model;
 use elevon_core::solver::{Clock, RunSpec};
 use numpy::PyReadonlyArray1;
@@ -29,19 +29,29 @@ pub fn paths(model: Model) -> HashMap<String, usize> {
 
 pub fn vector(model: Model, given: &PyReadonlyArray1<'_, f64>) -> PyResult<Vec<f64>> {
     let raw = given.as_slice()?.to_vec();
-    let variables: Vec<_> =
-        model.groups().iter().flat_map(|g| (0..g.variables.len()).map(move |i| (g.path(i), g.variables[i].range))).collect();
-    if raw.len() != variables.len() {
-        return Err(bad(format!("{} parameters given, {} expected", raw.len(), variables.len())));
+    let expected: usize = model.groups().iter().map(|g| g.variables.len()).sum();
+    if raw.len() != expected {
+        return Err(bad(format!("{} parameters given, {expected} expected", raw.len())));
     }
-    for (&x, (path, range)) in raw.iter().zip(&variables) {
-        if !range.contains(x) {
-            let (low, high, _) = range.bounds();
-            return Err(bad(format!("{path}: {x} is outside {low} to {high}")));
-        }
-    }
+    in_range(model, &raw, "")?;
     Ok(raw)
 }
+
+/// The first parameter outside its range, as an error.
+fn in_range(model: Model, raw: &[f64], start: &str) -> PyResult<()> {
+    let all = model.groups().iter().flat_map(|g| (0..g.variables.len()).map(move |i| (g, i)));
+    for (&x, (group, i)) in raw.iter().zip(all) {
+        let range = group.variables[i].range;
+        if !range.contains(x) {
+            let (low, high, _) = range.bounds();
+            return Err(bad(format!("{start}{}: {x} is outside {low} to {high}", group.path(i))));
+        }
+    }
+    Ok(())
+}
+
+/// Steps are counted in whole numbers that a double holds exactly.
+const MOST_STEPS: f64 = 9.0e15;
 
 /// A required entry of a dictionary.
 fn need<'py>(d: &Bound<'py, PyDict>, key: &str) -> PyResult<Bound<'py, PyAny>> {
@@ -66,6 +76,13 @@ fn term(d: &Bound<'_, PyDict>) -> PyResult<Term> {
     let rising = times.windows(2).all(|w| w[0] < w[1]);
     if record.wave == Wave::Table && (times.is_empty() || times.len() != values.len() || !rising) {
         return Err(bad("table: times and values must be of one length and times rising"));
+    }
+    // Instants may lie at infinity, nothing else may.
+    if let Some((p, x)) = record.parameters.iter().zip(&parameters).find(|(p, x)| x.is_nan() || (x.is_infinite() && p.unit != "s")) {
+        return Err(bad(format!("{kind}: {} = {x} is not a number", p.name)));
+    }
+    if let Some(x) = times.iter().chain(values.iter()).find(|x| !x.is_finite()) {
+        return Err(bad(format!("{kind}: {x} among its points is not a number")));
     }
     Ok(Term { wave: record.wave, enabled: need(d, "enabled")?.extract()?, parameters, times, values })
 }
@@ -103,6 +120,9 @@ fn fault(model: &[FaultKind], places: &HashMap<String, usize>, d: &Bound<'_, PyD
     let numbers: Vec<f64> = need(&profile, "parameters")?.extract()?;
     let profile = Profile::new(&shape, &numbers, points(&profile, "times")?, points(&profile, "values")?)
         .ok_or_else(|| bad(format!("profile {shape:?} with {} parameters", numbers.len())))?;
+    if writes.iter().any(|w| w.op == Op::Pulse) && !(period > 0.0 && period.is_finite()) {
+        return Err(bad(format!("{kind}@{name}: period = {period} s must be positive")));
+    }
     Ok(FaultSpec { severity, profile, writes, settings, period })
 }
 
@@ -146,12 +166,15 @@ impl Resolver {
         }
         let faults = need(d, "faults")?.cast_into::<PyList>()?;
         let faults = self.faults(&faults)?;
-        if let Some(finding) = self.model.check_faulted(&whole(&parameters, &faults)).into_iter().next() {
+        let broken = whole(&parameters, &faults);
+        in_range(self.model, &broken, "the faults at their whole severity: ")?;
+        if let Some(finding) = self.model.check_faulted(&broken).into_iter().next() {
             return Err(bad(format!("the faults at their whole severity: {}", finding.message)));
         }
         let duration: f64 = need(d, "duration")?.extract()?;
-        if !(duration > 0.0 && duration.is_finite()) {
-            return Err(bad(format!("duration: {duration} s")));
+        let steps = duration / self.model.step(&parameters);
+        if !(duration > 0.0 && steps < MOST_STEPS) {
+            return Err(bad(format!("duration: {duration} s is {steps:e} solver steps; above 0 and below {MOST_STEPS:e} of them")));
         }
         Ok(RunSpec {
             parameters,

@@ -175,7 +175,7 @@ impl Term {
     fn triangle(&self, t: f64) -> Line {
         let p = &self.parameters;
         let (amplitude, frequency, bias, start, end) = (p[0], p[1], p[3], p[4], p[5]);
-        let time = t.clamp(start, end);
+        let time = t.max(start).min(end);
         // Quarter periods since the rising crossing of the bias.
         let quarters = 4.0 * (p[2] / TAU + frequency * (time - start));
         let half = ((quarters + 1.0) / 2.0).floor();

@@ -1,5 +1,6 @@
 //! PI speed control behind a rate limiter, gains by direction (P 2.3 and Table 2.1). It runs at control ticks.
 
+use crate::scalar::Scalar;
 use crate::variables;
 
 variables! {
@@ -29,13 +30,13 @@ impl PiRate {
         let (gain, zero) = (raw[P::GainExtension as usize + side], raw[P::ZeroExtension as usize + side]);
         let period = raw[P::Period as usize];
         let change = raw[P::AccelerationLimit as usize] * period;
-        self.reference += (target - self.reference).clamp(-change, change);
+        self.reference += (target - self.reference).clamp_abs(change);
         let error = self.reference - measured;
         let step = gain * zero * error * period;
         let wanted = gain * error + self.integral + step;
         if wanted.abs() <= supply || wanted * error < 0.0 {
             self.integral += step;
         }
-        (gain * error + self.integral).clamp(-supply, supply)
+        (gain * error + self.integral).clamp_abs(supply)
     }
 }

@@ -12,10 +12,23 @@ pub enum Op {
     Grow,
     /// x + s.
     Add,
-    /// s, where it is not zero.
+    /// x + the whole part of s: things that are counted.
+    AddWhole,
+    /// A switch: 1 from s = 1/2 on, else x.
     Set,
-    /// 1 during the fraction s of each period (attribute `period`), else x.
+    /// 1 during the fraction s of each period (attribute `period`), cut to whole steps, else x.
     Pulse,
+}
+
+impl Op {
+    /// What acts of a severity: labels say this.
+    pub fn acting(self, severity: f64) -> f64 {
+        match self {
+            Self::AddWhole => severity.floor(),
+            Self::Set => f64::from(u8::from(severity >= 0.5)),
+            Self::Lose | Self::Grow | Self::Add | Self::Pulse => severity,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug)]

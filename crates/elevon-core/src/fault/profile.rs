@@ -102,9 +102,7 @@ impl Profile {
             &Self::Ramp { start, .. } | &Self::Exponential { start, .. } if t < start => (0.0, start),
             &Self::Ramp { end, .. } | &Self::Exponential { end, .. } if t >= end => (1.0, never),
             &Self::Ramp { start, end } => ((t - start) / (end - start), t),
-            &Self::Exponential { start, end, time_constant } => {
-                (libm::expm1((t - start) / time_constant) / libm::expm1((end - start) / time_constant), t)
-            }
+            &Self::Exponential { start, end, time_constant } => (grown(t - start, end - start, time_constant), t),
             &Self::Intermittent { start, .. } if t < start => (0.0, start),
             &Self::Intermittent { start, period, duty } => {
                 let origin = start + ((t - start) / period).floor() * period;
@@ -127,5 +125,43 @@ impl Profile {
                 (line.value + line.slope * (t - line.at), if line.slope == 0.0 { line.until } else { t })
             }
         }
+    }
+}
+
+/// (exp(t/tau) - 1) / (exp(length/tau) - 1), written with falling exponentials: finite whatever the time constant.
+fn grown(t: f64, length: f64, time_constant: f64) -> f64 {
+    let whole = -libm::expm1(-length / time_constant);
+    if whole < f64::MIN_POSITIVE {
+        return t / length;
+    }
+    libm::exp((t - length) / time_constant) * (-libm::expm1(-t / time_constant) / whole)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn exponential(time_constant: f64, t: f64) -> f64 {
+        Profile::Exponential { start: 1.0, end: 3.0, time_constant }.factor(t).0
+    }
+
+    #[test]
+    fn exponential_growth_is_the_printed_one() {
+        for t in [1.0, 1.2, 2.0, 2.999] {
+            let printed = libm::expm1((t - 1.0) / 0.4) / libm::expm1(2.0 / 0.4);
+            assert!((exponential(0.4, t) - printed).abs() <= 4.0 * f64::EPSILON * printed.abs());
+        }
+    }
+
+    #[test]
+    fn exponential_growth_stays_a_fraction_at_any_time_constant() {
+        for time_constant in [f64::MIN_POSITIVE, 1e-300, 2.0 / 709.9, 1.0, 1e17, 1e300, f64::MAX] {
+            for t in [1.0, 1.0 + 1e-9, 2.0, 3.0 - 1e-9] {
+                let factor = exponential(time_constant, t);
+                assert!((0.0..=1.0).contains(&factor), "{time_constant} at {t}: {factor}");
+            }
+        }
+        assert_eq!(exponential(1e300, 2.0), 0.5);
+        assert_eq!(exponential(1e-300, 2.0), 0.0);
     }
 }

@@ -1,5 +1,5 @@
 //! Faults compiled to parameter writes: edges exact to a step, smooth profiles held on a grid. The label of a
-//! sample is the severity held then.
+//! sample is what acts then, in the unit of the catalogue: whole numbers of what is counted, 0 or 1 of a switch.
 
 use super::{Op, Profile};
 use crate::scalar::Scalar;
@@ -43,9 +43,12 @@ impl FaultSpec {
         let (factor, until) = self.profile.factor(t);
         let smooth = until <= t;
         let mut next = if smooth { (k / grid + 1) * grid } else { step_at(until, dt).max(k + 1) };
-        let label = factor * self.severity;
+        let given = factor * self.severity;
+        let mut label = self.writes.first().map_or(given, |w| w.op.acting(given));
         let mut pulse = false;
-        if self.writes.iter().any(|w| w.op == Op::Pulse) && label > 0.0 {
+        if self.writes.iter().any(|w| w.op == Op::Pulse) && label * self.period < 0.5 * dt {
+            label = 0.0;
+        } else if self.writes.iter().any(|w| w.op == Op::Pulse) {
             let origin = (t / self.period).floor() * self.period;
             let off = origin + label * self.period;
             pulse = t < off;
@@ -140,7 +143,8 @@ pub fn whole(raw: &[f64], faults: &[FaultSpec]) -> Vec<f64> {
         for &(index, value) in &fault.settings {
             all[index] = value;
         }
-        let held = Held { label: fault.severity, factor: 1.0, pulse: fault.severity > 0.0 };
+        let label = fault.writes.first().map_or(fault.severity, |w| w.op.acting(fault.severity));
+        let held = Held { label, factor: 1.0, pulse: fault.severity > 0.0 };
         for write in &fault.writes {
             all[write.index] = changed(all[write.index], fault.severity, write.op, held);
         }
@@ -153,9 +157,49 @@ fn changed<S: Scalar>(x: S, s: S, op: Op, held: Held) -> S {
         Op::Lose => x * (S::one() - s),
         Op::Grow => x * (S::one() + s),
         Op::Add => x + s,
+        Op::AddWhole => x + S::splat(held.label),
         Op::Set if held.label == 0.0 => x,
-        Op::Set => s,
+        Op::Set => S::one(),
         Op::Pulse if held.pulse => S::one(),
         Op::Pulse => x,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fault(op: Op, severity: f64, profile: Profile, period: f64) -> FaultSpec {
+        FaultSpec { severity, profile, writes: vec![Write { index: 0, op }], settings: Vec::new(), period }
+    }
+
+    /// Parameter and label at a time.
+    fn acting(fault: FaultSpec, healthy: f64, t: f64) -> (f64, f64) {
+        let dt = 1e-3;
+        let mut lanes = FaultLanes::new(vec![vec![fault.clone()]], 1);
+        lanes.renew((t / dt) as Steps, dt);
+        let mut raw = [healthy];
+        lanes.apply::<f64>(0, &mut raw, &|_, _| fault.severity);
+        (raw[0], lanes.label(0, 0))
+    }
+
+    #[test]
+    fn labels_are_what_acts() {
+        let ramp = Profile::Ramp { start: 0.0, end: 1.0 };
+        for (t, circuits) in [(0.1, 0.0), (0.4, 1.0), (0.7, 2.0), (1.5, 3.0)] {
+            assert_eq!(acting(fault(Op::AddWhole, 3.0, ramp.clone(), 0.0), 0.0, t), (circuits, circuits));
+        }
+        for (t, closed) in [(0.0, 0.0), (0.49, 0.0), (0.501, 1.0), (2.0, 1.0)] {
+            assert_eq!(acting(fault(Op::Set, 1.0, ramp.clone(), 0.0), 0.0, t), (closed, closed));
+        }
+        assert_eq!(acting(fault(Op::Set, 0.3, Profile::Constant, 0.0), 0.0, 1.0), (0.0, 0.0));
+        assert_eq!(acting(fault(Op::Lose, 0.5, ramp, 0.0), 1.0, 2.0), (0.5, 0.5));
+    }
+
+    #[test]
+    fn a_pulse_shorter_than_half_a_step_is_none() {
+        assert_eq!(acting(fault(Op::Pulse, 4e-3, Profile::Constant, 0.1), 0.0, 0.0), (0.0, 0.0));
+        assert_eq!(acting(fault(Op::Pulse, 2e-2, Profile::Constant, 0.1), 0.0, 0.0), (1.0, 2e-2));
+        assert_eq!(acting(fault(Op::Pulse, 2e-2, Profile::Constant, 0.1), 0.0, 0.05), (0.0, 2e-2));
     }
 }

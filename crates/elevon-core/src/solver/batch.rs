@@ -1,7 +1,8 @@
 //! Many runs: sorted into lane blocks of one structure, blocks shared between threads.
 
-use super::block::{structure, Block, Lift, Plain};
-use super::spec::{Clock, RunOutput, RunSpec};
+use super::block::{structure, Block};
+use super::kernels::{Lift, Plain};
+use super::spec::{Clock, RunOutput, RunSpec, Status};
 use super::width::Width;
 use crate::actuator::{Tick, Wiring, MAX_CHUNKS};
 #[cfg(not(feature = "physics"))]
@@ -10,6 +11,7 @@ use crate::scalar::{Dual, Scalar};
 use crate::time::Steps;
 use rayon::prelude::*;
 use std::collections::HashMap;
+use std::panic::{catch_unwind, AssertUnwindSafe};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
 #[cfg(all(target_arch = "x86_64", not(feature = "physics")))]
@@ -93,6 +95,29 @@ fn run_width<W: Wiring>(width: Width, runs: &[&RunSpec], clocks: &[Clock], recor
     }
 }
 
+/// The runs of one block. What panics in company is run alone: a defect may cost the runs that show it, no others.
+fn run_caught<W: Wiring>(width: Width, runs: &[&RunSpec], clocks: &[Clock], recorded: &[usize], monitor: &Monitor) -> Vec<RunOutput> {
+    let work = || run_width::<W>(width, runs, clocks, recorded, monitor);
+    match (catch_unwind(AssertUnwindSafe(work)), runs) {
+        (Ok(outputs), _) => outputs,
+        (Err(_), [run]) => vec![broken::<W>(run, clocks)],
+        (Err(_), _) => runs.iter().flat_map(|run| run_caught::<W>(Width::Single, &[run], clocks, recorded, monitor)).collect(),
+    }
+}
+
+/// What is left of a run in which the core panicked.
+fn broken<W: Wiring>(run: &RunSpec, clocks: &[Clock]) -> RunOutput {
+    RunOutput {
+        status: Status::Broken,
+        steps: 0,
+        time: 0.0,
+        wall: 0.0,
+        clocks: vec![Vec::new(); clocks.len()],
+        columns: clocks.iter().map(|c| c.signals.len() + run.faults.len()).collect(),
+        last: vec![f64::NAN; W::signals().len()],
+    }
+}
+
 /// The signals any clock keeps.
 fn recorded(clocks: &[Clock]) -> Vec<usize> {
     let mut all: Vec<usize> = clocks.iter().flat_map(|c| c.signals.iter().copied()).collect();
@@ -105,7 +130,7 @@ fn recorded(clocks: &[Clock]) -> Vec<usize> {
 pub fn run_all<W: Wiring>(runs: &[RunSpec], clocks: &[Clock], threads: usize, width: Width, monitor: &Monitor) -> Vec<RunOutput> {
     let recorded = recorded(clocks);
     if let [run] = runs {
-        return run_width::<W>(Width::Single, &[run], clocks, &recorded, monitor);
+        return run_caught::<W>(Width::Single, &[run], clocks, &recorded, monitor);
     }
     let blocks = blocks::<W>(runs, &recorded, width, threads);
     let work = || -> Vec<(Vec<usize>, Vec<RunOutput>)> {
@@ -115,7 +140,7 @@ pub fn run_all<W: Wiring>(runs: &[RunSpec], clocks: &[Clock], threads: usize, wi
                 let members: Vec<&RunSpec> = indices.iter().map(|&i| &runs[i]).collect();
                 // A lone run gains nothing from lanes.
                 let width = if members.len() == 1 { Width::Single } else { width };
-                let outputs = run_width::<W>(width, &members, clocks, &recorded, monitor);
+                let outputs = run_caught::<W>(width, &members, clocks, &recorded, monitor);
                 (indices, outputs)
             })
             .collect()

@@ -2,6 +2,8 @@
 
 mod batch;
 mod block;
+mod ending;
+mod kernels;
 mod rows;
 mod spec;
 mod width;

@@ -1,7 +1,7 @@
 //! What the clocks of one chunk of lanes recorded. Rows gather as whole vectors while the run goes on and are sorted into
 //! one table a lane some hundred rows at a time: a store a signal instead of one a signal and lane.
 
-use super::block::Lift;
+use super::kernels::Lift;
 use super::spec::Clock;
 use crate::fault::FaultLanes;
 use crate::scalar::Scalar;
@@ -78,6 +78,18 @@ impl<S: Scalar> Rows<S> {
             }
         }
         gathered.clear();
+    }
+
+    /// Ends the lanes whose row of `clock` is not all numbers, and says in which signal each of them is not.
+    #[inline(never)]
+    pub fn lose<L: Lift<S>>(&mut self, clock: &Clock, observed: &[S], lift: &L, lost: &mut Vec<(usize, usize)>) {
+        for lane in 0..S::LANES {
+            let wrong = clock.signals.iter().find(|&&signal| !observed[signal].lane(lane).is_finite());
+            if let Some(&signal) = wrong.filter(|_| !self.ended[lane]) {
+                self.end(lane, lift);
+                lost.push((lane, signal));
+            }
+        }
     }
 
     /// The lane records nothing from now on.

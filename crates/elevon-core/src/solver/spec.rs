@@ -42,12 +42,14 @@ pub enum Status {
         time: f64,
         temperature: f64,
     },
-    /// A signal left all bounds at this time.
+    /// A signal left all bounds, or the numbers, at this time.
     Diverged {
         time: f64,
         signal: &'static str,
     },
     Interrupted,
+    /// The core panicked: a defect, and nothing is left of the run.
+    Broken,
 }
 
 /// What is left of a run.

@@ -86,6 +86,18 @@ impl<S: Scalar> Friction<S> {
         S::select(rest, from_rest, torque - resist)
     }
 
+    /// Seizes where the user first reaches the jam's position while the jam is there; one that is gone holds nothing.
+    /// `side` is where the user stood when the jam came.
+    #[inline(always)]
+    pub fn seize(&self, user: S, side: &mut S, jammed: &mut S) {
+        let present = S::zero().lt(self.jam_torque);
+        let from = user - self.jam_position;
+        let reached = (from * *side).le(S::zero()) | S::splat(0.5).lt(self.jam_anywhere);
+        let seized = S::select(reached, S::one(), *jammed);
+        *jammed = S::select(present, seized, S::zero());
+        *side = S::select(present, *side, from.sign());
+    }
+
     /// The new speed, stopped for one step where it would change sign.
     #[inline(always)]
     pub fn stop_at_reversal(old: S, new: S) -> S {
@@ -95,5 +107,42 @@ impl<S: Scalar> Friction<S> {
         } else {
             new
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn jam(torque: f64, anywhere: f64) -> Friction<f64> {
+        let mut raw = [0.0; FRICTION.len()];
+        raw[FrictionParameter::JamTorque as usize] = torque;
+        raw[FrictionParameter::JamPosition as usize] = 1.0;
+        raw[FrictionParameter::JamAnywhere as usize] = anywhere;
+        Friction::derive(&raw)
+    }
+
+    /// Seized or not after each (torque, user position).
+    fn history(anywhere: f64, steps: &[(f64, f64)]) -> Vec<f64> {
+        let (mut side, mut jammed) = (-1.0, 0.0);
+        let mut seen = Vec::new();
+        for &(torque, user) in steps {
+            jam(torque, anywhere).seize(user, &mut side, &mut jammed);
+            seen.push(jammed);
+        }
+        seen
+    }
+
+    #[test]
+    fn a_passage_before_the_jam_does_not_seize() {
+        let there_and_back = [(0.0, 0.5), (0.0, 1.5), (2.0, 1.5), (2.0, 1.2), (2.0, 0.9), (2.0, 0.2)];
+        assert_eq!(history(0.0, &there_and_back), [0.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn a_jam_that_is_gone_must_be_reached_again() {
+        let gone = [(2.0, 1.5), (0.0, 1.5), (2.0, 1.4), (2.0, 0.9)];
+        assert_eq!(history(0.0, &gone), [1.0, 0.0, 0.0, 1.0]);
+        assert_eq!(history(1.0, &[(0.0, 0.2), (2.0, 0.2), (0.0, 0.2)]), [0.0, 1.0, 0.0]);
     }
 }

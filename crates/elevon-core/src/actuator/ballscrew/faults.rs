@@ -26,7 +26,7 @@ pub fn catalogue() -> Vec<FaultKind> {
     all.extend([
         FaultKind {
             kind: "return_jam", unit: "1", range: Range::Between(0.0, 64.0), attributes: &[],
-            places: places!("screw.return_channel": "screw.blocked_circuits" Add),
+            places: places!("screw.return_channel": "screw.blocked_circuits" AddWhole),
             effect: "whole number of circuits whose balls slide instead of rolling: efficiency falls, preload friction grows; the position follows, the current rises",
             source: "N 5.3",
         },

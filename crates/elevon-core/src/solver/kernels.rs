@@ -1,0 +1,139 @@
+//! What the solver does to one chunk of lanes with their instruction set enabled, and how numbers become scalars.
+
+use super::rows::Rows;
+use super::spec::{Clock, RunSpec};
+use crate::actuator::{Inputs, Wiring};
+use crate::fault::FaultLanes;
+use crate::scalar::{Kernel, Scalar};
+use crate::time::Steps;
+
+/// Turns the plain numbers of a run into scalars: lanes by default, dual numbers with their seeds otherwise.
+pub trait Lift<S> {
+    fn parameter(&self, first: usize, index: usize) -> S;
+    fn severity(&self, lane: usize, fault: usize) -> S;
+    /// Numbers written per value and lane.
+    fn emit(&self, x: S, lane: usize, out: &mut Vec<f64>);
+    fn width(&self) -> usize;
+}
+
+/// Lanes of plain runs.
+pub struct Plain<'a>(pub &'a [&'a RunSpec]);
+
+impl<S: Scalar> Lift<S> for Plain<'_> {
+    fn parameter(&self, first: usize, index: usize) -> S {
+        S::from_fn(|i| self.0[first + i].parameters[index])
+    }
+    fn severity(&self, lane: usize, fault: usize) -> S {
+        S::splat(self.0[lane].faults[fault].severity)
+    }
+    #[inline(always)]
+    fn emit(&self, x: S, lane: usize, out: &mut Vec<f64>) {
+        out.push(x.lane(lane));
+    }
+    fn width(&self) -> usize {
+        1
+    }
+}
+
+pub(super) struct Advance<'a, W: Wiring, S: Scalar> {
+    pub structure: &'a W::Structure,
+    pub models: &'a [W::Model<S>],
+    pub inputs: &'a [Inputs<S>],
+    pub states: &'a mut [W::State<S>],
+    pub from: Steps,
+    pub count: Steps,
+}
+
+impl<W: Wiring, S: Scalar> Kernel for Advance<'_, W, S> {
+    /// Some lane has left its limits or tripped.
+    type Output = bool;
+    #[inline(always)]
+    fn run(self) -> bool {
+        W::advance(self.structure, self.models, self.inputs, self.states, self.from, self.count);
+        let mut trouble = S::mask(false);
+        for state in self.states.iter() {
+            trouble = trouble | S::zero().lt(W::tripped(state));
+            for watch in W::watch(state) {
+                trouble = trouble | !watch.value.abs().le(S::splat(watch.limit));
+            }
+        }
+        S::any(trouble)
+    }
+}
+
+pub(super) struct Observe<'a, W: Wiring, S: Scalar> {
+    pub structure: &'a W::Structure,
+    pub model: &'a W::Model<S>,
+    pub inputs: &'a Inputs<S>,
+    pub state: &'a W::State<S>,
+    pub t: f64,
+    pub out: &'a mut [S],
+}
+
+impl<W: Wiring, S: Scalar> Kernel for Observe<'_, W, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        W::observe(self.structure, self.model, self.inputs, self.state, S::splat(self.t), self.out);
+    }
+}
+
+/// Observes one chunk and appends a row to every clock that is due. A lane whose row is not all numbers ends before it.
+pub(super) struct Record<'a, W: Wiring, S: Scalar, L: Lift<S>> {
+    pub observe: Observe<'a, W, S>,
+    pub clocks: &'a [Clock],
+    pub due: &'a [Steps],
+    pub k: Steps,
+    pub faults: &'a FaultLanes,
+    pub lift: &'a L,
+    pub rows: &'a mut Rows<S>,
+}
+
+impl<W: Wiring, S: Scalar, L: Lift<S>> Kernel for Record<'_, W, S, L> {
+    /// The lanes that ended, each with the signal in which it left the numbers.
+    type Output = Vec<(usize, usize)>;
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let mut lost = Vec::new();
+        let Observe { structure, model, inputs, state, t, out } = self.observe;
+        W::observe(structure, model, inputs, state, S::splat(t), out);
+        for (i, (clock, &due)) in self.clocks.iter().zip(self.due).enumerate() {
+            if due <= self.k {
+                if !numbers(clock, out) {
+                    self.rows.lose(clock, out, self.lift, &mut lost);
+                }
+                self.rows.append(i, clock, out, self.faults, self.lift);
+            }
+        }
+        lost
+    }
+}
+
+pub(super) struct Ticking<'a, W: Wiring, S: Scalar> {
+    pub kind: u8,
+    pub structure: &'a W::Structure,
+    pub model: &'a W::Model<S>,
+    pub inputs: &'a Inputs<S>,
+    pub state: &'a mut W::State<S>,
+    pub t: f64,
+    pub noise: &'a mut dyn FnMut(u64) -> S,
+}
+
+impl<W: Wiring, S: Scalar> Kernel for Ticking<'_, W, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        W::tick(self.kind, self.structure, self.model, self.inputs, self.state, S::splat(self.t), self.noise);
+    }
+}
+
+/// Is all of a row numbers, in every lane?
+#[inline(always)]
+fn numbers<S: Scalar>(clock: &Clock, observed: &[S]) -> bool {
+    let largest = S::splat(f64::MAX);
+    let mut all = S::mask(true);
+    for &signal in &clock.signals {
+        all = all & observed[signal].abs().le(largest);
+    }
+    !S::any(!all)
+}
