@@ -121,10 +121,10 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         loop {
             // Looked for at instants that every run of this shape has, so that a run ends at the same one in any company.
             let look = trouble && self.shared(k);
+            self.renew(k);
             if look {
                 self.watch(k, &mut out, Self::mark_diverged);
             }
-            self.renew(k);
             self.tick(k);
             self.record(k, &mut out);
             if look {
