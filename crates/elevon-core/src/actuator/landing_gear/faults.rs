@@ -53,7 +53,7 @@ fn motor() -> Vec<FaultKind> {
             attributes: PHASE_DYNAMIC,
             places: places!("motor": "motor.eccentricity_dynamic" Add),
             effect: "fraction of the air gap; the modulation turns with the shaft (law ASSUMED: the paper names the fault only)",
-            source: "N 4.3",
+            source: "N 4.4 and 5.1",
         },
         FaultKind {
             kind: "demagnetisation",
@@ -204,7 +204,7 @@ fn mechanical() -> Vec<FaultKind> {
             attributes: &[],
             places: places!("screw": "friction.growth" Add),
             effect: "force added to the friction of the screw, in FF and FFM: more current, no free fall at the end",
-            source: "N 4.1 (wear of the screw)",
+            source: "N 6.1 (wear of the screw: insufficient lubrication, spalling)",
         },
         FaultKind {
             kind: "efficiency_loss",
@@ -213,7 +213,7 @@ fn mechanical() -> Vec<FaultKind> {
             attributes: &[],
             places: places!("screw": "screw.efficiency_scale" Lose, "gear_first": "gear.efficiency_first" Lose, "gear_second": "gear.efficiency_second" Lose),
             effect: "fraction of an efficiency lost; the load cannot drive back once the train's is below one half",
-            source: "N 4.1",
+            source: "N 5.3 (what a jam takes from the screw; of the gears ASSUMED alike)",
         },
         FaultKind {
             kind: "jam",
@@ -222,7 +222,7 @@ fn mechanical() -> Vec<FaultKind> {
             attributes: JAM,
             places: places!("screw": "screw.jam_force" Add),
             effect: "resistive force on the nut: the motor stalls, retries, the control unit faults",
-            source: "N 4.2",
+            source: "N 4.2 and 5.3 (jam; as a force on the nut ASSUMED)",
         },
         FaultKind {
             kind: "brake_dragging",

@@ -68,7 +68,7 @@ pub fn electrical() -> Vec<FaultKind> {
             kind: "short", unit: "1", range: Range::Between(0.0, 0.95), attributes: CONTACT,
             places: places!("motor.phase_a": "motor.turns_a" Lose, "motor.phase_b": "motor.turns_b" Lose, "motor.phase_c": "motor.turns_c" Lose),
             effect: "fraction of the turns of a phase shorted: R ~ N, L ~ N^2, k ~ N; ripple at twice the electrical frequency",
-            source: "T2 (fault coefficients N_j)",
+            source: "T2 (fault coefficients N_j), N 5.2",
         },
         FaultKind {
             kind: "eccentricity_static", unit: "1", range: Range::Between(0.0, 0.9), attributes: PHASE,
@@ -80,7 +80,7 @@ pub fn electrical() -> Vec<FaultKind> {
             kind: "eccentricity_dynamic", unit: "1", range: Range::Between(0.0, 0.9), attributes: PHASE_DYNAMIC,
             places: places!("motor": "motor.eccentricity_dynamic" Add),
             effect: "fraction of the air gap; the modulation turns with the shaft (law ASSUMED: the paper names the fault only)",
-            source: "N 4.3",
+            source: "N 4.4 and 5.1",
         },
         FaultKind {
             kind: "resistor_short", unit: "1", range: Range::Between(0.0, 0.5), attributes: REFERENCE,
@@ -237,7 +237,7 @@ pub fn mechanical(side: Side) -> Vec<FaultKind> {
             attributes: &[],
             places: places!("transmission": "friction.viscous_scale" Grow),
             effect: "fraction added to the viscous friction (negative: thinner lubricant)",
-            source: "N 4.1",
+            source: "N 6.1 (insufficient lubrication)",
         },
         FaultKind {
             kind: "play",
@@ -255,7 +255,7 @@ pub fn mechanical(side: Side) -> Vec<FaultKind> {
             attributes: side.jam,
             places: places!("transmission": "friction.jam_torque" Add),
             effect: "seizure torque on the fast shaft, resistive",
-            source: "N 4.2",
+            source: "N 4.2 and 5.3 (jam; as a torque on the fast shaft ASSUMED)",
         },
     ]
 }
