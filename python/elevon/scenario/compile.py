@@ -165,7 +165,10 @@ def _sequence(steps: Sequence[Action], wiring: str) -> dict[str, Any]:
         if time == 0.0:
             times, values = [], []
         times.append(time)
-        values.append(float(actions.index(step.action)))
+        number = float(actions.index(step.action))
+        # The same action again would not show in a held value: it stands one round of actions higher.
+        repeats = index > 0 and steps[index - 1].action == step.action
+        values.append(number + len(actions) if repeats and values[-1] == number else number)
     record = wave_records()[TABLE]
     given = {**{p.name: p.default or 0.0 for p in record.parameters}, "hold": 1.0}
     return {

@@ -1,15 +1,23 @@
-//! Six-step commutation with both conducting legs chopped together (P 2.1.2): a leg is HIGH or LOW while the demand is
-//! at or above a saw-tooth carrier, else ZERO, both switches off.
+//! Six-step commutation (P 2.1.2): a conducting leg is HIGH or LOW/PWM while the demand is at or above a saw-tooth carrier.
+//! Above it the LOW leg is ZERO, both switches off, and the HIGH one stays at the upper rail (low-side chopping) or is
+//! ZERO as well. For the software brake all legs are LOW.
 
 use crate::scalar::Scalar;
 use crate::three;
-use crate::variables;
+use crate::{choices, variables};
+
+choices! {
+    /// Which of the two conducting legs the carrier switches.
+    Chopping { LowSide "low_side", Both "both" }
+}
 
 variables! {
     /// Modulator and protection of the bridge.
     SixStepParameter, SIX_STEP {
         SwitchingPeriod => "switching_period", "T_PWM", "s", Positive, Controller, None, "period of the carrier";
         CurrentCutoff => "current_cutoff", "I_cut", "A", Positive, Controller, None, "phase current above which the legs stay at ZERO until the next carrier period";
+        Chopping => "chopping", "-", "1", Choice(Chopping::NAMES), Controller, Some(0.0), "legs that the carrier switches: the LOW one alone (P 2.1.2: +V_s, OPEN, or PWM between ground and OPEN), or both together";
+        TerminalsShorted => "terminals_shorted", "-", "1", Unit, Plant, Some(0.0), "1: the motor's terminals are shorted to the lower rail";
     }
 }
 
@@ -61,8 +69,11 @@ impl<S: Scalar> SixStep<S> {
     }
 }
 
-/// Leg states for a sign of the demand.
+/// Legs while the carrier is above the demand, from those below it.
 #[inline(always)]
-pub fn gates<S: Scalar>(demand: [S; 3], sign: S) -> [S; 3] {
-    three!(|j| demand[j] * sign)
+pub fn chopped<S: Scalar>(chopping: Chopping, legs: [S; 3]) -> [S; 3] {
+    match chopping {
+        Chopping::LowSide => three!(|j| legs[j].maximum(S::zero())),
+        Chopping::Both => [S::zero(); 3],
+    }
 }

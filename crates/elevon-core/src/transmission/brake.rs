@@ -16,6 +16,7 @@ variables! {
         EngageDelay => "engage_delay", "-", "s", NonNegative, Plant, None, "from power off to set";
         Drag => "drag", "-", "N m", NonNegative, Plant, Some(0.0), "torque left when released; healthy 0";
         Powered => "powered", "-", "1", Choice(Powered::NAMES), Plant, Some(0.0), "always: the bench holds the brake open whatever the drive does (modified free-fall test)";
+        Stuck => "stuck", "-", "1", Unit, Plant, Some(0.0), "1: the brake stays set under power";
     }
 }
 
@@ -23,17 +24,28 @@ variables! {
 pub struct Brake<S> {
     torque: S,
     drag: S,
+    works: S,
 }
 
 impl<S: Scalar> Brake<S> {
     pub fn derive(raw: &[S]) -> Self {
-        Self { torque: raw[BrakeParameter::Torque as usize], drag: raw[BrakeParameter::Drag as usize] }
+        Self {
+            torque: raw[BrakeParameter::Torque as usize],
+            drag: raw[BrakeParameter::Drag as usize],
+            works: S::indicator(raw[BrakeParameter::Stuck as usize].lt(S::splat(0.5))),
+        }
+    }
+
+    /// 1 while the brake is open.
+    #[inline(always)]
+    pub fn open(&self, free: S) -> S {
+        free * self.works
     }
 
     /// Resistive torque; `free` is 1 while the coil holds the spring back. Dragging never exceeds the spring.
     #[inline(always)]
     pub fn torque(&self, free: S) -> S {
-        S::select(S::splat(0.5).lt(free), self.drag.minimum(self.torque), self.torque)
+        S::select(S::splat(0.5).lt(self.open(free)), self.drag.minimum(self.torque), self.torque)
     }
 }
 

@@ -12,6 +12,7 @@ variables! {
         ReleaseTravel => "release_travel", "s_off", "m", Positive, Plant, None, "travel on the way back at which they let go";
         SpringForce => "spring_force", "F_0", "N", NonNegative, Plant, None, "sleeve spring at the end of the stroke, pushing the nut on";
         SpringRate => "spring_rate", "k", "N/m", NonNegative, Plant, None, "loss of spring force over the travel";
+        SpringScale => "spring_scale", "-", "1", Unit, Plant, Some(1.0), "healthy 1; less: the sleeve spring is weak";
         Stiffness => "stiffness", "k_lock", "N/m", Positive, Plant, None, "ram against the locked segments";
         Strength => "strength", "-", "N", Positive, Plant, None, "load that breaks the segments: the run ends";
         Overtravel => "overtravel", "-", "m", NonNegative, Plant, Some(1e-3), "travel left behind s_max before the nut meets its stop";
@@ -42,8 +43,8 @@ impl<S: Scalar> Lock<S> {
         Self {
             engage: g(P::EngageTravel),
             release: g(P::ReleaseTravel),
-            force: g(P::SpringForce),
-            rate: g(P::SpringRate),
+            force: g(P::SpringForce) * g(P::SpringScale),
+            rate: g(P::SpringRate) * g(P::SpringScale),
             per_stiffness: S::one() / g(P::Stiffness),
             per_strength: S::one() / g(P::Strength),
             end: S::select(blocked, g(P::BlockTravel), g(P::Travel) + g(P::Overtravel)),

@@ -6,8 +6,9 @@ use super::signals::{Quantity as Q, ENERGIES};
 use super::unit::{Shown, Unit};
 use crate::actuator::{Inputs, Setup};
 use crate::control::pi_rate::PiRateParameter;
+use crate::control::sequence::COMMANDS;
 use crate::inverter::bridge::{BridgeStructure, InverterParameter as Inverter};
-use crate::inverter::six_step::SixStep;
+use crate::inverter::six_step::{Chopping, SixStep, SixStepParameter};
 use crate::inverter::supply::{Link, Supply};
 use crate::motor::star::{EmfShape, MotorParameter, MotorStructure, Star};
 use crate::scalar::{three_phase, Scalar};
@@ -15,12 +16,17 @@ use crate::sensor::hall::{Hall, HallState};
 use crate::sensor::proximity::ProximityParameter;
 use crate::three;
 use crate::transmission::lock::LockParameter;
+use crate::transmission::planetary::ReleaseParameter;
 
 /// Everything that decides which code runs; equal over a lane block.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Structure {
     pub motor: MotorStructure,
     pub bridge: BridgeStructure,
+    /// What the legs do while the carrier is above the demand.
+    pub chopping: Chopping,
+    /// The motor's terminals are shorted at some time.
+    pub shorted: bool,
     /// The friction rig moves the ram.
     pub rig: bool,
     pub accounts: bool,
@@ -37,6 +43,8 @@ impl Structure {
                 dynamic_eccentricity: departs(MotorParameter::EccentricityDynamic),
             },
             bridge: bridge(setup),
+            chopping: Chopping::read(setup.raw[SixStepParameter::Chopping.at()]),
+            shorted: setup.departs(SixStepParameter::TerminalsShorted.at(), 0.0),
             rig: setup.driven[RIG],
             accounts: setup.recorded.iter().any(|s| ENERGIES.contains(s)),
         }
@@ -45,7 +53,8 @@ impl Structure {
 
 fn bridge(setup: &Setup) -> BridgeStructure {
     let departs = |i: usize| setup.departs(i, 0.0);
-    let switch_faults = (Inverter::OpenAHigh.at()..=Inverter::ShortedCLow.at()).any(departs);
+    let switch_faults =
+        (Inverter::OpenAHigh.at()..=Inverter::ShortedCLow.at()).any(departs) || departs(SixStepParameter::TerminalsShorted.at());
     BridgeStructure {
         switch_faults,
         open_phases: (MotorParameter::OpenA.at()..=MotorParameter::OpenC.at()).any(departs),
@@ -69,6 +78,8 @@ pub struct Constants<S> {
     temperature: S,
     per_control_period: S,
     cell_noise: S,
+    /// 1 while the release's cable pulls.
+    cable: S,
     /// Parameters of each lane as plain numbers, for the control unit.
     raw: Vec<Vec<f64>>,
 }
@@ -81,6 +92,8 @@ pub struct Body<S> {
     units: Vec<Unit>,
     pub demand: S,
     pub driving: S,
+    /// 1 while all low switches are on.
+    pub short: S,
     pub brake_free: S,
     pub released: S,
     pub link: S,
@@ -122,6 +135,7 @@ impl<S: Scalar> Constants<S> {
             temperature: at(MotorParameter::WindingTemperature.at()),
             per_control_period: S::one() / at(PiRateParameter::Period.at()),
             cell_noise: at(CellParameter::LoadCellNoise.at()),
+            cable: S::one() - S::indicator(S::splat(0.5).le(at(ReleaseParameter::CableFailed.at()))),
             raw: (0..S::LANES).map(|lane| raw.iter().map(|x| x.lane(lane)).collect()).collect(),
         }
     }
@@ -140,6 +154,7 @@ impl<S: Scalar> Constants<S> {
             units,
             demand: zero,
             driving: zero,
+            short: zero,
             brake_free: zero,
             released: zero,
             link: raw[Inverter::SupplyVoltage.at()] * self.supply_scale,
@@ -152,7 +167,7 @@ impl<S: Scalar> Constants<S> {
             lock_use: zero,
             energy: [zero; 5],
         };
-        body.obey();
+        body.obey(self.cable);
         body
     }
 
@@ -160,13 +175,16 @@ impl<S: Scalar> Constants<S> {
         inputs[SUPPLY].at(t) * self.supply_scale
     }
 
-    /// The control units' tick.
-    pub fn tick(&self, s: &mut Body<S>, inputs: &Inputs<S>, t: S, noise: &mut dyn FnMut(u64) -> S) {
+    /// The control units' tick; `tripped` is positive where the bridge has given up.
+    pub fn tick(&self, structure: &Structure, s: &mut Body<S>, inputs: &Inputs<S>, t: S, tripped: S, noise: &mut dyn FnMut(u64) -> S) {
         let command = inputs[COMMAND].at(t);
         let wheels = inputs[WHEELS].at(t);
         let speed = self.hall.speed(&s.hall, t);
         let counted = s.hall.count * self.hall.pitch * self.mechanics.travel;
         let bus = s.charge * self.per_control_period;
+        s.shown_line = [s.line[0] * self.dt * self.per_control_period, s.line[1]];
+        s.line = [S::zero(); 2];
+        let high = s.hall.code[0] + s.hall.code[1] + s.hall.code[2];
         if S::any(t.equals(S::zero())) {
             // The link starts at the source's own voltage.
             s.link = self.source(inputs, t);
@@ -181,16 +199,21 @@ impl<S: Scalar> Constants<S> {
                 speed: speed.lane(lane),
                 ram: s.motion.nut_position.lane(lane).min(self.mechanics.lever.stroke.lane(lane)),
                 locked: s.motion.locked.lane(lane),
+                line: s.shown_line[0].lane(lane),
                 counted: counted.lane(lane),
+                travel: self.mechanics.travel.lane(lane),
+                pitch: (self.hall.pitch * self.mechanics.travel).lane(lane),
                 hall_errors: s.hall.errors.lane(lane),
+                hall_valid: high.lane(lane) > 0.5 && high.lane(lane) < 2.5,
+                tripped: tripped.lane(lane) > 0.5,
+                rig: structure.rig,
+                nut_speed: s.motion.nut_speed.lane(lane),
             };
             s.units[lane].tick(&self.raw[lane], &shown);
         }
         s.charge = S::zero();
-        s.shown_line = [s.line[0] * self.dt * self.per_control_period, s.line[1]];
-        s.line = [S::zero(); 2];
         s.lock_use = s.motion.locked * self.mechanics.end_load(inputs[USER].at(t)).abs() * self.mechanics.lock.per_strength;
-        s.obey();
+        s.obey(self.cable);
         if S::any(S::zero().lt(self.cell_noise)) {
             s.cell_noise = self.cell_noise * noise(0);
         }
@@ -258,10 +281,14 @@ impl<S: Scalar> Constants<S> {
         let user = inputs[USER].at(t);
         let unit = |f: &dyn Fn(&Unit) -> f64| S::from_fn(|lane| f(&s.units[lane]));
         let flag = |f: &dyn Fn(&Unit) -> bool| S::from_fn(|lane| f64::from(u8::from(f(&s.units[lane]))));
-        set(Q::Command, inputs[COMMAND].at(t));
+        // A repeated command differs by the number of commands.
+        let command = inputs[COMMAND].at(t);
+        let number = S::splat(COMMANDS.len() as f64);
+        set(Q::Command, S::select(number.le(command), command - number, command));
         set(Q::State, unit(&|u| f64::from(u.sequence.phase as u8)));
         set(Q::CommandRefused, unit(&|u| f64::from(u.sequence.refused)));
         set(Q::FaultCode, unit(&|u| f64::from(u.sequence.fault)));
+        set(Q::WarningCode, unit(&|u| f64::from(u.sequence.warning)));
         set(Q::SpeedRef, unit(&|u| u.speed.reference));
         set(Q::SpeedMeas, unit(&|u| u.speed_meas));
         set(Q::Proximity0, flag(&|u| u.switches.shown[0]));
@@ -288,7 +315,8 @@ impl<S: Scalar> Constants<S> {
         set(Q::MotorTorque, torque);
         set(Q::DetentTorque, m.detent_torque(s.motion.motor_position));
         set(Q::BrakeTorque, m.brake_torque(s.brake_free));
-        set(Q::BrakeReleased, s.brake_free);
+        set(Q::BrakeReleased, m.brake_open(s.brake_free));
+        set(Q::SoftwareBrake, s.short);
         let forces = m.forces(&s.motion, user, structure.rig);
         set(Q::FrictionForce, m.friction_force(&s.motion, s.released));
         let locked = S::splat(0.5).lt(s.motion.locked);
@@ -321,17 +349,18 @@ impl<S: Scalar> Constants<S> {
 
 impl<S: Scalar> Body<S> {
     /// Takes over what the control units order.
-    fn obey(&mut self) {
+    fn obey(&mut self, cable: S) {
         let units = &self.units;
         let flag = |f: &dyn Fn(&Unit) -> bool| S::from_fn(|lane| f64::from(u8::from(f(&units[lane]))));
         self.demand = S::from_fn(|lane| units[lane].demand);
         self.driving = flag(&|u| u.driving);
         self.brake_free = flag(&|u| u.coil.free);
-        self.released = flag(&|u| u.sequence.released);
+        self.short = flag(&|u| u.short);
+        self.released = self.released.maximum(flag(&|u| u.sequence.released) * cable);
     }
 
-    /// Positive where the control unit gave up.
+    /// Positive where something went otherwise than commanded.
     pub fn tripped(&self) -> S {
-        S::from_fn(|lane| f64::from(u8::from(self.units[lane].sequence.fault > 0 || self.units[lane].sequence.turned_down.is_some())))
+        S::from_fn(|lane| f64::from(u8::from(self.units[lane].sequence.notes.any())))
     }
 }

@@ -6,8 +6,8 @@ use super::signals::{Quantity as Q, ALL};
 use crate::actuator::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring, WATCHED};
 use crate::control::pi_rate::PiRateParameter;
 use crate::fault::FaultKind;
-use crate::inverter::bridge::{quench, Bridge, BridgeState, BridgeStructure, Windings};
-use crate::inverter::six_step;
+use crate::inverter::bridge::{quench, Bridge, BridgeState, BridgeStructure, InverterParameter, Windings};
+use crate::inverter::six_step::{self, SixStepParameter};
 use crate::scalar::Scalar;
 use crate::three;
 use crate::time::Steps;
@@ -110,23 +110,29 @@ fn electric<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, so
     let carrier = m.c.modulator.carrier(t);
     let duty = m.c.duty(&s.body);
     s.cut = m.c.modulator.cut(s.cut, carrier, s.current);
-    let live = S::splat(0.5).lt(s.body.driving) & s.cut.le(carrier);
+    let uncut = s.cut.le(carrier);
+    let short = S::splat(0.5).lt(s.body.short);
+    let live = S::splat(0.5).lt(s.body.driving) & uncut & !short;
     let on = S::select(live, m.c.modulator.on_fraction(carrier, dt, duty), zero);
     let wanted = six_step::demand(s.body.hall.code);
     let sign = s.body.demand.sign();
-    let gated = zero.lt(on);
-    let legs: [S; 3] = three!(|j| S::select(gated, wanted[j] * sign, zero));
-    let split = gated & on.lt(S::one());
+    let armed = zero.lt(on) & !short;
+    let gated: [S; 3] = three!(|j| wanted[j] * sign);
+    let chopped = six_step::chopped(structure.chopping, gated);
+    let idle: [S; 3] = three!(|j| S::select(live, chopped[j], zero));
+    let low: [S; 3] = three!(|j| S::select(short & uncut, -S::one(), idle[j]));
+    let legs: [S; 3] = three!(|j| S::select(armed, gated[j], low[j]));
+    let split = armed & on.lt(S::one());
     let first = S::select(split, on * dt, dt);
     let start = s.current;
     let mut whole = part(m, &structure.bridge, s, legs, k, resistance, first, start);
     if S::any(split) {
         let blanking = s.bridge;
         let kept = s.legs;
-        let off = three!(|j| S::select(split, zero, legs[j]));
+        let off = three!(|j| S::select(split, chopped[j], legs[j]));
         let rest = part(m, &structure.bridge, s, off, k, resistance, dt - first, whole.current);
         s.bridge.keep(split, &blanking);
-        s.legs = three!(|j| S::select(split, zero, kept[j]));
+        s.legs = three!(|j| S::select(split, chopped[j], kept[j]));
         let add = |a: S, b: S| S::select(split, a + b, a);
         whole.current = three!(|j| S::select(split, rest.current[j], whole.current[j]));
         whole.voltage = three!(|j| S::select(split, rest.voltage[j], whole.voltage[j]));
@@ -163,6 +169,16 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
         m.c.mechanics.kick(&mut s.body.motion, &acting, structure.rig);
         s.torque = S::zero();
     }
+}
+
+/// The bridge's parameters; shorted terminals are what three lower switches shorted together are.
+fn terminals<S: Scalar>(raw: &[S]) -> Vec<S> {
+    let mut inverter = Raw(raw).inverter().to_vec();
+    let shorted = raw[SixStepParameter::TerminalsShorted.at()];
+    for low in [InverterParameter::ShortedALow, InverterParameter::ShortedBLow, InverterParameter::ShortedCLow] {
+        inverter[low as usize] = inverter[low as usize].maximum(shorted);
+    }
+    inverter
 }
 
 impl Wiring for High {
@@ -205,7 +221,7 @@ impl Wiring for High {
         let mechanical = raw[SolverParameter::MechanicalStep.at()];
         Model {
             c: Constants::derive(raw, structure, dt, mechanical),
-            bridge: Bridge::derive(Raw(raw).inverter(), dt.lane(0)),
+            bridge: Bridge::derive(&terminals(raw), dt.lane(0)),
             per_torque_steps: S::one() / mechanical,
             mechanical: ((mechanical.lane(0) / dt.lane(0)).round() as Steps).max(1),
         }
@@ -226,14 +242,14 @@ impl Wiring for High {
 
     fn tick<S: Scalar>(
         _kind: u8,
-        _structure: &Structure,
+        structure: &Structure,
         m: &Model<S>,
         inputs: &Inputs<S>,
         s: &mut State<S>,
         t: S,
         noise: &mut dyn FnMut(u64) -> S,
     ) {
-        m.c.tick(&mut s.body, inputs, t, noise);
+        m.c.tick(structure, &mut s.body, inputs, t, s.bridge.tripped, noise);
     }
 
     #[inline(always)]
@@ -273,7 +289,7 @@ impl Wiring for High {
         super::watch(&s.body, s.current[0].abs() + s.current[1].abs() + s.current[2].abs())
     }
     fn tripped<S: Scalar>(s: &State<S>) -> S {
-        s.body.tripped().maximum(s.bridge.tripped)
+        s.body.tripped()
     }
     fn trip_reason<S: Scalar>(m: &Model<S>, s: &State<S>, lane: usize) -> Option<String> {
         m.c.trip_reason(&s.body, lane)

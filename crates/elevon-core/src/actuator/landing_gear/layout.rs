@@ -138,7 +138,7 @@ groups! {
 }
 
 pub const PORTS: &[Port] = &[
-    Port { name: "command", unit: "1", text: "0 stop, 1 extend, 2 retract, 3 free fall, held until the next one", parameter: "" },
+    Port { name: "command", unit: "1", text: "0 stop, 1 extend, 2 retract, 3 free fall, held until the next one; 4 more repeats the one before", parameter: "" },
     Port { name: "user", unit: "N", text: "signed load on the ram besides the leg's, positive opposes extension", parameter: "" },
     Port { name: "supply", unit: "V", text: "voltage of the source", parameter: "inverter.supply_voltage" },
     Port { name: "weight_on_wheels", unit: "1", text: "1: the aircraft stands on its wheels", parameter: "" },

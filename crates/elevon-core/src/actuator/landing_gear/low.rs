@@ -8,7 +8,7 @@ use crate::actuator::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring, WATCHED
 use crate::control::pi_rate::PiRateParameter;
 use crate::fault::FaultKind;
 use crate::inverter::bridge::InverterParameter;
-use crate::inverter::six_step;
+use crate::inverter::six_step::{self, Chopping, SixStepParameter};
 use crate::scalar::Scalar;
 use crate::three;
 use crate::time::Steps;
@@ -25,13 +25,20 @@ pub struct Model<S> {
     inductance: [S; 3],
     /// Commutation resistance per motor speed and inductance: c p.
     commutation: S,
+    /// 1 while the motor's terminals are shorted.
+    terminals: S,
 }
+
+/// Fundamental of a trapezoid with flats of 120 degrees over its top: (4/pi) sin(30 deg)/(pi/6).
+const FUNDAMENTAL: f64 = 1.215_854_203_708_053_3;
 
 #[derive(Clone, Debug)]
 pub struct State<S> {
     body: Body<S>,
     current: S,
     torque: S,
+    /// 1 once the drive has tripped.
+    tripped: S,
 }
 
 /// The conducting pair in series.
@@ -65,35 +72,68 @@ fn pair<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>) -> Pair<S>
     pair
 }
 
+/// What the pair sees while the carrier is above the demand, against the current: with low-side chopping one diode, else the
+/// link and two of them.
+#[inline(always)]
+fn against<S: Scalar>(m: &Model<S>, chopping: Chopping, link: S) -> S {
+    match chopping {
+        Chopping::LowSide => m.diode_drop,
+        Chopping::Both => link + m.diode_drop + m.diode_drop,
+    }
+}
+
 /// Mean current over a carrier period (`docs/theory/landing-gear.md`).
 #[inline(always)]
-fn mean_current<S: Scalar>(m: &Model<S>, p: &Pair<S>, s: &Body<S>, duty: S) -> S {
+fn mean_current<S: Scalar>(m: &Model<S>, chopping: Chopping, p: &Pair<S>, s: &Body<S>, duty: S) -> S {
     let (zero, one) = (S::zero(), S::one());
     let speed = s.motion.motor_speed;
     let emf = p.constant * speed;
     let link = s.link;
-    let two_drops = m.diode_drop + m.diode_drop;
     let inductance = S::select(zero.lt(p.inductance), p.inductance, one);
     let resistance = S::select(zero.lt(p.resistance), p.resistance, one) + m.commutation * speed.abs() * (S::splat(0.5) * inductance);
-    let rail = link + two_drops;
-    let excess = (emf.abs() - rail).maximum(zero);
+    // The diodes rectify an EMF above the link, which no switch can cut off.
+    let excess = (emf.abs() - (link + m.diode_drop + m.diode_drop)).maximum(zero);
     let passive = -(emf.signed(excess) / resistance);
     let sign = s.demand.signed(one);
     let along = sign * emf;
-    let (rise, fall) = (link - along, rail + along);
+    let off = against(m, chopping, link);
+    let (rise, fall) = (link - along, off + along);
     let usable = zero.lt(rise) & zero.lt(fall);
     let safe_fall = S::select(usable, fall, one);
     let safe_rise = S::select(usable, rise, zero);
     let boundary = safe_fall / (safe_rise + safe_fall);
     let gap = duty.minimum(boundary);
     let pulsed = S::splat(0.5) * gap * gap * m.c.modulator.period / inductance * safe_rise * (one + safe_rise / safe_fall);
-    let continuous = (duty * link - (one - duty) * rail - along) / resistance;
-    let driven = S::select(boundary.lt(duty), pulsed.maximum(continuous), pulsed) * sign;
-    let both = driven + S::select(zero.lt(driven * emf), passive, zero);
-    let plugging = (sign * link * duty - emf) / resistance;
-    let idle = rise.le(zero) | duty.le(zero);
-    let active = S::select(idle, passive, S::select(fall.le(zero), plugging, both));
-    active.clamp_abs(m.c.cutoff) * p.closed
+    let continuous = (duty * link - (one - duty) * off - along) / resistance;
+    let driven = S::select(boundary.lt(duty), pulsed.maximum(continuous), pulsed);
+    let plugging = match chopping {
+        // The EMF drives its current on through the HIGH leg.
+        Chopping::LowSide => continuous,
+        Chopping::Both => (duty * link - along) / resistance,
+    };
+    // An EMF above the link drives a current back through the closed switches.
+    let back = duty * rise / resistance;
+    let active = S::select(rise.le(zero), back, S::select(fall.le(zero), plugging, driven));
+    let cut = S::select(zero.lt(duty), active.clamp_abs(m.c.cutoff) * sign, zero);
+    let braking = passive.signed(passive.abs().maximum((cut * passive.sign()).maximum(zero)));
+    S::select(passive.equals(zero), cut, S::select(zero.lt(cut * passive), braking, cut + passive)) * p.closed
+}
+
+/// Line current that gives the mean torque of the windings shorted by the low switches: 3/2 k_1^2 w R/(R^2 + (p w L)^2)
+/// with the fundamental k_1 of the EMF, up to the current cut-off.
+#[inline(always)]
+fn shorted_current<S: Scalar>(m: &Model<S>, p: &Pair<S>, s: &Body<S>) -> S {
+    let (half, one) = (S::splat(0.5), S::one());
+    let constant = S::select(p.constant.equals(S::zero()), one, p.constant);
+    let fundamental = S::splat(FUNDAMENTAL * 0.5) * constant;
+    let resistance = half * p.resistance;
+    let speed = s.motion.motor_speed;
+    let reactance = m.c.star.pole_pairs * speed * (half * p.inductance);
+    let impedance = resistance * resistance + reactance * reactance;
+    let torque = S::splat(1.5) * fundamental * fundamental * speed * resistance / impedance;
+    // No cut-off opens a short across the terminals.
+    let limit = S::select(half.lt(m.terminals), S::splat(1e9), m.c.cutoff);
+    -(torque / constant).clamp_abs(limit)
 }
 
 #[inline(always)]
@@ -103,19 +143,44 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
     let one = S::one();
     let source = m.c.source(inputs, t);
     let p = pair(m, structure, s);
-    let duty = m.c.duty(&s.body) * s.body.driving;
-    let target = mean_current(m, &p, &s.body, duty);
-    let inductance = S::select(S::zero().lt(p.inductance), p.inductance, one);
-    let follow = S::select(S::splat(0.5).lt(p.closed), (dt * p.resistance / inductance).minimum(one), one);
-    s.current = follow.fma(target - s.current, s.current);
+    let zero = S::zero();
+    let half = S::splat(0.5);
+    let duty = m.c.duty(&s.body) * s.body.driving * (one - s.body.short);
+    let mut target = mean_current(m, structure.chopping, &p, &s.body, duty * (one - s.tripped));
+    let shorted = m.terminals.maximum(s.body.short * (one - s.tripped));
+    let short = half.lt(shorted) & half.lt(p.closed);
+    if S::any(short) {
+        target = S::select(short, shorted_current(m, &p, &s.body), target);
+    }
+    if structure.shorted {
+        // Driving into shorted terminals is a short of the link.
+        s.tripped = S::select(half.lt(m.terminals) & zero.lt(duty), one, s.tripped);
+    }
+    let inductance = S::select(zero.lt(p.inductance), p.inductance, one);
+    let follow = S::select(half.lt(p.closed), (dt * p.resistance / inductance).minimum(one), one);
+    let followed = follow.fma(target - s.current, s.current);
+    // What decays to nothing is nothing: numbers without full precision are slow.
+    s.current = S::select(followed.abs().lt(S::splat(1e-30)), zero, followed);
     let i = s.current;
     Constants::meter(&mut s.body, i);
     let square = i * i;
     s.torque = m.c.star.saturate(p.constant * i);
     let speed = s.body.motion.motor_speed;
-    let winding = p.winding * square;
-    let drops = i.abs() * (one - duty) * (m.diode_drop + m.diode_drop) + (p.resistance - p.winding) * square;
-    let drawn = p.constant * speed * i + winding + drops;
+    let drop = match structure.chopping {
+        Chopping::LowSide => m.diode_drop,
+        Chopping::Both => m.diode_drop + m.diode_drop,
+    };
+    let mut winding = p.winding * square;
+    let mut drops = i.abs() * (one - duty) * drop + (p.resistance - p.winding) * square;
+    let mut drawn = p.constant * speed * i + winding + drops;
+    if S::any(short) {
+        // All that a shorted winding brakes becomes heat in its own circuit.
+        let heat = -(p.constant * speed * i);
+        let share = p.winding / S::select(zero.lt(p.resistance), p.resistance, one);
+        winding = S::select(short, heat * share, winding);
+        drops = S::select(short, heat * (one - share), drops);
+        drawn = S::select(short, zero, drawn);
+    }
     let bus = drawn / s.body.link.maximum(one);
     if structure.accounts {
         s.body.energy[E_COPPER] = s.body.energy[E_COPPER] + dt * winding;
@@ -174,24 +239,25 @@ impl Wiring for Low {
             diode_drop: raw[InverterParameter::DiodeDrop.at()],
             inductance: three!(|j| S::one() / c.star.per_inductance[j]),
             commutation: raw[LowParameter::CommutationFactor.at()] * c.star.pole_pairs,
+            terminals: S::indicator(S::splat(0.5).le(raw[SixStepParameter::TerminalsShorted.at()])),
             c,
         }
     }
 
     fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
-        State { body: model.c.start(raw, initial), current: S::zero(), torque: S::zero() }
+        State { body: model.c.start(raw, initial), current: S::zero(), torque: S::zero(), tripped: S::zero() }
     }
 
     fn tick<S: Scalar>(
         _kind: u8,
-        _structure: &Structure,
+        structure: &Structure,
         m: &Model<S>,
         inputs: &Inputs<S>,
         s: &mut State<S>,
         t: S,
         noise: &mut dyn FnMut(u64) -> S,
     ) {
-        m.c.tick(&mut s.body, inputs, t, noise);
+        m.c.tick(structure, &mut s.body, inputs, t, s.tripped, noise);
     }
 
     #[inline(always)]

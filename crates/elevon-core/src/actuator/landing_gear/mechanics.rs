@@ -219,6 +219,10 @@ impl<S: Scalar> Mechanics<S> {
         S::select(S::splat(0.5).lt(released), rubs.screw, rubs.train)
     }
 
+    pub fn brake_open(&self, brake_free: S) -> S {
+        self.brake.open(brake_free)
+    }
+
     pub fn brake_torque(&self, brake_free: S) -> S {
         self.brake.torque(brake_free)
     }

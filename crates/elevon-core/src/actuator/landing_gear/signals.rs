@@ -7,8 +7,9 @@ signals! {
     Quantity, ALL {
         Command => "command", "-", "1", "0 stop, 1 extend, 2 retract, 3 free fall";
         State => "state", "-", "1", "0 retracted, 1 extending, 2 locked, 3 retracting, 4 stopped, 5 released, 6 fault";
-        CommandRefused => "command_refused", "-", "1", "why the last command was refused: 1 released, 2 fault, 3 undervoltage, 4 overvoltage, 5 weight on wheels, 6 locked; 0 accepted";
-        FaultCode => "fault_code", "-", "1", "1 motion, 2 lock not released, 3 lock not engaged, 4 stalled, 5 overspeed, 6 overcurrent, 7 hall, 8 proximity; 0 none";
+        CommandRefused => "command_refused", "-", "1", "why the last command was refused: 1 released, 2 fault, 3 undervoltage, 4 overvoltage, 5 weight on wheels, 6 locked, 7 repeated; 0 accepted";
+        FaultCode => "fault_code", "-", "1", "1 motion, 2 lock not released, 3 lock not engaged, 4 stalled, 5 overspeed, 6 overcurrent, 7 hall, 8 proximity, 9 drive tripped, 10 uncommanded motion; 0 none";
+        WarningCode => "warning_code", "-", "1", "1 drag: the current is above what any healthy load needs; 0 none";
         UserPosition => "user_position", "x_a", "m", "position of the ram";
         UserSpeed => "user_speed", "v_a", "m/s", "speed of the ram";
         NutPosition => "nut_position", "x_n", "m", "position of the nut, from retracted; beyond the stroke it works the lock";
@@ -31,6 +32,7 @@ signals! {
         DetentTorque => "detent_torque", "T_mc", "N m", "detent torque";
         BrakeTorque => "brake_torque", "T_br", "N m", "torque the brake can oppose";
         BrakeReleased => "brake_released", "-", "1", "1 while the brake is open";
+        SoftwareBrake => "software_brake", "-", "1", "1 while all low switches are on and short the windings";
         FrictionForce => "friction_force", "F_f", "N", "kinetic friction of the tables at the present speed and position, without the efficiencies";
         LoadForce => "load_force", "F", "N", "load on the ram, positive towards extension";
         LockForce => "lock_force", "-", "N", "force in the locked segments, else of the sleeve spring on the nut";

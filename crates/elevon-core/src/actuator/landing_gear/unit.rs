@@ -2,7 +2,7 @@
 
 use super::layout::Raw;
 use crate::control::pi_rate::{PiRate, PiRateParameter};
-use crate::control::sequence::{Phase, Seen, Sequence, SequenceParameter, COMMANDS, FAULTS, REFUSALS};
+use crate::control::sequence::{BrakeReading, Note, Phase, Places, Seen, Sequence, SequenceParameter, COMMANDS};
 use crate::sensor::proximity::{ProximityParameter, Switches};
 use crate::transmission::brake::{BrakeParameter, Coil, Powered};
 use crate::transmission::lever::LeverParameter;
@@ -17,9 +17,14 @@ pub struct Unit {
     pub coil: Coil,
     pub demand: f64,
     pub driving: bool,
+    /// All low switches on.
+    pub short: bool,
     pub speed_meas: f64,
     current: f64,
-    origin: f64,
+    line: f64,
+    hall_errors: f64,
+    hanging: f64,
+    told: bool,
 }
 
 /// What the plant shows the unit at a tick.
@@ -33,9 +38,36 @@ pub struct Shown {
     pub speed: f64,
     pub ram: f64,
     pub locked: f64,
-    /// Travel of the nut by the Hall count since the start.
+    /// Mean line current since the last tick.
+    pub line: f64,
+    /// Travel of the nut by the Hall count since the start, and per motor angle and edge.
     pub counted: f64,
+    pub travel: f64,
+    pub pitch: f64,
     pub hall_errors: f64,
+    pub hall_valid: bool,
+    pub tripped: bool,
+    pub rig: bool,
+    /// For the verdict on the run alone, no input of the unit: the nut's speed.
+    pub nut_speed: f64,
+}
+
+/// A released ram that stands for this long (s) short of its lock hangs.
+const HANGING: f64 = 0.5;
+/// Edges that a wrong Hall code may hide.
+const HIDDEN: f64 = 3.0;
+
+fn places(raw: Raw<'_, f64>) -> Places {
+    let (proximity, lock) = (raw.proximity(), raw.lock());
+    let at = |p: ProximityParameter| proximity[p as usize];
+    Places {
+        switch: [at(ProximityParameter::Position0), at(ProximityParameter::Position25), at(ProximityParameter::Position75)],
+        hysteresis: at(ProximityParameter::Hysteresis),
+        stroke: raw.lever()[LeverParameter::Stroke as usize],
+        engage: lock[LockParameter::EngageTravel as usize],
+        release: lock[LockParameter::ReleaseTravel as usize],
+        end: lock[LockParameter::Travel as usize] + lock[LockParameter::Overtravel as usize],
+    }
 }
 
 impl Unit {
@@ -53,68 +85,95 @@ impl Unit {
         };
         let coil = Coil::new(Powered::read(raw.brake()[BrakeParameter::Powered as usize]) == Powered::Always);
         Self {
-            sequence: Sequence::start(phase, released),
+            sequence: Sequence::start(phase, released, places(raw), switches.shown),
             speed: PiRate::default(),
             switches,
             coil,
             demand: 0.0,
             driving: false,
+            short: false,
             speed_meas: 0.0,
             current: 0.0,
-            origin: nut,
+            line: 0.0,
+            hall_errors: 0.0,
+            hanging: 0.0,
+            told: false,
         }
     }
 
     pub fn tick(&mut self, raw: &[f64], shown: &Shown) {
         let raw = Raw(raw);
-        let (p, proximity) = (raw.sequence(), raw.proximity());
+        let p = raw.sequence();
         let dt = raw.pi_rate()[PiRateParameter::Period as usize];
-        self.switches.step(proximity, shown.ram, shown.locked > 0.5, dt);
-        self.current += (shown.bus - self.current) * (dt / (dt + p[SequenceParameter::CurrentFilter as usize]));
+        self.switches.step(raw.proximity(), shown.ram, shown.locked > 0.5, dt);
+        let share = dt / (dt + p[SequenceParameter::CurrentFilter as usize]);
+        self.current = settled(self.current + (shown.bus - self.current) * share);
+        self.line = settled(self.line + (shown.line - self.line) * share);
         self.speed_meas = shown.speed;
-        let travel = self.origin + shown.counted;
-        let orders = self.sequence.step(
-            p,
-            &Seen {
-                dt,
-                time: shown.time,
-                command: shown.command.round().clamp(0.0, COMMANDS.len() as f64 - 1.0) as u8,
-                on_wheels: shown.on_wheels > 0.5,
-                supply: shown.supply,
-                current: self.current,
-                speed: shown.speed,
-                demand: self.demand,
-                switches: self.switches.shown,
-                travel,
-                left: raw.lever()[LeverParameter::Stroke as usize] - travel,
-                quarters: [proximity[ProximityParameter::Position25 as usize], proximity[ProximityParameter::Position75 as usize]],
-                hall_errors: shown.hall_errors,
-                release_time: raw.release()[ReleaseParameter::Time as usize],
-            },
-        );
-        if orders.fresh {
+        let seen = self.seen(raw, shown, dt);
+        let orders = self.sequence.step(p, &seen);
+        if orders.fresh || !orders.drive {
             self.speed = PiRate::default();
         }
         self.driving = orders.drive;
-        if orders.drive {
-            self.demand = self.speed.step(raw.pi_rate(), orders.extending, orders.target, shown.speed, shown.supply);
-        } else {
-            self.demand = 0.0;
-            self.speed = PiRate::default();
-        }
+        self.demand =
+            if orders.drive { self.speed.step(raw.pi_rate(), orders.extending, orders.target, shown.speed, shown.supply) } else { 0.0 };
+        let software = BrakeReading::read(p[SequenceParameter::BrakeReading as usize]) == BrakeReading::SoftwareBrake;
+        self.short = orders.short || (software && orders.drive && self.demand.abs() < p[SequenceParameter::BrakeVoltage as usize]);
         let brake = raw.brake();
         let powered = orders.brake_powered || Powered::read(brake[BrakeParameter::Powered as usize]) == Powered::Always;
         self.coil.step(powered, brake[BrakeParameter::ReleaseDelay as usize], brake[BrakeParameter::EngageDelay as usize], dt);
+        self.judge(shown, dt);
     }
 
-    /// Why the unit gave up, if it did.
-    pub fn reason(&self) -> Option<String> {
-        let sequence = &self.sequence;
-        if let Some((command, value)) = sequence.turned_down {
-            let interlock = REFUSALS[usize::from(sequence.refused.max(1))];
-            let shown = if matches!(sequence.refused, 3 | 4) { format!(" ({value:.1} V)") } else { String::new() };
-            return Some(format!("{} refused: {interlock}{shown}", COMMANDS[usize::from(command)]));
+    fn seen(&mut self, raw: Raw<'_, f64>, shown: &Shown, dt: f64) -> Seen {
+        let wrong = shown.hall_errors - self.hall_errors;
+        self.hall_errors = shown.hall_errors;
+        // While no code comes the motor may run as fast as it is let.
+        let blind = if shown.hall_valid { 0.0 } else { dt * shown.travel * raw.sequence()[SequenceParameter::Overspeed as usize] };
+        Seen {
+            dt,
+            time: shown.time,
+            command: shown.command.round().clamp(0.0, 2.0 * COMMANDS.len() as f64 - 1.0) as u8,
+            on_wheels: shown.on_wheels > 0.5,
+            supply: shown.supply,
+            current: self.current,
+            line: self.line,
+            line_now: shown.line,
+            speed: shown.speed,
+            demand: self.demand,
+            switches: self.switches.shown,
+            counted: shown.counted,
+            lost: wrong * HIDDEN * shown.pitch + blind,
+            hall_errors: shown.hall_errors,
+            hall_valid: shown.hall_valid,
+            tripped: shown.tripped,
+            rig: shown.rig,
+            release_time: raw.release()[ReleaseParameter::Time as usize],
         }
-        (sequence.fault > 0).then(|| format!("the control unit is in its fault state: {}", FAULTS[usize::from(sequence.fault)]))
+    }
+
+    /// A ram that should fall and rests unlocked did not arrive.
+    fn judge(&mut self, shown: &Shown, dt: f64) {
+        let hangs = self.sequence.released && shown.locked < 0.5 && shown.nut_speed == 0.0 && !shown.rig;
+        self.hanging = if hangs { self.hanging + dt } else { 0.0 };
+        if self.hanging > HANGING && !self.told {
+            self.told = true;
+            self.sequence.notes.add(Note::Hanging { time: shown.time, place: shown.ram });
+        }
+    }
+
+    /// What went otherwise than commanded, if anything.
+    pub fn reason(&self) -> Option<String> {
+        self.sequence.notes.text()
+    }
+}
+
+/// A filter's rest that is too small to be a number of full precision is zero.
+fn settled(x: f64) -> f64 {
+    if x.abs() < 1e-30 {
+        0.0
+    } else {
+        x
     }
 }

@@ -1,0 +1,108 @@
+//! Commands: taken, refused, repeated; and the notes from which a run says what went otherwise than commanded.
+
+use super::codes::*;
+use super::{Phase, Seen, Sequence, SequenceParameter as P};
+
+/// Something that did not go as it was commanded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Note {
+    Refused { time: f64, command: u8, reason: u8, value: f64 },
+    /// The unit went to its fault state; the command it was carrying out (stop: it was at rest).
+    Failed { time: f64, fault: u8, command: u8 },
+    /// The ram rests short of its lock after the release.
+    Hanging { time: f64, place: f64 },
+}
+
+/// The first notes of a run.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Notes {
+    list: [Option<Note>; 6],
+}
+
+impl Notes {
+    pub fn add(&mut self, note: Note) {
+        if let Some(free) = self.list.iter_mut().find(|entry| entry.is_none()) {
+            *free = Some(note);
+        }
+    }
+
+    pub fn any(&self) -> bool {
+        self.list[0].is_some()
+    }
+
+    pub fn text(&self) -> Option<String> {
+        let texts: Vec<String> = self.list.iter().flatten().map(Note::text).collect();
+        (!texts.is_empty()).then(|| texts.join("; "))
+    }
+}
+
+impl Note {
+    fn text(&self) -> String {
+        let name = |command: &u8| COMMANDS[usize::from(*command)];
+        match self {
+            Note::Refused { time, command, reason, value } => {
+                let shown = if matches!(*reason, SUPPLY_LOW | SUPPLY_HIGH) { format!(" ({value:.1} V)") } else { String::new() };
+                format!("{} refused at {time:.2} s: {}{shown}", name(command), REFUSALS[usize::from(*reason)])
+            }
+            Note::Failed { time, fault, command: STOP } => {
+                format!("fault of the control unit at rest at {time:.2} s: {}", FAULTS[usize::from(*fault)])
+            }
+            Note::Failed { time, fault, command } => {
+                format!("{} did not arrive, fault of the control unit at {time:.2} s: {}", name(command), FAULTS[usize::from(*fault)])
+            }
+            Note::Hanging { time, place } => format!("free_fall did not lock: the ram rests at {:.1} mm at {time:.2} s", 1e3 * place),
+        }
+    }
+}
+
+impl Sequence {
+    pub(super) fn take_command(&mut self, p: &[f64], see: &Seen) {
+        if see.command == self.last {
+            return;
+        }
+        let number = COMMANDS.len() as u8;
+        let (command, before) = (see.command % number, self.last % number);
+        self.last = see.command;
+        if command == STOP {
+            self.wanted = STOP;
+            self.cleared = self.phase == Phase::Fault;
+            self.refused = 0;
+            return;
+        }
+        if command == before && command == self.wanted {
+            self.refused = REPEATED;
+            return;
+        }
+        match self.refusal(p, see, command) {
+            Some((reason, value)) => {
+                self.refused = reason;
+                self.notes.add(Note::Refused { time: see.time, command, reason, value });
+            }
+            None => {
+                self.refused = 0;
+                self.warning = 0;
+                self.wanted = command;
+                self.retries = 0.0;
+            }
+        }
+    }
+
+    fn refusal(&self, p: &[f64], see: &Seen, command: u8) -> Option<(u8, f64)> {
+        if command == FREE_FALL {
+            return if self.phase == Phase::Locked { Some((LOCK_ENGAGED, 1.0)) } else { see.on_wheels.then_some((ON_WHEELS, 1.0)) };
+        }
+        if self.released || self.releasing > 0.0 {
+            return Some((RELEASED_ALREADY, 1.0));
+        }
+        if self.phase == Phase::Fault && !self.cleared {
+            return Some((IN_FAULT, f64::from(self.fault)));
+        }
+        if see.supply < p[P::Undervoltage as usize] {
+            return Some((SUPPLY_LOW, see.supply));
+        }
+        if see.supply > p[P::Overvoltage as usize] {
+            return Some((SUPPLY_HIGH, see.supply));
+        }
+        (command == RETRACT && see.on_wheels).then_some((ON_WHEELS, 1.0))
+    }
+}
