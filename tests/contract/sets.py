@@ -78,10 +78,18 @@ def motion(name: str) -> dict[str, Any]:
         },
     }
     if takes_actions(name):
-        # A whole cycle of a short stroke: every switch and the lock change.
+        # A short stroke back, out and down: every switch, the lock and the release change.
         data = {
-            "duration": "2.2 s",
-            "command": {"mode": "gear", "steps": [step(0.01, "retract"), step(1.15, "extend")]},
+            "duration": "2.5 s",
+            "command": {
+                "mode": "gear",
+                "steps": [
+                    step(0.01, "retract"),
+                    step(1.1, "extend"),
+                    step(1.6, "stop"),
+                    step(1.7, "free_fall"),
+                ],
+            },
             "initial": {"nut_position": "13 mm"},
             "parameters": {
                 "lever.stroke": "10 mm",

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 import elevon
 from elevon.errors import DivergedError, RangeError
-from tests.physics.gear import EXTENDED, NAME, gear, states
+from tests.physics.gear import EXTENDED, NAME, gear, states, value
 
 RETRACTED, EXTENDING, LOCKED, RETRACTING, STOPPED, RELEASED, FAULT = range(7)
-MOTION, NOT_RELEASED, NOT_ENGAGED, STALLED, OVERSPEED, OVERCURRENT, HALL, PROXIMITY = range(1, 9)
+(MOTION, NOT_RELEASED, NOT_ENGAGED, STALLED, OVERSPEED, OVERCURRENT, HALL, PROXIMITY, TRIPPED,
+ UNCOMMANDED) = range(1, 11)  # fmt: skip
 JAM = {"kind": "jam", "place": "screw", "severity": 40e3, "position": "130 mm", "width": "20 mm"}
 ON_WHEELS = {"weight_on_wheels": {"terms": [{"kind": "constant", "value": 1.0}]}}
 
@@ -87,12 +89,151 @@ def test_failed_switches_are_found(fault: str, action: str) -> None:
 
 
 @pytest.mark.parametrize("action", ["extend", "retract"])
-def test_a_dead_end_switch_stalls_at_the_stop(action: str) -> None:
-    """P0 or the lock's switch never comes: stall, retries, fault, not for ever under current."""
+def test_a_dead_end_switch_is_told_by_the_count(action: str) -> None:
+    """P0 or the lock's switch never comes: the nut has passed it, not for ever under current."""
     place = "proximity_100" if action == "extend" else "proximity_0"
-    rec = gear((0.1, action), duration=14.0, faults=[f"proximity_off@sensor.{place}=1"],
+    rec = gear((0.1, action), duration=9.0, faults=[f"proximity_off@sensor.{place}=1"],
                start=EXTENDED if action == "retract" else None)  # fmt: skip
-    assert rec.final["fault_code"] in (STALLED, NOT_ENGAGED)
+    assert rec.final["fault_code"] == PROXIMITY
+    assert rec.final["brake_released"] == 0.0
+
+
+def at(time: float, text: str) -> Any:
+    """A fault that comes at a time."""
+    kind, _, place = text.partition("@")
+    place, _, severity = place.partition("=")
+    return {
+        "kind": kind,
+        "place": place,
+        "severity": float(severity),
+        "profile": {"kind": "step", "time": time},
+    }
+
+
+@pytest.mark.parametrize("fidelity", ["low", "high"])
+@pytest.mark.parametrize(
+    ("place", "action", "time"),
+    [("proximity_100", "extend", 5.5), ("proximity_0", "retract", 4.0)],
+)
+def test_the_count_confirms_an_end_switch(
+    place: str, action: str, time: float, fidelity: str
+) -> None:
+    """Stuck on far from its end: never locked or retracted, a fault within the switch's time."""
+    fault = at(time, f"proximity_on@sensor.{place}=1")
+    rec = gear((0.1, action), duration=time + 0.5, faults=[fault], fidelity=fidelity,
+               start=EXTENDED if action == "retract" else None)  # fmt: skip
+    assert states(rec)[-1] == FAULT
+    assert LOCKED not in states(rec)[1:]
+    assert RETRACTED not in states(rec)[1:]
+    state = rec["state"]
+    assert state.time[state.values == FAULT][0] - time == pytest.approx(0.02, abs=0.005)
+    assert rec.final["fault_code"] == PROXIMITY
+
+
+def test_a_lock_switch_stuck_within_the_lock_travel_is_waited_for() -> None:
+    """On 1 mm short of the lock: the motor goes on until the count says it is engaged."""
+    early = gear((0.1, "extend"), duration=9.0, record="nut_position,state@1 kHz")
+    nut = early["nut_position"]
+    time = float(nut.time[nut.values > 0.2652][0])
+    fault = at(time, "proximity_on@sensor.proximity_100=1")
+    rec = gear((0.1, "extend"), duration=9.0, faults=[fault])
+    locked, indicated = rec["locked"].values > 0.5, rec["state"].values == LOCKED
+    assert indicated.any()
+    assert not np.any(indicated & ~locked)
+
+
+@pytest.mark.parametrize(
+    ("start", "phase"), [(None, RETRACTED), ("100 mm", STOPPED), ("250 mm", STOPPED)]
+)
+def test_a_leg_that_moves_at_rest_is_a_fault(start: str | None, phase: int) -> None:
+    """The brake slips: found within half a millimetre, the shorted windings slow the fall."""
+    fault = at(1.0, "brake_slipping@brake=1")
+    rec = gear(duration=4.0, start=start, faults=[fault], values={"load.factor": 2.0})
+    assert states(rec) == [phase, FAULT]
+    assert rec.final["fault_code"] == UNCOMMANDED
+    state, nut = rec["state"], rec["nut_position"].values
+    found = nut[state.values == FAULT][0]
+    assert found - nut[0] == pytest.approx(5e-4, abs=1e-4)
+    # 2 g would run away; the short leaves some 0.6 mm/s.
+    assert rec.final["software_brake"] == 1.0
+    assert 0.0 < rec.final["user_speed"] < 1.5e-3
+    assert "at rest" in rec.meta["message"]
+
+
+@pytest.mark.parametrize("action", ["extend", "retract"])
+def test_a_trip_of_the_bridge_sets_the_brake(action: str) -> None:
+    """A shorted switch trips the drive: the unit knows, the brake is set, the demand is zero."""
+    fault = at(2.0, "shorted_switch@inverter.a_high=1")
+    rec = gear((0.1, action), duration=3.0, faults=[fault], fidelity="high",
+               start=EXTENDED if action == "retract" else None)  # fmt: skip
+    assert rec.final["fault_code"] == TRIPPED
+    assert rec.final["state"] == FAULT
+    assert rec.final["brake_released"] == 0.0
+    assert rec.final["voltage_ref"] == 0.0
+    assert "tripped" in rec.meta["message"]
+
+
+@pytest.mark.parametrize("fidelity", ["low", "high"])
+@pytest.mark.parametrize(
+    "values",
+    [
+        {},
+        {"control.brake_reading": "release"},
+        {"inverter.chopping": "both", "control.proof_current": 8.0},
+        {"inverter.chopping": "both", "control.brake_reading": "release",
+         "control.proof_current": 8.0},
+    ],
+)  # fmt: skip
+def test_the_motor_holds_before_the_brake_opens(values: dict[str, Any], fidelity: str) -> None:
+    """Retraction from mid-stroke under 3.5 g: hardly a step backwards, where it was 1.8 mm."""
+    rec = gear((0.1, "retract"), duration=1.5, start="130 mm", fidelity=fidelity,
+               values={"load.factor": 3.5, **values})  # fmt: skip
+    assert rec["nut_position"].values.max() - 0.130 < 2e-4
+    assert rec.final["user_speed"] < -0.02
+
+
+def test_without_any_of_them_the_load_takes_the_motor_along() -> None:
+    """The comparison: both legs chopped, released by the demand alone, no proof."""
+    values = {"load.factor": 3.5, "inverter.chopping": "both", "control.brake_reading": "release"}
+    rec = gear((0.1, "retract"), duration=1.5, start="130 mm", values=values)
+    assert rec["nut_position"].values.max() - 0.130 > 1e-3
+
+
+@pytest.mark.parametrize("fidelity", ["low", "high"])
+def test_the_software_brake_holds_the_overrun(fidelity: str) -> None:
+    """3.5 g extension: within 6 % of the set speed, 15 % and more by the brake's release alone."""
+    peaks = []
+    for reading in ("software_brake", "release"):
+        rec = gear((0.1, "extend"), duration=3.0, fidelity=fidelity,
+                   values={"load.factor": 3.5, "control.brake_reading": reading})  # fmt: skip
+        peaks.append(rec["motor_speed"].values.max() / value("control.speed_high"))
+    assert peaks[0] < 1.06
+    assert peaks[1] > 1.15
+
+
+@pytest.mark.parametrize("fidelity", ["low", "high"])
+def test_shorted_windings_brake_by_the_closed_form(fidelity: str) -> None:
+    """3/2 k_1^2 w R/(R^2 + (p w L)^2) at low speed, k_1 = 1.216 k."""
+    rec = gear(duration=1.0, start="100 mm", fidelity=fidelity,
+               faults=["motor_shorted@motor=1", "brake_slipping@brake=1"],
+               values={"load.factor": 3.5, "motor.detent_torque": 0.0, "control.rest_travel": 1.0},
+               record="motor_torque,motor_speed@10 kHz")  # fmt: skip
+    late = rec["motor_speed"].time > 0.5
+    speed = rec["motor_speed"].values[late].mean()
+    resistance = value("motor.winding_resistance") + value("inverter.on_resistance")
+    reactance = value("motor.pole_pairs") * speed * value("motor.winding_inductance")
+    k1 = 1.21585 * value("motor.emf_constant")
+    torque = 1.5 * k1**2 * speed * resistance / (resistance**2 + reactance**2)
+    assert speed > 3.0
+    assert -rec["motor_torque"].values[late].mean() == pytest.approx(torque, rel=0.02)
+
+
+def test_a_drag_warns_in_extension_and_hides_in_retraction() -> None:
+    """In extension the load aids, so current tells; in retraction a heavier leg needs as much."""
+    for action, told in (("extend", True), ("retract", False)):
+        rec = gear((0.1, action), duration=4.0, faults=["brake_dragging@brake=0.5"],
+                   start=EXTENDED if action == "retract" else None)  # fmt: skip
+        assert bool(rec.final["warning_code"]) is told
 
 
 def test_a_faulted_unit_moves_again_after_stop_and_command() -> None:
@@ -138,11 +279,59 @@ def test_a_refused_command_names_its_interlock(
 
 
 def test_a_refused_command_after_a_good_one_changes_nothing() -> None:
-    """Free fall of a locked leg is refused; the run stays ok and the signal tells."""
+    """Free fall of a locked leg is refused: tripped with its reason, as a first refusal is."""
     rec = gear((0.1, "extend"), (8.0, "free_fall"), duration=9.0)
-    assert rec.meta["status"] == "ok"
+    assert rec.meta["status"] == "tripped"
+    assert "free_fall refused at 8.00 s: the down-lock is engaged" in rec.meta["message"]
     assert rec.final["state"] == LOCKED
     assert rec.final["command_refused"] == 6.0
+
+
+def test_a_repeated_command_is_reported_and_a_refused_one_tries_again() -> None:
+    """7 while nothing is new; after a refusal the same command is judged afresh."""
+    rec = gear((0.1, "extend"), (1.0, "extend"), duration=2.0)
+    assert rec.final["command_refused"] == 7.0
+    assert rec.meta["status"] == "ok"
+    assert rec.final["command"] == 1.0
+    brief = {"kind": "sag", "place": "supply", "severity": 0.7,
+             "profile": {"kind": "step", "time": "0.0 s", "level": 0.0}}  # fmt: skip
+    sag = dict(
+        brief, profile={"kind": "table", "times": [0.0, 0.5, 0.6], "values": [1.0, 1.0, 0.0]}
+    )
+    rec = gear((0.1, "extend"), (1.0, "extend"), duration=2.0, faults=[sag])
+    assert rec.final["command_refused"] == 0.0
+    assert rec.final["state"] == EXTENDING
+    assert "extend refused at 0.10 s" in rec.meta["message"]
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        "lock_spring_weak@lock=0.9",
+        "release_cable_failed@release=1",
+        "friction_growth@screw=2000",
+    ],
+)
+def test_a_free_fall_that_does_not_lock_ends_tripped(fault: str) -> None:
+    """Weak spring, failed cable, stiff screw: released, never locked, and the place is named."""
+    rec = gear((0.1, "free_fall"), duration=7.0, faults=[fault])
+    assert rec.final["state"] == RELEASED
+    assert rec.meta["status"] == "tripped"
+    assert "did not lock" in rec.meta["message"]
+
+
+def test_names_that_nobody_knows_get_the_near_ones() -> None:
+    """What an engineer would type first."""
+    for typed, near in (
+        ("brake_stuck", "brake_not_releasing"),
+        ("weak_lock_spring", "lock_spring_weak"),
+        ("release_cable", "release_cable_failed"),
+        ("shorted_motor", "motor_shorted"),
+        ("hall_stuck", "hall_high"),
+        ("proximity_stuck_on", "proximity_on"),
+    ):
+        with pytest.raises(elevon.InputError, match=near):
+            gear(duration=0.1, faults=[f"{typed}@brake=1"])
 
 
 def test_a_lock_loaded_beyond_its_strength_ends_the_run() -> None:

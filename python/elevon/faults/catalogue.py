@@ -100,7 +100,7 @@ def find_record(kind: str, place: str, wiring: str, where: str = "") -> FaultRec
     known = catalogue(wiring)
     found = [record for record in known if record.kind == kind]
     if not found:
-        raise unknown("fault", kind, [record.kind for record in known], where or None)
+        raise _unknown_kind(kind, known, where)
     for record in found:
         if place in record.places:
             return record
@@ -111,3 +111,32 @@ def find_record(kind: str, place: str, wiring: str, where: str = "") -> FaultRec
         place,
         nearest(place, places),
     )
+
+
+_STUCK = ("not", "high", "low", "on", "off")
+"""Words by which the catalogue says that something is stuck."""
+
+
+def _unknown_kind(kind: str, known: tuple[FaultRecord, ...], where: str) -> UnknownNameError:
+    """Build the error for a kind that does not exist.
+
+    Like names first, then those that share a word with it: `brake_stuck` is near every fault of
+    the brake, those that mean stuck first.
+    """
+    kinds = list(dict.fromkeys(record.kind for record in known))
+    words = {word for word in kind.lower().replace("-", "_").split("_") if len(word) > 2}
+    if "stuck" in words:
+        words.update(_STUCK)
+
+    def shared(name: str) -> int:
+        return len(words & set(name.split("_")))
+
+    things = words.difference(_STUCK)
+    akin = [name for name in kinds if things & set(name.split("_"))]
+    akin.sort(key=shared, reverse=True)
+    near = list(dict.fromkeys([*nearest(kind, kinds), *akin]))[:4]
+    if not near:
+        return unknown("fault", kind, kinds, where or None)
+    start = f"{where}: " if where else ""
+    listed = " or ".join(repr(name) for name in near)
+    return UnknownNameError(f"{start}unknown fault {kind!r}; did you mean {listed}?", kind, near)

@@ -1,4 +1,4 @@
-//! PI speed control behind a rate limiter, gains by direction (P 2.3 and Table 2.1). It runs at control ticks.
+//! PI speed control behind a rate limiter, gains by direction (P 2.1.4 and Table 2.1). It runs at control ticks.
 
 use crate::scalar::Scalar;
 use crate::variables;

@@ -1,5 +1,5 @@
 //! Actuator, leg and airframe make a triangle: the actuator turns about the origin, the leg about `(d, e)`, and the
-//! lever arm of the leg carries the rod end (P eqs. 13 to 17; the triangle is solved, not its tangent).
+//! lever arm of the leg carries the rod end (P eqs. 16 to 19; the triangle is solved, not its tangent).
 
 use crate::scalar::Scalar;
 use crate::variable::Switch;

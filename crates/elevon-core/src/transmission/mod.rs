@@ -7,6 +7,7 @@ pub mod friction_law;
 pub mod gear;
 pub mod lever;
 pub mod lock;
+pub mod lubricant;
 pub mod planetary;
 pub mod play;
 pub mod roller_screw;

@@ -1,6 +1,7 @@
 //! Two planetary stages with the free-fall release between them, and the governor that limits the fall.
 
 use crate::scalar::Scalar;
+use crate::transmission::lubricant::Lubricant;
 use crate::{choices, variables};
 
 variables! {
@@ -40,13 +41,14 @@ pub struct Planetary<S> {
 }
 
 impl<S: Scalar> Planetary<S> {
-    pub fn derive(raw: &[S]) -> Self {
+    pub fn derive(raw: &[S], lubricant: &Lubricant<S>) -> Self {
         use PlanetaryParameter as P;
         let g = |p: P| raw[p as usize];
+        let second = lubricant.efficiency(g(P::EfficiencySecond));
         Self {
             ratio: g(P::RatioFirst) * g(P::RatioSecond),
-            efficiency: g(P::EfficiencyFirst) * g(P::EfficiencySecond),
-            efficiency_second: g(P::EfficiencySecond),
+            efficiency: lubricant.efficiency(g(P::EfficiencyFirst)) * second,
+            efficiency_second: second,
         }
     }
 }

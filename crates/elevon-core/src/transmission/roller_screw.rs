@@ -1,6 +1,7 @@
-//! Planetary roller screw with load-dependent efficiency (P 2.1.6 and Fig. 4.9).
+//! Planetary roller screw with load-dependent efficiency (P 2.1.3, 4.1.2 and Fig. 4.9).
 
 use crate::scalar::Scalar;
+use crate::transmission::lubricant::Lubricant;
 use crate::variables;
 
 variables! {
@@ -34,13 +35,14 @@ pub struct RollerScrew<S> {
 }
 
 impl<S: Scalar> RollerScrew<S> {
-    pub fn derive(raw: &[S]) -> Self {
+    pub fn derive(raw: &[S], lubricant: &Lubricant<S>) -> Self {
         use ScrewParameter as P;
         let g = |p: P| raw[p as usize];
+        let loaded = lubricant.efficiency(g(P::EfficiencyLoaded));
         Self {
             turns: S::one() / g(P::Lead),
-            loaded: g(P::EfficiencyLoaded),
-            excess: g(P::EfficiencyUnloaded) - g(P::EfficiencyLoaded),
+            loaded,
+            excess: lubricant.efficiency(g(P::EfficiencyUnloaded)) - loaded,
             per_force: S::one() / g(P::EfficiencyForce),
             scale: g(P::EfficiencyScale),
             jam_force: g(P::JamForce),

@@ -1,8 +1,9 @@
 //! Friction of the whole train as measured: mean force over speed for the connected train (FFM) and for the screw
-//! side alone (FF), and five harmonics of the screw's pitch (P 4.1 to 4.3).
+//! side alone (FF), and five harmonics of the screw's pitch (P 4.1.1, eqs. 34 to 36, Figs. 4.3 and 4.4).
 
 use crate::piecewise::{Curve, Knots};
 use crate::scalar::Scalar;
+use crate::transmission::lubricant::Lubricant;
 use crate::variables;
 
 /// Knots of the speed tables.
@@ -118,14 +119,15 @@ pub struct Resistance<S> {
 }
 
 impl<S: Scalar> TrainFriction<S> {
-    pub fn derive(raw: &[S]) -> Self {
+    pub fn derive(raw: &[S], lubricant: &Lubricant<S>) -> Self {
         use TrainFrictionParameter as P;
         let knots = Knots::new(std::array::from_fn(|k| raw[P::Speed1 as usize + k]));
         let curve = |first: usize| Curve::new(&knots, &raw[first..first + SPEEDS]);
+        let warm = |first: usize| Curve::new(&knots, &lubricant.friction::<SPEEDS>(std::array::from_fn(|k| raw[first + k])));
         Self {
             knots,
-            connected: [curve(P::FfmExtension1 as usize), curve(P::FfmRetraction1 as usize)],
-            screw: [curve(P::FfExtension1 as usize), curve(P::FfRetraction1 as usize)],
+            connected: [warm(P::FfmExtension1 as usize), warm(P::FfmRetraction1 as usize)],
+            screw: [warm(P::FfExtension1 as usize), warm(P::FfRetraction1 as usize)],
             harmonics: std::array::from_fn(|h| curve(P::Harmonic1_1 as usize + h * SPEEDS)),
             breakaway: raw[P::BreakawayRatio as usize],
             growth: raw[P::Growth as usize],

@@ -174,7 +174,7 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
 /// The bridge's parameters; shorted terminals are what three lower switches shorted together are.
 fn terminals<S: Scalar>(raw: &[S]) -> Vec<S> {
     let mut inverter = Raw(raw).inverter().to_vec();
-    let shorted = raw[SixStepParameter::TerminalsShorted.at()];
+    let shorted = S::indicator(S::splat(0.5).le(raw[SixStepParameter::TerminalsShorted.at()]));
     for low in [InverterParameter::ShortedALow, InverterParameter::ShortedBLow, InverterParameter::ShortedCLow] {
         inverter[low as usize] = inverter[low as usize].maximum(shorted);
     }

@@ -12,6 +12,7 @@ use crate::sensor::proximity::{ProximityParameter, PROXIMITY};
 use crate::transmission::brake::{BrakeParameter, BRAKE};
 use crate::transmission::lever::{LegParameter, LeverParameter, LEG, LEVER};
 use crate::transmission::lock::{LockParameter, LOCK};
+use crate::transmission::lubricant::{LubricantParameter, LUBRICANT};
 use crate::transmission::planetary::{PlanetaryParameter, ReleaseParameter, PLANETARY, RELEASE};
 use crate::transmission::roller_screw::{ScrewParameter, SCREW};
 use crate::transmission::train_friction::{TrainFrictionParameter, TRAIN_FRICTION};
@@ -125,6 +126,7 @@ groups! {
     leg: "leg", LEG, LegParameter;
     load: "load", LOAD_CURVE, LoadCurveParameter;
     friction: "friction", TRAIN_FRICTION, TrainFrictionParameter;
+    lubricant: "lubricant", LUBRICANT, LubricantParameter;
     brake: "brake", BRAKE, BrakeParameter;
     lock: "lock", LOCK, LockParameter;
     release: "release", RELEASE, ReleaseParameter;
@@ -138,7 +140,12 @@ groups! {
 }
 
 pub const PORTS: &[Port] = &[
-    Port { name: "command", unit: "1", text: "0 stop, 1 extend, 2 retract, 3 free fall, held until the next one; 4 more repeats the one before", parameter: "" },
+    Port {
+        name: "command",
+        unit: "1",
+        text: "0 stop, 1 extend, 2 retract, 3 free fall, held until the next one; 4 more repeats the one before",
+        parameter: "",
+    },
     Port { name: "user", unit: "N", text: "signed load on the ram besides the leg's, positive opposes extension", parameter: "" },
     Port { name: "supply", unit: "V", text: "voltage of the source", parameter: "inverter.supply_voltage" },
     Port { name: "weight_on_wheels", unit: "1", text: "1: the aircraft stands on its wheels", parameter: "" },

@@ -9,6 +9,7 @@ use crate::transmission::brake::Brake;
 use crate::transmission::friction::Friction;
 use crate::transmission::lever::{Arm, LegParameter, Lever};
 use crate::transmission::lock::Lock;
+use crate::transmission::lubricant::Lubricant;
 use crate::transmission::planetary::{Governor, Planetary, PlanetaryParameter};
 use crate::transmission::roller_screw::{RollerScrew, ScrewParameter};
 use crate::transmission::train_friction::TrainFriction;
@@ -120,8 +121,9 @@ impl<S: Scalar> Mechanics<S> {
     pub fn derive(raw: &[S], dt: S) -> Self {
         let view = Raw(raw);
         let at = |i: usize| raw[i];
-        let screw = RollerScrew::derive(view.screw());
-        let gear = Planetary::derive(view.gear());
+        let lubricant = Lubricant::derive(view.lubricant());
+        let screw = RollerScrew::derive(view.screw(), &lubricant);
+        let gear = Planetary::derive(view.gear(), &lubricant);
         let lever = Lever::derive(view.lever());
         let per_travel = screw.turns * gear.ratio;
         let travel = S::one() / per_travel;
@@ -147,7 +149,7 @@ impl<S: Scalar> Mechanics<S> {
             lock: Lock::derive(view.lock()),
             screw,
             gear,
-            friction: TrainFriction::derive(view.friction()),
+            friction: TrainFriction::derive(view.friction(), &lubricant),
             governor: Governor::derive(view.release()),
             brake: Brake::derive(view.brake()),
             detent: at(ShaftParameter::DetentTorque.at()),

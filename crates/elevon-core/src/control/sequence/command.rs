@@ -6,11 +6,23 @@ use super::{Phase, Seen, Sequence, SequenceParameter as P};
 /// Something that did not go as it was commanded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Note {
-    Refused { time: f64, command: u8, reason: u8, value: f64 },
+    Refused {
+        time: f64,
+        command: u8,
+        reason: u8,
+        value: f64,
+    },
     /// The unit went to its fault state; the command it was carrying out (stop: it was at rest).
-    Failed { time: f64, fault: u8, command: u8 },
+    Failed {
+        time: f64,
+        fault: u8,
+        command: u8,
+    },
     /// The ram rests short of its lock after the release.
-    Hanging { time: f64, place: f64 },
+    Hanging {
+        time: f64,
+        place: f64,
+    },
 }
 
 /// The first notes of a run.

@@ -37,7 +37,7 @@ impl Sequence {
         }
         match self.action {
             Move::Rest => self.rest(see),
-            Move::Extend if self.locked_by_count(p, see) || self.locked_at_the_stop(p, see) => self.finish(Phase::Locked),
+            Move::Extend if self.locked_by_count(see) || self.locked_at_the_stop(p, see) => self.finish(Phase::Locked),
             Move::Retract if self.retracted_by_count(p, see) => self.finish(Phase::Retracted),
             Move::Extend if self.wanted != EXTEND => self.halt(),
             Move::Retract | Move::Reseat if self.wanted != RETRACT => self.halt(),
@@ -57,7 +57,7 @@ impl Sequence {
     }
 
     /// The lock's switch, and the nut by the count at least where the lock engages.
-    fn locked_by_count(&self, _p: &[f64], see: &Seen) -> bool {
+    fn locked_by_count(&self, see: &Seen) -> bool {
         see.switches[2] && see.switches[3] && self.position.low >= self.places.stroke + self.places.engage
     }
 

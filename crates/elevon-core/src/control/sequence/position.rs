@@ -109,8 +109,7 @@ impl Position {
 mod tests {
     use super::*;
 
-    const PLACES: Places =
-        Places { switch: [1.5, 66.0, 198.0], hysteresis: 0.5, stroke: 264.0, engage: 2.2, release: 0.8, end: 4.0 };
+    const PLACES: Places = Places { switch: [1.5, 66.0, 198.0], hysteresis: 0.5, stroke: 264.0, engage: 2.2, release: 0.8, end: 4.0 };
     const MARGINS: Margins = Margins { end: 0.5, quarter: 20.0 };
 
     fn seen(x: f64) -> [bool; 4] {

@@ -166,7 +166,7 @@ impl Sequence {
     /// Pairs that no position of the ram shows, and switches that the count contradicts.
     fn switches_fail(&mut self, p: &[f64], see: &Seen) -> bool {
         let [at_0, at_25, at_75, lock] = see.switches;
-        let pair = (lock && !at_75) || (at_75 && !at_25) || (at_0 && (at_25 || at_75 || lock));
+        let pair = (lock && !at_75) || (at_75 && !at_25) || (at_25 && at_0);
         let margins = Margins { end: p[P::CountTolerance as usize], quarter: p[P::ProximityTravel as usize] };
         let contradicted = self.position.contradicted(&self.places, see.switches, &margins);
         let fails = pair || contradicted.is_some();
