@@ -103,7 +103,11 @@ def test_lever_is_the_triangle_and_virtual_work_is_an_identity() -> None:
 def test_energy_balances_over_a_cycle_with_the_lock(
     fidelity: str, factor: float, supply: float
 ) -> None:
-    """Extension, lock, unlock, retraction; the exact inertia term on."""
+    """Extension, lock, unlock, retraction; the exact inertia term on.
+
+    What the electrical account leaves is the cut of a step where an outgoing phase stops
+    conducting: of first order in the step, 0.06 % at 3.5 g and 1 us.
+    """
     rec = gear(
         (0.1, "extend"), (9.0, "retract"), duration=18.0, record="all@10 Hz", fidelity=fidelity,
         values={"load.factor": factor, "inverter.supply_voltage": supply,
@@ -121,7 +125,7 @@ def test_energy_balances_over_a_cycle_with_the_lock(
                       "impact", "kinetic")  # fmt: skip
     assert rec.final["state"] == RETRACTED
     assert given > 500.0
-    assert abs(given - electric) < 5e-4 * given
+    assert abs(given - electric) < 1e-3 * given
     assert abs(change("motor") - mechanic) < 1e-3
     assert change("impact") > 0.0
     assert change("brake") > 0.0
