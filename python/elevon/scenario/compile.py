@@ -166,7 +166,7 @@ def _sequence(steps: Sequence[Action], wiring: str) -> dict[str, Any]:
             times, values = [], []
         times.append(time)
         number = float(actions.index(step.action))
-        # The same action again would not show in a held value: it stands one round of actions higher.
+        # The same action again would not show in a held value: it stands a round higher.
         repeats = index > 0 and steps[index - 1].action == step.action
         values.append(number + len(actions) if repeats and values[-1] == number else number)
     record = wave_records()[TABLE]
