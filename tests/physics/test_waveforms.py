@@ -10,6 +10,7 @@ import pytest
 from scipy import signal
 
 from elevon import _core
+from elevon.errors import InputError
 from tests.physics.rig import FREE_SHAFT, run, term
 
 DURATION, RATE = 2.0, 1000.0
@@ -201,3 +202,51 @@ def test_terms_add_and_disabled_terms_do_not() -> None:
     time, command = command_of(terms)
     expected = sum(CASES[kind][1](time) for kind in chosen)
     assert command == pytest.approx(expected, abs=1e-9)
+
+
+ROUNDED = {
+    "triangle": (
+        {"amplitude": 0.05, "frequency": 1.0, "phase": "30 deg"},
+        triangle(0.05, 1.0, math.radians(30), 0.0, 0.0),
+    ),
+    "trapezoid": (
+        {"low": -0.1, "high": 0.1, "rise": "0.5 s", "fall": "0.4 s", "hold_high": "0.2 s",
+         "start": "-0.2 s"},
+        trapezoid(-0.1, 0.1, [0.5, 0.2, 0.4, 0.0], -0.2),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ROUNDED)
+def test_rounded_corners_keep_the_acceleration_and_the_lines(kind: str) -> None:
+    """From rest, within the limit, elsewhere the sharp figure later by half a parabola."""
+    arguments, sharp = ROUNDED[kind]
+    limit = 4.0
+    time, command = command_of([term(kind, **arguments, acceleration=limit)])
+    second = np.diff(command, 2) * RATE**2
+    assert np.max(np.abs(second)) == pytest.approx(limit, rel=1e-6)
+    assert abs(command[1] - command[0]) < limit / RATE**2
+    rate = (sharp(np.array([1e-3])) - sharp(np.array([0.0])))[0] / 1e-3
+    later = time - 0.5 * abs(rate) / limit
+    straight = np.abs(second) < 1e-3
+    lines = np.flatnonzero(straight[1:] & straight[:-1] & (later[2:-1] > 0.3)) + 2
+    assert lines.size > 0.3 * time.size
+    assert command[lines] == pytest.approx(sharp(later[lines]), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kind", "more", "words"),
+    [
+        ("triangle", {"acceleration": 1.0}, "at least"),
+        ("triangle", {"acceleration": -1.0}, "negative"),
+        ("triangle", {"acceleration": 9.0, "end": "1 s"}, "end"),
+        ("trapezoid", {"acceleration": 9.0, "rise": "0 s"}, "rise"),
+        ("trapezoid", {"acceleration": 1.0}, "at least"),
+    ],
+)
+def test_corners_that_cannot_be_rounded_are_refused(
+    kind: str, more: dict[str, object], words: str
+) -> None:
+    """Too little room, a negative limit, a sharp end, a jump."""
+    with pytest.raises(InputError, match=words):
+        command_of([term(kind, **{**ROUNDED[kind][0], **more})])

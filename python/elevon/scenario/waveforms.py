@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 from elevon.errors import InputError
 
@@ -95,9 +97,66 @@ def check_values(record: WaveRecord, values: Mapping[str, float], place: str) ->
         )
     if record.kind == "trapezoid":
         _check_cycle(values, place)
+    if values.get("acceleration"):
+        _check_acceleration(record, values, place)
 
 
 def _check_cycle(values: Mapping[str, float], place: str) -> None:
     cycle = sum(values[name] for name in ("rise", "hold_high", "fall", "hold_low"))
     if values["repeat"] and cycle <= 0.0:
         raise InputError(f"{place}: a repeated trapezoid needs a cycle longer than zero")
+
+
+def _check_acceleration(record: WaveRecord, values: Mapping[str, float], place: str) -> None:
+    """Rounded corners must fit between each other, and what is rounded must have no jumps."""
+    acceleration = values["acceleration"]
+    if acceleration < 0.0:
+        raise InputError(f"{place}: acceleration = {acceleration:g} must not be negative")
+    if values.get("end", math.inf) < math.inf:
+        raise InputError(f"{place}: end and acceleration exclude each other: the end is a corner")
+    if record.kind == "trapezoid" and not (values["rise"] > 0.0 and values["fall"] > 0.0):
+        raise InputError(f"{place}: acceleration needs rise and fall above 0 s")
+    corners = _corners(record, values)
+    slopes = [0.0, *((b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(corners))]
+    bends = [abs(b - a) for a, b in pairwise(slopes)]
+    spans = [b[0] - a[0] for a, b in pairwise(corners)]
+    # Half of the parabola at each end of a line must fit into it.
+    least = max(0.5 * (a + b) / span for (a, b), span in zip(pairwise(bends), spans, strict=False))
+    if acceleration < least:
+        raise InputError(
+            f"{place}: acceleration = {acceleration:g} is too small for its corners to be rounded "
+            f"between each other; at least {least:.6g}"
+        )
+
+
+def _corners(record: WaveRecord, values: Mapping[str, float]) -> list[tuple[float, float]]:
+    """Corners (s, value) from where the motion begins, through more than one cycle."""
+    entered = max(-values["start"], 0.0)
+    if record.kind == "triangle":
+        size, frequency = values["amplitude"], values["frequency"]
+        quarters = 4.0 * (values["phase"] / (2.0 * math.pi) + frequency * entered)
+        # Turning points stand at the odd quarters.
+        first = 2.0 * math.floor(0.5 * (quarters - 1.0)) + 3.0
+        turns = [first + 2.0 * k for k in range(3)]
+        past = quarters - first + 2.0
+        start = size * (1.0 - past) * (1.0 if (first - 2.0) % 4.0 == 1.0 else -1.0)
+        return [
+            (0.0, start),
+            *((0.25 * (q - quarters) / frequency, size if q % 4.0 == 1.0 else -size)
+              for q in turns),
+        ]  # fmt: skip
+    levels = (values["high"], values["high"], values["low"], values["low"])
+    spans = [values[name] for name in ("rise", "hold_high", "fall", "hold_low")]
+    cycle = sum(spans)
+    found, time = [(0.0, values["low"])], 0.0
+    cycles = 3 if values["repeat"] else 1
+    for _ in range(cycles):
+        for span, level in zip(spans, levels, strict=True):
+            time += span
+            if span > 0.0:
+                found.append((time, level))
+    entered = entered % cycle if values["repeat"] else min(entered, cycle)
+    behind = next((i for i, corner in enumerate(found) if corner[0] > entered), len(found) - 1)
+    (t0, v0), (t1, v1) = found[behind - 1], found[behind]
+    here = (entered, v0 + (v1 - v0) * (entered - t0) / (t1 - t0))
+    return [(time - entered, value) for time, value in (here, *found[behind:])]

@@ -10,13 +10,14 @@ pub struct SourcePlan {
     pub terms: Vec<Term>,
 }
 
-/// What the inner loop evaluates: a line and oscillators, one value a lane.
+/// What the inner loop evaluates: a parabola and oscillators, one value a lane.
 #[derive(Clone, Debug)]
 pub struct Source<S> {
     at: S,
     value: S,
     slope: S,
-    /// No slope and no oscillator in any lane: the value is all there is.
+    curve: S,
+    /// No slope, no curve and no oscillator in any lane: the value is all there is.
     flat: bool,
     oscillators: Vec<[S; 5]>,
 }
@@ -31,19 +32,21 @@ impl SourcePlan {
         self.terms.iter().filter(|t| t.oscillates()).count()
     }
 
-    /// Line at step `k` as (at, value, slope) and the step of the next breakpoint.
-    fn line(&self, k: Steps, dt: f64) -> ([f64; 3], Steps) {
+    /// Parabola at step `k` as (at, value, slope, curve) and the step of the next breakpoint.
+    fn line(&self, k: Steps, dt: f64) -> ([f64; 4], Steps) {
         let t = k as f64 * dt;
         // Half a step of grace: a breakpoint that falls on the step belongs to what follows it.
         let looked_up = t + 0.5 * dt;
-        let (mut value, mut slope, mut next) = (0.0, 0.0, Steps::MAX);
+        let (mut value, mut slope, mut curve, mut next) = (0.0, 0.0, 0.0, Steps::MAX);
         for term in &self.terms {
             let line = term.line(looked_up);
-            value += line.value + line.slope * (t - line.at);
-            slope += line.slope;
+            let since = t - line.at;
+            value += line.value + (line.slope + line.curve * since) * since;
+            slope += line.slope + 2.0 * line.curve * since;
+            curve += line.curve;
             next = next.min(step_at(line.until, dt).max(k + 1));
         }
-        ([t, value, slope], next)
+        ([t, value, slope, curve], next)
     }
 
     fn oscillations(&self, k: Steps, dt: f64) -> impl Iterator<Item = Oscillation> + '_ {
@@ -56,7 +59,7 @@ impl SourcePlan {
 #[derive(Clone, Debug)]
 pub struct SourceLanes {
     plans: Vec<SourcePlan>,
-    lines: Vec<[f64; 3]>,
+    lines: Vec<[f64; 4]>,
     oscillations: Vec<Vec<Oscillation>>,
     next: Vec<Steps>,
     soonest: Steps,
@@ -65,7 +68,7 @@ pub struct SourceLanes {
 impl SourceLanes {
     pub fn new(plans: Vec<SourcePlan>) -> Self {
         let n = plans.len();
-        Self { plans, lines: vec![[0.0; 3]; n], oscillations: vec![Vec::new(); n], next: vec![0; n], soonest: 0 }
+        Self { plans, lines: vec![[0.0; 4]; n], oscillations: vec![Vec::new(); n], next: vec![0; n], soonest: 0 }
     }
 
     pub fn next(&self) -> Steps {
@@ -92,7 +95,7 @@ impl SourceLanes {
         renewed
     }
 
-    /// Packs the present lines and oscillators of lanes `first..first + S::LANES`.
+    /// Packs the present parabolas and oscillators of lanes `first..first + S::LANES`.
     pub fn pack<S: Scalar>(&self, first: usize) -> Source<S> {
         let lane = |f: &dyn Fn(usize) -> f64| S::from_fn(|i| f(first + i));
         let count = self.oscillations[first].len();
@@ -102,12 +105,13 @@ impl SourceLanes {
                 [get(&|o| o.at), get(&|o| o.amplitude), get(&|o| o.phase), get(&|o| o.rate), get(&|o| o.sweep)]
             })
             .collect();
-        let flat = count == 0 && (0..S::LANES).all(|i| self.lines[first + i][2] == 0.0);
+        let flat = count == 0 && (0..S::LANES).all(|i| self.lines[first + i][2..] == [0.0; 2]);
         Source {
             flat,
             at: lane(&|i| self.lines[i][0]),
             value: lane(&|i| self.lines[i][1]),
             slope: lane(&|i| self.lines[i][2]),
+            curve: lane(&|i| self.lines[i][3]),
             oscillators,
         }
     }
@@ -125,7 +129,8 @@ impl<S: Scalar> Source<S> {
         if self.flat {
             return self.value;
         }
-        let mut sum = self.slope.fma(t - self.at, self.value);
+        let since = t - self.at;
+        let mut sum = self.curve.fma(since, self.slope).fma(since, self.value);
         for [at, amplitude, phase, rate, sweep] in &self.oscillators {
             let tau = t - *at;
             let (sin, _) = sweep.fma(tau, *rate).fma(tau, *phase).sin_cos();

@@ -1,5 +1,6 @@
 //! One waveform of one run: its straight line or oscillator at a given time, and the time of its next breakpoint.
 
+use super::rounded::{rounded, TrapezoidFigure, TriangleFigure};
 use super::Wave;
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -15,12 +16,13 @@ pub struct Term {
     pub values: Arc<[f64]>,
 }
 
-/// `value + slope (t - at)` until `until`.
+/// `value + (slope + curve (t - at)) (t - at)` until `until`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {
     pub at: f64,
     pub value: f64,
     pub slope: f64,
+    pub curve: f64,
     pub until: f64,
 }
 
@@ -65,12 +67,12 @@ impl Cycle {
 const NEVER: f64 = f64::INFINITY;
 
 impl Line {
-    fn constant(value: f64, until: f64) -> Self {
-        Self { at: 0.0, value, slope: 0.0, until }
+    pub fn constant(value: f64, until: f64) -> Self {
+        Self { at: 0.0, value, slope: 0.0, curve: 0.0, until }
     }
     /// Through two points, exact at the first.
     fn through(t0: f64, v0: f64, t1: f64, v1: f64) -> Self {
-        Self { at: t0, value: v0, slope: (v1 - v0) / (t1 - t0), until: t1 }
+        Self { at: t0, value: v0, slope: (v1 - v0) / (t1 - t0), curve: 0.0, until: t1 }
     }
     fn shifted(self, offset: f64) -> Self {
         Self { at: self.at + offset, until: self.until + offset, ..self }
@@ -91,7 +93,7 @@ impl Term {
             Wave::Step if t < p[2] => Line::constant(p[0], p[2]),
             Wave::Step => Line::constant(p[1], NEVER),
             Wave::Ramp if t < p[2] => Line::constant(p[0], p[2]),
-            Wave::Ramp if t < p[3] => Line { at: p[2], value: p[0], slope: p[1], until: p[3] },
+            Wave::Ramp if t < p[3] => Line { at: p[2], value: p[0], slope: p[1], curve: 0.0, until: p[3] },
             Wave::Ramp => Line::constant(p[0] + p[1] * (p[3] - p[2]), NEVER),
             Wave::Sine => self.sine_line(t),
             Wave::Chirp => self.chirp_line(t),
@@ -175,6 +177,12 @@ impl Term {
     fn triangle(&self, t: f64) -> Line {
         let p = &self.parameters;
         let (amplitude, frequency, bias, start, end) = (p[0], p[1], p[3], p[4], p[5]);
+        if p[6] > 0.0 {
+            // Entered where it stands when the run begins, at the latest.
+            let begin = start.max(0.0);
+            let entered = 4.0 * (p[2] / TAU + frequency * (begin - start));
+            return rounded(&TriangleFigure::new(amplitude, frequency, entered, bias), p[6], begin, t);
+        }
         let time = t.max(start).min(end);
         // Quarter periods since the rising crossing of the bias.
         let quarters = 4.0 * (p[2] / TAU + frequency * (time - start));
@@ -187,12 +195,17 @@ impl Term {
             let until = if t < start { start } else { NEVER };
             return Line::constant(bias + slope * (time - at), until);
         }
-        Line { at, value: bias, slope, until: (at + 0.25 / frequency).min(end) }
+        Line { at, value: bias, slope, curve: 0.0, until: (at + 0.25 / frequency).min(end) }
     }
 
     fn trapezoid(&self, t: f64) -> Line {
         let p = &self.parameters;
         let (low, high, start, repeat) = (p[0], p[1], p[6], p[7] != 0.0);
+        if p[8] > 0.0 {
+            let begin = start.max(0.0);
+            let figure = TrapezoidFigure::new([low, high], [p[2], p[3], p[4], p[5]], repeat, begin - start);
+            return rounded(&figure, p[8], begin, t);
+        }
         if t < start {
             return Line::constant(low, start);
         }

@@ -39,6 +39,12 @@ const fn p(name: &'static str, unit: &'static str, default: Option<f64>, text: &
 const START: WaveParameter = p("start", "s", Some(0.0), "before it the term holds its starting value");
 const END: WaveParameter = p("end", "s", Some(f64::INFINITY), "after it the term holds the value it had then");
 const BIAS: WaveParameter = p("bias", "", Some(0.0), "mean value");
+const ACCELERATION: WaveParameter = p(
+    "acceleration",
+    "/s2",
+    Some(0.0),
+    "largest second derivative: corners become parabolas and the motion begins from rest; 0: sharp corners",
+);
 const REPEAT: WaveParameter = p("repeat", "1", Some(1.0), "1: starts again after its last point, 0: holds its last value");
 
 /// Every waveform.
@@ -96,7 +102,7 @@ pub fn catalogue() -> &'static [WaveRecord] {
             wave: Wave::Triangle,
             kind: "triangle",
             text: "triangle about the bias, rising through it at start when the phase is zero",
-            parameters: &[p("amplitude", "", None, "peak value"), p("frequency", "Hz", None, "frequency"), p("phase", "rad", Some(0.0), "phase at start, 2 pi a period"), BIAS, START, END],
+            parameters: &[p("amplitude", "", None, "peak value"), p("frequency", "Hz", None, "frequency"), p("phase", "rad", Some(0.0), "phase at start, 2 pi a period"), BIAS, START, END, ACCELERATION],
         },
         WaveRecord {
             wave: Wave::Trapezoid,
@@ -111,6 +117,7 @@ pub fn catalogue() -> &'static [WaveRecord] {
                 p("hold_low", "s", Some(0.0), "time at the lower level after the fall"),
                 START,
                 REPEAT,
+                ACCELERATION,
             ],
         },
         WaveRecord {

@@ -41,17 +41,25 @@ class Profile:
         m/s, peak; of a sweep that of its first cycle, whose end has twice this rate.
     duration : float
         s.
+    acceleration : float
+        m/s2, at which the corners of a triangle or a trapezoid are rounded; 0: sharp, as the
+        paper draws them.
     """
 
     name: str
     amplitude: float
     rate: float
     duration: float
+    acceleration: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what is no profile."""
         if self.name not in PROFILES:
             raise unknown("profile", self.name, PROFILES)
+        if self.acceleration and self.name not in ("trapezoidal", "triangular"):
+            raise InputError(
+                f"profile {self.name}: has no corners to round; acceleration must be 0"
+            )
         if self.amplitude < 0.0 or self.rate <= 0.0 or self.duration <= 0.0:
             raise InputError(
                 f"profile {self.name}: amplitude {self.amplitude:g} m must not be negative; rate "
@@ -74,10 +82,10 @@ class Profile:
 
     @property
     def peak_acceleration(self) -> float:
-        """Largest commanded acceleration between corners, m/s2."""
+        """Largest commanded acceleration, m/s2; sharp corners, which ask for any, left out."""
         if self.name in ("sinusoidal", "sweep") and self.amplitude > 0.0:
             return self.peak_rate**2 / self.amplitude
-        return 0.0
+        return self.acceleration
 
     @property
     def period(self) -> float:
@@ -102,11 +110,14 @@ class Profile:
             return {
                 "kind": "trapezoid", "low": -a, "high": a, "rise": ramp, "fall": ramp,
                 "hold_high": HOLD, "hold_low": HOLD, "start": -0.5 * ramp,
+                "acceleration": self.acceleration,
             }  # fmt: skip
         if self.name == "sinusoidal":
             return {"kind": "sine", "amplitude": a, "frequency": v / (2.0 * math.pi * a)}
         if self.name == "triangular":
-            return {"kind": "triangle", "amplitude": a, "frequency": v / (4.0 * a)}
+            frequency = v / (4.0 * a)
+            return {"kind": "triangle", "amplitude": a, "frequency": frequency,
+                    "acceleration": self.acceleration}  # fmt: skip
         period = 2.0 * math.pi * a / v
         return {
             "kind": "period_sweep", "amplitude": a, "start_period": period,
