@@ -180,6 +180,7 @@ pub fn check<'py>(py: Python<'py>, wiring: &str, fidelity: &str, parameters: PyR
     let model = model(wiring, fidelity)?;
     let raw = vector(model, &parameters)?;
     dicts(py, model.check(&raw), |d, f| {
+        d.set_item("severity", f.severity.name())?;
         d.set_item("path", f.path)?;
         d.set_item("value", f.value)?;
         d.set_item("limit", f.limit)?;

@@ -1,6 +1,7 @@
 //! Runs as the caller describes them, resolved to the core's indices. Everything is checked here, so that the
 //! core never sees a name or a length it does not expect.
 
+use elevon_core::actuator::Severity;
 use elevon_core::command::{catalogue, SourcePlan, Term, Wave};
 use elevon_core::fault::{whole, FaultKind, FaultSpec, Op, Profile, Write};
 use elevon_core::registry::Model;
@@ -168,7 +169,7 @@ impl Resolver {
         let faults = self.faults(&faults)?;
         let broken = whole(&parameters, &faults);
         in_range(self.model, &broken, "the faults at their whole severity: ")?;
-        if let Some(finding) = self.model.check_faulted(&broken).into_iter().next() {
+        if let Some(finding) = self.model.check_faulted(&broken).into_iter().find(|f| f.severity == Severity::Error) {
             return Err(bad(format!("the faults at their whole severity: {}", finding.message)));
         }
         let duration: f64 = need(d, "duration")?.extract()?;

@@ -50,17 +50,55 @@ impl Setup<'_> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Tick {
     pub period: Steps,
+    /// Step of its first occurrence.
+    pub first: Steps,
     /// What the wiring does then.
     pub kind: u8,
+}
+
+impl Tick {
+    /// From the start on.
+    pub fn every(period: Steps, kind: u8) -> Self {
+        Self { period, first: 0, kind }
+    }
+}
+
+/// Does a finding stop the run, or only say what to expect of it?
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    Error,
+    Warning,
+}
+
+impl Severity {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Error => "error",
+            Self::Warning => "warning",
+        }
+    }
 }
 
 /// A finding of the cross-parameter checks.
 #[derive(Clone, Debug)]
 pub struct Finding {
+    pub severity: Severity,
     pub path: String,
     pub value: f64,
     pub limit: f64,
     pub message: String,
+}
+
+impl Finding {
+    /// The run cannot be.
+    pub fn error(path: &str, value: f64, limit: f64, message: String) -> Self {
+        Self { severity: Severity::Error, path: path.to_string(), value, limit, message }
+    }
+
+    /// The run can be; its user should know.
+    pub fn warning(path: &str, value: f64, limit: f64, message: String) -> Self {
+        Self { severity: Severity::Warning, ..Self::error(path, value, limit, message) }
+    }
 }
 
 /// A quantity watched for divergence.

@@ -68,7 +68,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         let ticks = W::ticks(&first.parameters, &structure);
         let rows = (0..chunks).map(|c| Rows::new(c * S::LANES, real, clocks, &faults, steps, &lift)).collect();
         let mut block = Self {
-            tick_due: vec![0; ticks.len()],
+            tick_due: ticks.iter().map(|tick| tick.first).collect(),
             clock_due: vec![0; clocks.len()],
             runs,
             real,

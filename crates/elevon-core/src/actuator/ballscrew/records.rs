@@ -135,7 +135,7 @@ pub const LOW: &[Signal] = &extended::<{ signals::LOW.len() + LOW_OWN.len() }>(
 );
 
 fn finding(path: &str, value: f64, limit: f64, message: String) -> Finding {
-    Finding { path: path.to_string(), value, limit, message }
+    Finding::error(path, value, limit, message)
 }
 
 /// What a screw cannot be.

@@ -15,7 +15,7 @@ use crate::transmission::roller_screw::ScrewParameter as Screw;
 use crate::transmission::train_friction::{TrainFrictionParameter as Friction, SPEEDS};
 
 fn finding(path: &str, value: f64, limit: f64, message: String) -> Finding {
-    Finding { path: path.to_string(), value, limit, message }
+    Finding::error(path, value, limit, message)
 }
 
 /// `low` below (or, with `equal`, not above) `high`.

@@ -24,7 +24,7 @@ const MODES: &[&str] = &["gear"];
 const ACTIONS: &[&str] = sequence::COMMANDS;
 
 fn control_tick(period: f64, dt: f64) -> Vec<Tick> {
-    vec![Tick { period: ((period / dt).round() as Steps).max(1), kind: 0 }]
+    vec![Tick::every(((period / dt).round() as Steps).max(1), 0)]
 }
 
 fn watch<S: Scalar>(body: &body::Body<S>, current: S) -> [Watch<S>; WATCHED] {

@@ -18,7 +18,7 @@ use crate::transmission::gear::{GearParameter, LoadParameter, StopParameter};
 use crate::transmission::play::{PlayModel, PlayParameter};
 
 pub fn finding(path: &str, value: f64, limit: f64, message: String) -> Finding {
-    Finding { path: path.to_string(), value, limit, message }
+    Finding::error(path, value, limit, message)
 }
 
 fn drive(raw: &[f64]) -> DriveKind {

@@ -66,7 +66,7 @@ impl<F: Form> Wiring for High<F> {
         let mut ticks = Vec::new();
         let mut add = |present: bool, index: usize, kind: u8| {
             if present {
-                ticks.push(Tick { period: sample_steps(raw, index).max(1), kind });
+                ticks.push(Tick::every(sample_steps(raw, index).max(1), kind));
             }
         };
         add(raw[ControlParameter::NoiseDeviation.at()] != 0.0, ControlParameter::NoiseSampleTime.at(), TICK_COMMAND_NOISE);

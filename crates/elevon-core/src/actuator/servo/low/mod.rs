@@ -394,10 +394,10 @@ impl<F: Form> Wiring for Low<F> {
         let period = |seconds: f64| ((seconds / raw[LowParameter::Step.at()]).round() as Steps).max(1);
         let mut ticks = Vec::new();
         if structure.heat {
-            ticks.push(Tick { period: period(raw[ThermalParameter::SampleTime.at()]), kind: TICK_THERMAL });
+            ticks.push(Tick::every(period(raw[ThermalParameter::SampleTime.at()]), TICK_THERMAL));
         }
         if structure.debris {
-            ticks.push(Tick { period: period(raw[ControlParameter::SampleTime.at()]), kind: TICK_DEBRIS });
+            ticks.push(Tick::every(period(raw[ControlParameter::SampleTime.at()]), TICK_DEBRIS));
         }
         ticks
     }
