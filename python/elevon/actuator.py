@@ -113,8 +113,9 @@ class Actuator:
     def findings(self, fidelity: str = "high") -> list[dict[str, Any]]:
         """Return what the core says against these values together (empty when nothing).
 
-        Each finding has ``path``, ``value``, ``limit`` and ``message``: a step too large for a
-        named pole, gains that cannot be stable, limits the wrong way round.
+        Each finding has ``severity``, ``path``, ``value``, ``limit`` and ``message``: a step too
+        large for a named pole, gains that cannot be stable, limits the wrong way round. With an
+        ``error`` nothing runs; a ``warning`` says what to expect.
         """
         from elevon import _core
 

@@ -175,7 +175,6 @@ def test_overrides_keep_the_old_value_and_leave_the_original_alone():
     [
         ("solver.step", 1e-4, "derivative_filter"),
         ("solver.step", 0.1, "electrical pole"),
-        ("control.speed_gain", 0.5, "acts like an added inertia"),
     ],
 )
 def test_values_that_contradict_each_other_are_refused_before_the_run(path, value, named):

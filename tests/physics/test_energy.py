@@ -29,7 +29,7 @@ ELASTIC = {
     "load.inertia": 0.5,
     "load.stiffness": 0.8,
 }
-LOSSY = {"inverter.on_resistance": 0.2, "inverter.diode_drop": 1.0, "inverter.dead_time": 2e-6}
+LOSSY = {"inverter.on_resistance": 0.2, "inverter.diode_drop": 1.0, "inverter.dead_time": 2.4e-6}
 
 
 DRIVES = {

@@ -169,6 +169,58 @@ def test_decoupling_keeps_the_direct_current_at_zero() -> None:
     assert disturbance(True) < 0.6 * disturbance(False)
 
 
+@pytest.mark.parametrize(
+    "fault",
+    [
+        {"kind": "offset", "place": "sensor.resolver", "severity": "0.3 rad"},
+        {"kind": "dropout", "place": "sensor.resolver", "severity": 0.5, "period": "20 ms"},
+    ],
+)
+def test_a_track_of_its_own_keeps_the_carrier_drives_field(fault: dict) -> None:
+    """Torque mode under load at 4 A, resolver wrong: with the field's own track torque and direct
+    current are the healthy ones; with the resolver's angle they are not.
+    """
+
+    def quiet(source: str, faults: list[dict]) -> tuple[float, float]:
+        rec = run(
+            MOTOR | PWM | {"drive.commutation_source": source},
+            duration=0.12,
+            mode="torque",
+            command=[constant(4.0)],
+            record="motor_torque,current_d@4 kHz",
+            scenario={"fault": faults, "load": {"brake": {"terms": [constant(3.0)]}}},
+        )
+        late = rec["motor_torque"].time > 0.06
+        return (
+            float(np.mean(rec["motor_torque"].values[late])),
+            float(np.max(np.abs(rec["current_d"].values[late]))),
+        )
+
+    healthy, own = quiet("resolver", []), quiet("separate", [fault])
+    assert own == healthy
+    lost = quiet("resolver", [fault])
+    assert lost[0] < 0.97 * healthy[0]
+    assert lost[1] > 5 * healthy[1]
+
+
+def test_computation_delay_moves_the_first_pulse() -> None:
+    """Locked, a step of the reference at the start, which the sampling at 125 us sees first. With
+    the reference m of half the link in one phase and -m in the others, legs differ where the
+    carrier, one way in each half period, lies between: 62.5 us (1 - m) after its begin. Half a
+    sample late is the middle of it.
+    """
+
+    def first(delay: float) -> float:
+        rec = locked_pwm(2.0, rate="1 MHz", **{"pwm.computation_delay": delay})
+        return float(rec["current_q"].time[np.argmax(rec["current_q"].values > 0.0)])
+
+    height = PWM["pwm.proportional_gain"] * 2.0 / (1.5 * K) / (SUPPLY / 2) * 0.75
+    early = 62.5e-6 * (1 - height)
+    assert first(0.0) == pytest.approx(125e-6 + early, abs=3e-6)
+    assert first(0.5) == pytest.approx(187.5e-6, abs=3e-6)
+    assert first(1.0) == pytest.approx(250e-6 + early, abs=3e-6)
+
+
 def test_on_resistance_adds_to_the_winding() -> None:
     """Locked and fully driven, two switches of R_on in the loop: i_a = (2/3 V) / (R + R_on)."""
     extra = {

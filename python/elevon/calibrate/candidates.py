@@ -210,7 +210,7 @@ def _controller(actuator: Actuator, found: DirectEstimate, kt: float) -> dict[st
 def tamed(actuator: Actuator, values: Mapping[str, str | float]) -> dict[str, float]:
     """Return a shorter derivative time where gain times it would exceed the inertia, else nothing.
 
-    The model refuses such a pair: it acts like an inertia larger than the real one.
+    Such a pair acts like an inertia larger than the real one; a drive with a tick does not bear it.
     """
 
     def value(path: str) -> float:

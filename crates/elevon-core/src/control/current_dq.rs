@@ -21,6 +21,8 @@ variables! {
             high_only("a first-order lag stands for carrier, sampling and integral").when(&[Chosen("drive.kind", &["pwm"])]);
         EmfConstant => "emf_constant", "k_hat", "V s/rad", NonNegative, Controller, Some(0.0), "phase EMF constant (peak) the feed-forward believes",
             high_only("a first-order lag stands for carrier, sampling and integral").when(&[Chosen("drive.kind", &["pwm"])]);
+        ComputationDelay => "computation_delay", "d", "1", Unit, Controller, Some(1.0), "sample times from the sampling of the currents until the duties computed from them act: 1, the usual drive, at the next sampling; 0: at once",
+            high_only("a first-order lag stands for carrier, sampling and integral").when(&[Chosen("drive.kind", &["pwm"])]);
     }
 }
 
@@ -43,6 +45,8 @@ pub struct CurrentControlState<S> {
     pub voltage_q: S,
     /// Phase voltage references over half the supply, to be compared with the carrier.
     pub modulation: [S; 3],
+    /// Those of the last sample, which act after the computation delay.
+    computed: [S; 3],
 }
 
 /// What the current controller sees at a tick.
@@ -57,6 +61,15 @@ pub struct CurrentSample<S> {
     pub supply: S,
 }
 
+/// Proportional gain, in units of inductance per sample time, at which the current loop oscillates: with the duties
+/// acting a share `delay` of a sample late, i(k+1) = i(k) + g (delay v(k-1) + (1 - delay) v(k)), v = -i, and Jury's
+/// conditions on z^2 - (1 - g (1 - delay)) z + g delay are g delay < 1 and g (1 - 2 delay) < 2.
+pub fn largest_gain(delay: f64) -> f64 {
+    let alternating = if delay < 0.5 { 2.0 / (1.0 - 2.0 * delay) } else { f64::INFINITY };
+    let turning = if delay > 0.0 { 1.0 / delay } else { f64::INFINITY };
+    alternating.min(turning)
+}
+
 impl<S: Scalar> CurrentControl<S> {
     pub fn derive(raw: &[S], pole_pairs: S) -> Self {
         use PwmParameter as P;
@@ -68,8 +81,8 @@ impl<S: Scalar> CurrentControl<S> {
             emf_constant: g(P::EmfConstant),
             pole_pairs,
             frequency: g(P::Frequency),
-            // The voltage acts over the coming tick: turn it by half of what the rotor moves meanwhile.
-            lead: S::splat(0.5) * g(P::SampleTime) * pole_pairs,
+            // The voltage acts over a tick after the delay: turn it by what the rotor moves until the middle of that tick.
+            lead: (S::splat(0.5) + g(P::ComputationDelay)) * g(P::SampleTime) * pole_pairs,
         }
     }
 
@@ -101,7 +114,7 @@ impl<S: Scalar> CurrentControl<S> {
         let high = phase[0].maximum(phase[1]).maximum(phase[2]);
         let low = phase[0].minimum(phase[1]).minimum(phase[2]);
         let shift = S::splat(0.5) * (high + low);
-        s.modulation = three!(|j| phase[j] - shift);
+        s.computed = three!(|j| phase[j] - shift);
     }
 
     /// Gate signals: +1 while the reference stands above the triangular carrier, else -1.
@@ -117,6 +130,54 @@ impl<S: Scalar> CurrentControl<S> {
 impl<S: Scalar> CurrentControlState<S> {
     pub fn rest() -> Self {
         let zero = S::zero();
-        Self { integral_d: zero, integral_q: zero, voltage_d: zero, voltage_q: zero, modulation: [zero; 3] }
+        Self { integral_d: zero, integral_q: zero, voltage_d: zero, voltage_q: zero, modulation: [zero; 3], computed: [zero; 3] }
+    }
+
+    /// The duties computed from the last sample act from now on.
+    #[inline(always)]
+    pub fn update(&mut self) {
+        self.modulation = self.computed;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD: f64 = 125e-6;
+
+    /// A winding without resistance behind the controller, sampled each period; the error after a unit step.
+    fn errors(gain: f64, delay: f64, samples: usize) -> Vec<f64> {
+        let (inductance, supply) = (30e-3, 1e4);
+        let mut raw = vec![0.0; PWM.len()];
+        raw[PwmParameter::SampleTime as usize] = PERIOD;
+        raw[PwmParameter::ProportionalGain as usize] = gain * inductance / PERIOD;
+        raw[PwmParameter::ComputationDelay as usize] = delay;
+        let control = CurrentControl::derive(&raw, 4.0);
+        let mut state = CurrentControlState::rest();
+        let mut current = 0.0;
+        let mut errors = Vec::new();
+        for _ in 0..samples {
+            let sample =
+                CurrentSample { reference_d: 0.0, reference_q: 1.0, current_d: 0.0, current_q: current, speed: 0.0, angle: 0.0, supply };
+            // At angle zero the quadrature voltage stands between the phases c and b.
+            let volts = |s: &CurrentControlState<f64>| (s.modulation[2] - s.modulation[1]) * supply / (2.0 * 3.0_f64.sqrt());
+            let before = volts(&state);
+            control.step(&mut state, &sample);
+            state.update();
+            current += PERIOD / inductance * (delay * before + (1.0 - delay) * volts(&state));
+            errors.push(1.0 - current);
+        }
+        errors
+    }
+
+    #[test]
+    fn an_integrating_winding_is_stable_up_to_the_gain_of_the_delay() {
+        for delay in [0.0, 0.3, 0.5, 1.0] {
+            let limit = largest_gain(delay);
+            let size = |share: f64| errors(share * limit, delay, 600).iter().rev().take(9).fold(0.0, |a: f64, b| a.max(b.abs()));
+            assert!(size(0.97) < 0.05, "{delay}: {}", size(0.97));
+            assert!(size(1.03) > 1.0, "{delay}: {}", size(1.03));
+        }
     }
 }

@@ -3,6 +3,10 @@
 //! A leg is high, low or off. Off, its diodes conduct by the sign of the phase current; at zero current the
 //! phase floats until its terminal voltage v_n + e_j leaves the rails. The neutral voltage sums the
 //! connected phases only. A shorted switch whose partner is gated shoots through: the drive trips.
+//!
+//! Dead time need not be whole steps: in the step in which a switch closes, its leg shows the mean of diode and switch
+//! over the step. The volt-seconds are exact for a current that keeps its sign within the step; a leg without current
+//! has no diode to follow and is given to its switch at once.
 
 use crate::scalar::Scalar;
 use crate::three;
@@ -58,12 +62,11 @@ pub struct Bridge<S> {
     trip_current: S,
     open: [[S; 2]; 3],
     shorted: [[S; 2]; 3],
-    dt: S,
 }
 
 #[derive(Clone, Copy, Debug)]
 pub struct BridgeState<S> {
-    /// Time left before the newly commanded switch closes.
+    /// Time left at the end of the last step before the newly commanded switch closes.
     blanking: [S; 3],
     /// 1 once the drive has tripped: no gate signals any more.
     pub tripped: S,
@@ -113,7 +116,7 @@ pub struct Windings<S> {
 }
 
 impl<S: Scalar> Bridge<S> {
-    pub fn derive(raw: &[S], dt: f64) -> Self {
+    pub fn derive(raw: &[S]) -> Self {
         use InverterParameter as P;
         let g = |p: P| raw[p as usize];
         let pairs = |first: P| -> [[S; 2]; 3] { three!(|j| std::array::from_fn(|i| raw[first as usize + 2 * j + i])) };
@@ -124,30 +127,59 @@ impl<S: Scalar> Bridge<S> {
             trip_current: g(P::TripCurrent),
             open: pairs(P::OpenAHigh),
             shorted: pairs(P::ShortedAHigh),
-            dt: S::splat(dt),
         }
     }
 
-    /// Gate signals after dead time: which switch of each leg conducts.
+    /// Gate signals after dead time: which switch of each leg conducts at the end of a step of `dt`, and the share of
+    /// the step before it closes.
     #[inline(always)]
-    fn gates(&self, s: &mut BridgeState<S>, old: [S; 3], new: [S; 3]) -> [[S::Mask; 2]; 3] {
-        let zero = S::zero();
-        let tiny = S::splat(0.5);
+    fn gates(&self, s: &mut BridgeState<S>, old: [S; 3], new: [S; 3], dt: S) -> ([[S::Mask; 2]; 3], Option<[S; 3]>) {
+        let (zero, one) = (S::zero(), S::one());
         let changed: [S::Mask; 3] = three!(|j| !old[j].equals(new[j]));
         let blank = s.blanking[0].maximum(s.blanking[1]).maximum(s.blanking[2]);
+        let mut off = None;
         if S::any(changed[0] | changed[1] | changed[2] | zero.lt(blank)) {
-            s.blanking = three!(|j| S::select(changed[j], self.dead_time, (s.blanking[j] - self.dt).maximum(zero)));
+            let left: [S; 3] = three!(|j| S::select(changed[j], self.dead_time, s.blanking[j]));
+            s.blanking = three!(|j| (left[j] - dt).maximum(zero));
+            // Whole steps but for rounding are whole steps.
+            let tiny = S::splat(1e-6);
+            off = Some(three!(|j| {
+                let share = left[j] / dt;
+                let share = S::select((one - tiny).lt(share), one, share);
+                S::select(share.lt(tiny), zero, share)
+            }));
         }
-        let running = s.tripped.le(tiny);
-        three!(|j| {
-            let live = s.blanking[j].le(tiny * self.dt) & running;
+        let running = s.tripped.le(S::splat(0.5));
+        let gates = three!(|j| {
+            let live = match off {
+                Some(off) => off[j].lt(one) & running,
+                None => running,
+            };
             [live & zero.lt(new[j]), live & new[j].lt(zero)]
-        })
+        });
+        (gates, off)
     }
 
-    /// Legs from the commands (+1 high, -1 low, 0 off) and the windings; `None` when every leg is held by a switch,
-    /// as it is most of the time, then with the terminal voltages and rails alone.
+    /// Mean of diode and switch over a step in which a leg is off for the share `off` of its begin.
     #[inline(always)]
+    fn blank(&self, legs: &mut Legs<S>, off: [S; 3], half_supply: S, current: [S; 3]) {
+        let (zero, one, tiny) = (S::zero(), S::one(), S::splat(0.5));
+        let diode = half_supply + self.diode_drop;
+        for j in 0..3 {
+            let held = tiny.lt(self.shorted[j][0]) | tiny.lt(self.shorted[j][1]);
+            let within = zero.lt(off[j]) & off[j].lt(one) & !current[j].equals(zero) & !held;
+            let positive = zero.lt(current[j]);
+            let voltage = off[j].fma(S::select(positive, -diode, diode) - legs.voltage[j], legs.voltage[j]);
+            let rail = off[j].fma(S::select(positive, -half_supply, half_supply) - legs.rail[j], legs.rail[j]);
+            legs.voltage[j] = S::select(within, voltage, legs.voltage[j]);
+            legs.rail[j] = S::select(within, rail, legs.rail[j]);
+        }
+    }
+
+    /// Legs over a step of `dt` from the commands (+1 high, -1 low, 0 off) and the windings; `None` when every leg is held
+    /// by a switch, as it is most of the time, then with the terminal voltages and rails alone.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
     pub fn connect(
         &self,
         s: &mut BridgeState<S>,
@@ -156,9 +188,10 @@ impl<S: Scalar> Bridge<S> {
         new: [S; 3],
         half_supply: S,
         w: &Windings<S>,
+        dt: S,
     ) -> Connection<S> {
         let tiny = S::splat(0.5);
-        let mut gates = self.gates(s, old, new);
+        let (mut gates, off) = self.gates(s, old, new, dt);
         if structure.switch_faults {
             gates = three!(|j| [
                 (gates[j][0] & self.open[j][0].le(tiny)) | tiny.lt(self.shorted[j][0]),
@@ -179,6 +212,9 @@ impl<S: Scalar> Bridge<S> {
             connected: [S::mask(true); 3],
             passive: three!(|j| !(gates[j][0] | gates[j][1])),
         };
+        if let Some(off) = off {
+            self.blank(&mut legs, off, half_supply, w.current);
+        }
         let all_held = !S::any(legs.passive[0] | legs.passive[1] | legs.passive[2]);
         if all_held && !structure.open_phases {
             return Connection { legs, loose: None };
@@ -258,10 +294,10 @@ impl<S: Scalar> BridgeState<S> {
         Self { blanking: [S::zero(); 3], tripped: S::zero() }
     }
 
-    /// After the second part of a step: blanking counts whole steps, and lanes without a second part keep the first.
+    /// After the second part of a step: lanes without one keep the state after the first.
     #[inline(always)]
     pub fn keep(&mut self, second: S::Mask, first: &Self) {
-        self.blanking = first.blanking;
+        self.blanking = three!(|j| S::select(second, self.blanking[j], first.blanking[j]));
         self.tripped = S::select(second, self.tripped, first.tripped);
     }
 }
@@ -285,4 +321,66 @@ pub fn quench<S: Scalar>(legs: &Legs<S>, old: [S; 3], new: [S; 3]) -> [S; 3] {
     let whole = count.equals(zero) | count.equals(S::splat(3.0));
     let share = S::select(whole, zero, residue / count.maximum(S::one()));
     three!(|j| current[j] - carrying[j] * share)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HALF: f64 = 190.0;
+    const DROP: f64 = 1.5;
+    const STEP: f64 = 1e-6;
+
+    fn bridge(dead_time: f64) -> Bridge<f64> {
+        let mut raw = vec![0.0; INVERTER.len()];
+        raw[InverterParameter::DeadTime as usize] = dead_time;
+        raw[InverterParameter::DiodeDrop as usize] = DROP;
+        Bridge::derive(&raw)
+    }
+
+    fn windings(current: f64) -> Windings<f64> {
+        let current = [current, -0.5 * current, -0.5 * current];
+        Windings { current, emf: [0.0; 3], per_inductance: [30.0; 3], resistance: [1.0; 3], open: [0.0; 3] }
+    }
+
+    /// Volt-seconds of leg a over `steps` steps that begin with its command changing to `new`.
+    fn volt_seconds(dead_time: f64, new: f64, current: f64, steps: usize) -> f64 {
+        let bridge = bridge(dead_time);
+        let mut state = BridgeState::rest();
+        let (mut old, legs) = ([-new, -1.0, -1.0], [new, -1.0, -1.0]);
+        let mut sum = 0.0;
+        for _ in 0..steps {
+            let c = bridge.connect(&mut state, &BridgeStructure::default(), old, legs, HALF, &windings(current), STEP);
+            sum += c.legs.voltage[0] * STEP;
+            old = legs;
+        }
+        sum
+    }
+
+    #[test]
+    fn dead_time_has_its_volt_seconds_at_any_length() {
+        for dead_time in [0.0, 0.2e-6, 0.5e-6, 0.7e-6, 1e-6, 2e-6, 2.5e-6, 4.3e-6] {
+            for (new, current) in [(1.0, 3.0), (1.0, -3.0), (-1.0, 3.0), (-1.0, -3.0)] {
+                let diode = if current > 0.0 { -HALF - DROP } else { HALF + DROP };
+                let exact = dead_time * diode + (8.0 * STEP - dead_time) * new * HALF;
+                let got = volt_seconds(dead_time, new, current, 8);
+                assert!((got - exact).abs() < 1e-12, "{dead_time} {new} {current}: {got} {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_transition_split_within_a_step_begins_its_dead_time_there() {
+        let bridge = bridge(0.5e-6);
+        let mut state = BridgeState::rest();
+        let structure = BridgeStructure::default();
+        let (low, high) = ([-1.0; 3], [1.0, -1.0, -1.0]);
+        let mut part = |old, new, dt| {
+            let c = bridge.connect(&mut state, &structure, old, new, HALF, &windings(3.0), dt);
+            c.legs.voltage[0] * dt
+        };
+        let sum = part(low, low, 0.7e-6) + part(low, high, 0.3e-6) + part(high, high, STEP);
+        let exact = -0.7e-6 * HALF - 0.5e-6 * (HALF + DROP) + 0.8e-6 * HALF;
+        assert!((sum - exact).abs() < 1e-12, "{sum} {exact}");
+    }
 }

@@ -68,7 +68,7 @@ fn part<S: Scalar>(
     let i = start;
     let emf: [S; 3] = three!(|j| k[j] * speed);
     let windings = Windings { current: i, emf, per_inductance: m.c.star.per_inductance, resistance, open: m.c.star.open };
-    let connection = m.bridge.connect(&mut s.bridge, structure, s.legs, legs, half_supply, &windings);
+    let connection = m.bridge.connect(&mut s.bridge, structure, s.legs, legs, half_supply, &windings, dt);
     let state = connection.legs;
     let all = state.connected[0] & state.connected[1] & state.connected[2];
     let plain = m.c.star.neutral(three!(|j| (-resistance[j]).fma(i[j], state.voltage[j] - emf[j])));
@@ -221,7 +221,7 @@ impl Wiring for High {
         let mechanical = raw[SolverParameter::MechanicalStep.at()];
         Model {
             c: Constants::derive(raw, structure, dt, mechanical),
-            bridge: Bridge::derive(&terminals(raw), dt.lane(0)),
+            bridge: Bridge::derive(&terminals(raw)),
             per_torque_steps: S::one() / mechanical,
             mechanical: ((mechanical.lane(0) / dt.lane(0)).round() as Steps).max(1),
         }

@@ -3,7 +3,8 @@
 use super::form::Form;
 use super::layout::*;
 use crate::actuator::Finding;
-use crate::control::current_dq::PwmParameter;
+use crate::control::current_dq::{largest_gain, PwmParameter};
+use crate::control::derivative::{Carrier, Relays, SpeedLoop};
 use crate::control::position_speed::ControlParameter as Control;
 use crate::inverter::bridge::InverterParameter as Inverter;
 use crate::motor::equivalent::LowParameter;
@@ -31,17 +32,68 @@ fn step_limit(out: &mut Vec<Finding>, dt: f64, limit: f64, pole: &str) {
     }
 }
 
-/// Torque per speed error times derivative time acts like an inertia; above the real one no discretisation is stable.
-fn derivative_inertia(out: &mut Vec<Finding>, raw: &[f64], inertia: f64) {
-    let gain = raw[Control::SpeedGain.at()] * raw[Control::SpeedGainScale.at()];
-    let td = raw[Control::DerivativeTime.at()];
-    if gain * td >= inertia {
-        let message = format!(
-            "control.speed_gain: K_p T_d = {gain} N m s/rad * {td} s = {:.4e} kg m2 acts like an added inertia and must stay below the real one, {inertia:.4e} kg m2; at most {:.4} N m s/rad",
-            gain * td,
-            inertia / td
-        );
-        out.push(finding("control.speed_gain", gain, inertia / td, message));
+/// Factor to the limit below which the derivative action is warned of.
+const CLOSE: f64 = 1.25;
+
+/// Speed gain at which the derivative action becomes unstable, where that is below `CLOSE` times the present one, and
+/// whether the run should not be at all beyond it.
+fn derivative_limit(raw: &[f64], inertia: f64, dt: f64) -> Option<(f64, bool)> {
+    let speed = SpeedLoop {
+        gain: raw[Control::SpeedGain.at()] * raw[Control::SpeedGainScale.at()],
+        derivative_time: raw[Control::DerivativeTime.at()],
+        filter: raw[Control::DerivativeFilter.at()],
+        tick: raw[Control::SampleTime.at()].max(dt),
+        inertia,
+    };
+    if !(speed.ratio() > 0.0 && speed.ratio().is_finite()) {
+        return None;
+    }
+    match DriveKind::read(raw[DriveParameter::Kind.at()]) {
+        DriveKind::Pwm => {
+            let carrier = Carrier {
+                proportional: raw[PwmParameter::ProportionalGain.at()],
+                integral: raw[PwmParameter::IntegralGain.at()],
+                sample: raw[PwmParameter::SampleTime.at()],
+                delay: raw[PwmParameter::ComputationDelay.at()],
+                resistance: raw[Motor::WindingResistance.at()],
+                inductance: raw[Motor::WindingInductance.at()],
+            };
+            let margin = carrier.margin(&speed, CLOSE);
+            (margin < CLOSE).then_some((margin * speed.gain, true))
+        }
+        DriveKind::Hysteresis => {
+            let slew = raw[Inverter::SupplyVoltage.at()] * (2.0 / 3.0) / raw[Motor::WindingInductance.at()];
+            let relays = Relays { half_band: raw[Inverter::HysteresisBand.at()], slew };
+            let margin = relays.largest_ratio(&speed) / speed.ratio();
+            let ticks = raw[Control::SampleTime.at()] > dt;
+            (ticks && margin < CLOSE).then_some((margin * speed.gain, relays.leaves_band(speed.tick)))
+        }
+        DriveKind::Off => None,
+    }
+}
+
+/// K_p T_d acts like an inertia; how much of it is borne depends on the drive.
+fn derivative_inertia(out: &mut Vec<Finding>, raw: &[f64], inertia: f64, dt: f64, refuse: bool) {
+    let Some((limit, grows)) = derivative_limit(raw, inertia, dt) else {
+        return;
+    };
+    let (gain, td) = (raw[Control::SpeedGain.at()] * raw[Control::SpeedGainScale.at()], raw[Control::DerivativeTime.at()]);
+    let ratio = gain * td / inertia;
+    let what = format!("control.speed_gain: K_p T_d = {gain} N m s/rad * {td} s is {ratio:.3} of the inertia, {inertia:.4e} kg m2");
+    if gain < limit {
+        let message = format!("{what}; the derivative action becomes unstable at K_p = {limit:.4} N m s/rad");
+        out.push(Finding::warning("control.speed_gain", gain, limit, message));
+    } else if grows && refuse {
+        let message = format!("{what}: more than this drive's current loop bears; at most {limit:.4} N m s/rad");
+        out.push(finding("control.speed_gain", gain, limit, message));
+    } else if refuse {
+        let message =
+            format!("{what}: the torque reference alternates from tick to tick above {limit:.4} N m s/rad, within the relays' band");
+        out.push(Finding::warning("control.speed_gain", gain, limit, message));
+    } else {
+        let message =
+            format!("{what}: stable here, where the current has no delay, but not in the high fidelity above {limit:.4} N m s/rad");
+        out.push(Finding::warning("control.speed_gain", gain, limit, message));
     }
 }
 
@@ -132,6 +184,7 @@ pub fn high<F: Form>(raw: &[f64]) -> Vec<Finding> {
     step_limit(&mut out, dt, turns * l / r, "electrical pole R / L of motor.winding_resistance and motor.winding_inductance");
     shorted_loops(&mut out, raw, dt);
     relay_band(&mut out, raw, dt, turns * turns * l);
+    current_loop(&mut out, raw, turns * turns * l);
     let rotor = raw[Motor::Inertia.at()]
         + raw[GearParameter::Inertia.at()]
         + F::screw_inertia(raw)
@@ -140,7 +193,7 @@ pub fn high<F: Form>(raw: &[f64]) -> Vec<Finding> {
     let ratio = F::ratio(raw);
     let elastic = PlayModel::read(raw[PlayParameter::Model.at()]) == PlayModel::Elastic;
     let inertia = if elastic { rotor } else { rotor + user / (ratio * ratio) };
-    derivative_inertia(&mut out, raw, inertia);
+    derivative_inertia(&mut out, raw, inertia, dt, true);
     let td = raw[Control::DerivativeTime.at()];
     if td > 0.0 && raw[Control::SampleTime.at()] == 0.0 {
         step_limit(
@@ -184,6 +237,22 @@ pub fn high<F: Form>(raw: &[f64]) -> Vec<Finding> {
         }
     }
     out
+}
+
+/// The current loop of a carrier drive against the delay of its own duties.
+fn current_loop(out: &mut Vec<Finding>, raw: &[f64], inductance: f64) {
+    if DriveKind::read(raw[DriveParameter::Kind.at()]) != DriveKind::Pwm {
+        return;
+    }
+    let (gain, sample) = (raw[PwmParameter::ProportionalGain.at()], raw[PwmParameter::SampleTime.at()]);
+    let delay = raw[PwmParameter::ComputationDelay.at()];
+    let limit = largest_gain(delay) * inductance / sample;
+    if gain >= limit {
+        let message = format!(
+            "pwm.proportional_gain: {gain} V/A makes the current loop oscillate: with pwm.sample_time {sample:e} s and pwm.computation_delay {delay} it must stay below {limit:.4} V/A"
+        );
+        out.push(finding("pwm.proportional_gain", gain, limit, message));
+    }
 }
 
 fn shorted_loops(out: &mut Vec<Finding>, raw: &[f64], dt: f64) {
@@ -238,7 +307,7 @@ pub fn low<F: Form>(raw: &[f64]) -> Vec<Finding> {
         + F::screw_inertia(raw)
         + raw[UnbalanceParameter::UnbalanceInertia.at()]
         + raw[LoadParameter::Inertia.at()] / (ratio * ratio);
-    derivative_inertia(&mut out, raw, inertia);
+    derivative_inertia(&mut out, raw, inertia, raw[SolverParameter::Step.at()], false);
     let dt = raw[LowParameter::Step.at()];
     let gain = raw[Control::SpeedGain.at()] * raw[Control::SpeedGainScale.at()];
     let effective = inertia + gain * raw[Control::DerivativeTime.at()];

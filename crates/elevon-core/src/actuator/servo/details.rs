@@ -4,6 +4,7 @@ use super::form::Form;
 use super::layout::*;
 use super::signals::HighSignal;
 use crate::actuator::Setup;
+use crate::control::current_dq::PwmParameter;
 use crate::control::position_speed::{ControlParameter, ControlStructure, Feedback};
 use crate::inverter::bridge::{BridgeStructure, InverterParameter};
 use crate::motor::star::{EmfShape, MotorParameter, MotorStructure, ShortModel};
@@ -24,6 +25,8 @@ pub struct Structure {
     pub(super) control: ControlStructure,
     pub(super) motor: MotorStructure,
     pub(super) control_every_step: bool,
+    /// Steps from the sampling of the currents to the update of the duties.
+    pub(super) duty_delay: Steps,
     pub(super) semi_implicit: bool,
     pub(super) acquisition: bool,
     pub(super) full: bool,
@@ -117,6 +120,7 @@ impl Structure {
             drive,
             control,
             motor,
+            duty_delay: duty_delay(setup.raw, drive),
             control_every_step: sample_steps(setup.raw, ControlParameter::SampleTime.at()) <= 1,
             semi_implicit: Method::read(at(SolverParameter::Method.at())) == Method::SemiImplicit,
             acquisition: setup
@@ -147,6 +151,16 @@ impl Structure {
             commutated,
             stops,
         }
+    }
+}
+
+/// Whole solver steps of a carrier drive's computation delay.
+fn duty_delay(raw: &[f64], drive: DriveKind) -> Steps {
+    let delay = raw[PwmParameter::ComputationDelay.at()] * raw[PwmParameter::SampleTime.at()];
+    if drive == DriveKind::Pwm {
+        (delay / raw[SolverParameter::Step.at()]).round() as Steps
+    } else {
+        0
     }
 }
 

@@ -84,7 +84,7 @@ pub(crate) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
     let neutral;
     if FULL && structure.bridge {
         let windings = Windings { current: i, emf, per_inductance: m.star.per_inductance, resistance, open: m.star.open };
-        let connection = m.bridge.connect(&mut s.bridge, &structure.bridge_structure, old_legs, s.legs, half_supply, &windings);
+        let connection = m.bridge.connect(&mut s.bridge, &structure.bridge_structure, old_legs, s.legs, half_supply, &windings, m.dt);
         terminal = connection.legs.voltage;
         rail = connection.legs.rail;
         let plain = m.star.neutral(drops(&terminal));

@@ -31,9 +31,9 @@ const TICK_COMMAND_NOISE: u8 = 0;
 const TICK_CURRENT_NOISE: u8 = 1;
 const TICK_CONTROL: u8 = 2;
 const TICK_CURRENT_CONTROL: u8 = 3;
-
 const TICK_THERMAL: u8 = 4;
 const TICK_DEBRIS: u8 = 5;
+const TICK_DUTIES: u8 = 6;
 
 impl<F: Form> Wiring for High<F> {
     type Structure = Structure;
@@ -64,6 +64,11 @@ impl<F: Form> Wiring for High<F> {
 
     fn ticks(raw: &[f64], structure: &Structure) -> Vec<Tick> {
         let mut ticks = Vec::new();
+        if structure.duty_delay > 0 {
+            // Before the next sampling, where both fall on one step.
+            let period = sample_steps(raw, PwmParameter::SampleTime.at()).max(1);
+            ticks.push(Tick { period, first: structure.duty_delay, kind: TICK_DUTIES });
+        }
         let mut add = |present: bool, index: usize, kind: u8| {
             if present {
                 ticks.push(Tick::every(sample_steps(raw, index).max(1), kind));
@@ -117,23 +122,22 @@ impl<F: Form> Wiring for High<F> {
                 (s.star.resistance_factor, s.star.flux_factor) = m.extra.network.factors(&s.extra.network);
             }
             TICK_DEBRIS => s.extra.scatter = m.extra.screw.scatter.fma(noise(4), S::one()).maximum(S::zero()),
+            TICK_DUTIES => s.current_control.update(),
             _ => {
                 let reading = shaft_reading::<S, true>(m, structure, s);
-                let angle = m.star.electrical_angle(reading.angle);
+                let separate = structure.resolver && !structure.commutated;
+                let (angle, speed) = if separate { (s.motor_position, s.motor_speed) } else { (reading.angle, reading.speed) };
+                let angle = m.star.electrical_angle(angle);
                 let (sin, cos) = angle.sin_cos();
                 let (sines, cosines) = three_phase(sin, cos);
                 let (current_q, current_d) = park(seen_current(m, structure, s), sines, cosines);
                 let supply = inputs[SUPPLY].at(t) * m.supply_scale;
-                let sample = CurrentSample {
-                    reference_d: S::zero(),
-                    reference_q: s.current_ref,
-                    current_d,
-                    current_q,
-                    speed: reading.speed,
-                    angle,
-                    supply,
-                };
+                let sample =
+                    CurrentSample { reference_d: S::zero(), reference_q: s.current_ref, current_d, current_q, speed, angle, supply };
                 m.current_control.step(&mut s.current_control, &sample);
+                if structure.duty_delay == 0 {
+                    s.current_control.update();
+                }
             }
         }
     }

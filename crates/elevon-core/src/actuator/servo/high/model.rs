@@ -132,7 +132,7 @@ impl<S: Scalar> Model<S> {
         Self {
             dt,
             star,
-            bridge: Bridge::derive(view.inverter(), dt0),
+            bridge: Bridge::derive(view.inverter()),
             half_band: at(InverterParameter::HysteresisBand.at()),
             supply_scale: at(InverterParameter::SupplyScale.at()),
             control: PositionSpeed::derive(view.control(), ts, ratio),
