@@ -28,6 +28,7 @@ COMMANDS: dict[str, Command] = {
     "fit-low": Command("elevon.cli.fit_low", "Tune the low model against the high one."),
     "bench": Command("elevon.cli.bench", "Run the virtual test bench's procedures."),
     "design": Command("elevon.cli.design", "Design experiments and parts."),
+    "loads": Command("elevon.cli.loads", "Turn a recorded flight into an actuator's load."),
     "import": Command("elevon.cli.import_log", "Read bench and drive logs into recordings."),
     "calibrate": Command("elevon.cli.calibrate", "Fit an actuator's parameters to logs."),
     "validate": Command(

@@ -4,6 +4,8 @@ Three layers of constant temperature gradient in geopotential altitude, hydrosta
 Source: ISO 2533:1975, equal to ICAO Doc 7488 and the U.S. Standard Atmosphere 1976 over this range.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,6 +49,16 @@ class Atmosphere:
     pressure: Array
     density: Array
     speed_of_sound: Array
+
+    def with_density(self, density: npt.ArrayLike) -> Atmosphere:
+        """Return the air of the same pressure with a measured density [kg/m3], above 0.
+
+        The temperature and the speed of sound are those of dry air of that density.
+        """
+        dense = np.asarray(density, dtype=np.float64)
+        temperature = self.pressure / (GAS_CONSTANT * dense)
+        sound = np.sqrt(HEAT_RATIO * GAS_CONSTANT * temperature)
+        return Atmosphere(temperature, self.pressure, dense, sound)
 
 
 def standard_atmosphere(

@@ -10,8 +10,9 @@ from typing import cast
 import numpy as np
 import numpy.typing as npt
 
-from elevon.errors import FormatError, InputError, RangeError, unknown
+from elevon.errors import FormatError, InputError, Interrupted, RangeError, unknown
 from elevon.loads.airspeed import AIRSPEED_KINDS, AirspeedKind
+from elevon.progress import Progress
 from elevon.units import check_kind, to_si
 
 __all__ = ["FlightData", "read_flight"]
@@ -33,12 +34,10 @@ _UNITS = {
     "equivalent_airspeed": "m/s",
     "calibrated_airspeed": "m/s",
     "mach": "1",
+    "air_density": "kg/m3",
 }
-_LIMITS = {
-    "airspeed": (0.0, np.inf),
-    "angle_of_attack": (-np.pi / 2, np.pi / 2),
-    "deflection": (-np.pi / 2, np.pi / 2),
-}
+REPORT = 1000
+"""Lines between two reports of progress."""
 _NEEDED = ("time", "altitude", "angle_of_attack", "deflection")
 
 
@@ -57,6 +56,9 @@ class FlightData:
     airspeed_kind : {"true", "equivalent", "calibrated", "mach"}
     angle_of_attack, deflection : ndarray, shape (n,)
         rad, each within +-90 deg.
+    air_density : ndarray, shape (n,), optional
+        kg/m3, above 0, as measured: it takes the place of the standard atmosphere's, and the
+        temperature follows from it at the altitude's pressure.
 
     Raises
     ------
@@ -71,11 +73,15 @@ class FlightData:
     airspeed_kind: AirspeedKind
     angle_of_attack: Array
     deflection: Array
+    air_density: Array | None = None
 
     def __post_init__(self) -> None:
         if self.airspeed_kind not in AIRSPEED_KINDS:
             raise unknown("kind of airspeed", str(self.airspeed_kind), AIRSPEED_KINDS)
-        for name in ("time", "altitude", "airspeed", "angle_of_attack", "deflection"):
+        names = ["time", "altitude", "airspeed", "angle_of_attack", "deflection"]
+        if self.air_density is not None:
+            names.append("air_density")
+        for name in names:
             values = np.array(getattr(self, name), dtype=np.float64)
             self._check_column(name, values)
             values.setflags(write=False)
@@ -94,7 +100,11 @@ class FlightData:
                 f"{name}: shape {values.shape}; every column is a series of the same length, "
                 f"at least 2 (time has {np.size(self.time)})"
             )
-        limit = {"airspeed": (0.0, np.inf), "angle_of_attack": (-np.pi / 2, np.pi / 2)}
+        limit = {
+            "airspeed": (0.0, np.inf),
+            "angle_of_attack": (-np.pi / 2, np.pi / 2),
+            "air_density": (np.finfo(float).tiny, np.inf),
+        }
         low, high = limit.get(
             "angle_of_attack" if name == "deflection" else name, (-np.inf, np.inf)
         )
@@ -107,7 +117,7 @@ class FlightData:
             )
 
 
-def read_flight(path: str | os.PathLike[str]) -> FlightData:
+def read_flight(path: str | os.PathLike[str], *, progress: Progress | None = None) -> FlightData:
     """Read flight data from a CSV file.
 
     Parameters
@@ -116,7 +126,10 @@ def read_flight(path: str | os.PathLike[str]) -> FlightData:
         UTF-8, comma separated. The first line that is not empty and not a comment (``#``) names the
         columns with their units: ``time [s],altitude [ft],calibrated_airspeed [kt],
         angle_of_attack [deg],deflection [deg]``. Exactly one airspeed column: `true_airspeed`,
-        `equivalent_airspeed`, `calibrated_airspeed` or `mach [1]`. Order free, no other columns.
+        `equivalent_airspeed`, `calibrated_airspeed` or `mach [1]`. `air_density [kg/m3]` may be
+        given. Order free, no other columns.
+    progress : callable, optional
+        Takes the fraction read; returns False to stop.
 
     Returns
     -------
@@ -127,6 +140,8 @@ def read_flight(path: str | os.PathLike[str]) -> FlightData:
     ------
     FormatError
         Not such a file: no header, a row of another length, not a number. Names the line.
+    Interrupted
+        `progress` returned False.
     UnknownNameError, UnitError, InputError, RangeError
         Unknown or missing column, wrong unit, impossible values. Names the file.
     """
@@ -135,7 +150,7 @@ def read_flight(path: str | os.PathLike[str]) -> FlightData:
     if not lines:
         raise FormatError(f"{source}: no header line")
     columns = _header(source, lines[0][1])
-    table = _numbers(source, lines[1:], len(columns))
+    table = _numbers(source, lines[1:], len(columns), progress)
     values = {name: to_si(table[:, i], unit) for i, (name, unit) in enumerate(columns)}
     airspeed = next(name for name in values if name in _AIRSPEEDS)
     try:
@@ -146,6 +161,7 @@ def read_flight(path: str | os.PathLike[str]) -> FlightData:
             airspeed_kind=cast("AirspeedKind", _AIRSPEEDS[airspeed]),
             angle_of_attack=values["angle_of_attack"],
             deflection=values["deflection"],
+            air_density=values.get("air_density"),
         )
     except InputError as error:
         raise type(error)(f"{source}: {error}") from error
@@ -194,11 +210,18 @@ def _header(source: Path, cells: Sequence[str]) -> list[tuple[str, str]]:
     return columns
 
 
-def _numbers(source: Path, lines: Sequence[tuple[int, list[str]]], width: int) -> Array:
+def _numbers(
+    source: Path,
+    lines: Sequence[tuple[int, list[str]]],
+    width: int,
+    progress: Progress | None = None,
+) -> Array:
     if len(lines) < 2:
         raise FormatError(f"{source}: {len(lines)} rows of data; at least 2 are needed")
     table = np.empty((len(lines), width))
     for row, (number, cells) in enumerate(lines):
+        if progress is not None and row % REPORT == 0 and not progress(row / len(lines)):
+            raise Interrupted(f"{source}: interrupted at line {number}")
         if len(cells) != width:
             raise FormatError(f"{source}:{number}: {len(cells)} cells, the header has {width}")
         for column, cell in enumerate(cells):

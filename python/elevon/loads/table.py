@@ -87,7 +87,7 @@ def flight_load(
     travel : float, optional
         m (or rad). The position is scaled so that its largest magnitude is this.
     temperature_offset : float
-        K, on the standard atmosphere.
+        K, on the standard atmosphere; not with a flight that has its own air density.
 
     Returns
     -------
@@ -100,7 +100,8 @@ def flight_load(
         An argument out of range, an altitude outside the standard atmosphere, a calibrated airspeed
         above Mach 1, a Mach number outside the coefficients' breakpoints.
     InputError
-        A scale was asked for and the load or the position is zero throughout.
+        An offset and a measured density; a scale was asked for and the load or the position is
+        zero throughout.
 
     Notes
     -----
@@ -112,6 +113,13 @@ def flight_load(
     if lever == 0.0:
         raise RangeError("arm: 0 m carries no moment; give a lever, or none for a rotary actuator")
     air = standard_atmosphere(flight.altitude, temperature_offset=temperature_offset)
+    if flight.air_density is not None:
+        if temperature_offset:
+            raise InputError(
+                f"temperature_offset: {temperature_offset:g} K, and the flight has its own "
+                "air_density; one of them decides the temperature"
+            )
+        air = air.with_density(flight.air_density)
     mach = mach_number(flight.airspeed, flight.airspeed_kind, air)
     pressure = dynamic_pressure(flight.airspeed, flight.airspeed_kind, air)
     moment = surface.moment(pressure, mach, flight.angle_of_attack, flight.deflection)
