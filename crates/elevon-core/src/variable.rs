@@ -3,6 +3,8 @@
 pub mod acts;
 mod macros;
 
+use std::marker::PhantomData;
+
 /// Which register of numbers a parameter belongs to: what the plant is, what the controller
 /// believes, what the sensors do to a signal, how the run is loaded and solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,6 +115,46 @@ pub const fn offset(groups: &[Group], index: usize) -> usize {
         i += 1;
     }
     sum
+}
+
+/// A parameter of a component: its place in the component's table.
+pub trait Parameter: Copy {
+    const TABLE: &'static [Variable];
+    fn index(self) -> usize;
+}
+
+/// The parameters of one component in a run, and which of them faults move.
+#[derive(Clone, Copy)]
+pub struct Own<'a, P> {
+    pub raw: &'a [f64],
+    touched: &'a [bool],
+    table: PhantomData<P>,
+}
+
+impl<'a, P: Parameter> Own<'a, P> {
+    pub fn new(raw: &'a [f64], touched: &'a [bool]) -> Self {
+        Self { raw, touched, table: PhantomData }
+    }
+
+    pub fn value(&self, parameter: P) -> f64 {
+        self.raw[parameter.index()]
+    }
+
+    /// Is the parameter away from its neutral value, that of its record, now or later?
+    pub fn away(&self, parameter: P) -> bool {
+        let neutral = P::TABLE[parameter.index()].default.unwrap_or(0.0);
+        self.value(parameter) != neutral || self.touched[parameter.index()]
+    }
+
+    pub fn any_away(&self, parameters: impl IntoIterator<Item = P>) -> bool {
+        parameters.into_iter().any(|p| self.away(p))
+    }
+
+    /// The same of all rows from `first` to `last`.
+    pub fn any_away_among(&self, first: P, last: P) -> bool {
+        let neutral = |i: usize| P::TABLE[i].default.unwrap_or(0.0);
+        (first.index()..=last.index()).any(|i| self.raw[i] != neutral(i) || self.touched[i])
+    }
 }
 
 /// The parameters of group `index` in the vector of a wiring.

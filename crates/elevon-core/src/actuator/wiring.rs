@@ -39,13 +39,6 @@ pub struct Setup<'a> {
     pub recorded: &'a [usize],
 }
 
-impl Setup<'_> {
-    /// Is the parameter away from its healthy value, now or later?
-    pub fn departs(&self, index: usize, healthy: f64) -> bool {
-        self.raw[index] != healthy || self.touched[index]
-    }
-}
-
 /// A periodic event of the run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Tick {

@@ -10,6 +10,7 @@
 
 use crate::scalar::Scalar;
 use crate::three;
+use crate::variable::Own;
 use crate::variables;
 
 variables! {
@@ -94,6 +95,19 @@ pub struct BridgeStructure {
     pub open_phases: bool,
     /// Something may trip the drive.
     pub trips: bool,
+}
+
+impl BridgeStructure {
+    pub fn read(own: &Own<InverterParameter>, open_phases: bool) -> Self {
+        use InverterParameter as P;
+        let switch_faults = own.any_away_among(P::OpenAHigh, P::ShortedCLow);
+        Self { switch_faults, open_phases, trips: switch_faults || own.away(P::TripCurrent) }
+    }
+}
+
+/// Does the bridge show more than ideal switches?
+pub fn detailed(own: &Own<InverterParameter>) -> bool {
+    own.any_away_among(InverterParameter::OnResistance, InverterParameter::ShortedCLow)
 }
 
 /// The legs of one step, and the neutral voltage where some leg is loose.

@@ -4,6 +4,7 @@
 use crate::scalar::Scalar;
 use crate::three;
 use crate::variable::acts::When;
+use crate::variable::Own;
 use crate::{choices, variables};
 
 choices! {
@@ -74,6 +75,39 @@ pub struct MotorStructure {
     pub shorted_loop: bool,
     pub static_eccentricity: bool,
     pub dynamic_eccentricity: bool,
+}
+
+impl MotorStructure {
+    pub fn read(own: &Own<MotorParameter>) -> Self {
+        use MotorParameter as P;
+        Self {
+            trapezoidal: EmfShape::read(own.value(P::EmfShape)) == EmfShape::Trapezoidal,
+            shorted_loop: ShortModel::read(own.value(P::ShortModel)) == ShortModel::Loop,
+            static_eccentricity: own.away(P::EccentricityStatic),
+            dynamic_eccentricity: own.away(P::EccentricityDynamic),
+        }
+    }
+
+    /// An unbalanced rotor leans into the gap.
+    pub fn with_unbalance(self, unbalance: bool) -> Self {
+        Self { dynamic_eccentricity: self.dynamic_eccentricity || unbalance, ..self }
+    }
+
+    /// Does it need more than the plain step? That knows the static eccentricity.
+    pub fn detailed(&self) -> bool {
+        let Self { trapezoidal, shorted_loop, static_eccentricity: _, dynamic_eccentricity } = *self;
+        trapezoidal || shorted_loop || dynamic_eccentricity
+    }
+}
+
+/// Is some phase interrupted at some time?
+pub fn interrupted(own: &Own<MotorParameter>) -> bool {
+    own.any_away([MotorParameter::OpenA, MotorParameter::OpenB, MotorParameter::OpenC])
+}
+
+/// Do resistance or flux follow the temperature?
+pub fn warms(own: &Own<MotorParameter>) -> bool {
+    own.any_away([MotorParameter::TemperatureCoefficient, MotorParameter::FluxTemperatureCoefficient])
 }
 
 #[derive(Clone, Copy, Debug)]

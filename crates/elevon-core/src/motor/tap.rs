@@ -6,6 +6,7 @@
 
 use crate::scalar::Scalar;
 use crate::three;
+use crate::variable::Own;
 use crate::variables;
 
 variables! {
@@ -39,6 +40,10 @@ impl<S: Scalar> Tap<S> {
             level / (reference * (S::one() - level))
         });
         Self { conductance, per_dt: S::one() / dt }
+    }
+
+    pub fn needed(own: &Own<TapParameter>) -> bool {
+        own.any_away([TapParameter::TapLevelA, TapParameter::TapLevelB, TapParameter::TapLevelC])
     }
 
     /// Neutral voltage that closes Kirchhoff's law at the end of the step. `drop` is terminal voltage less EMF and R i.

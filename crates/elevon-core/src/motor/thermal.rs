@@ -5,6 +5,7 @@
 //! closes to rounding at any tick.
 
 use crate::scalar::Scalar;
+use crate::variable::Own;
 use crate::{choices, variables};
 
 /// Stefan-Boltzmann constant, W/(m2 K4).
@@ -97,6 +98,10 @@ impl<S: Scalar> Network<S> {
             coefficient: temperature[1],
             flux_coefficient: temperature[2],
         }
+    }
+
+    pub fn needed(own: &Own<ThermalParameter>) -> bool {
+        ThermalModel::read(own.value(ThermalParameter::Model)) != ThermalModel::Off
     }
 
     /// Both nodes at the given temperatures; a surface without capacity follows the winding at once.

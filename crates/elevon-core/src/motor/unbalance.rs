@@ -1,6 +1,7 @@
 //! Excess mass on one side of the rotor: inertia, gravity torque, and the gap it narrows (N 4.4).
 
 use crate::scalar::Scalar;
+use crate::variable::Own;
 use crate::variables;
 
 const GRAVITY: f64 = 9.806_65;
@@ -39,6 +40,10 @@ impl<S: Scalar> Unbalance<S> {
             phase: g(P::UnbalancePhase),
             gap_share: g(P::UnbalanceGapShare),
         }
+    }
+
+    pub fn needed(own: &Own<UnbalanceParameter>) -> bool {
+        own.away(UnbalanceParameter::UnbalanceInertia)
     }
 
     /// Gravity torque on the shaft.

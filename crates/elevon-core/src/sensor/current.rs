@@ -2,6 +2,7 @@
 
 use crate::scalar::Scalar;
 use crate::three;
+use crate::variable::Own;
 use crate::variables;
 
 variables! {
@@ -73,10 +74,8 @@ impl<S: Scalar> CurrentSensor<S> {
     }
 
     /// Does the measured current differ from the true one at all? Then it must be fed back.
-    pub fn ideal(raw: &[f64]) -> bool {
+    pub fn needed(own: &Own<CurrentSensorParameter>) -> bool {
         use CurrentSensorParameter as P;
-        let at = |p: P, healthy: f64| raw[p as usize] == healthy;
-        [P::GainA, P::GainB, P::GainC].into_iter().all(|p| at(p, 1.0))
-            && [P::OffsetA, P::OffsetB, P::OffsetC, P::NoiseDeviation, P::Bits].into_iter().all(|p| at(p, 0.0))
+        own.any_away_among(P::GainA, P::NoiseDeviation) || own.away(P::Bits)
     }
 }

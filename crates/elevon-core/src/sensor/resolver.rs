@@ -4,6 +4,7 @@
 //! converter shows a shaft at rest: the held angle or zero, and no speed.
 
 use crate::scalar::Scalar;
+use crate::variable::Own;
 use crate::{choices, variables};
 
 choices! {
@@ -56,9 +57,10 @@ impl<S: Scalar> Resolver<S> {
         }
     }
 
-    pub fn ideal(raw: &[f64]) -> bool {
+    /// Does it ever show another angle than the shaft's?
+    pub fn needed(own: &Own<ResolverParameter>) -> bool {
         use ResolverParameter as P;
-        raw[P::Gain as usize] == 1.0 && [P::Mismatch, P::Offset, P::PowerOff].into_iter().all(|p| raw[p as usize] == 0.0)
+        own.any_away([P::Mismatch, P::Offset, P::Gain, P::PowerOff])
     }
 
     /// Reading at angle `theta`, speed `omega`; `held` is the last angle shown with power on.

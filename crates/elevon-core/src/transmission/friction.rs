@@ -1,6 +1,7 @@
 //! Borello's dry friction with exact stick (T2; reference sheet 1.6) and viscous friction.
 
 use crate::scalar::Scalar;
+use crate::variable::Own;
 use crate::variables;
 
 variables! {
@@ -12,7 +13,7 @@ variables! {
             when(&[Either(&[Away("friction.static", 0.0), Away("friction.dynamic", 0.0)])]);
         Viscous => "viscous", "C", "N m s/rad", NonNegative, Plant, None, "viscous coefficient at rest";
         ViscousSlope => "viscous_slope", "-", "s/rad", Any, Plant, Some(0.0), "relative change of the viscous coefficient per rad/s: C(w) = C (1 + slope |w|), not below zero",
-            high_only("its viscous friction is linear").when(&[Away("friction.viscous", 0.0)]);
+            when(&[Away("friction.viscous", 0.0)]);
         ViscousScale => "viscous_scale", "-", "1", NonNegative, Plant, Some(1.0), "healthy 1; change of the lubricant",
             when(&[Away("friction.viscous", 0.0)]);
         JamTorque => "jam_torque", "T_jam", "N m", NonNegative, Plant, Some(0.0), "resistive torque once the mechanism has seized; 0: none";
@@ -47,6 +48,16 @@ impl<S: Scalar> Friction<S> {
             jam_position: g(P::JamPosition),
             jam_anywhere: g(P::JamAnywhere),
         }
+    }
+
+    /// Does the viscous coefficient change with the speed?
+    pub fn sloped(own: &Own<FrictionParameter>) -> bool {
+        own.away(FrictionParameter::ViscousSlope)
+    }
+
+    /// Does the mechanism ever seize?
+    pub fn jams(own: &Own<FrictionParameter>) -> bool {
+        own.away(FrictionParameter::JamTorque)
     }
 
     /// Adds the friction of a preloaded screw, which sticks as much above its dynamic value as the rest; `viscous` scales

@@ -1,6 +1,7 @@
 //! Gear ratio, inertia and load-dependent friction, end stops, user inertia and spring.
 
 use crate::scalar::Scalar;
+use crate::variable::Own;
 use crate::variables;
 
 variables! {
@@ -59,6 +60,11 @@ impl<S: Scalar> Gear<S> {
             stiffness: load[LoadParameter::Stiffness as usize],
             spring_zero: load[LoadParameter::SpringZero as usize],
         }
+    }
+
+    /// Does a load add to the friction?
+    pub fn loaded(own: &Own<GearParameter>) -> bool {
+        own.any_away([GearParameter::Efficiency, GearParameter::EfficiencyAiding])
     }
 
     /// Friction that a user torque adds on the fast shaft (Borello and Dalla Vedova 2006). `direction` is the

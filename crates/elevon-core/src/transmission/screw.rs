@@ -5,6 +5,7 @@
 //! to that coefficient, and the efficiencies follow. With nothing added the set's own numbers are used unchanged.
 
 use crate::scalar::Scalar;
+use crate::variable::Own;
 use crate::variables;
 use std::f64::consts::{PI, TAU};
 
@@ -120,6 +121,16 @@ impl<S: Scalar> Screw<S> {
             position: zero,
             reach: zero,
         }
+    }
+
+    /// Do balls pass a spall?
+    pub fn spalled(own: &Own<ScrewParameter>) -> bool {
+        own.any_away([ScrewParameter::SpallGroove, ScrewParameter::SpallNut, ScrewParameter::SpallBall])
+    }
+
+    /// Does debris scatter the friction?
+    pub fn contaminated(own: &Own<ScrewParameter>) -> bool {
+        own.away(ScrewParameter::Debris)
     }
 
     /// `gear` is the ratio of a gearbox between motor and screw.

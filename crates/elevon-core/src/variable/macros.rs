@@ -13,6 +13,12 @@ macro_rules! variables {
         #[repr(usize)]
         pub enum $id { $($variant),* }
         $(const _: () = assert!($crate::variable::named(stringify!($variant), $path), concat!("the variant of ", $path, " carries its name"));)*
+        impl $crate::variable::Parameter for $id {
+            const TABLE: &'static [$crate::variable::Variable] = $table;
+            fn index(self) -> usize {
+                self as usize
+            }
+        }
         pub const $table: &[$crate::variable::Variable] = {
             #[allow(unused_imports)]
             use $crate::variable::{acts::{Fidelity::*, When::*, *}, Range::{self, *}};
@@ -72,6 +78,41 @@ macro_rules! choices {
     )*};
 }
 
+/// Declares the details of a run: what decides which code runs, equal over a lane block. Each is a line: the name and the
+/// condition under which a run needs it. `full` and `extra` follow from the lines: no detail can be forgotten in them.
+#[macro_export]
+macro_rules! details {
+    (
+        $(#[$meta:meta])* $id:ident, $read:ident<$form:ident>($x:ident: $from:ty)
+        always { $($(#[$ameta:meta])* $always:ident: $kind:ty = $value:expr;)* }
+        full { $($(#[$fmeta:meta])* $full:ident = $needed:expr;)* }
+        extra { $($(#[$emeta:meta])* $extra:ident = $wanted:expr;)* }
+    ) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub struct $id {
+            $($(#[$ameta])* pub $always: $kind,)*
+            $($(#[$fmeta])* pub $full: bool,)*
+            $($(#[$emeta])* pub $extra: bool,)*
+            /// Some optional detail is there.
+            pub full: bool,
+            /// Some detail is there that only some servos have.
+            pub extra: bool,
+        }
+
+        impl $id {
+            pub(in $crate::actuator::servo) fn $read<$form: Form>($x: $from) -> Self {
+                $(let $always: $kind = $value;)*
+                $(let $full: bool = $needed;)*
+                $(let $extra: bool = $wanted;)*
+                let extra = false $(|| $extra)*;
+                let full = extra $(|| $full)*;
+                Self { $($always,)* $($full,)* $($extra,)* full, extra }
+            }
+        }
+    };
+}
+
 /// Declares the groups of a wiring in the order of its parameter vector: `GROUPS`, a view of the vector by component, and
 /// where each parameter stands in it (`At`). With `over`, the groups of another layout (some with other names and units,
 /// none with other lengths) and further ones behind them.
@@ -94,6 +135,18 @@ macro_rules! groups {
         impl<'a, S> Raw<'a, S> {
             $(pub fn $view(self) -> &'a [S] {
                 $crate::variable::slice(GROUPS, Part::$view as usize, self.0)
+            })*
+        }
+
+        /// The parameters of each component in a run, and which of them faults move.
+        #[derive(Clone, Copy)]
+        pub struct Parts<'a>(pub &'a $crate::actuator::Setup<'a>);
+
+        // Some components are always there.
+        #[allow(dead_code)]
+        impl<'a> Parts<'a> {
+            $(pub fn $view(self) -> $crate::variable::Own<'a, $id> {
+                $crate::variable::Own::new(Raw(self.0.raw).$view(), Raw(self.0.touched).$view())
             })*
         }
 
@@ -124,6 +177,18 @@ macro_rules! groups {
             )*
             all
         };
+
+        /// The further components in a run, and which of their parameters faults move.
+        #[derive(Clone, Copy)]
+        pub struct Parts<'a>(pub &'a $crate::actuator::Setup<'a>);
+
+        // Some components are always there.
+        #[allow(dead_code)]
+        impl<'a> Parts<'a> {
+            $(pub fn $more(self) -> $crate::variable::Own<'a, $id> {
+                $crate::variable::Own::new($more(self.0.raw), $more(self.0.touched))
+            })*
+        }
 
         $(
             #[doc = concat!("The parameters of the group `", $prefix, "`.")]

@@ -6,7 +6,7 @@ mod faults;
 mod records;
 
 use super::servo::{layout, Form};
-use super::{Finding, Port};
+use super::{Finding, Port, Setup};
 use crate::fault::FaultKind;
 use crate::scalar::Scalar;
 use crate::transmission::gear::GearParameter;
@@ -36,9 +36,11 @@ impl Form for Ballscrew {
     fn screw<S: Scalar>(raw: &[S]) -> Screw<S> {
         Screw::derive(records::screw(raw), raw[GearParameter::Ratio.at()])
     }
-    fn worn(departs: &dyn Fn(usize, f64) -> bool) -> (bool, bool) {
-        let spalls = [ScrewParameter::SpallGroove, ScrewParameter::SpallNut, ScrewParameter::SpallBall];
-        (spalls.into_iter().any(|p| departs(p.at(), 0.0)), departs(ScrewParameter::Debris.at(), 0.0))
+    fn spalled(setup: &Setup) -> bool {
+        Screw::<f64>::spalled(&records::Parts(setup).screw())
+    }
+    fn contaminated(setup: &Setup) -> bool {
+        Screw::<f64>::contaminated(&records::Parts(setup).screw())
     }
     fn check(raw: &[f64]) -> Vec<Finding> {
         records::check(raw)

@@ -10,7 +10,7 @@ use crate::control::sequence::COMMANDS;
 use crate::inverter::bridge::{BridgeStructure, InverterParameter as Inverter};
 use crate::inverter::six_step::{Chopping, SixStep, SixStepParameter};
 use crate::inverter::supply::{Link, Supply};
-use crate::motor::star::{EmfShape, MotorParameter, MotorStructure, Star};
+use crate::motor::star::{interrupted, MotorParameter, MotorStructure, Star};
 use crate::scalar::{three_phase, Scalar};
 use crate::sensor::hall::{Hall, HallState};
 use crate::sensor::proximity::ProximityParameter;
@@ -34,31 +34,20 @@ pub struct Structure {
 
 impl Structure {
     pub fn read(setup: &Setup) -> Self {
-        let departs = |p: MotorParameter| setup.departs(p.at(), 0.0);
+        let parts = Parts(setup);
+        let shorted = parts.six_step().away(SixStepParameter::TerminalsShorted);
+        let mut bridge = BridgeStructure::read(&parts.inverter(), interrupted(&parts.motor()));
+        // Terminals shorted by a fault act through the switches.
+        bridge.switch_faults |= shorted;
+        bridge.trips |= shorted;
         Self {
-            motor: MotorStructure {
-                trapezoidal: EmfShape::read(setup.raw[MotorParameter::EmfShape.at()]) == EmfShape::Trapezoidal,
-                shorted_loop: false,
-                static_eccentricity: departs(MotorParameter::EccentricityStatic),
-                dynamic_eccentricity: departs(MotorParameter::EccentricityDynamic),
-            },
-            bridge: bridge(setup),
+            motor: MotorStructure::read(&parts.motor()),
+            bridge,
             chopping: Chopping::read(setup.raw[SixStepParameter::Chopping.at()]),
-            shorted: setup.departs(SixStepParameter::TerminalsShorted.at(), 0.0),
+            shorted,
             rig: setup.driven[RIG],
             accounts: setup.recorded.iter().any(|s| ENERGIES.contains(s)),
         }
-    }
-}
-
-fn bridge(setup: &Setup) -> BridgeStructure {
-    let departs = |i: usize| setup.departs(i, 0.0);
-    let switch_faults =
-        (Inverter::OpenAHigh.at()..=Inverter::ShortedCLow.at()).any(departs) || departs(SixStepParameter::TerminalsShorted.at());
-    BridgeStructure {
-        switch_faults,
-        open_phases: (MotorParameter::OpenA.at()..=MotorParameter::OpenC.at()).any(departs),
-        trips: switch_faults || departs(Inverter::TripCurrent.at()),
     }
 }
 

@@ -1,7 +1,7 @@
 //! The rotary actuator (Torino): a geared servo whose output turns.
 
 use super::servo::{faults, layout, signals, Form};
-use super::{Finding, Port};
+use super::{Finding, Port, Setup};
 use crate::fault::FaultKind;
 use crate::scalar::Scalar;
 use crate::transmission::gear::GearParameter;
@@ -30,8 +30,11 @@ impl Form for Rotary {
     fn screw<S: Scalar>(_raw: &[S]) -> Screw<S> {
         Screw::none()
     }
-    fn worn(_departs: &dyn Fn(usize, f64) -> bool) -> (bool, bool) {
-        (false, false)
+    fn spalled(_setup: &Setup) -> bool {
+        false
+    }
+    fn contaminated(_setup: &Setup) -> bool {
+        false
     }
     fn check(_raw: &[f64]) -> Vec<Finding> {
         Vec::new()

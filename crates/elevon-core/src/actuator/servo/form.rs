@@ -1,6 +1,6 @@
 //! What distinguishes one servo from another.
 
-use crate::actuator::{Finding, Port};
+use crate::actuator::{Finding, Port, Setup};
 use crate::fault::FaultKind;
 use crate::scalar::Scalar;
 use crate::transmission::screw::Screw;
@@ -26,8 +26,10 @@ pub trait Form: Send + Sync + 'static {
     /// Inertia on the fast shaft besides the motor's and the gear's.
     fn screw_inertia<S: Scalar>(raw: &[S]) -> S;
     fn screw<S: Scalar>(raw: &[S]) -> Screw<S>;
-    /// Does the screw need its own code: (spall, debris)?
-    fn worn(departs: &dyn Fn(usize, f64) -> bool) -> (bool, bool);
+    /// Do balls of a screw pass spalls?
+    fn spalled(setup: &Setup) -> bool;
+    /// Does debris scatter the friction of a screw?
+    fn contaminated(setup: &Setup) -> bool;
     /// Findings of its own.
     fn check(raw: &[f64]) -> Vec<Finding>;
 }

@@ -10,6 +10,7 @@ mod form;
 mod high;
 pub mod layout;
 mod low;
+mod sensing;
 mod shaft;
 pub mod signals;
 

@@ -29,10 +29,10 @@ pub(crate) fn coupling<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &St
     let mut loop_k = [S::zero(); 3];
     if FULL {
         if structure.motor.trapezoidal {
-            shape = m.star.trapezoid(m.star.electrical_angle(s.motor_position));
+            shape = m.star.trapezoid(m.star.electrical_angle(s.shaft.motor_position));
         }
         if structure.motor.dynamic_eccentricity {
-            let turning = m.star.dynamic_gap(s.motor_position);
+            let turning = m.star.dynamic_gap(s.shaft.motor_position);
             gap = three!(|j| gap[j] * turning[j]);
         }
         if structure.thermal {
@@ -64,7 +64,7 @@ pub(crate) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
     half_supply: S,
     old_legs: [S; 3],
 ) -> ([S; 3], [S; 3]) {
-    let speed = s.motor_speed;
+    let speed = s.shaft.motor_speed;
     let i = s.star.current;
     let mut emf: [S; 3] = three!(|j| c.k[j] * speed);
     let mut resistance = m.star.resistance;

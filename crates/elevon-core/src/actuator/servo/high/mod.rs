@@ -9,7 +9,7 @@ mod step;
 use self::model::{Model, State};
 use self::step::{control_step, park, seen_current, shaft_reading, HighStep};
 use crate::actuator::servo::advance::Stretch;
-use crate::actuator::servo::details::{sample_steps, Structure};
+use crate::actuator::servo::details::{sample_steps, Needs, Structure};
 use crate::actuator::servo::form::Form;
 use crate::actuator::servo::layout::*;
 use crate::actuator::{Finding, Inputs, Overheat, Port, Setup, Tick, Watch, Wiring, WATCHED};
@@ -59,7 +59,7 @@ impl<F: Form> Wiring for High<F> {
         raw[SolverParameter::FaultGrid.at()]
     }
     fn structure(setup: &Setup) -> Structure {
-        Structure::read::<F>(setup)
+        Structure::read::<F>(&Needs::new(setup))
     }
 
     fn ticks(raw: &[f64], structure: &Structure) -> Vec<Tick> {
@@ -79,7 +79,7 @@ impl<F: Form> Wiring for High<F> {
         add(!structure.control_every_step, ControlParameter::SampleTime.at(), TICK_CONTROL);
         add(structure.drive == DriveKind::Pwm, PwmParameter::SampleTime.at(), TICK_CURRENT_CONTROL);
         add(structure.heat, ThermalParameter::SampleTime.at(), TICK_THERMAL);
-        add(structure.debris, ControlParameter::SampleTime.at(), TICK_DEBRIS);
+        add(structure.shaft.debris, ControlParameter::SampleTime.at(), TICK_DEBRIS);
         ticks
     }
 
@@ -121,12 +121,12 @@ impl<F: Form> Wiring for High<F> {
                 m.extra.network.tick(&mut s.extra.network);
                 (s.star.resistance_factor, s.star.flux_factor) = m.extra.network.factors(&s.extra.network);
             }
-            TICK_DEBRIS => s.extra.scatter = m.extra.screw.scatter.fma(noise(4), S::one()).maximum(S::zero()),
+            TICK_DEBRIS => s.shaft.scatter(&m.shaft.screw, noise(4)),
             TICK_DUTIES => s.current_control.update(),
             _ => {
                 let reading = shaft_reading::<S, true>(m, structure, s);
-                let separate = structure.resolver && !structure.commutated;
-                let (angle, speed) = if separate { (s.motor_position, s.motor_speed) } else { (reading.angle, reading.speed) };
+                let (angle, speed) =
+                    if structure.sensing.separate { (s.shaft.motor_position, s.shaft.motor_speed) } else { (reading.angle, reading.speed) };
                 let angle = m.star.electrical_angle(angle);
                 let (sin, cos) = angle.sin_cos();
                 let (sines, cosines) = three_phase(sin, cos);
@@ -174,9 +174,9 @@ impl<F: Form> Wiring for High<F> {
             + s.star.loop_current[1].abs()
             + s.star.loop_current[2].abs();
         [
-            Watch { name: "motor_speed", value: s.motor_speed, limit: 1e6 },
+            Watch { name: "motor_speed", value: s.shaft.motor_speed, limit: 1e6 },
             Watch { name: "current_a", value: currents, limit: 1e7 },
-            Watch { name: "user_position", value: s.user_position, limit: 1e9 },
+            Watch { name: "user_position", value: s.shaft.user_position, limit: 1e9 },
             Watch { name: "torque_ref", value: s.control.integral + s.control.filtered_error, limit: 1e12 },
         ]
     }

@@ -3,22 +3,18 @@
 use crate::actuator::servo::details::Structure;
 use crate::actuator::servo::form::Form;
 use crate::actuator::servo::layout::*;
+use crate::actuator::servo::sensing::Sensing;
+use crate::actuator::servo::shaft::{Shaft, ShaftState};
 use crate::control::current_dq::{CurrentControl, CurrentControlState};
 use crate::control::position_speed::{ControlParameter, PositionSpeed, PositionSpeedState};
 use crate::inverter::bridge::{Bridge, BridgeState, InverterParameter};
 use crate::motor::star::{MotorParameter, Star, StarState};
 use crate::motor::tap::Tap;
 use crate::motor::thermal::{Network, NetworkState, ThermalParameter};
-use crate::motor::unbalance::Unbalance;
 use crate::scalar::Scalar;
 use crate::sensor::current::{CurrentSensor, CurrentSensorParameter};
-use crate::sensor::encoder::Encoder;
 use crate::sensor::filter::closing;
-use crate::sensor::resolver::{Resolver, ResolverParameter};
-use crate::transmission::friction::{Friction, FrictionParameter};
-use crate::transmission::gear::{Gear, GearParameter, LoadParameter};
-use crate::transmission::play::Play;
-use crate::transmission::screw::Screw;
+use crate::sensor::resolver::ResolverParameter;
 
 /// Constants of a run.
 #[derive(Clone, Copy, Debug)]
@@ -30,17 +26,10 @@ pub struct Model<S> {
     pub(crate) supply_scale: S,
     pub(crate) control: PositionSpeed<S>,
     pub(crate) current_control: CurrentControl<S>,
-    pub(crate) friction: Friction<S>,
-    pub(crate) gear: Gear<S>,
-    pub(crate) play: Play<S>,
+    pub(crate) shaft: Shaft<S>,
+    pub(crate) sensing: Sensing<S>,
     pub(crate) sensor: CurrentSensor<S>,
-    pub(crate) encoder: Encoder<S>,
-    pub(crate) resolver: Resolver<S>,
     pub(crate) filter: S,
-    pub(crate) inertia: S,
-    pub(crate) dt_per_inertia: S,
-    pub(crate) user_inertia: S,
-    pub(crate) per_user_inertia: S,
     pub(crate) noise_deviation: S,
     pub(crate) temperature: S,
     pub(crate) extra: Extra<S>,
@@ -49,13 +38,8 @@ pub struct Model<S> {
 /// Constants of what only some servos have.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Extra<S> {
-    pub screw: Screw<S>,
-    pub unbalance: Unbalance<S>,
     pub tap: Tap<S>,
     pub network: Network<S>,
-    /// Dry friction and damping of the load side.
-    pub load_friction: S,
-    pub load_damping: S,
     /// Filter of the controlled current.
     pub closing: S,
     pub resolver_off: S,
@@ -70,20 +54,15 @@ pub struct State<S> {
     pub(crate) control: PositionSpeedState<S>,
     pub(crate) current_ref: S,
     pub(crate) current_control: CurrentControlState<S>,
-    pub(crate) motor_position: S,
-    pub(crate) motor_speed: S,
-    pub(crate) user_position: S,
-    pub(crate) user_speed: S,
+    pub(crate) shaft: ShaftState<S>,
     pub(crate) command_noise: S,
     pub(crate) current_noise: [S; 3],
     pub(crate) held_angle: S,
-    pub(crate) jam_side: S,
-    pub(crate) jammed: S,
     pub(crate) filtered: [S; 3],
     pub(crate) transitions: S,
     /// Phase-to-neutral voltages of the last step (detailed bridge).
     pub(crate) voltage: [S; 3],
-    pub(crate) energy: [S; 8],
+    pub(crate) energy: [S; 4],
     pub(crate) extra: ExtraState<S>,
 }
 
@@ -93,19 +72,13 @@ pub(crate) struct ExtraState<S> {
     pub network: NetworkState<S>,
     /// Currents as the drive sees them.
     pub sensed: [S; 3],
-    /// Factor on the dry friction of a screw with debris in it.
-    pub scatter: S,
 }
 
+/// Accounts of the electrical part; those of the shaft are its own.
 pub(crate) const E_SUPPLY: usize = 0;
 pub(crate) const E_COPPER: usize = 1;
 pub(crate) const E_INVERTER: usize = 2;
-pub(crate) const E_FRICTION: usize = 3;
-pub(crate) const E_BRAKE: usize = 4;
-pub(crate) const E_LOAD: usize = 5;
-pub(crate) const E_IMPACT: usize = 6;
-
-pub(crate) const E_TAP: usize = 7;
+pub(crate) const E_TAP: usize = 3;
 
 impl<S: Scalar> Model<S> {
     pub(crate) fn derive<F: Form>(raw: &[S], structure: &Structure) -> Self {
@@ -114,49 +87,28 @@ impl<S: Scalar> Model<S> {
         let dt = at(SolverParameter::Step.at());
         let dt0 = dt.lane(0);
         let ts = at(ControlParameter::SampleTime.at()).lane(0).max(dt0);
-        let screw = F::screw(raw);
-        let ratio = F::ratio(raw);
-        let gear = Gear::derive(ratio, view.gear(), view.stop(), view.load(), [screw.efficiency, screw.efficiency_aiding]);
-        let user_inertia = at(LoadParameter::Inertia.at());
-        let reflected = user_inertia * gear.per_ratio * gear.per_ratio;
-        let unbalance = Unbalance::derive(view.unbalance());
-        let mut rotor = at(MotorParameter::Inertia.at()) + at(GearParameter::Inertia.at());
+        let shaft = Shaft::derive::<F>(raw, &structure.shaft, dt);
         let mut star = Star::derive(view.motor(), &structure.motor, dt);
-        if structure.extra {
-            rotor = rotor + F::screw_inertia(raw) + unbalance.inertia;
-            star.lean(unbalance.eccentricity(rotor + reflected));
+        if structure.shaft.unbalance {
+            star.lean(shaft.unbalance.eccentricity(shaft.whole_inertia));
         }
-        let inertia = if structure.elastic { rotor } else { rotor + reflected };
-        let mut friction = Friction::derive(view.friction());
-        friction.preloaded(screw.preload_torque, screw.viscous, at(FrictionParameter::Static.at()), at(FrictionParameter::Dynamic.at()));
         Self {
             dt,
             star,
             bridge: Bridge::derive(view.inverter()),
             half_band: at(InverterParameter::HysteresisBand.at()),
             supply_scale: at(InverterParameter::SupplyScale.at()),
-            control: PositionSpeed::derive(view.control(), ts, ratio),
+            control: PositionSpeed::derive(view.control(), ts, shaft.gear.ratio),
             current_control: CurrentControl::derive(view.pwm(), at(MotorParameter::PolePairs.at())),
-            friction,
-            gear,
-            play: Play::derive(view.play()),
+            shaft,
+            sensing: Sensing::derive(raw, &structure.sensing),
             sensor: CurrentSensor::derive(view.current_sensor()),
-            encoder: Encoder::derive(view.encoder(), if F::LINEAR { 1.0 } else { std::f64::consts::TAU }),
-            resolver: Resolver::derive(view.resolver()),
             filter: closing(at(CurrentSensorParameter::FilterCutoff.at()), dt0),
-            inertia,
-            dt_per_inertia: dt / inertia,
-            user_inertia: if structure.elastic { user_inertia } else { S::zero() },
-            per_user_inertia: S::one() / S::select(S::zero().lt(user_inertia), user_inertia, S::one()),
             noise_deviation: at(ControlParameter::NoiseDeviation.at()),
             temperature: at(MotorParameter::WindingTemperature.at()),
             extra: Extra {
-                screw,
-                unbalance,
                 tap: Tap::derive(view.tap(), dt),
                 network: network(raw, dt0),
-                load_friction: at(LoadParameter::Friction.at()),
-                load_damping: at(LoadParameter::Damping.at()),
                 closing: closing(at(CurrentSensorParameter::Bandwidth.at()), dt0),
                 resolver_off: at(ResolverParameter::PowerOff.at()),
             },

@@ -9,7 +9,6 @@ use crate::motor::star::{MotorParameter, StarState};
 use crate::motor::thermal::{NetworkState, ThermalModel, ThermalParameter};
 use crate::scalar::Scalar;
 use crate::three;
-use crate::transmission::friction::FrictionParameter;
 
 /// Signals whose initial value a scenario may set.
 pub(crate) const INITIAL: &[&str] =
@@ -18,13 +17,11 @@ pub(crate) const INITIAL: &[&str] =
 pub(crate) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
     let or = |i: usize, other: S| S::select(initial[i].equals(initial[i]), initial[i], other);
     let zero = S::zero();
-    let motor_position = or(0, zero);
-    let driver = motor_position * model.gear.per_ratio;
+    let shaft = model.shaft.start([initial[0], initial[1]], [initial[2], initial[3]]);
     let mut star = StarState::rest();
     star.current = three!(|j| or(4 + j, zero));
     let warm = model.extra.network.start(model.temperature, model.temperature);
     heat(raw, &mut star, &warm);
-    let user_position = model.play.drag(driver, or(2, driver));
     State {
         star,
         legs: [-S::one(); 3],
@@ -32,29 +29,21 @@ pub(crate) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> St
         control: PositionSpeedState::rest(),
         current_ref: zero,
         current_control: CurrentControlState::rest(),
-        motor_position,
-        motor_speed: or(1, zero),
-        user_position,
-        user_speed: or(3, zero),
+        shaft,
         command_noise: zero,
         current_noise: [zero; 3],
-        held_angle: motor_position,
-        jam_side: (user_position - model.friction.jam_position).sign(),
-        jammed: S::select(S::splat(0.5).lt(model.friction.jam_anywhere), S::one(), zero),
+        held_angle: shaft.motor_position,
         filtered: [zero; 3],
         transitions: zero,
         voltage: [zero; 3],
-        energy: [zero; 8],
-        extra: ExtraState { network: warm, sensed: star.current, scatter: S::one() },
+        energy: [zero; 4],
+        extra: ExtraState { network: warm, sensed: star.current },
     }
 }
 
 pub(crate) fn refresh<S: Scalar>(raw: &[S], state: &mut State<S>) {
     heat(raw, &mut state.star, &state.extra.network);
-    let position = raw[FrictionParameter::JamPosition.at()];
-    let free = state.jammed.equals(S::zero());
-    let side = (state.user_position - position).sign();
-    state.jam_side = S::select(free & state.jam_side.equals(S::zero()), side, state.jam_side);
+    state.shaft.refresh(raw);
 }
 
 /// Temperature factors: of the network where there is one, else of the given winding temperature.

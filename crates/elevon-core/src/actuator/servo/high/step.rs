@@ -7,22 +7,16 @@ use super::model::{Model, State};
 use crate::actuator::servo::advance::{Instant, Stepper};
 use crate::actuator::servo::details::Structure;
 use crate::actuator::servo::layout::DriveKind;
-use crate::actuator::servo::shaft::mechanical_step;
-use crate::control::position_speed::Feedback;
 use crate::inverter::hysteresis::{count_transitions, relays, six_step};
 use crate::scalar::{three_phase, Scalar};
 use crate::sensor::filter::low_pass;
 use crate::sensor::resolver::Reading;
 use crate::three;
 
-/// What the controller is told of the shaft.
+/// What the controller sees of the shaft.
 #[inline(always)]
 pub(crate) fn shaft_reading<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &mut State<S>) -> Reading<S> {
-    if FULL && structure.resolver {
-        m.resolver.read(s.motor_position, s.motor_speed, &mut s.held_angle)
-    } else {
-        Reading { angle: s.motor_position, position: s.motor_position, speed: s.motor_speed }
-    }
+    m.sensing.shaft::<FULL>(&structure.sensing, &s.shaft, &mut s.held_angle)
 }
 
 #[inline(always)]
@@ -33,11 +27,7 @@ pub(crate) fn control_step<S: Scalar, const FULL: bool>(
     s: &mut State<S>,
     reading: &Reading<S>,
 ) {
-    let position = match structure.control.feedback {
-        Feedback::Encoder if FULL => m.encoder.read(s.user_position),
-        Feedback::Resolver if FULL => reading.position * m.gear.per_ratio,
-        _ => s.user_position,
-    };
+    let position = m.sensing.user::<FULL>(&structure.sensing, &s.shaft, reading, m.shaft.gear.per_ratio);
     let command = command + s.command_noise;
     s.current_ref = m.control.step(&structure.control, &mut s.control, command, position, reading.speed);
 }
@@ -96,13 +86,13 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     if structure.control_every_step {
         control_step::<S, FULL>(m, structure, x.command, s, &reading);
     }
-    let (sin, cos) = m.star.electrical_angle(s.motor_position).sin_cos();
+    let (sin, cos) = m.star.electrical_angle(s.shaft.motor_position).sin_cos();
     let mut measured = measured_current::<S, FULL, EXTRA>(m, structure, s);
     if EXTRA && structure.current_filter {
         s.extra.sensed = three!(|j| low_pass(m.extra.closing, s.extra.sensed[j], measured[j]));
         measured = s.extra.sensed;
     }
-    let (sin_c, cos_c) = if FULL && structure.resolver && (!EXTRA || structure.commutated) {
+    let (sin_c, cos_c) = if FULL && structure.sensing.resolver && (!EXTRA || structure.sensing.commutated) {
         m.star.electrical_angle(reading.angle).sin_cos()
     } else {
         (sin, cos)
@@ -140,7 +130,8 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     }
 
     // Motor and transmission dynamics.
-    mechanical_step::<S, FULL, EXTRA>(m, structure, x, s, torque);
+    let loads = m.shaft.loads::<FULL, EXTRA>(&structure.shaft, x, &s.shaft, torque);
+    m.shaft.step::<FULL, EXTRA>(&structure.shaft, x, &mut s.shaft, &loads, torque);
     s.star.current = current;
 }
 

@@ -1,0 +1,231 @@
+//! Constants and state of a run at low fidelity.
+
+use super::phase::Phase;
+use crate::actuator::servo::form::Form;
+use crate::actuator::servo::high::model::network;
+use crate::actuator::servo::layout::*;
+use crate::actuator::servo::sensing::{Sensing, SensingDetails};
+use crate::actuator::servo::shaft::{Shaft, ShaftDetails, ShaftNeeds, ShaftState};
+use crate::control::current_dq::PwmParameter;
+use crate::control::position_speed::{ControlParameter, ControlStructure, Mode};
+use crate::details;
+use crate::inverter::bridge::InverterParameter;
+use crate::motor::equivalent::{Circuit, LowParameter};
+use crate::motor::star::{interrupted, MotorParameter, MotorStructure, Star, StarState};
+use crate::motor::thermal::{Network, NetworkState, ThermalModel, ThermalParameter};
+use crate::scalar::Scalar;
+use crate::sensor::current::CurrentSensorParameter;
+use crate::sensor::filter::closing;
+use crate::three;
+
+details! {
+    /// What of a low-fidelity servo a run needs; equal over a lane block.
+    Structure, read<F>(parts: Parts)
+    always {
+        drive: DriveKind = DriveKind::read(parts.drive().value(DriveParameter::Kind));
+        control: ControlStructure = ControlStructure::read(parts.control().raw);
+        integral: bool = parts.control().value(ControlParameter::IntegralTime) > 0.0;
+        shaft: ShaftDetails = ShaftDetails::read::<F>(&ShaftNeeds::low(parts));
+        sensing: SensingDetails = SensingDetails::read::<F>(parts);
+        motor: MotorStructure = MotorStructure::read(&parts.motor()).with_unbalance(shaft.unbalance);
+    }
+    full {
+        /// Coefficients vary with the rotor angle.
+        angle = (sensing.resolver && sensing.commutated)
+            || motor.dynamic_eccentricity
+            || motor.static_eccentricity
+            || interrupted(&parts.motor())
+            || parts.motor().any_away([MotorParameter::TurnsA, MotorParameter::TurnsB, MotorParameter::TurnsC]);
+        heat = Network::<f64>::needed(&parts.thermal());
+        detailed_shaft = shaft.full;
+        detailed_sensing = sensing.full;
+    }
+    extra {
+        extra_shaft = shaft.extra;
+        extra_sensing = sensing.extra;
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Model<S> {
+    pub dt: S,
+    pub star: Star<S>,
+    pub resistance: [S; 3],
+    pub inductance: [S; 3],
+    pub healthy: Phase<S>,
+    /// Constant, resistance and inductance of the healthy phase at the reference temperature.
+    pub cold: [S; 3],
+    pub control: Control<S>,
+    pub drive: Drive<S>,
+    pub shaft: Shaft<S>,
+    pub sensing: Sensing<S>,
+    pub filter: S,
+    pub temperature: S,
+    pub network: Network<S>,
+}
+
+/// What the controller believes: P, and PID whose derivative acts as inertia.
+#[derive(Clone, Copy, Debug)]
+pub struct Control<S> {
+    pub per_dt: S,
+    pub position_gain: S,
+    pub feedforward: S,
+    pub speed_gain: S,
+    pub integral_step: S,
+    pub derivative_inertia: S,
+    pub speed_limit: S,
+    pub torque_limit: S,
+    pub per_torque_constant: S,
+}
+
+/// The current loop and the voltage it has.
+#[derive(Clone, Copy, Debug)]
+pub struct Drive<S> {
+    pub voltage_ratio: S,
+    pub band: S,
+    /// Share of the current's error that a step of the PWM loop closes.
+    pub tracking: S,
+    pub supply_scale: S,
+    /// p L of the cross coupling.
+    pub electrical_inductance: S,
+    pub tripped: S,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct State<S> {
+    pub resistance_factor: S,
+    pub flux_factor: S,
+    pub network: NetworkState<S>,
+    /// Command of the last step; NaN before the first.
+    pub command: S,
+    pub copper: S,
+    pub current: S,
+    pub voltage: S,
+    pub integral: S,
+    pub speed_ref: S,
+    pub torque_ref: S,
+    pub motor_torque: S,
+    pub held_angle: S,
+    pub filtered: [S; 2],
+    pub tripped: S,
+    pub shaft: ShaftState<S>,
+}
+
+impl<S: Scalar> Control<S> {
+    fn derive(raw: &[S], structure: &Structure, ratio: S, dt: S) -> Self {
+        let at = |p: ControlParameter| raw[p.at()];
+        let (zero, one) = (S::zero(), S::one());
+        let gain = at(ControlParameter::SpeedGain) * at(ControlParameter::SpeedGainScale);
+        let ti = at(ControlParameter::IntegralTime);
+        let integrates = zero.lt(ti);
+        // A torque command passes the loops by, their derivative included.
+        let torque_mode = structure.control.mode == Mode::Torque;
+        Self {
+            per_dt: one / dt,
+            position_gain: at(ControlParameter::PositionGain) * at(ControlParameter::PositionGainScale),
+            feedforward: at(ControlParameter::SpeedFeedforward) * ratio / dt,
+            speed_gain: gain,
+            integral_step: S::select(integrates, gain / S::select(integrates, ti, one) * dt, zero),
+            derivative_inertia: if torque_mode { zero } else { gain * at(ControlParameter::DerivativeTime) },
+            speed_limit: at(ControlParameter::SpeedLimit),
+            torque_limit: at(ControlParameter::TorqueConstant) * at(ControlParameter::CurrentLimit),
+            per_torque_constant: one / at(ControlParameter::TorqueConstant),
+        }
+    }
+}
+
+impl<S: Scalar> Drive<S> {
+    fn derive(raw: &[S], structure: &Structure, dt: S) -> Self {
+        let at = |i: usize| raw[i];
+        let one = S::one();
+        let inductance = at(MotorParameter::WindingInductance.at());
+        let shorted = (0..6).fold(S::zero(), |sum, i| sum + at(InverterParameter::ShortedAHigh.at() + i));
+        Self {
+            voltage_ratio: at(LowParameter::VoltageRatio.at()),
+            band: at(LowParameter::BandRatio.at()) * at(InverterParameter::HysteresisBand.at()),
+            tracking: match structure.drive {
+                DriveKind::Pwm => one - (-(at(PwmParameter::ProportionalGain.at()) / inductance * dt)).exp(),
+                DriveKind::Hysteresis | DriveKind::Off => one,
+            },
+            supply_scale: at(InverterParameter::SupplyScale.at()),
+            electrical_inductance: at(MotorParameter::PolePairs.at()) * inductance,
+            tripped: S::indicator(S::splat(0.5).lt(shorted)),
+        }
+    }
+}
+
+impl<S: Scalar> Model<S> {
+    pub(super) fn derive<F: Form>(raw: &[S], structure: &Structure) -> Self {
+        let at = |p: MotorParameter| raw[p.at()];
+        let one = S::one();
+        let dt = raw[LowParameter::Step.at()];
+        let shaft = Shaft::derive::<F>(raw, &structure.shaft, dt);
+        // The reduced short: missing turns only; loop currents do not show in one phase.
+        let reduced = MotorStructure { shorted_loop: false, ..structure.motor };
+        let mut star = Star::derive(Raw(raw).motor(), &reduced, dt);
+        star.lean(shaft.unbalance.eccentricity(shaft.inertia));
+        let control = Control::derive(raw, structure, shaft.gear.ratio, dt);
+        let constant = S::splat(1.5) * at(MotorParameter::EmfConstant) * at(MotorParameter::FluxFraction);
+        let cold = [constant, at(MotorParameter::WindingResistance), at(MotorParameter::WindingInductance)];
+        let rise = at(MotorParameter::WindingTemperature) - at(MotorParameter::ReferenceTemperature);
+        let resistance_factor = one + at(MotorParameter::TemperatureCoefficient) * rise;
+        let flux_factor = one + at(MotorParameter::FluxTemperatureCoefficient) * rise;
+        let circuit = Circuit::new(cold[1] * resistance_factor, cold[2], dt);
+        Self {
+            dt,
+            resistance: star.resistance,
+            inductance: three!(|j| one / star.per_inductance[j]),
+            healthy: Phase::new(constant * flux_factor, circuit, &control, shaft.inertia),
+            cold,
+            star,
+            control,
+            drive: Drive::derive(raw, structure, dt),
+            shaft,
+            sensing: Sensing::derive(raw, &structure.sensing),
+            filter: closing(raw[CurrentSensorParameter::FilterCutoff.at()], dt.lane(0)),
+            temperature: at(MotorParameter::WindingTemperature),
+            network: network(raw, dt.lane(0)),
+        }
+    }
+
+    pub(super) fn start(&self, raw: &[S], initial: &[S]) -> State<S> {
+        let (zero, nan) = (S::zero(), S::splat(f64::NAN));
+        let shaft = self.shaft.start([initial[0], initial[1]], [initial[2], nan]);
+        let warm = self.network.start(self.temperature, self.temperature);
+        let (resistance_factor, flux_factor) = heat(raw, &warm);
+        State {
+            resistance_factor,
+            flux_factor,
+            network: warm,
+            command: nan,
+            copper: zero,
+            current: zero,
+            voltage: zero,
+            integral: zero,
+            speed_ref: zero,
+            torque_ref: zero,
+            motor_torque: zero,
+            held_angle: shaft.motor_position,
+            filtered: [zero; 2],
+            tripped: zero,
+            shaft,
+        }
+    }
+}
+
+impl<S: Scalar> State<S> {
+    pub(super) fn refresh(&mut self, raw: &[S]) {
+        (self.resistance_factor, self.flux_factor) = heat(raw, &self.network);
+        self.shaft.refresh(raw);
+    }
+}
+
+/// Factors of the winding's resistance and of the flux.
+fn heat<S: Scalar>(raw: &[S], warm: &NetworkState<S>) -> (S, S) {
+    if ThermalModel::read(raw[ThermalParameter::Model.at()]) == ThermalModel::Off {
+        let mut star = StarState::rest();
+        star.heat(Raw(raw).motor(), raw[MotorParameter::WindingTemperature.at()]);
+        return (star.resistance_factor, star.flux_factor);
+    }
+    network(raw, raw[LowParameter::Step.at()].lane(0)).factors(warm)
+}

@@ -1,0 +1,56 @@
+//! All signals of the low fidelity from its state. Nothing here feeds back.
+
+use super::model::{Model, State, Structure};
+use crate::actuator::servo::advance::Instant;
+use crate::actuator::servo::form::Form;
+use crate::actuator::servo::signals::{LowSignal as Q, LOW};
+use crate::actuator::Inputs;
+use crate::scalar::Scalar;
+
+#[inline(always)]
+pub(super) fn observe<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
+    let x = Instant::at(inputs, t);
+    let shown = m.shaft.show(&structure.shaft, &x, &s.shaft, s.motor_torque);
+    let [encoder, resolver, resolver_speed] = m.sensing.show(&structure.sensing, &s.shaft, s.held_angle);
+    let limited = m.control.speed_limit.le(s.speed_ref.abs()) | m.control.torque_limit.le(s.torque_ref.abs());
+    for (q, value) in [
+        (Q::Command, x.command),
+        (Q::UserPosition, s.shaft.user_position),
+        (Q::UserSpeed, shown.user_speed),
+        (Q::MotorPosition, s.shaft.motor_position),
+        (Q::MotorSpeed, s.shaft.motor_speed),
+        (Q::SpeedRef, s.speed_ref),
+        (Q::TorqueRef, s.torque_ref),
+        (Q::CurrentRef, s.torque_ref * m.control.per_torque_constant),
+        (Q::CurrentQ, s.current),
+        (Q::CurrentQMeas, s.filtered[0]),
+        (Q::VoltageQRef, s.voltage),
+        (Q::VoltageQMeas, s.filtered[1]),
+        (Q::MotorTorque, s.motor_torque),
+        (Q::FrictionTorque, shown.friction),
+        (Q::BrakeTorque, x.brake),
+        (Q::LoadTorque, shown.load),
+        (Q::SupplyVoltage, x.supply * m.drive.supply_scale),
+        (Q::WindingTemperature, if structure.heat { s.network.winding } else { m.temperature }),
+        (Q::SurfaceTemperature, s.network.surface),
+        (Q::HeatCopper, s.network.power[0]),
+        (Q::HeatAir, s.network.power[2]),
+        (Q::ThermalWarning, m.network.warns(&s.network)),
+        (Q::Limited, S::indicator(limited)),
+        (Q::EncoderPosition, encoder),
+        (Q::ResolverPosition, resolver),
+        (Q::ResolverSpeed, resolver_speed),
+        (Q::Tripped, s.tripped.maximum(s.network.over)),
+        (Q::EnergyCopper, s.copper),
+        (Q::EnergyHeatStored, m.network.stored(&s.network)),
+        (Q::EnergyAir, s.network.heat_out),
+    ] {
+        out[q as usize] = value;
+    }
+    if F::LINEAR {
+        let [position, speed, torque, efficiency, aiding] = m.shaft.show_screw(&s.shaft, &shown);
+        // Current and voltage of the printed L-R circuit.
+        let root = S::splat(1.5_f64.sqrt());
+        out[LOW.len()..].copy_from_slice(&[position, speed, torque, efficiency, aiding, root * s.current, root * s.voltage]);
+    }
+}

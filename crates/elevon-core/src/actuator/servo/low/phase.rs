@@ -1,0 +1,59 @@
+//! The equivalent phase at one rotor angle (docs/theory/low-fidelity.md, "From three phases to one").
+
+use super::model::{Control, Model, State, Structure};
+use crate::motor::equivalent::{equivalent, imposed_shape, Circuit};
+use crate::scalar::{three_phase, Scalar};
+use crate::three;
+
+#[derive(Clone, Copy, Debug)]
+pub struct Phase<S> {
+    pub torque_constant: S,
+    pub circuit: Circuit<S>,
+    /// Torque per torque the controller believes in.
+    pub efficacy: S,
+    /// 1 / (J + efficacy K_p T_d): the derivative of the speed acts as inertia.
+    pub per_effective_inertia: S,
+}
+
+impl<S: Scalar> Phase<S> {
+    #[inline(always)]
+    pub(super) fn new(torque_constant: S, circuit: Circuit<S>, control: &Control<S>, inertia: S) -> Self {
+        let efficacy = torque_constant * control.per_torque_constant;
+        let per_effective_inertia = S::one() / efficacy.fma(control.derivative_inertia, inertia);
+        Self { torque_constant, circuit, efficacy, per_effective_inertia }
+    }
+}
+
+/// The phase at the shaft's angle, its currents imposed at the angle `commutation` that the drive believes.
+#[inline(always)]
+pub(super) fn phase<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &State<S>, commutation: S) -> Phase<S> {
+    if !FULL || !structure.angle {
+        return if FULL && structure.heat { warm(m, s) } else { m.healthy };
+    }
+    let (sin, cos) = m.star.electrical_angle(s.shaft.motor_position).sin_cos();
+    let (shape, _) = three_phase(sin, cos);
+    let mut gap = m.star.static_gap(sin, cos);
+    if structure.motor.dynamic_eccentricity {
+        let turning = m.star.dynamic_gap(s.shaft.motor_position);
+        gap = three!(|j| gap[j] * turning[j]);
+    }
+    let k = m.star.coefficients(shape, gap);
+    let sines = if structure.sensing.resolver && structure.sensing.commutated {
+        let (sin, cos) = m.star.electrical_angle(commutation).sin_cos();
+        three_phase(sin, cos).0
+    } else {
+        shape
+    };
+    let resistance = three!(|j| m.resistance[j] * s.resistance_factor);
+    let e = equivalent(k, resistance, m.inductance, imposed_shape(sines, m.star.open));
+    let circuit = Circuit::new(e.resistance, e.inductance, m.dt);
+    Phase::new(e.torque_constant * s.flux_factor, circuit, &m.control, m.shaft.inertia)
+}
+
+/// The healthy phase at the present temperatures.
+#[inline(always)]
+fn warm<S: Scalar>(m: &Model<S>, s: &State<S>) -> Phase<S> {
+    let [constant, resistance, inductance] = m.cold;
+    let circuit = Circuit::new(resistance * s.resistance_factor, inductance, m.dt);
+    Phase::new(constant * s.flux_factor, circuit, &m.control, m.shaft.inertia)
+}

@@ -1,0 +1,126 @@
+//! One step of the low fidelity: sensors, control electronics, equivalent phase, shaft. The derivative of the measured
+//! speed is solved with the acceleration (docs/theory/low-fidelity.md, "The speed derivative as inertia").
+
+use super::model::{Model, State, Structure};
+use super::phase::{phase, Phase};
+use crate::actuator::servo::advance::{Instant, Stepper};
+use crate::actuator::servo::layout::DriveKind;
+use crate::actuator::servo::shaft::Shaft;
+use crate::control::position_speed::Mode;
+use crate::scalar::Scalar;
+use crate::sensor::filter::low_pass;
+
+/// What the controller asks for before the derivative of the speed is known.
+struct Demand<S> {
+    speed_ref: S,
+    error: S,
+    torque: S,
+}
+
+#[inline(always)]
+fn demand<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, command: S, position: S, speed: S) -> Demand<S> {
+    let c = &m.control;
+    let demanded = match structure.control.mode {
+        Mode::Position if structure.control.feedforward => {
+            let moved = command - s.command;
+            s.command = command;
+            let ahead = S::select(moved.equals(moved), c.feedforward * moved, S::zero());
+            c.position_gain * (command - position) + ahead
+        }
+        Mode::Position => c.position_gain * (command - position),
+        Mode::Speed | Mode::Torque => command,
+    };
+    let speed_ref = demanded.clamp_abs(c.speed_limit);
+    let error = speed_ref - speed;
+    let slope = (speed_ref - s.speed_ref) * c.per_dt;
+    let torque = match structure.control.mode {
+        Mode::Torque => command,
+        Mode::Position | Mode::Speed => c.speed_gain * error + s.integral + c.derivative_inertia * slope,
+    };
+    Demand { speed_ref, error, torque }
+}
+
+/// Current and voltage of the phase after a step towards the torque reference.
+#[inline(always)]
+fn electric_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &Instant<S>, s: &mut State<S>, p: &Phase<S>) {
+    let speed = s.shaft.motor_speed;
+    let emf = S::splat(2.0 / 3.0) * p.torque_constant * speed;
+    let current_ref = s.torque_ref * m.control.per_torque_constant;
+    let circuit = &p.circuit;
+    let target = match structure.drive {
+        // The relays act only at the edges of their band; inside it the EMF drives the current.
+        DriveKind::Hysteresis => circuit.current(s.current, -emf).clamp(current_ref - m.drive.band, current_ref + m.drive.band),
+        DriveKind::Pwm => s.current + m.drive.tracking * (current_ref - s.current),
+        DriveKind::Off => S::zero(),
+    };
+    let driving = circuit.voltage(s.current, target);
+    let supply = x.supply * m.drive.supply_scale;
+    let cross = m.drive.electrical_inductance * speed * s.current;
+    let largest = m.drive.voltage_ratio * supply;
+    // v_q^2 + v_d^2 stays inside the largest phase voltage; v_d is the cross coupling p omega L i_q.
+    let room = largest * largest - cross * cross;
+    s.voltage = driving + emf;
+    let limited = room.lt(s.voltage * s.voltage);
+    let mut reached = target;
+    if S::any(limited) {
+        let held = s.voltage.clamp_abs(room.maximum(S::zero()).sqrt());
+        s.voltage = S::select(limited, held, s.voltage);
+        reached = S::select(limited, circuit.current(s.current, held - emf), target);
+    }
+    s.tripped = s.tripped.maximum(m.drive.tripped);
+    let before = s.current;
+    s.current = reached * (S::one() - s.tripped);
+    if FULL && structure.heat {
+        // Sum of R_j i_j^2 of the three phases, at the step's middle.
+        let middle = S::splat(0.5) * (before + s.current);
+        let heat = S::splat(1.5) * middle * middle * m.dt / p.circuit.per_resistance;
+        s.network.collected[0] = s.network.collected[0] + heat;
+        s.copper = s.copper + heat;
+    }
+}
+
+#[inline(always)]
+fn step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &Instant<S>, s: &mut State<S>) {
+    // Sensors and control electronics.
+    let reading = m.sensing.shaft::<FULL>(&structure.sensing, &s.shaft, &mut s.held_angle);
+    let position = m.sensing.user::<FULL>(&structure.sensing, &s.shaft, &reading, m.shaft.gear.per_ratio);
+    let asked = demand(m, structure, s, x.command, position, reading.speed);
+
+    // Loads, and the acceleration that the derivative of the speed takes part in.
+    let p = phase::<S, FULL>(m, structure, s, reading.angle);
+    let torque = p.efficacy * asked.torque;
+    let loads = m.shaft.loads::<FULL, FULL>(&structure.shaft, x, &s.shaft, torque);
+    let acceleration = Shaft::net(&loads, s.shaft.motor_speed, torque) * p.per_effective_inertia;
+    s.torque_ref = (asked.torque - m.control.derivative_inertia * acceleration).clamp_abs(m.control.torque_limit);
+    s.speed_ref = asked.speed_ref;
+    if structure.integral {
+        s.integral = s.integral + m.control.integral_step * asked.error;
+    }
+
+    // Equivalent phase, motor and transmission dynamics.
+    electric_step::<S, FULL>(m, structure, x, s, &p);
+    s.motor_torque = m.star.saturate(p.torque_constant * s.current);
+    m.shaft.step::<FULL, FULL>(&structure.shaft, x, &mut s.shaft, &loads, s.motor_torque);
+
+    // Acquisition.
+    s.filtered[0] = low_pass(m.filter, s.filtered[0], s.current);
+    s.filtered[1] = low_pass(m.filter, s.filtered[1], s.voltage);
+}
+
+/// The step of the inner loop with and without details.
+pub(super) struct LowStep<const FULL: bool>;
+
+impl<S: Scalar, const FULL: bool> Stepper<S> for LowStep<FULL> {
+    type Model = Model<S>;
+    type Structure = Structure;
+    type State = State<S>;
+
+    #[inline(always)]
+    fn dt(model: &Model<S>) -> S {
+        model.dt
+    }
+    #[inline(always)]
+    fn step(model: &Model<S>, structure: &Structure, instant: &Instant<S>, state: &mut State<S>) {
+        step::<S, FULL>(model, structure, instant, state);
+    }
+}

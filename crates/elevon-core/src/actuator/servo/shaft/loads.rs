@@ -1,0 +1,125 @@
+//! What acts on the fast shaft.
+
+use super::{Shaft, ShaftDetails, ShaftState};
+use crate::actuator::servo::advance::Instant;
+use crate::scalar::Scalar;
+
+/// What acts on the fast shaft.
+#[derive(Clone, Copy)]
+pub(in crate::actuator::servo) struct Loads<S> {
+    pub(super) brake: S,
+    pub user_torque: S,
+    /// Signed torque on the fast shaft, and the part of it that is not the contact of the elastic play.
+    pub load: S,
+    pub(super) own: S,
+    /// Torque between gear and user, at the user.
+    pub(super) through: S,
+    pub static_limit: S,
+    pub dynamic: S,
+    pub(super) viscous: S,
+    /// All that opposes the motion at the present speed.
+    pub(super) resist: S,
+}
+
+impl<S: Scalar> Shaft<S> {
+    /// Everything on the shaft under the motor's `torque`, which decides the direction of what is about to start.
+    #[inline(always)]
+    pub(in crate::actuator::servo) fn loads<const FULL: bool, const EXTRA: bool>(
+        &self,
+        d: &ShaftDetails,
+        x: &Instant<S>,
+        s: &ShaftState<S>,
+        torque: S,
+    ) -> Loads<S> {
+        let user_torque = self.user_torque(x, s);
+        let elastic = FULL && d.elastic;
+        let through = if elastic { self.contact(s) } else { user_torque };
+        let mut load = through.fma(self.gear.per_ratio, x.shaft);
+        let mut own = if elastic { x.shaft } else { load };
+        let mut added = x.brake;
+        if EXTRA {
+            if d.linear {
+                added = S::zero();
+            }
+            if d.load_side && !elastic {
+                // Rigid: the load side's friction is felt on the fast shaft.
+                added = added + self.load_side_friction(d, x) * self.gear.per_ratio;
+            }
+            let (torque, friction) = self.disturbance(d, s, through);
+            load = load - torque;
+            own = own - torque;
+            added = added + friction;
+        }
+        if FULL {
+            if d.loaded {
+                let moving = s.motor_speed.sign();
+                let direction = S::select(s.motor_speed.equals(S::zero()), (torque - load).sign(), moving);
+                added = added + self.gear.load_friction(through, direction);
+            }
+            if d.jams {
+                added = added + s.jammed * self.friction.jam_torque;
+            }
+        }
+        let mut brake = x.brake;
+        let mut static_limit = self.friction.static_limit + added;
+        let mut dynamic = self.friction.dynamic + added;
+        if EXTRA {
+            if d.linear {
+                brake = if elastic { S::zero() } else { x.brake * self.gear.per_ratio };
+            }
+            if d.debris {
+                static_limit = static_limit * s.scatter;
+                dynamic = dynamic * s.scatter;
+            }
+        }
+        let speed = s.motor_speed;
+        let viscous = self.viscous::<FULL, EXTRA>(d, speed);
+        let resist = load + speed.signed(dynamic) + viscous;
+        Loads { brake, user_torque, load, own, through, static_limit, dynamic, viscous, resist }
+    }
+
+    #[inline(always)]
+    pub(super) fn viscous<const FULL: bool, const EXTRA: bool>(&self, d: &ShaftDetails, speed: S) -> S {
+        let mut viscous = if FULL && d.sloped { self.friction.viscous_torque(speed) } else { self.friction.viscous * speed };
+        if EXTRA && d.load_side && !d.elastic {
+            viscous = viscous + self.load_damping * self.gear.per_ratio * self.gear.per_ratio * speed;
+        }
+        viscous
+    }
+
+    #[inline(always)]
+    pub(super) fn user_torque(&self, x: &Instant<S>, s: &ShaftState<S>) -> S {
+        self.gear.stiffness.fma(s.user_position - self.gear.spring_zero, x.user)
+    }
+
+    /// Dry friction of the load side, at the user.
+    #[inline(always)]
+    pub(super) fn load_side_friction(&self, d: &ShaftDetails, x: &Instant<S>) -> S {
+        if d.linear {
+            self.load_friction + x.brake
+        } else {
+            self.load_friction
+        }
+    }
+
+    /// Torque of unbalance and spalls on the fast shaft, positive where it drives forwards, and the friction of the spalls.
+    #[inline(always)]
+    pub(super) fn disturbance(&self, d: &ShaftDetails, s: &ShaftState<S>, through: S) -> (S, S) {
+        let (mut torque, mut friction) = (S::zero(), S::zero());
+        if d.spall {
+            (torque, friction) = self.screw.spall(s.motor_position, through, s.motor_position * self.gear.per_ratio);
+        }
+        if d.unbalance {
+            torque = torque + self.unbalance.torque(s.motor_position);
+        }
+        (torque, friction)
+    }
+
+    /// Torque on the user through the elastic play.
+    #[inline(always)]
+    pub(super) fn contact(&self, s: &ShaftState<S>) -> S {
+        let displacement = s.motor_position * self.gear.per_ratio - s.user_position;
+        let rate = s.motor_speed * self.gear.per_ratio - s.user_speed;
+        self.play.contact(displacement, rate)
+    }
+}

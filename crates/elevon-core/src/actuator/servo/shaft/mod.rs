@@ -1,0 +1,178 @@
+//! The fast shaft with all that turns or loads it, and the load side: one component of both fidelities. It knows the
+//! loads, the friction (dry, viscous, of a preloaded or worn screw, of the load side), unbalance, seizure, stops and play,
+//! and it keeps the accounts of their work.
+
+mod loads;
+mod show;
+mod step;
+
+pub(super) use self::show::Shown;
+use super::form::Form;
+use super::layout::*;
+use crate::details;
+use crate::motor::star::MotorParameter;
+use crate::motor::unbalance::Unbalance;
+use crate::scalar::Scalar;
+use crate::transmission::friction::{Friction, FrictionParameter};
+use crate::transmission::gear::{Gear, GearParameter, LoadParameter};
+use crate::transmission::play::{Play, PlayModel};
+use crate::transmission::screw::Screw;
+
+details! {
+    /// What of the shaft a run needs.
+    ShaftDetails, read<F>(x: &ShaftNeeds)
+    always {
+        /// The user's side travels, and the brake acts there.
+        linear: bool = F::LINEAR;
+        /// Positions move with the new speed.
+        semi_implicit: bool = x.semi_implicit;
+    }
+    full {
+        elastic = x.elastic;
+        loaded = F::LINEAR || Gear::<f64>::loaded(&x.parts.gear());
+        sloped = Friction::<f64>::sloped(&x.parts.friction());
+        jams = Friction::<f64>::jams(&x.parts.friction());
+        /// The work of each load is summed.
+        accounts = x.accounts;
+    }
+    extra {
+        /// A load side with damping and dry friction of its own.
+        load_side = F::LINEAR || x.parts.load().any_away([LoadParameter::Damping, LoadParameter::Friction]);
+        unbalance = Unbalance::<f64>::needed(&x.parts.unbalance());
+        spall = F::spalled(x.parts.0);
+        debris = F::contaminated(x.parts.0);
+    }
+}
+
+/// What a run says of its shaft; the low fidelity neither has the elastic play nor sums work.
+pub(super) struct ShaftNeeds<'a> {
+    pub parts: Parts<'a>,
+    pub semi_implicit: bool,
+    pub elastic: bool,
+    pub accounts: bool,
+}
+
+impl<'a> ShaftNeeds<'a> {
+    /// The second mass behind an elastic play, where the set has one.
+    pub(super) fn high(parts: Parts<'a>, accounts: bool) -> Self {
+        use crate::transmission::play::PlayParameter;
+        let semi_implicit = Method::read(parts.solver().value(SolverParameter::Method)) == Method::SemiImplicit;
+        let elastic = PlayModel::read(parts.play().value(PlayParameter::Model)) == PlayModel::Elastic;
+        Self { parts, semi_implicit, elastic, accounts }
+    }
+
+    pub(super) fn low(parts: Parts<'a>) -> Self {
+        Self { parts, semi_implicit: true, elastic: false, accounts: false }
+    }
+}
+
+/// Constants of the shaft.
+#[derive(Clone, Copy, Debug)]
+pub struct Shaft<S> {
+    dt: S,
+    pub friction: Friction<S>,
+    pub gear: Gear<S>,
+    pub play: Play<S>,
+    pub screw: Screw<S>,
+    pub unbalance: Unbalance<S>,
+    /// Of the fast shaft; with a rigid transmission the user's included.
+    pub inertia: S,
+    /// Of the whole train, at the fast shaft.
+    pub whole_inertia: S,
+    dt_per_inertia: S,
+    /// Of the second mass; none with a rigid transmission.
+    pub user_inertia: S,
+    per_user_inertia: S,
+    /// Dry friction and damping of the load side.
+    load_friction: S,
+    load_damping: S,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct ShaftState<S> {
+    pub motor_position: S,
+    pub motor_speed: S,
+    pub user_position: S,
+    pub user_speed: S,
+    jam_side: S,
+    jammed: S,
+    /// Factor on the dry friction of a screw with debris in it.
+    pub scatter: S,
+    pub work: Work<S>,
+}
+
+/// Work done against each load since the start, J.
+#[derive(Clone, Copy, Debug)]
+pub struct Work<S> {
+    pub friction: S,
+    pub brake: S,
+    pub load: S,
+    /// Lost at the stops and in the contact.
+    pub impact: S,
+}
+
+impl<S: Scalar> Shaft<S> {
+    pub(super) fn derive<F: Form>(raw: &[S], d: &ShaftDetails, dt: S) -> Self {
+        let view = Raw(raw);
+        let at = |i: usize| raw[i];
+        let screw = F::screw(raw);
+        let gear = Gear::derive(F::ratio(raw), view.gear(), view.stop(), view.load(), [screw.efficiency, screw.efficiency_aiding]);
+        let user_inertia = at(LoadParameter::Inertia.at());
+        let reflected = user_inertia * gear.per_ratio * gear.per_ratio;
+        let unbalance = Unbalance::derive(view.unbalance());
+        let rotor = at(MotorParameter::Inertia.at()) + at(GearParameter::Inertia.at());
+        let rotor = rotor + F::screw_inertia(raw) + unbalance.inertia;
+        let inertia = if d.elastic { rotor } else { rotor + reflected };
+        let mut friction = Friction::derive(view.friction());
+        friction.preloaded(screw.preload_torque, screw.viscous, at(FrictionParameter::Static.at()), at(FrictionParameter::Dynamic.at()));
+        Self {
+            dt,
+            friction,
+            gear,
+            play: Play::derive(view.play()),
+            screw,
+            unbalance,
+            inertia,
+            whole_inertia: rotor + reflected,
+            dt_per_inertia: dt / inertia,
+            user_inertia: if d.elastic { user_inertia } else { S::zero() },
+            per_user_inertia: S::one() / S::select(S::zero().lt(user_inertia), user_inertia, S::one()),
+            load_friction: at(LoadParameter::Friction.at()),
+            load_damping: at(LoadParameter::Damping.at()),
+        }
+    }
+
+    /// At rest or moving as given; NaN where nothing is given.
+    pub(super) fn start(&self, motor: [S; 2], user: [S; 2]) -> ShaftState<S> {
+        let or = |given: S, other: S| S::select(given.equals(given), given, other);
+        let zero = S::zero();
+        let motor_position = or(motor[0], zero);
+        let driver = motor_position * self.gear.per_ratio;
+        let user_position = self.play.drag(driver, or(user[0], driver));
+        ShaftState {
+            motor_position,
+            motor_speed: or(motor[1], zero),
+            user_position,
+            user_speed: or(user[1], zero),
+            jam_side: (user_position - self.friction.jam_position).sign(),
+            jammed: S::select(S::splat(0.5).lt(self.friction.jam_anywhere), S::one(), zero),
+            scatter: S::one(),
+            work: Work { friction: zero, brake: zero, load: zero, impact: zero },
+        }
+    }
+}
+
+impl<S: Scalar> ShaftState<S> {
+    /// After a fault changed parameters: a jam at a position has not been passed before.
+    pub(super) fn refresh(&mut self, raw: &[S]) {
+        let position = raw[FrictionParameter::JamPosition.at()];
+        let free = self.jammed.equals(S::zero());
+        let side = (self.user_position - position).sign();
+        self.jam_side = S::select(free & self.jam_side.equals(S::zero()), side, self.jam_side);
+    }
+
+    /// The friction of a screw with debris in it, until the next tick; `noise` has unit deviation.
+    pub(super) fn scatter(&mut self, screw: &Screw<S>, noise: S) {
+        self.scatter = screw.scatter.fma(noise, S::one()).maximum(S::zero());
+    }
+}

@@ -1,0 +1,76 @@
+//! What the shaft shows to an observer. Nothing here feeds back.
+
+use super::{Shaft, ShaftDetails, ShaftState};
+use crate::actuator::servo::advance::Instant;
+use crate::scalar::Scalar;
+use crate::transmission::friction::Friction;
+
+/// What the shaft shows to an observer.
+pub(in crate::actuator::servo) struct Shown<S> {
+    pub user_speed: S,
+    pub friction: S,
+    pub brake: S,
+    pub load: S,
+    pub user_torque: S,
+    pub through: S,
+    pub unbalance: S,
+}
+
+impl<S: Scalar> Shaft<S> {
+    /// What the shaft shows while the motor gives `torque`.
+    #[inline(always)]
+    pub(in crate::actuator::servo) fn show(&self, d: &ShaftDetails, x: &Instant<S>, s: &ShaftState<S>, torque: S) -> Shown<S> {
+        let loads = self.loads::<true, true>(d, x, s, torque);
+        let dry = Friction::dry_torque(torque - loads.load, s.motor_speed, loads.static_limit, loads.dynamic);
+        Shown {
+            user_speed: self.user_speed(d, s),
+            friction: dry + self.friction.viscous_torque(s.motor_speed),
+            brake: loads.brake,
+            load: loads.load,
+            user_torque: loads.user_torque,
+            through: loads.through,
+            unbalance: if d.unbalance { self.unbalance.torque(s.motor_position) } else { S::zero() },
+        }
+    }
+
+    /// In the operator model the user moves with the motor while the play is taken up, else it rests.
+    #[inline(always)]
+    fn user_speed(&self, d: &ShaftDetails, s: &ShaftState<S>) -> S {
+        if d.elastic {
+            return s.user_speed;
+        }
+        let lag = s.motor_position * self.gear.per_ratio - s.user_position;
+        let edge = self.play.half * S::splat(1.0 - 1e-9);
+        let pushing = edge.le(lag.abs()) & S::zero().le(lag * s.motor_speed);
+        S::select(pushing, s.motor_speed * self.gear.per_ratio, S::zero())
+    }
+
+    /// Ram position and speed, the screw's torque at the fast shaft, its efficiencies.
+    #[inline(always)]
+    pub(in crate::actuator::servo) fn show_screw(&self, s: &ShaftState<S>, shown: &Shown<S>) -> [S; 5] {
+        let per_ratio = self.gear.per_ratio;
+        let efficiency = [self.screw.efficiency, self.screw.efficiency_aiding];
+        [s.motor_position * per_ratio, s.motor_speed * per_ratio, shown.through * per_ratio, efficiency[0], efficiency[1]]
+    }
+
+    /// Friction and damping of the load side, and the torque of spalls.
+    #[inline(always)]
+    pub(in crate::actuator::servo) fn show_load_side(
+        &self,
+        d: &ShaftDetails,
+        x: &Instant<S>,
+        s: &ShaftState<S>,
+        shown: &Shown<S>,
+    ) -> [S; 2] {
+        let limit = self.load_side_friction(d, x);
+        let dry = Friction::dry_torque(shown.through - shown.user_torque, s.user_speed, limit, limit);
+        let disturbance = self.disturbance(d, s, shown.through).0;
+        [dry + self.load_damping * s.user_speed, disturbance - shown.unbalance]
+    }
+
+    #[inline(always)]
+    pub(in crate::actuator::servo) fn kinetic(&self, s: &ShaftState<S>) -> S {
+        let half = S::splat(0.5);
+        half * self.inertia * s.motor_speed * s.motor_speed + half * self.user_inertia * s.user_speed * s.user_speed
+    }
+}
