@@ -94,7 +94,30 @@ def read_toml(path: str | Path) -> Document:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise FormatError(f"{file}: not valid TOML: {error}") from error
+    except RecursionError as error:
+        raise FormatError(f"{file}: {_TOO_DEEP}") from error
+    if _depth(data) > _DEEPEST:
+        raise FormatError(f"{file}: {_TOO_DEEP}")
     return Document(str(file), text, data, file.parent)
+
+
+#: Levels of tables and lists that any file of ours can need, with room to spare.
+_DEEPEST = 32
+_TOO_DEEP = f"tables and lists are nested deeper than {_DEEPEST} levels"
+
+
+def _depth(data: Any) -> int:
+    """Return how deep tables and lists are nested, counted without recursion."""
+    level, depth = [data], 0
+    while level and depth <= _DEEPEST:
+        depth += 1
+        level = [
+            inner
+            for item in level
+            if isinstance(item, (dict, list))
+            for inner in (item.values() if isinstance(item, dict) else item)
+        ]
+    return depth
 
 
 def validated(model: type[Model], data: Mapping[str, Any], document: Document) -> Model:

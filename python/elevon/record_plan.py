@@ -9,7 +9,10 @@ from dataclasses import dataclass
 from elevon.errors import InputError, unknown
 from elevon.units import parse_quantity
 
-__all__ = ["DEFAULT_RECORD", "GROUPS", "ClockPlan", "clock_name", "record_plan"]
+__all__ = ["DEFAULT_RECORD", "GROUPS", "MOST_STEPS", "ClockPlan", "clock_name", "record_plan"]
+
+#: Solver steps are counted in whole numbers that a double holds exactly.
+MOST_STEPS = 9.0e15
 
 #: Named groups of signals; a model without one of them leaves it out of the group.
 GROUPS: Mapping[str, tuple[str, ...]] = {
@@ -164,6 +167,9 @@ def _period(rate: str, step: float) -> int:
     hertz = parse_quantity(rate, "Hz", "record")
     if hertz <= 0.0:
         raise InputError(f"record: the rate {rate} must be positive")
+    slowest = 1.0 / (MOST_STEPS * step)
+    if hertz < slowest:
+        raise InputError(f"record: the rate {rate} is too low; at least {slowest:.3g} Hz")
     exact = 1.0 / (hertz * step)
     period = max(round(exact), 1)
     if abs(exact - period) <= 1e-9 * exact:

@@ -14,8 +14,11 @@ import pytest
 import elevon
 from tests.contract import fuzz
 
+#: What does not act is said elsewhere; here it may be anything.
+pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
+
 #: Cases of each kind in the sample that always runs.
-FEW = 60
+FEW = 150
 #: Cases of each kind in the long test.
 MANY = 4000
 

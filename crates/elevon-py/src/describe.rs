@@ -6,7 +6,7 @@ use elevon_core::fault::{profiles as fault_profiles, Attribute};
 use elevon_core::registry::KINDS;
 use elevon_core::solver::Width;
 use elevon_core::variable::acts::{records, Fidelity};
-use elevon_core::variable::Range;
+use elevon_core::variable::{Group, Range};
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -115,7 +115,14 @@ pub fn initial(wiring: &str, fidelity: &str) -> PyResult<Vec<&'static str>> {
     Ok(model(wiring, fidelity)?.initial().to_vec())
 }
 
-fn attribute<'py>(d: &Bound<'py, PyDict>, a: &Attribute) -> PyResult<()> {
+/// An attribute ranges over what its parameter does; one without is the period of a pulse.
+fn attribute<'py>(d: &Bound<'py, PyDict>, a: &Attribute, groups: &[Group]) -> PyResult<()> {
+    let all = groups.iter().flat_map(|g| g.variables.iter().enumerate().map(move |(i, v)| (g.path(i), v.range)));
+    let range = all.into_iter().find(|(path, _)| path == a.path).map_or(Range::Positive, |(_, range)| range);
+    let (minimum, maximum, open) = range.bounds();
+    d.set_item("minimum", minimum)?;
+    d.set_item("maximum", maximum)?;
+    d.set_item("minimum_open", open)?;
     d.set_item("name", a.name)?;
     d.set_item("unit", a.unit)?;
     d.set_item("default", a.default)?;
@@ -136,7 +143,7 @@ pub fn faults<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
         d.set_item("minimum_open", open)?;
         d.set_item("effect", f.effect)?;
         d.set_item("source", f.source)?;
-        d.set_item("attributes", dicts(py, f.attributes, attribute)?)?;
+        d.set_item("attributes", dicts(py, f.attributes, |d, a| attribute(d, a, model.groups()))?)?;
         let targets = PyDict::new(py);
         for place in f.places {
             targets.set_item(place.name, place.targets.iter().map(|t| t.path).collect::<Vec<_>>())?;

@@ -38,20 +38,13 @@ class FaultRecord:
     @property
     def range_text(self) -> str:
         """The range of the severity, such as ``[0, 0.95]``."""
-        low = "(" if self.minimum_open or math.isinf(self.minimum) else "["
-        high = ")" if math.isinf(self.maximum) else "]"
-        return f"{low}{self.minimum:g}, {self.maximum:g}{high}"
+        return _interval(self.minimum, self.maximum, self.minimum_open)
 
     def read_severity(self, given: float | str, place: str) -> float:
         """Return the severity in SI, or raise when it is outside the range."""
         value = parse_quantity(given, self.unit or "1", place)
-        above = value > self.minimum or (value == self.minimum and not self.minimum_open)
-        if not (above and value <= self.maximum):
-            unit = self.unit or "1"
-            raise RangeError(
-                f"{place}: severity {format_quantity(value, unit)} is outside "
-                f"{self.range_text}{'' if unit == '1' else ' ' + unit} ({self.effect})"
-            )
+        bounds = (self.minimum, self.maximum, self.minimum_open)
+        _check(value, bounds, self.unit or "1", f"{place}: severity", self.effect)
         return value
 
     def read_attributes(self, given: Mapping[str, float | str], place: str) -> dict[str, float]:
@@ -61,8 +54,32 @@ class FaultRecord:
         for name, value in given.items():
             if name not in known:
                 raise unknown("attribute", name, known, place)
-            values[name] = parse_quantity(value, known[name]["unit"] or "1", f"{place}: {name}")
+            item = known[name]
+            unit = item["unit"] or "1"
+            values[name] = parse_quantity(value, unit, f"{place}: {name}")
+            bounds = (item["minimum"], item["maximum"], item["minimum_open"])
+            _check(values[name], bounds, unit, f"{place}: {name}", item["text"])
         return values
+
+
+def _interval(low: float, high: float, low_open: bool) -> str:
+    left = "(" if low_open or math.isinf(low) else "["
+    right = ")" if math.isinf(high) else "]"
+    return f"{left}{low:g}, {high:g}{right}"
+
+
+def _check(
+    value: float, bounds: tuple[float, float, bool], unit: str, subject: str, text: str
+) -> None:
+    """Raise `RangeError` unless the value lies within its bounds (low, high, low excluded)."""
+    low, high, low_open = bounds
+    above = value > low or (value == low and not low_open)
+    if not (above and value <= high):
+        shown = unit if unit != "1" else ""
+        raise RangeError(
+            f"{subject} {format_quantity(value, unit)} is outside "
+            f"{_interval(*bounds)}{' ' + shown if shown else ''} ({text})"
+        )
 
 
 @lru_cache(maxsize=32)

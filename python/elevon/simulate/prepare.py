@@ -11,7 +11,7 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.errors import InputError, unknown
 from elevon.parameters import records
-from elevon.record_plan import ClockPlan, record_plan
+from elevon.record_plan import MOST_STEPS, ClockPlan, record_plan
 from elevon.scenario import Scenario, compile_scenario
 from elevon.scenario.compile import signal_records
 from elevon.simulate.acting import Doubt, check_values, not_acting
@@ -105,6 +105,11 @@ def prepare(run: Run, fidelity: str, record: Record) -> Prepared:
     plan = record_plan(record, {name: item["unit"] for name, item in known.items()}, step)
     if compiled.duration < step:
         raise InputError(f"duration = {compiled.duration:g} s is shorter than a step ({step:g} s)")
+    if compiled.duration / step >= MOST_STEPS:
+        raise InputError(
+            f"duration = {compiled.duration:g} s is {compiled.duration / step:.3g} solver steps of "
+            f"{step:g} s; at most {MOST_STEPS:g}"
+        )
     core = {
         "parameters": actuator.parameters.vector(),
         "inputs": compiled.inputs,

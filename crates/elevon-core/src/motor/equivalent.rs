@@ -11,7 +11,7 @@ use crate::variables;
 variables! {
     /// The few numbers that only the low fidelity has.
     LowParameter, LOW {
-        Step => "step", "dt", "s", Positive, Solver, Some(5e-4), "solver step of the low fidelity",
+        Step => "step", "dt", "s", Between(1e-12, 1.0), Solver, Some(5e-4), "solver step of the low fidelity",
             low_only("it has solver.step");
         VoltageRatio => "voltage_ratio", "-", "1", Positive, Plant, Some(std::f64::consts::FRAC_2_PI), "largest phase voltage, peak, over the DC link: 2/pi in six-step, 1/sqrt 3 for a linear PWM",
             low_only("it has the relays themselves").when(&[Chosen("drive.kind", &["hysteresis"])]);

@@ -60,7 +60,7 @@ variables! {
 variables! {
     /// The low fidelity.
     LowParameter, LOW {
-        Step => "step", "dt_low", "s", Positive, Solver, Some(2e-5), "solver step of the low fidelity",
+        Step => "step", "dt_low", "s", Between(1e-12, 1.0), Solver, Some(2e-5), "solver step of the low fidelity",
             low_only("it has solver.step");
         CommutationFactor => "commutation_factor", "c", "1", NonNegative, Plant, Some(1.1), "mean torque loss of the commutations as a resistance c p |w| L",
             low_only("it has the commutations themselves");
@@ -70,11 +70,11 @@ variables! {
 variables! {
     /// The fixed-step solver of the high fidelity.
     SolverParameter, SOLVER {
-        Step => "step", "dt", "s", Positive, Solver, Some(1e-6), "solver step of the electrical part",
+        Step => "step", "dt", "s", Between(1e-12, 1.0), Solver, Some(1e-6), "solver step of the electrical part",
             high_only("it has low.step");
-        MechanicalStep => "mechanical_step", "-", "s", Positive, Solver, Some(1e-5), "step of speeds, friction and lock: a whole number of electrical steps",
+        MechanicalStep => "mechanical_step", "-", "s", Between(1e-12, 1.0), Solver, Some(1e-5), "step of speeds, friction and lock: a whole number of electrical steps",
             high_only("it has low.step for all");
-        FaultGrid => "fault_grid", "-", "s", Positive, Solver, Some(1e-3), "smooth fault profiles are held over this time";
+        FaultGrid => "fault_grid", "-", "s", Between(1e-12, 1e6), Solver, Some(1e-3), "smooth fault profiles are held over this time";
     }
 }
 

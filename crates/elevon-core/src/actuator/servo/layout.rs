@@ -43,11 +43,11 @@ variables! {
 variables! {
     /// The fixed-step solver.
     SolverParameter, SOLVER {
-        Step => "step", "dt", "s", Positive, Solver, Some(1e-6), "solver step of the high fidelity",
+        Step => "step", "dt", "s", Between(1e-12, 1.0), Solver, Some(1e-6), "solver step of the high fidelity",
             high_only("it has low.step");
         Method => "method", "-", "1", Choice(Method::NAMES), Solver, Some(0.0), "explicit Euler (the papers), or semi-implicit: positions move with the new speed",
             high_only("it is semi-implicit");
-        FaultGrid => "fault_grid", "-", "s", Positive, Solver, Some(1e-3), "smooth fault profiles are held over this time";
+        FaultGrid => "fault_grid", "-", "s", Between(1e-12, 1e6), Solver, Some(1e-3), "smooth fault profiles are held over this time";
     }
 }
 
