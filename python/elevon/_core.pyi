@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 __all__ = [
     "check",
+    "derivatives_per_pass",
     "faults",
     "initial",
     "not_acting",
@@ -18,6 +19,7 @@ __all__ = [
     "signals",
     "simulate",
     "version",
+    "waveform",
     "waveforms",
     "widths",
     "wirings",
@@ -30,6 +32,10 @@ def signals(wiring: str, fidelity: str) -> list[dict[str, Any]]: ...
 def ports(wiring: str) -> list[dict[str, Any]]: ...
 def initial(wiring: str, fidelity: str) -> list[str]: ...
 def faults(wiring: str) -> list[dict[str, Any]]: ...
+def waveform(
+    kind: str, parameters: list[float], time: npt.NDArray[np.float64]
+) -> npt.NDArray[np.float64]: ...
+def derivatives_per_pass() -> int: ...
 def waveforms() -> list[dict[str, Any]]: ...
 def profiles() -> list[dict[str, Any]]: ...
 def check(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 
@@ -79,3 +79,14 @@ def test_waveforms_and_profiles_are_described(catalogue: Any) -> None:
             assert parameter["text"], (record["kind"], parameter["name"])
             default = parameter["default"]
             assert default is None or not math.isnan(default)
+
+
+def test_every_port_and_mode_of_the_core_has_its_place_in_a_scenario() -> None:
+    """And a scenario has no place for anything else."""
+    from elevon.scenario.scenario import Command, Load
+
+    ports = {port["name"] for name in {w for w, _ in WIRINGS} for port in _core.ports(name)}
+    assert ports == {"command", "supply", *Load.model_fields}
+    modes = {mode for wiring in _core.wirings() for mode in wiring["modes"]}
+    assert modes == set(get_args(Command.model_fields["mode"].annotation))
+    assert all(set(w["mode_units"]) == set(w["modes"]) for w in _core.wirings())

@@ -16,7 +16,7 @@ ROWS = [
     ["documents", "series", "report"],
     ["recording"],
     ["parameters", "loads"],
-    ["actuator", "faults"],
+    ["actuator", "faults", "waveforms"],
     ["scenario", "diagram"],
     ["record_plan"],
     ["simulate"],

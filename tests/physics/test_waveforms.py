@@ -11,6 +11,8 @@ from scipy import signal
 
 from elevon import _core
 from elevon.errors import InputError
+from elevon.units import parse_quantity
+from elevon.waveforms import evaluate, unit_of, wave_records
 from tests.physics.rig import FREE_SHAFT, run, term
 
 DURATION, RATE = 2.0, 1000.0
@@ -187,6 +189,20 @@ def test_waveform_follows_its_formula(kind: str) -> None:
     given, formula = CASES[kind]
     time, command = command_of([given])
     assert command == pytest.approx(formula(time), abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", sorted(set(CASES) - {"table"}))
+def test_evaluated_waveform_follows_its_formula(kind: str) -> None:
+    """What the bench fits is the core's own; a jump belongs to what follows it."""
+    given, formula = CASES[kind]
+    time = np.arange(int(DURATION * RATE)) / RATE
+    units = {p.name: unit_of(p, "rad") for p in wave_records()[kind].parameters}
+    known = {
+        name: float(value) if isinstance(value, bool) else parse_quantity(value, units[name] or "1")
+        for name, value in given.items()
+        if name in units
+    }
+    assert evaluate(kind, known, time + 1e-12) == pytest.approx(formula(time), abs=1e-9)
 
 
 def test_repeating_table_starts_again() -> None:

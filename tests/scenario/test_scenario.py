@@ -8,7 +8,7 @@ import pytest
 import elevon
 from elevon.errors import FormatError, InputError, UnitError, UnknownNameError
 from elevon.scenario import Scenario, compile_scenario
-from elevon.scenario.waveforms import wave_records
+from elevon.waveforms import wave_records
 
 SINE = {"kind": "sine", "amplitude": "7 deg", "frequency": "0.2 Hz"}
 

@@ -95,6 +95,10 @@ impl Model {
     pub fn modes(self) -> &'static [&'static str] {
         dispatch!(self, W => W::MODES)
     }
+    /// Units of the command in each mode; empty: the command port's own.
+    pub fn mode_units(self) -> &'static [&'static str] {
+        dispatch!(self, W => W::MODE_UNITS)
+    }
     pub fn actions(self) -> &'static [&'static str] {
         dispatch!(self, W => W::ACTIONS)
     }

@@ -1,13 +1,13 @@
 //! What the core knows of its actuators, as plain dictionaries.
 
-use crate::spec::{model, vector, Resolver};
-use elevon_core::command;
+use crate::spec::{bad, model, vector, Resolver};
+use elevon_core::command::{self, Term, Wave};
 use elevon_core::fault::{profiles as fault_profiles, Attribute};
 use elevon_core::registry::KINDS;
-use elevon_core::solver::Width;
+use elevon_core::solver::{Width, DERIVATIVES};
 use elevon_core::variable::acts::{records, Fidelity};
 use elevon_core::variable::{Group, Range};
-use numpy::PyReadonlyArray1;
+use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -50,6 +50,12 @@ pub fn wirings(py: Python<'_>) -> Dicts<'_> {
         d.set_item("text", kind.text)?;
         let model = kind.fidelities[0].1;
         d.set_item("modes", model.modes().to_vec())?;
+        let command = model.ports().iter().find(|p| p.name == "command").map_or("", |p| p.unit);
+        let units = PyDict::new(py);
+        for (mode, unit) in model.modes().iter().zip(model.mode_units()) {
+            units.set_item(mode, if unit.is_empty() { command } else { unit })?;
+        }
+        d.set_item("mode_units", units)?;
         d.set_item("actions", model.actions().to_vec())?;
         d.set_item("fidelities", kind.fidelities.iter().map(|f| f.0).collect::<Vec<_>>())
     })
@@ -171,6 +177,29 @@ pub fn waveforms(py: Python<'_>) -> Dicts<'_> {
         d.set_item("text", w.text)?;
         d.set_item("parameters", rows(py, w.parameters.iter().map(|p| (p.name, p.unit, p.default, p.text)))?)
     })
+}
+
+/// Values of a waveform at instants; a table has points instead of parameters and is none of these.
+#[pyfunction]
+pub fn waveform<'py>(
+    py: Python<'py>,
+    kind: &str,
+    parameters: Vec<f64>,
+    time: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let record = command::catalogue().iter().find(|w| w.kind == kind && w.wave != Wave::Table);
+    let record = record.ok_or_else(|| bad(format!("no waveform {kind:?} without points")))?;
+    if parameters.len() != record.parameters.len() {
+        return Err(bad(format!("{kind}: {} parameters given, {} expected", parameters.len(), record.parameters.len())));
+    }
+    let term = Term { wave: record.wave, enabled: true, parameters, times: [].into(), values: [].into() };
+    Ok(PyArray1::from_vec(py, time.as_slice()?.iter().map(|&t| term.at(t)).collect()))
+}
+
+/// Derivatives that one pass of `sensitivities` carries.
+#[pyfunction]
+pub fn derivatives_per_pass() -> usize {
+    DERIVATIVES
 }
 
 #[pyfunction]

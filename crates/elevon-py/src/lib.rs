@@ -17,6 +17,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(describe::initial, m)?)?;
     m.add_function(wrap_pyfunction!(describe::faults, m)?)?;
     m.add_function(wrap_pyfunction!(describe::waveforms, m)?)?;
+    m.add_function(wrap_pyfunction!(describe::waveform, m)?)?;
+    m.add_function(wrap_pyfunction!(describe::derivatives_per_pass, m)?)?;
     m.add_function(wrap_pyfunction!(describe::profiles, m)?)?;
     m.add_function(wrap_pyfunction!(describe::check, m)?)?;
     m.add_function(wrap_pyfunction!(describe::not_acting, m)?)?;

@@ -1,7 +1,7 @@
 //! Runs without the GIL; the calling thread polls for progress and interruption.
 
 use crate::spec::{bad, Resolver};
-use elevon_core::solver::{Clock, Monitor, RunOutput, RunSpec, Status, Width};
+use elevon_core::solver::{Clock, Monitor, RunOutput, RunSpec, Status, Width, DERIVATIVES};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -171,7 +171,7 @@ pub fn simulate<'py>(
     Ok(list)
 }
 
-/// One run with exact derivatives. A list of results, one a pass of at most eight derivatives; in each, every
+/// One run with exact derivatives. A list of results, one a pass of `derivatives_per_pass`; in each, every
 /// value is followed by its derivatives.
 #[pyfunction]
 #[pyo3(signature = (wiring, fidelity, run, record, parameters, faults, progress=None))]
@@ -196,7 +196,7 @@ pub fn sensitivities<'py>(
     let model = resolver.model;
     let dt = model.step(&spec.parameters);
     let chosen = wanted.len() + faults.len();
-    let passes = chosen.div_ceil(8) as u64;
+    let passes = chosen.div_ceil(DERIVATIVES) as u64;
     let total = (spec.duration / dt).round() as u64 * passes;
     let outputs = polled(py, total, progress, |monitor| model.sensitivities(&spec, &wanted, &faults, &clocks, monitor))?;
     let outputs = outputs.ok_or_else(|| {

@@ -18,10 +18,10 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.bench.loadcell import Hx711
-from elevon.bench.waveforms import WAVEFORMS, evaluate
-from elevon.errors import InputError, RangeError, did_you_mean
+from elevon.errors import InputError, RangeError
 from elevon.scenario.scenario import Term
 from elevon.units import parse_quantity
+from elevon.waveforms import TABLE, evaluate, unit_of, wave_records
 
 __all__ = ["BrakeRig", "BrakeRun", "CellState", "brake_loop", "set_point"]
 
@@ -127,8 +127,6 @@ def set_point(terms: Sequence[Term], time: Floats) -> Floats:
 
 
 def _term(term: Term, time: Floats, place: str) -> Floats:
-    from elevon.scenario.waveforms import TABLE, unit_of, wave_records
-
     units = {p.name: unit_of(p, "N m") for p in wave_records()[term.kind].parameters}
     given = {n: _number(v, units[n], f"{place}: {n}") for n, v in term.arguments.items()}
     if term.kind == TABLE:
@@ -139,11 +137,6 @@ def _term(term: Term, time: Floats, place: str) -> Floats:
         scale = parse_quantity(f"1 {term.unit or 'N m'}", "N m", place) * given.get("gain", 1.0)
         at = time - given.get("start", 0.0)
         return np.asarray(np.interp(at, seconds, values * scale), dtype=np.float64)
-    if term.kind not in WAVEFORMS:
-        raise InputError(
-            f"{place}: the brake cannot follow a {term.kind}"
-            f"{did_you_mean(term.kind, [*WAVEFORMS, TABLE])}"
-        )
     return evaluate(term.kind, given, time)
 
 

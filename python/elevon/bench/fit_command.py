@@ -12,24 +12,14 @@ import numpy.typing as npt
 
 from elevon.bench.command import CommandTrace
 from elevon.bench.covariance import robust_covariance
-from elevon.bench.guess_command import guesses
-from elevon.bench.waveforms import WAVEFORMS, evaluate
+from elevon.bench.guess_command import FREE, guesses
 from elevon.errors import InputError, unknown
+from elevon.waveforms import evaluate, wave_records
 
 __all__ = ["FREE", "WaveformFit", "best_waveform", "fit_waveform"]
 
 FloatArray = npt.NDArray[np.float64]
 
-#: Parameters fitted for each waveform; the others keep their guess or the value given.
-FREE: dict[str, tuple[str, ...]] = {
-    "constant": ("value",),
-    "step": ("initial", "final", "time"),
-    "ramp": ("initial", "slope", "start", "end"),
-    "sine": ("amplitude", "frequency", "phase", "bias"),
-    "triangle": ("amplitude", "frequency", "phase", "bias"),
-    "chirp": ("amplitude", "start_frequency", "end_frequency", "phase", "bias"),
-    "trapezoid": ("low", "high", "rise", "hold_high", "fall", "hold_low", "start"),
-}
 _ANGLES = {"phase"}
 _OUTLIER = 6.0
 _FAR = 10.0  # of the robust spread: no noise reaches it
@@ -105,7 +95,7 @@ def fit_waveform(
     trace : CommandTrace
         From `elevon.bench.command.reconstruct`.
     kind : str
-        Waveform (see `elevon.bench.waveforms.WAVEFORMS`).
+        Waveform, one of `FREE`.
     fixed : mapping of str to float, optional
         Parameters that are known and not fitted (SI).
     window : (float, float), optional
@@ -127,11 +117,12 @@ def fit_waveform(
         Unknown waveform or parameter, or too few valid samples.
     """
     known = dict(fixed or {})
-    if kind not in WAVEFORMS:
-        raise unknown("waveform", kind, WAVEFORMS)
+    if kind not in FREE:
+        raise unknown("waveform", kind, FREE)
+    names = wave_records()[kind].names
     for name in known:
-        if name not in WAVEFORMS[kind]:
-            raise unknown("parameter", name, WAVEFORMS[kind], f"waveform {kind}")
+        if name not in names:
+            raise unknown("parameter", name, names, f"waveform {kind}")
     t, y = _selected(trace, window)
     moving = window is None and kind not in {"constant", "step", "ramp", "trapezoid"}
     if moving:

@@ -8,11 +8,21 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from elevon.bench.waveforms import waveform_parameters
+from elevon.waveforms import complete
 
-__all__ = ["guesses"]
+__all__ = ["FREE", "guesses"]
 
 FloatArray = npt.NDArray[np.float64]
+#: Parameters fitted for each waveform; the others keep their guess or the value given.
+FREE: dict[str, tuple[str, ...]] = {
+    "constant": ("value",),
+    "step": ("initial", "final", "time"),
+    "ramp": ("initial", "slope", "start", "end"),
+    "sine": ("amplitude", "frequency", "phase", "bias"),
+    "triangle": ("amplitude", "frequency", "phase", "bias"),
+    "chirp": ("amplitude", "start_frequency", "end_frequency", "phase", "bias"),
+    "trapezoid": ("low", "high", "rise", "hold_high", "fall", "hold_low", "start"),
+}
 _TAU = 2.0 * math.pi
 _COARSE = 1200  # samples enough for a scan
 _CHUNK = 128  # rows of a scan held at once
@@ -60,7 +70,7 @@ def _oscillation(
         # The fit's phase is at `start`; a shift of the time origin turns it.
         phase = math.atan2(b, a) + _TAU * frequency * known.get("start", 0.0)
         given = {"amplitude": amplitude, "frequency": frequency, "phase": phase, "bias": bias}
-        starts.append(waveform_parameters(kind, given))
+        starts.append(complete(kind, given))
     return starts
 
 
@@ -139,7 +149,7 @@ def _chirp(t: FloatArray, y: FloatArray, known: Mapping[str, float]) -> list[dic
             "start_frequency": low,
             "end_frequency": high,
         }
-        starts.append(waveform_parameters("chirp", {**given, **known}))
+        starts.append(complete("chirp", {**given, **known}))
     return starts
 
 
@@ -205,7 +215,7 @@ def _trapezoid(t: FloatArray, y: FloatArray, known: Mapping[str, float]) -> list
         "start": first - 0.5 * rise,
         **known,
     }
-    return [waveform_parameters("trapezoid", given)]
+    return [complete("trapezoid", given)]
 
 
 def _crossings(t: FloatArray, y: FloatArray, level: float) -> list[tuple[float, bool]]:

@@ -248,7 +248,7 @@ def _command(step: TraceStep, start: float) -> dict[str, Any]:
 
 
 def _moved(term: dict[str, Any], start: float) -> dict[str, Any]:
-    from elevon.scenario.waveforms import wave_records
+    from elevon.waveforms import wave_records
 
     known = {p.name: p.default for p in wave_records()[term["kind"]].parameters}
     moved = dict(term)

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.bench.guess_command import FREE
 from elevon.bench.loadcell import Hx711, write_loadcell
 from elevon.bench.logs.drive import DriveFormat, write_drive_csv
 from elevon.bench.rig import RATE, Setup
-from elevon.bench.waveforms import WAVEFORMS
 from elevon.files import write_text
 from elevon.units import parse_quantity
 
@@ -132,7 +132,7 @@ def _note(setup: Setup, layout: DriveFormat) -> dict[str, Any]:
     note: dict[str, Any] = {}
     terms = [term for term in setup.trace.command.terms if term.enabled]
     mode = setup.trace.command.mode
-    if mode == "position" and len(terms) == 1 and terms[0].kind in WAVEFORMS:
+    if mode == "position" and len(terms) == 1 and terms[0].kind in FREE:
         note |= _waveform(terms[0])
     note["brake"] = "on" if setup.brake is not None else "off"
     rig = setup.rig
@@ -146,8 +146,8 @@ def _note(setup: Setup, layout: DriveFormat) -> dict[str, Any]:
 
 
 def _waveform(term: Any) -> dict[str, Any]:
-    from elevon.scenario.waveforms import unit_of, wave_records
     from elevon.units import to_display
+    from elevon.waveforms import unit_of, wave_records
 
     found: dict[str, Any] = {"waveform": term.kind}
     for parameter in wave_records()[term.kind].parameters:

@@ -105,7 +105,7 @@ def faults(
 @app.command()
 def waveforms(*, json: JsonOption = False) -> None:
     """List the waveforms of commands and loads with their parameters (* = must be given)."""
-    from elevon.scenario.waveforms import wave_records
+    from elevon.waveforms import wave_records
 
     rows: list[dict[str, Any]] = [
         {

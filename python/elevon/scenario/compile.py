@@ -9,9 +9,9 @@ from typing import Any
 
 from elevon.errors import InputError, unknown
 from elevon.faults import check_together
-from elevon.scenario.scenario import Action, Scenario, Term
-from elevon.scenario.waveforms import TABLE, check_values, unit_of, wave_records
+from elevon.scenario.scenario import Action, Scenario, Term, Terms
 from elevon.units import check_kind, parse_quantity, to_si
+from elevon.waveforms import TABLE, check_values, unit_of, wave_records
 
 __all__ = ["CompiledScenario", "compile_scenario", "signal_records", "signal_units"]
 
@@ -125,16 +125,12 @@ def _ports(
     scenario: Scenario, known: Mapping[str, str]
 ) -> Iterator[tuple[str, str, tuple[Term, ...]]]:
     """Yield every port with what drives it; a port the wiring lacks must not be driven."""
-    loads = scenario.loads
-    ports = {
+    ports: dict[str, tuple[str, Terms]] = {
         "command": ("command", scenario.command),
-        "brake": ("load.brake", loads.brake),
-        "shaft": ("load.shaft", loads.shaft),
-        "user": ("load.user", loads.user),
-        "weight_on_wheels": ("load.weight_on_wheels", loads.weight_on_wheels),
-        "rig_speed": ("load.rig_speed", loads.rig_speed),
         "supply": ("supply", scenario.supply),
     }
+    for name in type(scenario.loads).model_fields:
+        ports[name] = (f"load.{name}", getattr(scenario.loads, name))
     for port, (place, source) in ports.items():
         if port in known:
             yield port, place, source.terms
@@ -147,8 +143,7 @@ def _port_units(mode: str, wiring: str) -> dict[str, str]:
     from elevon import _core
 
     units = {port["name"]: port["unit"] for port in _core.ports(wiring)}
-    command = {"position": units["command"], "speed": "rad/s", "torque": "N m", "gear": "1"}
-    return {**units, "command": command[mode]}
+    return {**units, "command": _wiring(wiring)["mode_units"][mode]}
 
 
 def _sequence(steps: Sequence[Action], wiring: str) -> dict[str, Any]:

@@ -23,9 +23,9 @@ from pydantic import (
 from elevon.documents import Document, read_toml, validated
 from elevon.errors import InputError, did_you_mean
 from elevon.faults import Fault
-from elevon.scenario.waveforms import TABLE, wave_records
 from elevon.series import check_series, read_series
 from elevon.units import parse_quantity
+from elevon.waveforms import TABLE, wave_records
 
 __all__ = ["Action", "Command", "Load", "Scenario", "Term", "Terms"]
 

@@ -112,10 +112,6 @@ def sensitivities(
     return _assembled(Run(actuator, scenario, seed), prepared, fidelity, names, passes)
 
 
-#: Derivatives the core carries through one pass.
-_PER_PASS = 8
-
-
 def _check(
     actuator: Actuator,
     scenario: Scenario,
@@ -145,10 +141,13 @@ def _assembled(
     names: Sequence[str],
     passes: Sequence[Mapping[str, Any]],
 ) -> Sensitivities:
+    from elevon import _core
+
+    count = _core.derivatives_per_pass()
     derivatives: dict[str, dict[str, Floats]] = {name: {} for name in names}
     clocks: dict[str, dict[str, Any]] = {}
     for number, item in enumerate(passes):
-        chosen = names[number * _PER_PASS : (number + 1) * _PER_PASS]
+        chosen = names[number * count : (number + 1) * count]
         width = 1 + len(chosen)
         for plan in prepared.plan:
             kept = item["clocks"][plan.name]

@@ -8,7 +8,7 @@ from typing import Any
 from elevon.actuator import Actuator
 from elevon.errors import RangeError
 from elevon.scenario.compile import CompiledScenario
-from elevon.scenario.waveforms import TABLE, wave_records
+from elevon.waveforms import TABLE, wave_records
 
 __all__ = ["check_stroke"]
 

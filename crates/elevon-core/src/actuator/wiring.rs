@@ -121,6 +121,8 @@ pub trait Wiring: Sized + Send + Sync + 'static {
     const INITIAL: &'static [&'static str];
     /// What a command may ask for.
     const MODES: &'static [&'static str] = Mode::NAMES;
+    /// Units of the command in each mode; empty: the command port's own.
+    const MODE_UNITS: &'static [&'static str] = &["", "rad/s", "N m"];
     /// Names of the values of a command that is a sequence of actions (mode `gear`).
     const ACTIONS: &'static [&'static str] = &[];
 

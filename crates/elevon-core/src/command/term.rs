@@ -84,6 +84,19 @@ impl Term {
         self.enabled && matches!(self.wave, Wave::Sine | Wave::Chirp | Wave::PeriodSweep)
     }
 
+    /// The value at time `t`.
+    pub fn at(&self, t: f64) -> f64 {
+        let line = self.line(t);
+        // A held value counts as it is: its slope is zero and its line may begin anywhere.
+        let value = if line.slope == 0.0 { line.value } else { line.value + line.slope * (t - line.at) };
+        if !self.oscillates() {
+            return value;
+        }
+        let o = self.oscillation(t);
+        let tau = t - o.at;
+        value + o.amplitude * libm::sin(o.phase + (o.rate + o.sweep * tau) * tau)
+    }
+
     /// The straight-line part at time `t` (for oscillating terms: the bias and the held values).
     pub fn line(&self, t: f64) -> Line {
         let p = &self.parameters;

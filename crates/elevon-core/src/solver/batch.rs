@@ -213,8 +213,8 @@ impl<const N: usize> Lift<Dual<N>> for Seeds<'_, N> {
     }
 }
 
-/// Slots of one dual pass.
-const SLOTS: usize = 8;
+/// Derivatives that one pass carries.
+pub const DERIVATIVES: usize = 8;
 
 /// One run with exact derivatives: each value is followed by its derivatives with respect to the chosen
 /// parameters, then to the severities of the chosen faults.
@@ -229,13 +229,13 @@ pub fn sensitivities<W: Wiring>(
     let mut chosen: Vec<(bool, usize)> = parameters.iter().map(|&p| (true, p)).collect();
     chosen.extend(faults.iter().map(|&f| (false, f)));
     chosen
-        .chunks(SLOTS)
+        .chunks(DERIVATIVES)
         .map(|pass| {
             let parameters: Vec<usize> = pass.iter().filter(|x| x.0).map(|x| x.1).collect();
             let faults: Vec<usize> = pass.iter().filter(|x| !x.0).map(|x| x.1).collect();
-            let seeds = Seeds::<SLOTS> { run, parameters: &parameters, faults: &faults };
+            let seeds = Seeds::<DERIVATIVES> { run, parameters: &parameters, faults: &faults };
             let runs = [run];
-            let mut outputs = Block::<W, Dual<SLOTS>, Seeds<SLOTS>>::new(&runs, 1, seeds, clocks, &recorded).run(monitor);
+            let mut outputs = Block::<W, Dual<DERIVATIVES>, Seeds<DERIVATIVES>>::new(&runs, 1, seeds, clocks, &recorded).run(monitor);
             outputs.remove(0)
         })
         .collect()

@@ -8,6 +8,6 @@ mod rows;
 mod spec;
 mod width;
 
-pub use batch::{run_all, sensitivities, Monitor};
+pub use batch::{run_all, sensitivities, Monitor, DERIVATIVES};
 pub use spec::{Clock, RunOutput, RunSpec, Status};
 pub use width::Width;

@@ -14,10 +14,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from elevon.bench.guess_command import FREE
 from elevon.bench.logs.limits import existing_file, quoted
-from elevon.bench.waveforms import WAVEFORMS
 from elevon.errors import FormatError, InputError, did_you_mean
 from elevon.units import parse_quantity
+from elevon.waveforms import wave_records
 
 __all__ = ["CommandNote", "read_command_note"]
 
@@ -161,9 +162,9 @@ def _note(place: str, values: dict[str, Any], ignored: tuple[str, ...]) -> Comma
     waveform = values.pop("waveform", None)
     if waveform is not None:
         waveform = str(waveform).strip().lower()
-        if waveform not in WAVEFORMS:
+        if waveform not in FREE:
             raise InputError(
-                f"{place}: unknown waveform {quoted(waveform)}{did_you_mean(waveform, WAVEFORMS)}"
+                f"{place}: unknown waveform {quoted(waveform)}{did_you_mean(waveform, FREE)}"
             )
     current = values.pop("current", None)
     if current is not None and str(current).lower() not in {"rms", "peak"}:
@@ -186,11 +187,12 @@ def _note(place: str, values: dict[str, Any], ignored: tuple[str, ...]) -> Comma
 def _check_parameters(place: str, waveform: str | None, numbers: Mapping[str, float]) -> None:
     if waveform is None:
         return
+    names = wave_records()[waveform].names
     for name in numbers:
-        if name not in WAVEFORMS[waveform]:
+        if name not in names:
             raise InputError(
                 f"{place}: {name} is no parameter of the waveform {waveform}"
-                f"{did_you_mean(name, WAVEFORMS[waveform])}"
+                f"{did_you_mean(name, names)}"
             )
 
 

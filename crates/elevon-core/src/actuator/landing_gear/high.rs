@@ -189,6 +189,7 @@ impl Wiring for High {
     const PORTS: &'static [Port] = PORTS;
     const INITIAL: &'static [&'static str] = super::INITIAL;
     const MODES: &'static [&'static str] = super::MODES;
+    const MODE_UNITS: &'static [&'static str] = &[""];
     const ACTIONS: &'static [&'static str] = super::ACTIONS;
 
     fn groups() -> &'static [Group] {

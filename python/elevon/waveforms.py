@@ -1,4 +1,4 @@
-"""The core's records of waveforms, and the rules their parameters follow."""
+"""The core's waveforms: their records, the rules their parameters follow, their values."""
 
 from __future__ import annotations
 
@@ -8,9 +8,20 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 
-from elevon.errors import InputError
+import numpy as np
+import numpy.typing as npt
 
-__all__ = ["TABLE", "WaveRecord", "check_values", "unit_of", "wave_records"]
+from elevon.errors import InputError, unknown
+
+__all__ = [
+    "TABLE",
+    "WaveRecord",
+    "check_values",
+    "complete",
+    "evaluate",
+    "unit_of",
+    "wave_records",
+]
 
 TABLE = "table"
 
@@ -55,6 +66,60 @@ def wave_records() -> Mapping[str, WaveRecord]:
         )
         for item in _core.waveforms()
     }
+
+
+def complete(kind: str, given: Mapping[str, float]) -> dict[str, float]:
+    """Return all parameters of a waveform in the core's order, defaults filled in.
+
+    Raises
+    ------
+    UnknownNameError
+        Unknown waveform or parameter.
+    InputError
+        A parameter without default is missing.
+    """
+    known = wave_records()
+    if kind not in known:
+        raise unknown("waveform", kind, known)
+    record = known[kind]
+    for name in given:
+        if name not in record.names:
+            raise unknown("parameter", name, record.names, f"waveform {kind}")
+    values = {}
+    for parameter in record.parameters:
+        value = given.get(parameter.name, parameter.default)
+        if value is None:
+            raise InputError(f"waveform {kind}: parameter {parameter.name!r} is missing")
+        values[parameter.name] = float(value)
+    return values
+
+
+def evaluate(kind: str, given: Mapping[str, float], time: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Return the values of a waveform, as the core computes them.
+
+    Parameters
+    ----------
+    kind : str
+        Any waveform but a table, which has points instead.
+    given : mapping of str to float
+        Parameters (SI); those left out take their default.
+    time : array_like, shape (n,)
+        Instants in s.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        In the unit of the parameters.
+
+    Raises
+    ------
+    UnknownNameError, InputError
+        As for `complete`.
+    """
+    from elevon import _core
+
+    values = list(complete(kind, given).values())
+    return _core.waveform(kind, values, np.ascontiguousarray(time, dtype=np.float64))
 
 
 def unit_of(parameter: WaveParameter, own: str) -> str:
