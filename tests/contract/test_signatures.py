@@ -39,6 +39,9 @@ SIGNATURES = {
     ("unbalance", "motor"): "test_unbalance_swings_the_speed_once_a_turn",
     ("resistor_short", "motor"): "test_resistor_draws_the_phase_voltage_over_its_resistance",
     ("missing_counts", "encoder"): "test_missing_counts_make_the_encoder_read_short",
+    ("bearing", "bearing"): "test_bearing_defect_shows_at_its_shaft_order",
+    ("tooth_wear", "gear"): "test_tooth_wear_opens_the_play_over_each_mesh",
+    ("chipped_tooth", "gear"): "test_chipped_tooth_opens_the_play_once_a_turn",
 }
 
 

@@ -4,15 +4,19 @@
 //! T = -A (sin N a + r sin 2 N a), a = theta + phi: its mean is zero, and no work is done over a turn.
 
 use crate::scalar::Scalar;
+use crate::variable::Own;
 use crate::variables;
 
 variables! {
     /// Cogging of the motor.
     CoggingParameter, COGGING {
         CoggingTorque => "cogging_torque", "A", "N m", NonNegative, Plant, Some(0.0), "amplitude of the cogging torque; 0: none";
-        CoggingCycles => "cogging_cycles", "N", "1", AtLeast(1.0), Plant, Some(24.0), "cycles of the cogging torque in a turn, the least common multiple of slots and poles; ASSUMED: 12 slots, 8 poles";
-        CoggingSecond => "cogging_second", "r", "1", Between(-1.0, 1.0), Plant, Some(0.0), "second harmonic of the cogging torque over the first";
-        CoggingPhase => "cogging_phase", "phi", "rad", Any, Plant, Some(0.0), "mechanical angle from a place where the rotor rests to the rotor's zero";
+        CoggingCycles => "cogging_cycles", "N", "1", AtLeast(1.0), Plant, Some(24.0), "cycles of the cogging torque in a turn, the least common multiple of slots and poles; ASSUMED: 12 slots, 8 poles",
+            when(&[Away("motor.cogging_torque", 0.0)]);
+        CoggingSecond => "cogging_second", "r", "1", Between(-1.0, 1.0), Plant, Some(0.0), "second harmonic of the cogging torque over the first",
+            when(&[Away("motor.cogging_torque", 0.0)]);
+        CoggingPhase => "cogging_phase", "phi", "rad", Any, Plant, Some(0.0), "mechanical angle from a place where the rotor rests to the rotor's zero",
+            when(&[Away("motor.cogging_torque", 0.0)]);
     }
 }
 
@@ -25,6 +29,11 @@ pub struct Cogging<S> {
 }
 
 impl<S: Scalar> Cogging<S> {
+    /// Is there any?
+    pub fn needed(own: &Own<CoggingParameter>) -> bool {
+        own.away(CoggingParameter::CoggingTorque)
+    }
+
     pub fn derive(raw: &[S]) -> Self {
         use CoggingParameter as P;
         let g = |p: P| raw[p as usize];

@@ -5,12 +5,16 @@
 //! pulls one way, a dynamic one turns with the shaft; the bearings carry their sum.
 
 use crate::scalar::Scalar;
+use crate::variable::Own;
 use crate::variables;
 
 variables! {
     /// Pull of an eccentric rotor.
     MagneticPullParameter, MAGNETIC_PULL {
-        MagneticPull => "magnetic_pull", "K_u", "N", NonNegative, Plant, Some(0.0), "radial pull on the rotor per relative eccentricity, pi R l B^2/(2 mu_0); 0: not counted. ASSUMED example: 490 N for R = 16 mm, l = 50 mm, B = 0.7 T";
+        MagneticPull => "magnetic_pull", "K_u", "N", NonNegative, Plant, Some(0.0), "radial pull on the rotor per relative eccentricity, pi R l B^2/(2 mu_0); 0: not counted. ASSUMED example: 490 N for R = 16 mm, l = 50 mm, B = 0.7 T",
+            when(&[Either(&[
+                Away("motor.eccentricity_static", 0.0), Away("motor.eccentricity_dynamic", 0.0), Away("motor.unbalance_inertia", 0.0),
+            ])]);
     }
 }
 
@@ -18,23 +22,29 @@ variables! {
 pub struct MagneticPull<S> {
     per_eccentricity: S,
     fixed: S,
-    turning: S,
-    phase: S,
+    /// The dynamic eccentricity at the rotor's zero, along the static one and across it.
+    along: S,
+    across: S,
 }
 
 impl<S: Scalar> MagneticPull<S> {
-    /// `fixed` and `turning` are the static and the dynamic eccentricity, `phase` the latter's mechanical angle.
-    pub fn derive(raw: &[S], fixed: S, turning: S, phase: S) -> Self {
-        Self { per_eccentricity: raw[MagneticPullParameter::MagneticPull as usize], fixed, turning, phase }
+    /// Is there any?
+    pub fn needed(own: &Own<MagneticPullParameter>) -> bool {
+        own.away(MagneticPullParameter::MagneticPull)
+    }
+
+    /// `fixed` is the static eccentricity, `turning` the dynamic one times cosine and sine of its mechanical phase.
+    pub fn derive(raw: &[S], fixed: S, [along, across]: [S; 2]) -> Self {
+        Self { per_eccentricity: raw[MagneticPullParameter::MagneticPull as usize], fixed, along, across }
     }
 
     /// Radial force on the bearings at a rotor angle.
     #[inline(always)]
     pub fn force(&self, angle: S) -> S {
-        let (_, cos) = (angle + self.phase).sin_cos();
-        let both = S::splat(2.0) * self.fixed * self.turning * cos;
-        let square = self.fixed * self.fixed + self.turning * self.turning + both;
-        self.per_eccentricity * square.maximum(S::zero()).sqrt()
+        let (sin, cos) = angle.sin_cos();
+        let x = self.along.fma(cos, self.across.fma(sin, self.fixed));
+        let y = self.along.fma(sin, -(self.across * cos));
+        self.per_eccentricity * x.fma(x, y * y).sqrt()
     }
 }
 
@@ -43,7 +53,7 @@ mod tests {
     use super::*;
 
     fn force(fixed: f64, turning: f64, angle: f64) -> f64 {
-        MagneticPull::derive(&[490.0], fixed, turning, 0.2).force(angle)
+        MagneticPull::derive(&[490.0], fixed, [turning * 0.2_f64.cos(), turning * 0.2_f64.sin()]).force(angle)
     }
 
     #[test]
@@ -57,7 +67,7 @@ mod tests {
 
     #[test]
     fn both_add_as_vectors_once_a_turn() {
-        assert!((force(0.1, 0.04, -0.2) - 490.0 * 0.14).abs() < 1e-10);
-        assert!((force(0.1, 0.04, std::f64::consts::PI - 0.2) - 490.0 * 0.06).abs() < 1e-10);
+        assert!((force(0.1, 0.04, 0.2) - 490.0 * 0.14).abs() < 1e-10);
+        assert!((force(0.1, 0.04, std::f64::consts::PI + 0.2) - 490.0 * 0.06).abs() < 1e-10);
     }
 }

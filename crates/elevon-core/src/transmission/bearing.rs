@@ -7,22 +7,37 @@
 //! which half is lost on the far edge. The bearing's friction when healthy is part of the measured friction of the shaft.
 
 use crate::scalar::Scalar;
+use crate::variable::Own;
 use crate::variables;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 variables! {
     /// The motor's bearing.
     BearingParameter, BEARING {
-        Balls => "balls", "Z", "1", Between(3.0, 100.0), Plant, Some(8.0), "balls of the motor's bearing; ASSUMED: a deep-groove bearing of 15 mm bore";
-        BallDiameter => "ball_diameter", "d", "m", Between(1e-4, 0.1), Plant, Some(5.95e-3), "diameter of a ball; ASSUMED as bearing.balls";
-        PitchDiameter => "pitch_diameter", "D", "m", Between(1e-3, 1.0), Plant, Some(0.025), "diameter of the circle of the balls' centres; ASSUMED as bearing.balls";
-        ContactAngle => "contact_angle", "alpha", "rad", Between(0.0, 1.2), Plant, Some(0.0), "contact angle of the balls";
-        Bore => "bore", "d_i", "m", Positive, Plant, Some(0.015), "diameter of the shaft in the bearing; ASSUMED as bearing.balls";
-        FrictionCoefficient => "friction_coefficient", "mu", "1", Between(0.0, 0.5), Plant, Some(1.5e-3), "friction at the bore over the radial load, the makers' value for deep-groove ball bearings";
-        BallForce => "ball_force", "Q_0", "N", NonNegative, Plant, Some(5.0), "force on every ball from the preload; ASSUMED: a spring of some 40 N";
-        RadialLoad => "radial_load", "F_r", "N", NonNegative, Plant, Some(30.0), "radial load at rest; ASSUMED: rotor's weight and the tension of a belt or mesh";
-        RadialPerTorque => "radial_per_torque", "-", "1/m", NonNegative, Plant, Some(100.0), "radial load per torque through the gear on the fast shaft; ASSUMED: 1/(r cos 20 deg) of a pinion of 10 mm";
-        DefectDepth => "defect_depth", "delta", "m", Between(0.0, 1e-3), Plant, Some(2e-4), "depth of the defects, unless the sag of a ball over their length is less";
+        Balls => "balls", "Z", "1", Between(3.0, 100.0), Plant, Some(8.0), "balls of the motor's bearing; ASSUMED: a deep-groove bearing of 15 mm bore",
+            when(&[Either(&[Away("bearing.outer_defect", 0.0), Away("bearing.inner_defect", 0.0), Away("bearing.ball_defect", 0.0)])]);
+        BallDiameter => "ball_diameter", "d", "m", Between(1e-4, 0.1), Plant, Some(5.95e-3), "diameter of a ball; ASSUMED as bearing.balls",
+            when(&[Either(&[Away("bearing.outer_defect", 0.0), Away("bearing.inner_defect", 0.0), Away("bearing.ball_defect", 0.0), Away("bearing.cage_drag", 0.0)])]);
+        PitchDiameter => "pitch_diameter", "D", "m", Between(1e-3, 1.0), Plant, Some(0.025), "diameter of the circle of the balls' centres; ASSUMED as bearing.balls",
+            when(&[Either(&[Away("bearing.outer_defect", 0.0), Away("bearing.inner_defect", 0.0), Away("bearing.ball_defect", 0.0), Away("bearing.cage_drag", 0.0)])]);
+        ContactAngle => "contact_angle", "alpha", "rad", Between(0.0, 1.2), Plant, Some(0.0), "contact angle of the balls",
+            when(&[Either(&[Away("bearing.outer_defect", 0.0), Away("bearing.inner_defect", 0.0), Away("bearing.ball_defect", 0.0), Away("bearing.cage_drag", 0.0)])]);
+        Bore => "bore", "d_i", "m", Positive, Plant, Some(0.015), "diameter of the shaft in the bearing; ASSUMED as bearing.balls",
+            when(&[Away("motor.magnetic_pull", 0.0), Either(&[
+                Away("motor.eccentricity_static", 0.0), Away("motor.eccentricity_dynamic", 0.0), Away("motor.unbalance_inertia", 0.0),
+            ])]);
+        FrictionCoefficient => "friction_coefficient", "mu", "1", Between(0.0, 0.5), Plant, Some(1.5e-3), "friction at the bore over the radial load, the makers' value for deep-groove ball bearings",
+            when(&[Away("motor.magnetic_pull", 0.0), Either(&[
+                Away("motor.eccentricity_static", 0.0), Away("motor.eccentricity_dynamic", 0.0), Away("motor.unbalance_inertia", 0.0),
+            ])]);
+        BallForce => "ball_force", "Q_0", "N", NonNegative, Plant, Some(5.0), "force on every ball from the preload; ASSUMED: a spring of some 40 N",
+            when(&[Either(&[Away("bearing.outer_defect", 0.0), Away("bearing.inner_defect", 0.0), Away("bearing.ball_defect", 0.0)])]);
+        RadialLoad => "radial_load", "F_r", "N", NonNegative, Plant, Some(30.0), "radial load at rest; ASSUMED: rotor's weight and the tension of a belt or mesh",
+            when(&[Either(&[Away("bearing.outer_defect", 0.0), Away("bearing.inner_defect", 0.0), Away("bearing.ball_defect", 0.0)])]);
+        RadialPerTorque => "radial_per_torque", "-", "1/m", NonNegative, Plant, Some(100.0), "radial load per torque through the gear on the fast shaft; ASSUMED: 1/(r cos 20 deg) of a pinion of 10 mm",
+            when(&[Either(&[Away("bearing.outer_defect", 0.0), Away("bearing.inner_defect", 0.0), Away("bearing.ball_defect", 0.0)])]);
+        DefectDepth => "defect_depth", "delta", "m", Between(0.0, 1e-3), Plant, Some(2e-4), "depth of the defects, unless the sag of a ball over their length is less",
+            when(&[Either(&[Away("bearing.outer_defect", 0.0), Away("bearing.inner_defect", 0.0), Away("bearing.ball_defect", 0.0)])]);
         OuterDefect => "outer_defect", "w_o", "m", Between(0.0, 5e-3), Plant, Some(0.0), "healthy 0; length of a defect of the outer ring, in the loaded zone";
         InnerDefect => "inner_defect", "w_i", "m", Between(0.0, 5e-3), Plant, Some(0.0), "healthy 0; length of a defect of the inner ring";
         BallDefect => "ball_defect", "w_b", "m", Between(0.0, 5e-3), Plant, Some(0.0), "healthy 0; length of a defect of a ball";
@@ -96,6 +111,16 @@ pub struct BearingTorque<S> {
 }
 
 impl<S: Scalar> Bearing<S> {
+    /// Is there any?
+    pub fn needed(own: &Own<BearingParameter>) -> bool {
+        own.any_away([
+            BearingParameter::OuterDefect,
+            BearingParameter::InnerDefect,
+            BearingParameter::BallDefect,
+            BearingParameter::CageDrag,
+        ])
+    }
+
     pub fn derive(raw: &[S]) -> Self {
         use BearingParameter as P;
         let g = |p: P| raw[p as usize];

@@ -1,6 +1,7 @@
 //! Gear ratio, inertia and load-dependent friction, end stops, user inertia and spring.
 
 use crate::scalar::Scalar;
+use crate::transmission::stop::Stop;
 use crate::variable::Own;
 use crate::variables;
 
@@ -41,8 +42,9 @@ pub struct Gear<S> {
     /// 1/eta - 1 and 1 - eta'.
     opposing: S,
     aiding: S,
-    pub upper: S,
-    pub lower: S,
+    /// The end stops, felt by the motor through the gear, and where they stand.
+    pub motor_stop: Stop<S>,
+    pub user_stop: Stop<S>,
     pub stiffness: S,
     pub spring_zero: S,
 }
@@ -50,13 +52,14 @@ pub struct Gear<S> {
 impl<S: Scalar> Gear<S> {
     /// `ratio` is the motor's angle over the user's coordinate, `screw` the efficiencies of what follows the gear.
     pub fn derive(ratio: S, gear: &[S], stop: &[S], load: &[S], screw: [S; 2]) -> Self {
+        let (upper, lower) = (stop[StopParameter::Upper as usize], stop[StopParameter::Lower as usize]);
         Self {
             ratio,
             per_ratio: S::one() / ratio,
             opposing: S::one() / (gear[GearParameter::Efficiency as usize] * screw[0]) - S::one(),
             aiding: S::one() - gear[GearParameter::EfficiencyAiding as usize] * screw[1],
-            upper: stop[StopParameter::Upper as usize] * ratio,
-            lower: stop[StopParameter::Lower as usize] * ratio,
+            motor_stop: Stop { upper: upper * ratio, lower: lower * ratio },
+            user_stop: Stop { upper, lower },
             stiffness: load[LoadParameter::Stiffness as usize],
             spring_zero: load[LoadParameter::SpringZero as usize],
         }
@@ -74,16 +77,5 @@ impl<S: Scalar> Gear<S> {
         let magnitude = user_torque.abs() * self.per_ratio;
         let opposes = S::zero().lt(user_torque * direction);
         magnitude * S::select(opposes, self.opposing, self.aiding)
-    }
-
-    /// Motor angle and speed after the stops: at one the speed is zero and its reaction cancels what pushes outwards.
-    #[inline(always)]
-    pub fn stop(&self, angle: S, speed: S) -> (S, S) {
-        let (above, below) = (self.upper.lt(angle), angle.lt(self.lower));
-        if !S::any(above | below) {
-            return (angle, speed);
-        }
-        let held = S::select(above, self.upper, S::select(below, self.lower, angle));
-        (held, S::select(above | below, S::zero(), speed))
     }
 }

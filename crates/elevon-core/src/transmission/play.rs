@@ -41,11 +41,18 @@ impl<S: Scalar> Play<S> {
         user.clamp(driver - self.half, driver + self.half)
     }
 
-    /// Torque on the user of the elastic dead zone; it only pushes, never pulls.
+    /// The same where worn teeth add `lag` to half the play.
     #[inline(always)]
-    pub fn contact(&self, displacement: S, rate: S) -> S {
+    pub fn drag_worn(&self, driver: S, user: S, lag: S) -> S {
+        let half = self.half + lag;
+        user.clamp(driver - half, driver + half)
+    }
+
+    /// Torque on the user of the elastic dead zone; it only pushes, never pulls. `lag` is what worn teeth add.
+    #[inline(always)]
+    pub fn contact(&self, displacement: S, rate: S, lag: S) -> S {
         let zero = S::zero();
-        let beyond = displacement - displacement.clamp_abs(self.half);
+        let beyond = displacement - displacement.clamp_abs(self.half + lag);
         let torque = self.stiffness * beyond + self.damping * rate;
         let above = zero.lt(beyond);
         let below = beyond.lt(zero);

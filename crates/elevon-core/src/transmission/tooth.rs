@@ -7,17 +7,21 @@
 //! that lag: the torque ripple of the transmission error.
 
 use crate::scalar::Scalar;
+use crate::variable::Own;
 use crate::variables;
 use std::f64::consts::{PI, TAU};
 
 variables! {
     /// Teeth of the gear.
     ToothParameter, TOOTH {
-        Teeth => "teeth", "N", "1", Between(5.0, 1000.0), Plant, Some(20.0), "teeth of the wheel whose teeth are worn or chipped; ASSUMED: a pinion on the motor's shaft";
-        TeethRatio => "teeth_ratio", "-", "1", AtLeast(1.0), Plant, Some(1.0), "turns of the motor per turn of that wheel; 1: it stands on the motor's shaft";
+        Teeth => "teeth", "N", "1", Between(5.0, 1000.0), Plant, Some(20.0), "teeth of the wheel whose teeth are worn or chipped; ASSUMED: a pinion on the motor's shaft",
+            when(&[Either(&[Away("gear.tooth_wear", 0.0), Away("gear.tooth_chip", 0.0)])]);
+        TeethRatio => "teeth_ratio", "-", "1", AtLeast(1.0), Plant, Some(1.0), "turns of the motor per turn of that wheel; 1: it stands on the motor's shaft",
+            when(&[Either(&[Away("gear.tooth_wear", 0.0), Away("gear.tooth_chip", 0.0)])]);
         ToothWear => "tooth_wear", "s", "rad", NonNegative, Plant, Some(0.0), "healthy 0; total play added where worn flanks slide most, measured at the user";
         ToothChip => "tooth_chip", "b", "rad", NonNegative, Plant, Some(0.0), "healthy 0; total play added while the chipped tooth carries, measured at the user";
-        ToothChipAngle => "tooth_chip_angle", "-", "rad", Any, Plant, Some(0.0), "angle of the wheel at which the chipped tooth carries";
+        ToothChipAngle => "tooth_chip_angle", "-", "rad", Any, Plant, Some(0.0), "angle of the wheel at which the chipped tooth carries",
+            when(&[Away("gear.tooth_chip", 0.0)]);
     }
 }
 
@@ -38,6 +42,11 @@ pub struct Lag<S> {
 }
 
 impl<S: Scalar> Teeth<S> {
+    /// Is there any?
+    pub fn needed(own: &Own<ToothParameter>) -> bool {
+        own.any_away([ToothParameter::ToothWear, ToothParameter::ToothChip])
+    }
+
     pub fn derive(raw: &[S]) -> Self {
         use ToothParameter as P;
         let g = |p: P| raw[p as usize];

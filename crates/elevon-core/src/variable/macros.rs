@@ -101,6 +101,8 @@ macro_rules! details {
         }
 
         impl $id {
+            // Not every part depends on the form.
+            #[allow(clippy::extra_unused_type_parameters)]
             pub(in $crate::actuator::servo) fn $read<$form: Form>($x: $from) -> Self {
                 $(let $always: $kind = $value;)*
                 $(let $full: bool = $needed;)*

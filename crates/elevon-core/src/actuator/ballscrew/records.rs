@@ -10,6 +10,7 @@ use crate::transmission::friction::{FrictionParameter as F, FRICTION};
 use crate::transmission::gear::{GearParameter, LoadParameter as D, StopParameter as T, GEAR, LOAD, STOP};
 use crate::transmission::play::{PlayParameter as P, PLAY};
 use crate::transmission::screw::{RatingParameter, ScrewParameter, RATING, SCREW};
+use crate::transmission::tooth::{ToothParameter as W, TOOTH};
 use crate::variable::{extended, relabelled, Relabel, Signal, Variable};
 
 const fn change(index: usize, name: &'static str, unit: &'static str, text: &'static str) -> Relabel {
@@ -54,6 +55,14 @@ const RAM_ENCODER: [Variable; ENCODER.len()] = relabelled(
     ],
 );
 
+const RAM_TOOTH: [Variable; TOOTH.len()] = relabelled(
+    TOOTH,
+    &[
+        change(W::ToothWear as usize, "", "m", "healthy 0; total play added where worn flanks slide most, measured at the ram"),
+        change(W::ToothChip as usize, "", "m", "healthy 0; total play added while the chipped tooth carries, measured at the ram"),
+    ],
+);
+
 groups! {
     over layout {
         gear: &RAM_GEAR;
@@ -63,6 +72,7 @@ groups! {
         load: &RAM_LOAD;
         control: &RAM_CONTROL;
         encoder: &RAM_ENCODER;
+        tooth: &RAM_TOOTH;
     }
     screw: "screw", SCREW, ScrewParameter;
     rating: "rating", RATING, RatingParameter;

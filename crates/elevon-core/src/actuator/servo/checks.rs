@@ -100,6 +100,7 @@ fn derivative_inertia(out: &mut Vec<Finding>, raw: &[f64], inertia: f64, dt: f64
 fn common<F: Form>(out: &mut Vec<Finding>, raw: &[f64]) {
     out.extend(F::check(raw));
     thermal(out, raw);
+    drivetrain(out, raw);
     let (fsj, fdj) = (raw[FrictionParameter::Static.at()], raw[FrictionParameter::Dynamic.at()]);
     if fdj > fsj {
         out.push(finding("friction.dynamic", fdj, fsj, format!("friction.dynamic: {fdj} N m exceeds friction.static, {fsj} N m")));
@@ -108,6 +109,31 @@ fn common<F: Form>(out: &mut Vec<Finding>, raw: &[f64]) {
     let (lower, upper) = (raw[StopParameter::Lower.at()], raw[StopParameter::Upper.at()]);
     if lower >= upper {
         out.push(finding("stop.lower", lower, upper, format!("stop.lower: {lower} {unit} is not below stop.upper, {upper} {unit}")));
+    }
+}
+
+/// Friction that no motor torque overcomes, balls that do not fit.
+fn drivetrain(out: &mut Vec<Finding>, raw: &[f64]) {
+    use crate::transmission::bearing::BearingParameter as B;
+    use crate::transmission::friction_law::{FrictionLaw, FrictionLawParameter as L};
+    let sum = raw[L::LoadMotor.at()] + raw[L::LoadMotorStribeck.at()];
+    if FrictionLaw::read(raw[L::Law.at()]) == FrictionLaw::LoadDependent && sum >= 1.0 {
+        out.push(finding(
+            "friction.load_motor",
+            sum,
+            1.0,
+            format!("friction.load_motor: with friction.load_motor_stribeck {sum}, the friction at rest grows as the motor's torque does and is never overcome; below 1"),
+        ));
+    }
+    let [balls, ball, pitch] = [B::Balls, B::BallDiameter, B::PitchDiameter].map(|p| raw[p.at()]);
+    let fits = std::f64::consts::PI * pitch / balls;
+    if ball >= fits {
+        out.push(finding(
+            "bearing.ball_diameter",
+            ball,
+            fits,
+            format!("bearing.ball_diameter: {balls} balls of {ball} m do not fit on a circle of {pitch} m (bearing.pitch_diameter); below {fits:.4e} m"),
+        ));
     }
 }
 

@@ -4,7 +4,9 @@ use crate::actuator::Port;
 use crate::control::current_dq::{PwmParameter, PWM};
 use crate::control::position_speed::{ControlParameter, CONTROL};
 use crate::inverter::bridge::{InverterParameter, INVERTER};
+use crate::motor::cogging::{CoggingParameter, COGGING};
 use crate::motor::equivalent::{LowParameter, LOW};
+use crate::motor::magnetic_pull::{MagneticPullParameter, MAGNETIC_PULL};
 use crate::motor::star::{MotorParameter, MOTOR};
 use crate::motor::tap::{TapParameter, TAP};
 use crate::motor::thermal::{ThermalParameter, THERMAL};
@@ -12,9 +14,12 @@ use crate::motor::unbalance::{UnbalanceParameter, UNBALANCE};
 use crate::sensor::current::{CurrentSensorParameter, CURRENT_SENSOR};
 use crate::sensor::encoder::{EncoderParameter, ENCODER};
 use crate::sensor::resolver::{ResolverParameter, RESOLVER};
+use crate::transmission::bearing::{BearingParameter, BEARING};
 use crate::transmission::friction::{FrictionParameter, FRICTION};
+use crate::transmission::friction_law::{FrictionLawParameter, FRICTION_LAW};
 use crate::transmission::gear::{GearParameter, LoadParameter, StopParameter, GEAR, LOAD, STOP};
 use crate::transmission::play::{PlayParameter, PLAY};
+use crate::transmission::tooth::{ToothParameter, TOOTH};
 use crate::{choices, groups, variables};
 
 choices! {
@@ -70,6 +75,11 @@ groups! {
     thermal: "thermal", THERMAL, ThermalParameter;
     tap: "motor", TAP, TapParameter;
     unbalance: "motor", UNBALANCE, UnbalanceParameter;
+    friction_law: "friction", FRICTION_LAW, FrictionLawParameter;
+    cogging: "motor", COGGING, CoggingParameter;
+    magnetic_pull: "motor", MAGNETIC_PULL, MagneticPullParameter;
+    bearing: "bearing", BEARING, BearingParameter;
+    tooth: "gear", TOOTH, ToothParameter;
 }
 
 pub const PORTS: &[Port] = &[

@@ -69,6 +69,10 @@ signals! {
         EnergyTap => "energy_tap", "-", "J", "heat of resistors at the centre tap";
         EnergyHeatStored => "energy_heat_stored", "-", "J", "heat in winding and housing above that of the start";
         EnergyAir => "energy_air", "-", "J", "heat given to the air";
+        CoggingTorque => "cogging_torque", "T_cog", "N m", "cogging torque of the motor, positive drives forwards";
+        BearingTorque => "bearing_torque", "-", "N m", "torque of balls passing a defect of the bearing, positive drives forwards";
+        ToothTorque => "tooth_torque", "-", "N m", "torque of worn or chipped flanks under load, positive drives forwards";
+        StopTorque => "stop_torque", "-", "N m", "torque on the fast shaft that the end stop's reaction cancels";
     }
 }
 
@@ -105,5 +109,9 @@ signals! {
         EnergyCopper => "energy_copper", "-", "J", "copper losses, counted with a thermal network";
         EnergyHeatStored => "energy_heat_stored", "-", "J", "heat in winding and housing above that of the start";
         EnergyAir => "energy_air", "-", "J", "heat given to the air";
+        CoggingTorque => "cogging_torque", "T_cog", "N m", "cogging torque of the motor, positive drives forwards";
+        BearingTorque => "bearing_torque", "-", "N m", "torque of balls passing a defect of the bearing, positive drives forwards";
+        ToothTorque => "tooth_torque", "-", "N m", "torque of worn or chipped flanks under load, positive drives forwards";
+        StopTorque => "stop_torque", "-", "N m", "torque on the fast shaft that the end stop's reaction cancels";
     }
 }

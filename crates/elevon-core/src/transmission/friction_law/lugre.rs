@@ -12,6 +12,7 @@
 //! bristle tends to exact sticking.
 
 use crate::scalar::Scalar;
+use crate::transmission::stop::Stop;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Bristle<S> {
@@ -61,6 +62,22 @@ impl<S: Scalar> Bristle<S> {
         let rising = S::zero().le(b);
         let size = S::select(rising, S::splat(2.0) * held.abs(), root - b) / S::select(rising, b + root, S::splat(2.0) * c);
         self.moved(push, z, held.signed(size))
+    }
+
+    /// The same beside an end stop: at rest there, what would leave `outwards` stays, and its bristles with it.
+    #[inline(always)]
+    pub fn advance_beside(&self, push: &Push<S>, bristle: S, speed: S, stop: &Stop<S>, position: S) -> Moved<S> {
+        let moved = self.advance(push, bristle);
+        let stopped = speed.equals(S::zero()) & stop.outwards(position, moved.speed);
+        if !S::any(stopped) {
+            return moved;
+        }
+        let held = self.moved(push, bristle, S::zero());
+        Moved {
+            speed: S::select(stopped, held.speed, moved.speed),
+            bristle: S::select(stopped, held.bristle, moved.bristle),
+            dry: S::select(stopped, held.dry, moved.dry),
+        }
     }
 
     /// Deflection and friction with the new speed given: solved, or zero at a stop.

@@ -98,6 +98,10 @@ fn mechanical<S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s:
     set(Q::FrictionTorque, shown.friction);
     set(Q::BrakeTorque, shown.brake);
     set(Q::LoadTorque, shown.load);
+    set(Q::CoggingTorque, shown.added.cogging);
+    set(Q::BearingTorque, shown.added.bearing.torque);
+    set(Q::ToothTorque, shown.added.teeth);
+    set(Q::StopTorque, shown.stop);
     set(Q::UserTorque, shown.user_torque);
     set(Q::TransmissionTorque, shown.through);
     shown

@@ -5,10 +5,10 @@ use super::model::{Model, State, Structure};
 use super::phase::{phase, Phase};
 use crate::actuator::servo::advance::{Instant, Stepper};
 use crate::actuator::servo::layout::DriveKind;
-use crate::actuator::servo::shaft::Shaft;
 use crate::control::position_speed::Mode;
 use crate::scalar::Scalar;
 use crate::sensor::filter::low_pass;
+use crate::transmission::friction_law::FrictionLaw;
 
 /// What the controller asks for before the derivative of the speed is known.
 struct Demand<S> {
@@ -89,8 +89,8 @@ fn step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &In
     // Loads, and the acceleration that the derivative of the speed takes part in.
     let p = phase::<S, FULL>(m, structure, s, reading.angle);
     let torque = p.efficacy * asked.torque;
-    let loads = m.shaft.loads::<FULL, FULL>(&structure.shaft, x, &s.shaft, torque);
-    let acceleration = Shaft::net(&loads, s.shaft.motor_speed, torque) * p.per_effective_inertia;
+    let mut loads = m.shaft.loads::<FULL, FULL>(&structure.shaft, x, &s.shaft, torque);
+    let acceleration = m.shaft.acceleration::<FULL>(&structure.shaft, &s.shaft, &loads, torque, p.per_effective_inertia);
     s.torque_ref = (asked.torque - m.control.derivative_inertia * acceleration).clamp_abs(m.control.torque_limit);
     s.speed_ref = asked.speed_ref;
     if structure.integral {
@@ -100,6 +100,10 @@ fn step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &In
     // Equivalent phase, motor and transmission dynamics.
     electric_step::<S, FULL>(m, structure, x, s, &p);
     s.motor_torque = m.star.saturate(p.torque_constant * s.current);
+    if FULL && structure.shaft.train.law == FrictionLaw::LoadDependent {
+        // The friction knows the torque that acts, not the one that was asked for.
+        loads = m.shaft.loads::<FULL, FULL>(&structure.shaft, x, &s.shaft, s.motor_torque);
+    }
     m.shaft.step::<FULL, FULL>(&structure.shaft, x, &mut s.shaft, &loads, s.motor_torque);
 
     // Acquisition.

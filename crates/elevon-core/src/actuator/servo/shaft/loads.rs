@@ -33,7 +33,7 @@ impl<S: Scalar> Shaft<S> {
     ) -> Loads<S> {
         let user_torque = self.user_torque(x, s);
         let elastic = FULL && d.elastic;
-        let through = if elastic { self.contact(s) } else { user_torque };
+        let through = if elastic { self.contact(d, s) } else { user_torque };
         let mut load = through.fma(self.gear.per_ratio, x.shaft);
         let mut own = if elastic { x.shaft } else { load };
         let mut added = x.brake;
@@ -61,8 +61,11 @@ impl<S: Scalar> Shaft<S> {
             }
         }
         let mut brake = x.brake;
-        let mut static_limit = self.friction.static_limit + added;
-        let mut dynamic = self.friction.dynamic + added;
+        let mut limits = [self.friction.static_limit, self.friction.dynamic];
+        if EXTRA {
+            limits = self.train.law.limits(d.train.law, limits, s.motor_speed, torque, load);
+        }
+        let (mut static_limit, mut dynamic) = (limits[0] + added, limits[1] + added);
         if EXTRA {
             if d.linear {
                 brake = if elastic { S::zero() } else { x.brake * self.gear.per_ratio };
@@ -102,7 +105,7 @@ impl<S: Scalar> Shaft<S> {
         }
     }
 
-    /// Torque of unbalance and spalls on the fast shaft, positive where it drives forwards, and the friction of the spalls.
+    /// Torque of unbalance, spalls and drive train on the fast shaft, positive where it drives forwards, and their friction.
     #[inline(always)]
     pub(super) fn disturbance(&self, d: &ShaftDetails, s: &ShaftState<S>, through: S) -> (S, S) {
         let (mut torque, mut friction) = (S::zero(), S::zero());
@@ -112,14 +115,20 @@ impl<S: Scalar> Shaft<S> {
         if d.unbalance {
             torque = torque + self.unbalance.torque(s.motor_position);
         }
+        if d.train.extra {
+            let added = self.train.added(&d.train, s.motor_position, through, self.gear.per_ratio);
+            torque = torque + added.torque();
+            friction = friction + added.bearing.friction;
+        }
         (torque, friction)
     }
 
     /// Torque on the user through the elastic play.
     #[inline(always)]
-    pub(super) fn contact(&self, s: &ShaftState<S>) -> S {
+    pub(super) fn contact(&self, d: &ShaftDetails, s: &ShaftState<S>) -> S {
         let displacement = s.motor_position * self.gear.per_ratio - s.user_position;
         let rate = s.motor_speed * self.gear.per_ratio - s.user_speed;
-        self.play.contact(displacement, rate)
+        let lag = if d.train.teeth { self.train.lag(s.motor_position) } else { S::zero() };
+        self.play.contact(displacement, rate, lag)
     }
 }

@@ -5,8 +5,10 @@
 mod loads;
 mod show;
 mod step;
+mod train;
 
 pub(super) use self::show::Shown;
+use self::train::{Train, TrainDetails};
 use super::form::Form;
 use super::layout::*;
 use crate::details;
@@ -26,6 +28,7 @@ details! {
         linear: bool = F::LINEAR;
         /// Positions move with the new speed.
         semi_implicit: bool = x.semi_implicit;
+        train: TrainDetails = TrainDetails::read::<F>(x.parts);
     }
     full {
         elastic = x.elastic;
@@ -41,6 +44,7 @@ details! {
         unbalance = Unbalance::<f64>::needed(&x.parts.unbalance());
         spall = F::spalled(x.parts.0);
         debris = F::contaminated(x.parts.0);
+        detailed_train = train.extra;
     }
 }
 
@@ -75,6 +79,7 @@ pub struct Shaft<S> {
     pub play: Play<S>,
     pub screw: Screw<S>,
     pub unbalance: Unbalance<S>,
+    train: Train<S>,
     /// Of the fast shaft; with a rigid transmission the user's included.
     pub inertia: S,
     /// Of the whole train, at the fast shaft.
@@ -98,6 +103,8 @@ pub struct ShaftState<S> {
     jammed: S,
     /// Factor on the dry friction of a screw with debris in it.
     pub scatter: S,
+    /// Deflection of the bristles.
+    bristle: S,
     pub work: Work<S>,
 }
 
@@ -131,6 +138,7 @@ impl<S: Scalar> Shaft<S> {
             gear,
             play: Play::derive(view.play()),
             screw,
+            train: Train::derive(raw, unbalance.eccentricity(rotor + reflected)),
             unbalance,
             inertia,
             whole_inertia: rotor + reflected,
@@ -157,6 +165,7 @@ impl<S: Scalar> Shaft<S> {
             jam_side: (user_position - self.friction.jam_position).sign(),
             jammed: S::select(S::splat(0.5).lt(self.friction.jam_anywhere), S::one(), zero),
             scatter: S::one(),
+            bristle: zero,
             work: Work { friction: zero, brake: zero, load: zero, impact: zero },
         }
     }

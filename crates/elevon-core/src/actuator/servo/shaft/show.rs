@@ -1,9 +1,12 @@
 //! What the shaft shows to an observer. Nothing here feeds back.
 
+use super::loads::Loads;
+use super::train::Added;
 use super::{Shaft, ShaftDetails, ShaftState};
 use crate::actuator::servo::advance::Instant;
 use crate::scalar::Scalar;
 use crate::transmission::friction::Friction;
+use crate::transmission::friction_law::FrictionLaw;
 
 /// What the shaft shows to an observer.
 pub(in crate::actuator::servo) struct Shown<S> {
@@ -14,6 +17,9 @@ pub(in crate::actuator::servo) struct Shown<S> {
     pub user_torque: S,
     pub through: S,
     pub unbalance: S,
+    pub added: Added<S>,
+    /// Torque on the fast shaft that an end stop cancels.
+    pub stop: S,
 }
 
 impl<S: Scalar> Shaft<S> {
@@ -21,7 +27,7 @@ impl<S: Scalar> Shaft<S> {
     #[inline(always)]
     pub(in crate::actuator::servo) fn show(&self, d: &ShaftDetails, x: &Instant<S>, s: &ShaftState<S>, torque: S) -> Shown<S> {
         let loads = self.loads::<true, true>(d, x, s, torque);
-        let dry = Friction::dry_torque(torque - loads.load, s.motor_speed, loads.static_limit, loads.dynamic);
+        let dry = self.dry(d, s, &loads, torque);
         Shown {
             user_speed: self.user_speed(d, s),
             friction: dry + self.friction.viscous_torque(s.motor_speed),
@@ -30,7 +36,34 @@ impl<S: Scalar> Shaft<S> {
             user_torque: loads.user_torque,
             through: loads.through,
             unbalance: if d.unbalance { self.unbalance.torque(s.motor_position) } else { S::zero() },
+            added: self.train.added(&d.train, s.motor_position, loads.through, self.gear.per_ratio),
+            stop: self.stopped(d, x, s, &loads, torque - loads.load - dry),
         }
+    }
+
+    /// Dry friction at the instant.
+    #[inline(always)]
+    fn dry(&self, d: &ShaftDetails, s: &ShaftState<S>, loads: &Loads<S>, torque: S) -> S {
+        if d.train.law == FrictionLaw::LuGre {
+            self.train.law.bristle.torque(s.bristle, s.motor_speed, loads.dynamic)
+        } else {
+            Friction::dry_torque(torque - loads.load, s.motor_speed, loads.static_limit, loads.dynamic)
+        }
+    }
+
+    /// What a stop cancels, on the fast shaft: of the torque `net` there, or of what pushes the second mass.
+    #[inline(always)]
+    fn stopped(&self, d: &ShaftDetails, x: &Instant<S>, s: &ShaftState<S>, loads: &Loads<S>, net: S) -> S {
+        let zero = S::zero();
+        if d.elastic {
+            let active = loads.through - loads.user_torque;
+            let limit = if d.load_side { self.load_side_friction(d, x) } else { zero };
+            let net = active - active.clamp_abs(limit);
+            let held = s.user_speed.equals(zero) & self.gear.user_stop.outwards(s.user_position, net);
+            return S::select(held, net * self.gear.per_ratio, zero);
+        }
+        let held = s.motor_speed.equals(zero) & self.gear.motor_stop.outwards(s.motor_position, net);
+        S::select(held, net, zero)
     }
 
     /// In the operator model the user moves with the motor while the play is taken up, else it rests.
@@ -64,8 +97,9 @@ impl<S: Scalar> Shaft<S> {
     ) -> [S; 2] {
         let limit = self.load_side_friction(d, x);
         let dry = Friction::dry_torque(shown.through - shown.user_torque, s.user_speed, limit, limit);
-        let disturbance = self.disturbance(d, s, shown.through).0;
-        [dry + self.load_damping * s.user_speed, disturbance - shown.unbalance]
+        let spall =
+            if d.spall { self.screw.spall(s.motor_position, shown.through, s.motor_position * self.gear.per_ratio).0 } else { S::zero() };
+        [dry + self.load_damping * s.user_speed, spall]
     }
 
     #[inline(always)]

@@ -5,12 +5,64 @@ use super::{Shaft, ShaftDetails, ShaftState};
 use crate::actuator::servo::advance::Instant;
 use crate::scalar::Scalar;
 use crate::transmission::friction::Friction;
+use crate::transmission::friction_law::{FrictionLaw, Moved, Push};
 
 impl<S: Scalar> Shaft<S> {
-    /// Torque left to accelerate under the motor's `torque`.
+    /// Acceleration of a shaft of the inertia 1/`per_inertia` under the motor's `torque`.
     #[inline(always)]
-    pub(in crate::actuator::servo) fn net(loads: &Loads<S>, speed: S, torque: S) -> S {
-        Friction::net_torque(torque, loads.load, loads.resist, speed, loads.static_limit)
+    pub(in crate::actuator::servo) fn acceleration<const EXTRA: bool>(
+        &self,
+        d: &ShaftDetails,
+        s: &ShaftState<S>,
+        loads: &Loads<S>,
+        torque: S,
+        per_inertia: S,
+    ) -> S {
+        if EXTRA && d.train.law == FrictionLaw::LuGre {
+            return (self.on_bristles(d, s, loads, torque, self.dt * per_inertia).speed - s.motor_speed) / self.dt;
+        }
+        self.net(d, s, loads, torque) * per_inertia
+    }
+
+    /// Torque left to accelerate under the motor's `torque`, by friction and a stop that it stands at.
+    #[inline(always)]
+    fn net(&self, d: &ShaftDetails, s: &ShaftState<S>, loads: &Loads<S>, torque: S) -> S {
+        let speed = s.motor_speed;
+        let net = Friction::net_torque(torque, loads.load, loads.resist, speed, loads.static_limit);
+        if d.elastic {
+            net
+        } else {
+            self.gear.motor_stop.react(s.motor_position, speed, net)
+        }
+    }
+
+    /// A step on bristles.
+    #[inline(always)]
+    fn on_bristles(&self, d: &ShaftDetails, s: &ShaftState<S>, loads: &Loads<S>, torque: S, dt_per_inertia: S) -> Moved<S> {
+        let push = Push {
+            free: dt_per_inertia.fma(torque - loads.load - loads.viscous, s.motor_speed),
+            limits: [loads.static_limit, loads.dynamic],
+            dt: self.dt,
+            dt_per_inertia,
+        };
+        let bristle = &self.train.law.bristle;
+        if d.elastic {
+            bristle.advance(&push, s.bristle)
+        } else {
+            bristle.advance_beside(&push, s.bristle, s.motor_speed, &self.gear.motor_stop, s.motor_position)
+        }
+    }
+
+    /// New speed, and the dry friction where bristles decide it.
+    #[inline(always)]
+    fn new_speed<const EXTRA: bool>(&self, d: &ShaftDetails, s: &mut ShaftState<S>, loads: &Loads<S>, torque: S) -> (S, Option<S>) {
+        if EXTRA && d.train.law == FrictionLaw::LuGre {
+            let moved = self.on_bristles(d, s, loads, torque, self.dt_per_inertia);
+            s.bristle = moved.bristle;
+            return (moved.speed, Some(moved.dry));
+        }
+        let free = self.dt_per_inertia.fma(self.net(d, s, loads, torque), s.motor_speed);
+        (Friction::stop_at_reversal(s.motor_speed, free), None)
     }
 
     /// One step under the motor's `torque`.
@@ -24,18 +76,17 @@ impl<S: Scalar> Shaft<S> {
         torque: S,
     ) {
         let speed = s.motor_speed;
-        let free = self.dt_per_inertia.fma(Self::net(loads, speed, torque), speed);
-        let new_speed = Friction::stop_at_reversal(speed, free);
+        let (new_speed, on_bristles) = self.new_speed::<EXTRA>(d, s, loads, torque);
         let moved = self.dt.fma(if d.semi_implicit { new_speed } else { speed }, s.motor_position);
-        let (position, held_speed) = self.gear.stop(moved, new_speed);
+        let (position, held_speed) = if FULL && d.elastic { (moved, new_speed) } else { self.gear.motor_stop.hold(moved, new_speed) };
         if FULL && d.accounts {
-            let dry = Friction::dry_torque(torque - loads.load, speed, loads.static_limit, loads.dynamic);
+            let dry = on_bristles.unwrap_or_else(|| Friction::dry_torque(torque - loads.load, speed, loads.static_limit, loads.dynamic));
             self.account(s, loads, [speed, new_speed, held_speed], dry);
         }
         if FULL && d.elastic {
             self.user_step::<EXTRA>(d, x, s, loads);
         } else {
-            s.user_position = self.play.drag(position * self.gear.per_ratio, s.user_position);
+            s.user_position = self.drag::<EXTRA>(d, position, s.user_position);
         }
         if FULL && d.jams {
             let passed = ((s.user_position - self.friction.jam_position) * s.jam_side).le(S::zero());
@@ -46,7 +97,18 @@ impl<S: Scalar> Shaft<S> {
         s.motor_speed = held_speed;
     }
 
-    /// The second mass of the elastic play.
+    /// The user as the play operator leaves it.
+    #[inline(always)]
+    fn drag<const EXTRA: bool>(&self, d: &ShaftDetails, position: S, user: S) -> S {
+        let driver = position * self.gear.per_ratio;
+        if EXTRA && d.train.teeth {
+            self.play.drag_worn(driver, user, self.train.lag(position))
+        } else {
+            self.play.drag(driver, user)
+        }
+    }
+
+    /// The second mass of the elastic play; its end stop is where the user stands.
     #[inline(always)]
     fn user_step<const EXTRA: bool>(&self, d: &ShaftDetails, x: &Instant<S>, s: &mut ShaftState<S>, loads: &Loads<S>) {
         let speed = s.user_speed;
@@ -54,10 +116,14 @@ impl<S: Scalar> Shaft<S> {
         let new_speed = if EXTRA && d.load_side {
             let dry = self.load_side_friction(d, x);
             let net = Friction::net_torque(active, S::zero(), (self.load_damping).fma(speed, speed.signed(dry)), speed, dry);
+            let net = self.gear.user_stop.react(s.user_position, speed, net);
             Friction::stop_at_reversal(speed, speed + self.dt * (self.per_user_inertia * net))
         } else {
-            speed + self.dt * (self.per_user_inertia * active)
+            let net = self.gear.user_stop.react(s.user_position, speed, active);
+            speed + self.dt * (self.per_user_inertia * net)
         };
+        let moved = s.user_position + self.dt * if d.semi_implicit { new_speed } else { speed };
+        let (position, held) = self.gear.user_stop.hold(moved, new_speed);
         if d.accounts {
             let middle = S::splat(0.5) * (speed + new_speed);
             s.work.load = s.work.load + self.dt * loads.user_torque * middle;
@@ -65,10 +131,11 @@ impl<S: Scalar> Shaft<S> {
                 self.account_load_side(d, x, s, active, middle);
             }
             let motor = s.motor_speed * self.gear.per_ratio;
-            s.work.impact = s.work.impact + self.dt * loads.through * (motor - middle);
+            let stopped = S::splat(0.5) * self.user_inertia * (new_speed * new_speed - held * held);
+            s.work.impact = s.work.impact + self.dt * loads.through * (motor - middle) + stopped;
         }
-        s.user_position = s.user_position + self.dt * if d.semi_implicit { new_speed } else { speed };
-        s.user_speed = new_speed;
+        s.user_position = position;
+        s.user_speed = held;
     }
 
     /// Work of a step at its middle; `speeds` before, after and as the stops leave it.

@@ -1,0 +1,102 @@
+//! What acts on the fast shaft beside the plain friction: the law of the dry friction, cogging, a bearing with a defect or a
+//! magnetic pull on it, worn teeth.
+
+use crate::actuator::servo::form::Form;
+use crate::actuator::servo::layout::*;
+use crate::details;
+use crate::motor::cogging::Cogging;
+use crate::motor::magnetic_pull::MagneticPull;
+use crate::motor::star::MotorParameter;
+use crate::motor::unbalance::Unbalance;
+use crate::scalar::Scalar;
+use crate::transmission::bearing::{Bearing, BearingTorque};
+use crate::transmission::friction::FrictionParameter;
+use crate::transmission::friction_law::{FrictionLaw, Law};
+use crate::transmission::tooth::Teeth;
+
+details! {
+    /// Which of it a run needs.
+    TrainDetails, read<F>(parts: Parts)
+    always {
+        law: FrictionLaw = FrictionLaw::chosen(&parts.friction_law());
+    }
+    full {}
+    extra {
+        /// Another law than Borello's.
+        lawful = law != FrictionLaw::Borello;
+        cogging = Cogging::<f64>::needed(&parts.cogging());
+        /// An eccentric rotor is pulled.
+        pull = MagneticPull::<f64>::needed(&parts.magnetic_pull())
+            && (parts.motor().any_away([MotorParameter::EccentricityStatic, MotorParameter::EccentricityDynamic])
+                || Unbalance::<f64>::needed(&parts.unbalance()));
+        bearing = pull || Bearing::<f64>::needed(&parts.bearing());
+        teeth = Teeth::<f64>::needed(&parts.tooth());
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Train<S> {
+    pub law: Law<S>,
+    cogging: Cogging<S>,
+    bearing: Bearing<S>,
+    pull: MagneticPull<S>,
+    teeth: Teeth<S>,
+}
+
+/// What it adds on the fast shaft: torques positive where they drive forwards, and dry friction.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::actuator::servo) struct Added<S> {
+    pub cogging: S,
+    pub bearing: BearingTorque<S>,
+    pub teeth: S,
+}
+
+impl<S: Scalar> Added<S> {
+    #[inline(always)]
+    pub fn torque(&self) -> S {
+        self.cogging + self.bearing.torque + self.teeth
+    }
+}
+
+impl<S: Scalar> Train<S> {
+    /// `(eccentricity, phase)` is what an excess mass of the rotor adds to the dynamic eccentricity.
+    pub(super) fn derive(raw: &[S], (eccentricity, phase): (S, S)) -> Self {
+        let view = Raw(raw);
+        let at = |p: MotorParameter| raw[p.at()];
+        let (sin, cos) = at(MotorParameter::EccentricityDynamicPhase).sin_cos();
+        let (sin_x, cos_x) = phase.sin_cos();
+        let own = at(MotorParameter::EccentricityDynamic);
+        let turning = [own * cos + eccentricity * cos_x, own * sin + eccentricity * sin_x];
+        Self {
+            law: Law::derive(view.friction_law(), raw[FrictionParameter::DryScale.at()]),
+            cogging: Cogging::derive(view.cogging()),
+            bearing: Bearing::derive(view.bearing()),
+            pull: MagneticPull::derive(view.magnetic_pull(), at(MotorParameter::EccentricityStatic), turning),
+            teeth: Teeth::derive(view.tooth()),
+        }
+    }
+
+    /// At a motor angle; `through` is the torque through the gear at the user, `per_ratio` the gear's.
+    #[inline(always)]
+    pub(super) fn added(&self, d: &TrainDetails, angle: S, through: S, per_ratio: S) -> Added<S> {
+        let zero = S::zero();
+        let mut added = Added { cogging: zero, bearing: BearingTorque { torque: zero, friction: zero }, teeth: zero };
+        if d.cogging {
+            added.cogging = self.cogging.torque(angle);
+        }
+        if d.bearing {
+            let pull = if d.pull { self.pull.force(angle) } else { zero };
+            added.bearing = self.bearing.torque(angle, through * per_ratio, pull);
+        }
+        if d.teeth {
+            added.teeth = self.teeth.lag(angle).torque(through);
+        }
+        added
+    }
+
+    /// What worn teeth add to half the play at a motor angle.
+    #[inline(always)]
+    pub(super) fn lag(&self, angle: S) -> S {
+        self.teeth.lag(angle).half
+    }
+}
