@@ -37,6 +37,7 @@ DRIVES = {
     "pwm": PWM,
     "lossy-hysteresis": HYSTERESIS | LOSSY,
     "lossy-pwm": PWM | LOSSY,
+    "lossy-located": HYSTERESIS | LOSSY | {"inverter.relay_crossing": "located"},
     "elastic-play": HYSTERESIS | ELASTIC,
 }
 

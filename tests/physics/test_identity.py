@@ -62,6 +62,7 @@ def batch(count: int = 19) -> list[Any]:
             "motor.inertia": 7e-4 + 1e-5 * i,
             "sensor.current.bits": (0, 8, 10, 12)[i % 4],
             "inverter.dead_time": 2e-6 if i % 6 == 5 else 0.0,
+            "inverter.relay_crossing": "located" if i % 6 == 4 else "sampled",
         }
         scenario = make_scenario(
             duration=0.02,

@@ -2,6 +2,26 @@
 
 use crate::scalar::Scalar;
 use crate::three;
+use crate::variable::Own;
+use crate::{choices, variables};
+
+choices! {
+    RelayCrossing { Sampled "sampled", Located "located" }
+}
+
+variables! {
+    /// How the relays are looked at.
+    RelayParameter, RELAYS {
+        RelayCrossing => "relay_crossing", "-", "1", Choice(RelayCrossing::NAMES), Solver, Some(0.0), "sampled: a relay acts at the first step after its threshold was passed (the papers), up to a step late, which prolongs the limit cycle of the three relays; located: at the instant within the step at which the error passes it",
+            high_only("it has no relays").when(&[Chosen("drive.kind", &["hysteresis"])]);
+    }
+}
+
+impl RelayCrossing {
+    pub fn located(own: &Own<RelayParameter>) -> bool {
+        Self::read(own.value(RelayParameter::RelayCrossing)) == Self::Located
+    }
+}
 
 /// New leg commands (+1 high, -1 low): beyond the half band they follow the error's sign, inside it they stay.
 #[inline(always)]
@@ -10,6 +30,24 @@ pub fn relays<S: Scalar>(half_band: S, legs: [S; 3], error: [S; 3]) -> [S; 3] {
         let lowered = S::select(error[j].lt(-half_band), -S::one(), legs[j]);
         S::select(half_band.lt(error[j]), S::one(), lowered)
     })
+}
+
+/// Share of a step after which the first relay passes its threshold, and which do then: errors at both ends of the step,
+/// straight between. `None`: none does. Commands other than +1 and -1 are no relay's.
+#[inline(always)]
+pub fn crossing<S: Scalar>(half_band: S, legs: [S; 3], start: [S; 3], end: [S; 3]) -> Option<(S, [S::Mask; 3])> {
+    let (zero, one) = (S::zero(), S::one());
+    let crossed: [S::Mask; 3] = three!(|j| (zero.lt(legs[j]) & end[j].lt(-half_band)) | (legs[j].lt(zero) & half_band.lt(end[j])));
+    if !S::any(crossed[0] | crossed[1] | crossed[2]) {
+        return None;
+    }
+    let shares: [S; 3] = three!(|j| {
+        let change = S::select(crossed[j], end[j] - start[j], one);
+        let share = ((-legs[j] * half_band - start[j]) / change).clamp(zero, one);
+        S::select(crossed[j], share, one)
+    });
+    let first = shares[0].minimum(shares[1]).minimum(shares[2]);
+    Some((first, three!(|j| crossed[j] & shares[j].le(first))))
 }
 
 /// References of a six-step drive per ampere: 1 on [30, 150), -1 on [210, 330) degrees of each phase angle, else 0,
@@ -32,4 +70,25 @@ pub fn count_transitions<S: Scalar>(count: S, old: [S; 3], new: [S; 3]) -> S {
     }
     let sum = (new[0] - old[0]).abs() + (new[1] - old[1]).abs() + (new[2] - old[2]).abs();
     count + S::splat(0.5) * sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_relay_to_pass_its_threshold_is_located_on_the_straight_line() {
+        let legs = [1.0, -1.0, -1.0];
+        assert!(crossing(0.5, legs, [0.0, 0.0, 0.0], [-0.5, 0.5, 0.4]).is_none());
+        let (share, which) = crossing(0.5, legs, [-0.4, 0.3, 0.0], [-0.8, 0.7, 0.1]).unwrap_or((0.0, [false; 3]));
+        assert!((share - 0.25_f64).abs() < 1e-12);
+        assert_eq!(which, [true, false, false]);
+        let (share, which) = crossing(0.5, legs, [-0.4, 0.3, 0.0], [-0.5, 0.8, 0.1]).unwrap_or((0.0, [false; 3]));
+        assert!((share - 0.4_f64).abs() < 1e-12);
+        assert_eq!(which, [false, true, false]);
+        // A relay beyond its threshold already acts at once; legs that are off are no relays.
+        let (share, _) = crossing(0.5, legs, [-0.6, 0.0, 0.0], [-0.8, 0.0, 0.0]).unwrap_or((1.0, [false; 3]));
+        assert_eq!(share, 0.0);
+        assert!(crossing(0.5, [0.0; 3], [-0.4; 3], [-0.8; 3]).is_none());
+    }
 }

@@ -187,6 +187,12 @@ impl<S: Scalar> Star<S> {
         }
     }
 
+    /// The same winding over a share of a step.
+    #[inline(always)]
+    pub fn over(&self, share: S) -> Self {
+        Self { dt_per_inductance: three!(|j| share * self.dt_per_inductance[j]), ..*self }
+    }
+
     /// Adds a dynamic eccentricity.
     pub fn lean(&mut self, (eccentricity, phase): (S, S)) {
         let (sin, cos) = phase.sin_cos();

@@ -46,6 +46,12 @@ impl<S: Scalar> Tap<S> {
         own.any_away([TapParameter::TapLevelA, TapParameter::TapLevelB, TapParameter::TapLevelC])
     }
 
+    /// The same over a share of a step.
+    #[inline(always)]
+    pub fn over(&self, share: S) -> Self {
+        Self { per_dt: self.per_dt / share, ..*self }
+    }
+
     /// Neutral voltage that closes Kirchhoff's law at the end of the step. `drop` is terminal voltage less EMF and R i.
     #[inline(always)]
     pub fn neutral(&self, terminal: [S; 3], drop: [S; 3], current: [S; 3], per_inductance: [S; 3]) -> S {

@@ -10,6 +10,7 @@ use crate::control::current_dq::PwmParameter;
 use crate::control::position_speed::{ControlParameter, ControlStructure};
 use crate::details;
 use crate::inverter::bridge::{self, BridgeStructure};
+use crate::inverter::hysteresis::RelayCrossing;
 use crate::motor::star::{interrupted, warms, MotorStructure};
 use crate::motor::tap::Tap;
 use crate::motor::thermal::Network;
@@ -50,6 +51,8 @@ details! {
         six_step = Commutation::read(x.parts.drive().value(DriveParameter::Commutation)) == Commutation::SixStep;
         /// A lost resolver opens the bridge.
         stops = x.stops();
+        /// Relays act at the instant of their crossing.
+        located = drive == DriveKind::Hysteresis && RelayCrossing::located(&x.parts.relays());
         extra_shaft = shaft.extra;
         extra_sensing = sensing.extra;
     }

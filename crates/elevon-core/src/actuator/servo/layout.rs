@@ -4,6 +4,7 @@ use crate::actuator::Port;
 use crate::control::current_dq::{PwmParameter, PWM};
 use crate::control::position_speed::{ControlParameter, CONTROL};
 use crate::inverter::bridge::{InverterParameter, INVERTER};
+use crate::inverter::hysteresis::{RelayParameter, RELAYS};
 use crate::motor::cogging::{CoggingParameter, COGGING};
 use crate::motor::equivalent::{LowParameter, LOW};
 use crate::motor::magnetic_pull::{MagneticPullParameter, MAGNETIC_PULL};
@@ -80,6 +81,7 @@ groups! {
     magnetic_pull: "motor", MAGNETIC_PULL, MagneticPullParameter;
     bearing: "bearing", BEARING, BearingParameter;
     tooth: "gear", TOOTH, ToothParameter;
+    relays: "inverter", RELAYS, RelayParameter;
 }
 
 pub const PORTS: &[Port] = &[

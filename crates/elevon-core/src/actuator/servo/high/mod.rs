@@ -1,5 +1,6 @@
 //! High fidelity: three phases, switching inverter, fixed step (reference sheet 1.2 to 1.7).
 
+mod crossing;
 mod electric;
 pub(crate) mod model;
 pub(crate) mod observe;

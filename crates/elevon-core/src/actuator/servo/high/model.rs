@@ -72,6 +72,8 @@ pub(crate) struct ExtraState<S> {
     pub network: NetworkState<S>,
     /// Currents as the drive sees them.
     pub sensed: [S; 3],
+    /// Current reference of the last step, where crossings of the relays are located.
+    pub last_reference: S,
 }
 
 /// Accounts of the electrical part; those of the shaft are its own.
@@ -81,6 +83,13 @@ pub(crate) const E_INVERTER: usize = 2;
 pub(crate) const E_TAP: usize = 3;
 
 impl<S: Scalar> Model<S> {
+    /// The electrical part over a share of a step.
+    #[inline(always)]
+    pub(crate) fn over(&self, share: S) -> Self {
+        let extra = Extra { tap: self.extra.tap.over(share), ..self.extra };
+        Self { dt: share * self.dt, star: self.star.over(share), extra, ..*self }
+    }
+
     pub(crate) fn derive<F: Form>(raw: &[S], structure: &Structure) -> Self {
         let view = Raw(raw);
         let at = |i: usize| raw[i];

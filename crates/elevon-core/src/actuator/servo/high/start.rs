@@ -37,7 +37,7 @@ pub(crate) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> St
         transitions: zero,
         voltage: [zero; 3],
         energy: [zero; 4],
-        extra: ExtraState { network: warm, sensed: star.current },
+        extra: ExtraState { network: warm, sensed: star.current, last_reference: S::splat(f64::NAN) },
     }
 }
 

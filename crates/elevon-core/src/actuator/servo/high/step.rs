@@ -2,6 +2,7 @@
 //! motor, transmission, acquisition. With `FULL` false the optional details compile to nothing, with `EXTRA` false those
 //! that only some servos have; a detail at its healthy value changes no bit, so the forms agree exactly where both apply.
 
+use super::crossing::{located_step, Seen};
 use super::electric::{coupling, electric_step, motor_torque};
 use super::model::{Model, State};
 use crate::actuator::servo::advance::{Instant, Stepper};
@@ -33,7 +34,11 @@ pub(crate) fn control_step<S: Scalar, const FULL: bool>(
 }
 
 #[inline(always)]
-fn measured_current<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure: &Structure, s: &State<S>) -> [S; 3] {
+pub(crate) fn measured_current<S: Scalar, const FULL: bool, const EXTRA: bool>(
+    m: &Model<S>,
+    structure: &Structure,
+    s: &State<S>,
+) -> [S; 3] {
     let mut current = s.star.current;
     if EXTRA && structure.tap {
         current = leg_current(m, structure, s);
@@ -102,13 +107,14 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     // Power electronics.
     let half_supply = S::splat(0.5) * (x.supply * m.supply_scale);
     let old_legs = s.legs;
+    let mut error = [S::zero(); 3];
     if PWM || (FULL && structure.drive == DriveKind::Pwm) {
         s.legs = m.current_control.compare(&s.current_control, x.t);
     } else if FULL && structure.drive == DriveKind::Off {
         s.legs = [S::zero(); 3];
     } else {
         let shape = if EXTRA && structure.six_step { six_step(sin_phases) } else { sin_phases };
-        let error = three!(|j| s.current_ref * shape[j] - measured[j]);
+        error = three!(|j| s.current_ref * shape[j] - measured[j]);
         s.legs = relays(m.half_band, old_legs, error);
     }
     if EXTRA && structure.stops {
@@ -120,7 +126,13 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     // Motor electromagnetics.
     let c = coupling::<S, FULL>(m, structure, s, sin, cos);
     let torque = motor_torque::<S, FULL>(m, structure, s, &c);
-    let (current, voltage) = electric_step::<S, FULL, EXTRA>(m, structure, s, &c, half_supply, old_legs);
+    let (current, voltage) = if EXTRA && structure.located {
+        let rate = if structure.sensing.resolver && structure.sensing.commutated { reading.speed } else { s.shaft.motor_speed };
+        let seen = Seen { error, sines: sin_phases, cosines: cos_phases, rate };
+        located_step::<S, FULL>(m, structure, s, &c, half_supply, old_legs, &seen)
+    } else {
+        electric_step::<S, FULL, EXTRA>(m, structure, s, &c, half_supply, old_legs)
+    };
     if structure.acquisition {
         let (q, d) = park(measured, sin_phases, cos_phases);
         let (v_q, _) = park(voltage, sin_phases, cos_phases);

@@ -1,0 +1,94 @@
+//! Relays that act at the instant of their crossing: the electrical step in two parts.
+//!
+//! The step is taken whole; where a relay's error is then beyond its threshold, the step is taken again up to the crossing
+//! (on the straight line between the errors at both ends, exact to the order of the step), the relay turns, and the rest
+//! follows. A second crossing within the same step is found at the begin of the next.
+
+use super::electric::{electric_step, Coupling};
+use super::model::{Model, State};
+use super::step::measured_current;
+use crate::actuator::servo::details::Structure;
+use crate::inverter::hysteresis::{count_transitions, crossing, six_step};
+use crate::scalar::Scalar;
+use crate::sensor::filter::low_pass;
+use crate::three;
+
+/// What the relays see at the begin of a step.
+pub(crate) struct Seen<S> {
+    pub error: [S; 3],
+    /// Of the phase angles, and the rate of the rotor that they turn with.
+    pub sines: [S; 3],
+    pub cosines: [S; 3],
+    pub rate: S,
+}
+
+/// Errors of the relays at the end of a step after which the currents are `current`: the reference goes on as it went.
+#[inline(always)]
+fn error_after<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, current: [S; 3], x: &Seen<S>) -> [S; 3] {
+    let mut after = *s;
+    after.star.current = current;
+    let mut measured = measured_current::<S, true, true>(m, structure, &after);
+    if structure.current_filter {
+        measured = three!(|j| low_pass(m.extra.closing, s.extra.sensed[j], measured[j]));
+    }
+    let turned = m.dt * m.star.pole_pairs * x.rate;
+    let shape = if structure.six_step { six_step(x.sines) } else { three!(|j| turned.fma(x.cosines[j], x.sines[j])) };
+    let mut reference = s.current_ref;
+    if structure.control_every_step {
+        reference = reference + (reference - s.extra.last_reference);
+    }
+    three!(|j| reference * shape[j] - measured[j])
+}
+
+/// As `electric_step`, in two parts where a relay crosses its threshold within the step.
+#[inline(always)]
+pub(crate) fn located_step<S: Scalar, const FULL: bool>(
+    m: &Model<S>,
+    structure: &Structure,
+    s: &mut State<S>,
+    c: &Coupling<S>,
+    half_supply: S,
+    old_legs: [S; 3],
+    x: &Seen<S>,
+) -> ([S; 3], [S; 3]) {
+    let before = *s;
+    let whole = electric_step::<S, FULL, true>(m, structure, s, c, half_supply, old_legs);
+    let end = error_after(m, structure, s, whole.0, x);
+    s.extra.last_reference = s.current_ref;
+    let Some((share, which)) = crossing(m.half_band, s.legs, x.error, end) else {
+        return whole;
+    };
+    let split = which[0] | which[1] | which[2];
+    let kept = *s;
+    *s = before;
+    let first = electric_step::<S, FULL, true>(&m.over(share), structure, s, c, half_supply, old_legs);
+    s.star.current = first.0;
+    let turned = three!(|j| S::select(which[j], -s.legs[j], s.legs[j]));
+    s.transitions = count_transitions(s.transitions, s.legs, turned);
+    let legs = s.legs;
+    s.legs = turned;
+    let rest = S::one() - share;
+    let second = electric_step::<S, FULL, true>(&m.over(rest), structure, s, c, half_supply, legs);
+    s.star.current = before.star.current;
+    s.extra.last_reference = kept.extra.last_reference;
+    choose(s, split, &kept);
+    let mean: [S; 3] = three!(|j| share * first.1[j] + rest * second.1[j]);
+    (three!(|j| S::select(split, second.0[j], whole.0[j])), three!(|j| S::select(split, mean[j], whole.1[j])))
+}
+
+/// Lanes that were not split keep what the whole step made of them.
+#[inline(always)]
+fn choose<S: Scalar>(s: &mut State<S>, split: S::Mask, kept: &State<S>) {
+    let pick = |mine: S, other: S| S::select(split, mine, other);
+    s.transitions = pick(s.transitions, kept.transitions);
+    s.legs = three!(|j| pick(s.legs[j], kept.legs[j]));
+    s.voltage = three!(|j| pick(s.voltage[j], kept.voltage[j]));
+    s.star.loop_current = three!(|j| pick(s.star.loop_current[j], kept.star.loop_current[j]));
+    s.bridge.keep(split, &kept.bridge);
+    for (mine, other) in s.energy.iter_mut().zip(kept.energy) {
+        *mine = pick(*mine, other);
+    }
+    for (mine, other) in s.extra.network.collected.iter_mut().zip(kept.extra.network.collected) {
+        *mine = pick(*mine, other);
+    }
+}
