@@ -38,6 +38,11 @@ SIGNATURES = {
     ("gain", "resolver"): "test_resolver_gain_shows_a_speed_off_by_it",
     ("unbalance", "motor"): "test_unbalance_swings_the_speed_once_a_turn",
     ("resistor_short", "motor"): "test_resistor_draws_the_phase_voltage_over_its_resistance",
+    ("phase_short", "motor"): "test_phase_short_draws_the_voltage_between_the_windings",
+    ("ground_short", "motor"): "test_ground_short_returns_by_the_link",
+    ("local_demagnetisation", "motor"): (
+        "test_local_demagnetisation_puts_sidebands_beside_the_emf"
+    ),
     ("missing_counts", "encoder"): "test_missing_counts_make_the_encoder_read_short",
     ("bearing", "bearing"): "test_bearing_defect_shows_at_its_shaft_order",
     ("tooth_wear", "gear"): "test_tooth_wear_opens_the_play_over_each_mesh",

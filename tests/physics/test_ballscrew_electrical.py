@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import elevon
 from tests.physics.rig import constant, run
 
 NAME = "nasa-ballscrew"
@@ -187,9 +186,34 @@ def test_unbalance_weighs_as_its_half_ring() -> None:
     assert np.max(expected) == pytest.approx(0.164, abs=0.001)
 
 
-@pytest.mark.parametrize("other", ["open_phase@motor.phase_b=1", "open_switch@inverter.a_high=1"])
-def test_a_resistor_at_a_floating_terminal_is_refused(other: str) -> None:
-    """Not modelled: said so, instead of a wrong answer."""
-    with pytest.raises(elevon.InputError, match=r"motor\.tap_level"):
-        run({}, duration=1e-3, record="current_a@1 kHz",
-            scenario={"fault": [tap(0.25), other]}, name=NAME)  # fmt: skip
+def test_a_resistor_at_an_open_phase_carries_what_the_other_phases_bring() -> None:
+    """Phase b interrupted: its terminal floats, and legs a and c carry one current through winding
+    and resistor.
+    """
+    rec = run(
+        {},
+        duration=0.1,
+        mode="speed",
+        command=[constant(40.0)],
+        record="current_a,current_b,current_c,tap_current_a,leg_current_a,leg_current_c@100 kHz",
+        scenario={
+            "fault": [tap(0.25), "open_phase@motor.phase_b=1"],
+            "initial": {"motor_speed": 40.0},
+        },
+        name=NAME,
+    )
+    late = rec["current_a"].time > 0.02
+    names = (
+        "current_a",
+        "current_b",
+        "current_c",
+        "tap_current_a",
+        "leg_current_a",
+        "leg_current_c",
+    )
+    a, b, c, drawn, leg, back = (rec[name].values[late] for name in names)
+    assert np.max(np.abs(b)) < 1e-9
+    assert np.max(np.abs(leg)) > 1.0
+    assert np.max(np.abs(leg - (a + drawn))) < 1e-12 * np.max(np.abs(leg))
+    assert np.max(np.abs(leg + back)) < 1e-9 * np.max(np.abs(leg))
+    assert np.max(np.abs(c - back)) == 0.0

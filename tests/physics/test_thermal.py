@@ -111,24 +111,28 @@ def test_high_and_low_heat_alike() -> None:
 
 
 def test_circulating_current_of_a_short_heats_the_winding() -> None:
-    """Its I^2 R is part of the heat, and counted."""
+    """Its I^2 R and that of the contact are part of the heat, and counted apart."""
     rec = run(
         {"motor.short_model": "loop", "motor.short_contact_resistance": 0.5},
         duration=0.5,
         mode="speed",
         command=[constant(37.7)],
-        record="heat_loop,heat_copper,loop_current_a,winding_temperature,energy_copper,"
+        record="heat_loop,heat_contact,current_a,loop_current_a,energy_copper,energy_contact,"
         "energy_heat_stored,energy_air@100 kHz",
         scenario={"fault": ["short@motor.phase_a=0.2"]},
         name=NAME,
     )
     # The tick that begins at a sample shows the mean of the 10 ms before it.
-    ticks = rec["heat_loop"].values[1000::1000]
-    loop = np.mean(rec["loop_current_a"].values[:-1] ** 2) * (0.2 * 0.9 + 0.5)
-    assert np.mean(ticks) == pytest.approx(loop, rel=0.01)
+    inside = rec["loop_current_a"].values[:-1]
+    through = rec["current_a"].values[:-1] - inside
+    loop, contact = np.mean(inside**2) * 0.2 * 0.9, np.mean(through**2) * 0.5
+    assert np.mean(rec["heat_loop"].values[1000::1000]) == pytest.approx(loop, rel=0.01)
+    assert np.mean(rec["heat_contact"].values[1000::1000]) == pytest.approx(contact, rel=0.01)
     assert loop > 1.0
+    assert contact > 1.0
     kept = rec.final["energy_heat_stored"] + rec.final["energy_air"]
-    assert kept == pytest.approx(rec.final["energy_copper"], rel=1e-9)
+    lost = rec.final["energy_copper"] + rec.final["energy_contact"]
+    assert kept == pytest.approx(lost, rel=1e-9)
 
 
 def test_a_resistor_at_the_terminals_heats_no_winding() -> None:

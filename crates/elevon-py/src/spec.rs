@@ -127,6 +127,15 @@ fn fault(model: &[FaultKind], places: &HashMap<String, usize>, d: &Bound<'_, PyD
     Ok(FaultSpec { severity, profile, writes, settings, period })
 }
 
+/// How the faults of a run are called.
+fn names_of(faults: &Bound<'_, PyList>) -> PyResult<Vec<String>> {
+    let name = |d: &Bound<'_, PyDict>| -> PyResult<String> {
+        let (kind, place): (String, String) = (need(d, "kind")?.extract()?, need(d, "place")?.extract()?);
+        Ok(format!("{kind}@{place}"))
+    };
+    faults.iter().map(|f| name(&f.cast_into::<PyDict>()?)).collect()
+}
+
 /// What a caller's runs are resolved against; made once a call.
 pub struct Resolver {
     pub model: Model,
@@ -160,17 +169,16 @@ impl Resolver {
         }
         let inputs = need(d, "inputs")?.cast_into::<PyDict>()?;
         let (ports, driven) = self.ports(&parameters, &inputs)?;
-        let given: HashMap<String, f64> = need(d, "initial")?.extract()?;
+        let initial: HashMap<String, f64> = need(d, "initial")?.extract()?;
         let names = self.model.initial();
-        if let Some(unknown) = given.keys().find(|k| !names.contains(&k.as_str())) {
+        if let Some(unknown) = initial.keys().find(|k| !names.contains(&k.as_str())) {
             return Err(bad(format!("no initial value {unknown:?}")));
         }
-        let faults = need(d, "faults")?.cast_into::<PyList>()?;
-        let faults = self.faults(&faults)?;
-        let broken = whole(&parameters, &faults);
-        in_range(self.model, &broken, "the faults at their whole severity: ")?;
-        if let Some(finding) = self.model.check_faulted(&broken).into_iter().find(|f| f.severity == Severity::Error) {
-            return Err(bad(format!("the faults at their whole severity: {}", finding.message)));
+        let given = need(d, "faults")?.cast_into::<PyList>()?;
+        let faults = self.faults(&given)?;
+        in_range(self.model, &whole(&parameters, &faults), "the faults at their whole severity: ")?;
+        if let Some(message) = self.refused(&parameters, &faults, &names_of(&given)?) {
+            return Err(bad(message));
         }
         let duration: f64 = need(d, "duration")?.extract()?;
         let steps = duration / self.model.step(&parameters);
@@ -182,7 +190,7 @@ impl Resolver {
             ports,
             driven,
             faults,
-            initial: names.iter().map(|n| given.get(*n).copied().unwrap_or(f64::NAN)).collect(),
+            initial: names.iter().map(|n| initial.get(*n).copied().unwrap_or(f64::NAN)).collect(),
             duration,
             seed: need(d, "seed")?.extract()?,
             run: need(d, "run")?.extract()?,
@@ -191,6 +199,27 @@ impl Resolver {
 
     pub fn faults(&self, given: &Bound<'_, PyList>) -> PyResult<Vec<FaultSpec>> {
         given.iter().map(|f| fault(&self.faults, &self.places, &f.cast_into::<PyDict>()?)).collect()
+    }
+
+    /// Why the faults cannot run at their whole severity: the one that alone is too much, and how much of it is not.
+    fn refused(&self, parameters: &[f64], faults: &[FaultSpec], names: &[String]) -> Option<String> {
+        let first =
+            |some: &[FaultSpec]| self.model.check_faulted(&whole(parameters, some)).into_iter().find(|f| f.severity == Severity::Error);
+        let finding = first(faults)?;
+        let Some(alone) = (0..faults.len()).find(|&i| first(&faults[i..=i]).is_some()) else {
+            return Some(format!("{} together at their whole severity: {}", names.join(" and "), finding.message));
+        };
+        let finding = first(&faults[alone..=alone])?;
+        let scaled = |share: f64| FaultSpec { severity: share * faults[alone].severity, ..faults[alone].clone() };
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..30 {
+            let middle = 0.5 * (low + high);
+            *(if first(&[scaled(middle)]).is_none() { &mut low } else { &mut high }) = middle;
+        }
+        let most = scaled(low).severity;
+        let digits = 10f64.powf(3.0 - most.abs().log10().floor());
+        let rest = if low > 0.0 { format!("; or a severity of at most {}", (most * digits).trunc() / digits) } else { String::new() };
+        Some(format!("{} at its whole severity: {}{rest}", names[alone], finding.message))
     }
 
     fn ports(&self, parameters: &[f64], inputs: &Bound<'_, PyDict>) -> PyResult<(Vec<SourcePlan>, Vec<bool>)> {

@@ -57,7 +57,7 @@ impl InverterParameter {
 /// Constants of the detailed bridge.
 #[derive(Clone, Copy, Debug)]
 pub struct Bridge<S> {
-    on_resistance: S,
+    pub on_resistance: S,
     diode_drop: S,
     dead_time: S,
     trip_current: S,
@@ -115,6 +115,16 @@ pub fn detailed(own: &Own<InverterParameter>) -> bool {
 pub struct Connection<S: Scalar> {
     pub legs: Legs<S>,
     pub loose: Option<S>,
+}
+
+/// What lies behind the three terminals of the bridge during a step.
+pub trait Circuit<S: Scalar> {
+    /// Currents of the legs at its start.
+    fn currents(&self) -> [S; 3];
+    /// 1: the phase is interrupted (as soon as its current has passed zero).
+    fn open(&self) -> [S; 3];
+    /// Potentials of the terminals and of the neutral: connected legs hold theirs, the others float without current.
+    fn potentials(&self, voltage: [S; 3], connected: [S::Mask; 3]) -> ([S; 3], S);
 }
 
 /// What the windings show to the bridge at the start of a step.
@@ -201,9 +211,10 @@ impl<S: Scalar> Bridge<S> {
         old: [S; 3],
         new: [S; 3],
         half_supply: S,
-        w: &Windings<S>,
+        w: &impl Circuit<S>,
         dt: S,
     ) -> Connection<S> {
+        let current = w.currents();
         let tiny = S::splat(0.5);
         let (mut gates, off) = self.gates(s, old, new, dt);
         if structure.switch_faults {
@@ -214,20 +225,20 @@ impl<S: Scalar> Bridge<S> {
         }
         if structure.trips {
             for j in 0..3 {
-                self.watch(s, gates[j][0] & gates[j][1], w.current[j]);
+                self.watch(s, gates[j][0] & gates[j][1], current[j]);
             }
         }
         let mut legs = Legs {
             voltage: three!(|j| {
                 let rail = S::select(gates[j][0], half_supply, -half_supply);
-                (-self.on_resistance).fma(w.current[j], rail)
+                (-self.on_resistance).fma(current[j], rail)
             }),
             rail: three!(|j| S::select(gates[j][0], half_supply, -half_supply)),
             connected: [S::mask(true); 3],
             passive: three!(|j| !(gates[j][0] | gates[j][1])),
         };
         if let Some(off) = off {
-            self.blank(&mut legs, off, half_supply, w.current);
+            self.blank(&mut legs, off, half_supply, current);
         }
         let all_held = !S::any(legs.passive[0] | legs.passive[1] | legs.passive[2]);
         if all_held && !structure.open_phases {
@@ -239,16 +250,17 @@ impl<S: Scalar> Bridge<S> {
 
     /// Legs that no switch holds, or whose phase is interrupted: diodes by the current's sign, floating at zero.
     #[inline(always)]
-    fn release(&self, legs: &mut Legs<S>, half_supply: S, w: &Windings<S>) -> S {
+    fn release(&self, legs: &mut Legs<S>, half_supply: S, w: &impl Circuit<S>) -> S {
         let zero = S::zero();
+        let (current, open) = (w.currents(), w.open());
         let diode = half_supply + self.diode_drop;
         for j in 0..3 {
-            let positive = zero.lt(w.current[j]);
-            let carrying = !w.current[j].equals(zero);
+            let positive = zero.lt(current[j]);
+            let carrying = !current[j].equals(zero);
             let off = legs.passive[j];
             legs.voltage[j] = S::select(off, S::select(positive, -diode, diode), legs.voltage[j]);
             legs.rail[j] = S::select(off, S::select(positive, -half_supply, half_supply), legs.rail[j]);
-            let interrupted = S::splat(0.5).lt(w.open[j]);
+            let interrupted = S::splat(0.5).lt(open[j]);
             legs.connected[j] = carrying | !(off | interrupted);
             legs.passive[j] = off | interrupted;
         }
@@ -264,42 +276,55 @@ impl<S: Scalar> Bridge<S> {
 
     /// Floating phases turn on when their terminal leaves the rails; the neutral follows.
     #[inline(always)]
-    fn turn_on(&self, legs: &mut Legs<S>, half_supply: S, w: &Windings<S>) -> S {
+    fn turn_on(&self, legs: &mut Legs<S>, half_supply: S, w: &impl Circuit<S>) -> S {
         let diode = half_supply + self.diode_drop;
         let tiny = S::splat(0.5);
-        let neutral = self.neutral(legs, w);
+        let open = w.open();
+        let (terminal, neutral) = w.potentials(legs.voltage, legs.connected);
         let mut any = S::mask(false);
         for j in 0..3 {
-            let terminal = neutral + w.emf[j];
-            let floating = !legs.connected[j] & w.open[j].le(tiny);
-            let up = floating & diode.lt(terminal);
-            let down = floating & terminal.lt(-diode);
+            let floating = !legs.connected[j] & open[j].le(tiny);
+            let up = floating & diode.lt(terminal[j]);
+            let down = floating & terminal[j].lt(-diode);
             legs.voltage[j] = S::select(up, diode, S::select(down, -diode, legs.voltage[j]));
             legs.rail[j] = S::select(up, half_supply, S::select(down, -half_supply, legs.rail[j]));
             legs.connected[j] = legs.connected[j] | up | down;
             any = any | up | down;
         }
         if S::any(any) {
-            self.neutral(legs, w)
+            w.potentials(legs.voltage, legs.connected).1
         } else {
             neutral
         }
     }
+}
+
+impl<S: Scalar> Circuit<S> for Windings<S> {
+    #[inline(always)]
+    fn currents(&self) -> [S; 3] {
+        self.current
+    }
+
+    #[inline(always)]
+    fn open(&self) -> [S; 3] {
+        self.open
+    }
 
     /// v_n over the connected phases; with none connected the EMFs float symmetrically between the rails.
     #[inline(always)]
-    fn neutral(&self, legs: &Legs<S>, w: &Windings<S>) -> S {
+    fn potentials(&self, voltage: [S; 3], connected: [S::Mask; 3]) -> ([S; 3], S) {
         let (mut sum, mut weight) = (S::zero(), S::zero());
         for j in 0..3 {
-            let g = S::select(legs.connected[j], w.per_inductance[j], S::zero());
-            sum = sum + g * (legs.voltage[j] - w.emf[j] - w.resistance[j] * w.current[j]);
+            let g = S::select(connected[j], self.per_inductance[j], S::zero());
+            sum = sum + g * (voltage[j] - self.emf[j] - self.resistance[j] * self.current[j]);
             weight = weight + g;
         }
         let none = weight.equals(S::zero());
-        let highest = w.emf[0].maximum(w.emf[1]).maximum(w.emf[2]);
-        let lowest = w.emf[0].minimum(w.emf[1]).minimum(w.emf[2]);
+        let highest = self.emf[0].maximum(self.emf[1]).maximum(self.emf[2]);
+        let lowest = self.emf[0].minimum(self.emf[1]).minimum(self.emf[2]);
         let floating = S::splat(-0.5) * (highest + lowest);
-        S::select(none, floating, sum / S::select(none, S::one(), weight))
+        let neutral = S::select(none, floating, sum / S::select(none, S::one(), weight));
+        (three!(|j| S::select(connected[j], voltage[j], neutral + self.emf[j])), neutral)
     }
 }
 

@@ -3,7 +3,8 @@
 pub mod cogging;
 pub mod equivalent;
 pub mod magnetic_pull;
+pub mod pole;
+pub mod short;
 pub mod star;
-pub mod tap;
 pub mod thermal;
 pub mod unbalance;

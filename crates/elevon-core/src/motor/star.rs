@@ -1,6 +1,7 @@
 //! Three-phase star with floating neutral, faults in the winding and the air gap included in
 //! their healthy form (T2; reference sheet 1.5).
 
+use super::short::{Contacts, KINDS};
 use crate::scalar::Scalar;
 use crate::three;
 use crate::variable::acts::When;
@@ -48,9 +49,9 @@ variables! {
         OpenC => "open_c", "-", "1", Unit, Plant, Some(0.0), "1: phase c is interrupted (from its next current zero on)";
         ShortModel => "short_model", "-", "1", Choice(ShortModel::NAMES), Plant, Some(0.0), "shorted turns only missing (the paper), or a loop of their own with circulating current",
             high_only("shorted turns are only missing in its one phase").when(&[SHORTED]);
-        ShortCoupling => "short_coupling", "kappa", "1", Between(0.0, 0.99), Plant, Some(0.9), "magnetic coupling of shorted and healthy turns of a phase",
+        ShortCoupling => "short_coupling", "kappa", "1", Unit, Plant, Some(0.9), "magnetic coupling of shorted and healthy turns of a phase: mutual inductance kappa N mu L",
             high_only("shorted turns are only missing in its one phase").when(&[SHORTED, Chosen("motor.short_model", &["loop"])]);
-        ShortContactResistance => "short_contact_resistance", "R_c", "ohm", NonNegative, Plant, Some(0.0), "resistance of the short itself",
+        ShortContactResistance => "short_contact_resistance", "R_c", "ohm", NonNegative, Plant, Some(0.0), "resistance of the short itself; without limit it is the healthy motor",
             high_only("shorted turns are only missing in its one phase").when(&[SHORTED, Chosen("motor.short_model", &["loop"])]);
         WindingTemperature => "winding_temperature", "T_w", "K", Positive, Plant, Some(293.15), "temperature of the winding, an input unless a thermal network drives it";
         ReferenceTemperature => "reference_temperature", "T_0", "K", Positive, Plant, Some(293.15), "temperature at which the resistance is given",
@@ -63,18 +64,20 @@ variables! {
             when(&[In(Low, &[Either(&[
                 SHORTED, Away("motor.open_a", 0.0), Away("motor.open_b", 0.0), Away("motor.open_c", 0.0),
                 Away("motor.eccentricity_static", 0.0), Away("motor.eccentricity_dynamic", 0.0), Away("motor.unbalance_inertia", 0.0),
+                Away("motor.pole_loss", 0.0),
                 Away("sensor.resolver.mismatch", 0.0), Away("sensor.resolver.offset", 0.0), Away("sensor.resolver.power_off", 0.0),
             ])])]);
     }
 }
 
 /// What of the motor needs the detailed step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct MotorStructure {
     pub trapezoidal: bool,
     pub shorted_loop: bool,
     pub static_eccentricity: bool,
     pub dynamic_eccentricity: bool,
+    pub weak_pole: bool,
 }
 
 impl MotorStructure {
@@ -85,6 +88,7 @@ impl MotorStructure {
             shorted_loop: ShortModel::read(own.value(P::ShortModel)) == ShortModel::Loop,
             static_eccentricity: own.away(P::EccentricityStatic),
             dynamic_eccentricity: own.away(P::EccentricityDynamic),
+            weak_pole: false,
         }
     }
 
@@ -93,10 +97,15 @@ impl MotorStructure {
         Self { dynamic_eccentricity: self.dynamic_eccentricity || unbalance, ..self }
     }
 
+    /// One pole pair may be weaker than the others.
+    pub fn with_weak_pole(self, weak_pole: bool) -> Self {
+        Self { weak_pole, ..self }
+    }
+
     /// Does it need more than the plain step? That knows the static eccentricity.
     pub fn detailed(&self) -> bool {
-        let Self { trapezoidal, shorted_loop, static_eccentricity: _, dynamic_eccentricity } = *self;
-        trapezoidal || shorted_loop || dynamic_eccentricity
+        let Self { trapezoidal, shorted_loop: _, static_eccentricity: _, dynamic_eccentricity, weak_pole } = *self;
+        trapezoidal || dynamic_eccentricity || weak_pole
     }
 }
 
@@ -127,18 +136,15 @@ pub struct Star<S> {
     flat_slope: S,
     pub open: [S; 3],
     /// Solver step over the inductance.
-    dt_per_inductance: [S; 3],
-    /// Shorted loops: coupling ratio M / L_f, resistance, 1 / L_f and turns of the loop.
-    loop_ratio: [S; 3],
-    loop_resistance: [S; 3],
-    loop_per_inductance: [S; 3],
-    loop_turns: [S; 3],
+    pub dt_per_inductance: [S; 3],
 }
 
 #[derive(Clone, Copy, Debug)]
 pub struct StarState<S> {
+    /// Ampere-turns per turn of the phases: their currents, but for contacts inside the winding (`short`).
     pub current: [S; 3],
-    pub loop_current: [S; 3],
+    /// Currents of the contacts.
+    pub contact: Contacts<S>,
     /// Factors by which temperature changes resistance and EMF constant.
     pub resistance_factor: S,
     pub flux_factor: S,
@@ -152,15 +158,11 @@ impl<S: Scalar> Star<S> {
     pub fn derive(raw: &[S], structure: &MotorStructure, dt: S) -> Self {
         use MotorParameter as P;
         let g = |p: P| raw[p as usize];
-        let (one, zero) = (S::one(), S::zero());
-        let turns = phases(raw, P::TurnsA);
+        let one = S::one();
+        // Turns shorted in a loop of their own are still there.
+        let turns = if structure.shorted_loop { [one; 3] } else { phases(raw, P::TurnsA) };
         let k = g(P::EmfConstant) * g(P::FluxFraction);
-        let coupling = if structure.shorted_loop { g(P::ShortCoupling) } else { zero };
-        let shorted = three!(|j| if structure.shorted_loop { one - turns[j] } else { zero });
-        let has_loop = three!(|j| zero.lt(shorted[j]));
-        let guarded: [S; 3] = three!(|j| S::select(has_loop[j], shorted[j], one));
-        let factor: [S; 3] = three!(|j| S::select(has_loop[j], one - coupling * coupling, one));
-        let per_inductance: [S; 3] = three!(|j| one / (turns[j] * turns[j] * g(P::WindingInductance) * factor[j]));
+        let per_inductance: [S; 3] = three!(|j| one / (turns[j] * turns[j] * g(P::WindingInductance)));
         let total = per_inductance[0] + per_inductance[1] + per_inductance[2];
         let (sin_s, cos_s) = g(P::EccentricityStaticPhase).sin_cos();
         let (sin_d, cos_d) = g(P::EccentricityDynamicPhase).sin_cos();
@@ -180,10 +182,6 @@ impl<S: Scalar> Star<S> {
             dynamic_sin: g(P::EccentricityDynamic) * sin_d,
             flat_slope: pi / (pi - g(P::EmfFlatWidth)),
             open: phases(raw, P::OpenA),
-            loop_ratio: three!(|j| S::select(has_loop[j], coupling * turns[j] / guarded[j], zero)),
-            loop_resistance: three!(|j| shorted[j] * g(P::WindingResistance) + g(P::ShortContactResistance)),
-            loop_per_inductance: three!(|j| S::select(has_loop[j], one / (guarded[j] * guarded[j] * g(P::WindingInductance)), zero)),
-            loop_turns: three!(|j| shorted[j] * k),
         }
     }
 
@@ -261,7 +259,7 @@ impl<S: Scalar> Star<S> {
         three!(|j| self.dt_per_inductance[j].fma(drop[j] - neutral, current[j]))
     }
 
-    /// Torque of phase and loop currents before saturation.
+    /// Torque before saturation.
     #[inline(always)]
     pub fn torque(&self, k: [S; 3], current: [S; 3]) -> S {
         k[0].fma(current[0], k[1].fma(current[1], k[2] * current[2]))
@@ -271,39 +269,11 @@ impl<S: Scalar> Star<S> {
     pub fn saturate(&self, torque: S) -> S {
         torque.clamp_abs(self.torque_limit)
     }
-
-    /// EMF that the loops' currents add to their phases: -(M / L_f)(R_f i_f + mu k_j' omega).
-    #[inline(always)]
-    pub fn loop_emf(&self, s: &StarState<S>, loop_k: [S; 3], speed: S) -> [S; 3] {
-        three!(|j| -self.loop_ratio[j] * (self.loop_resistance[j] * s.resistance_factor * s.loop_current[j] + loop_k[j] * speed))
-    }
-
-    /// k of the shorted turns alone, from the unit shape and gap of the phase.
-    #[inline(always)]
-    pub fn loop_coefficients(&self, shape: [S; 3], gap: [S; 3]) -> [S; 3] {
-        three!(|j| self.loop_turns[j] * shape[j] * gap[j])
-    }
-
-    /// Explicit step of the loop currents, given the phases' di/dt.
-    #[inline(always)]
-    pub fn step_loops(&self, s: &StarState<S>, loop_k: [S; 3], speed: S, slope: [S; 3], dt: S) -> [S; 3] {
-        three!(|j| {
-            let own = self.loop_resistance[j] * s.resistance_factor * s.loop_current[j] + loop_k[j] * speed;
-            let change = -own * self.loop_per_inductance[j] - self.loop_ratio[j] * slope[j];
-            s.loop_current[j] + dt * change
-        })
-    }
-
-    /// Copper loss in the loops, W.
-    #[inline(always)]
-    pub fn loop_loss(&self, s: &StarState<S>, current: [S; 3]) -> S {
-        (0..3).fold(S::zero(), |sum, j| sum + self.loop_resistance[j] * s.resistance_factor * current[j] * current[j])
-    }
 }
 
 impl<S: Scalar> StarState<S> {
     pub fn rest() -> Self {
-        Self { current: [S::zero(); 3], loop_current: [S::zero(); 3], resistance_factor: S::one(), flux_factor: S::one() }
+        Self { current: [S::zero(); 3], contact: [[S::zero(); 3]; KINDS], resistance_factor: S::one(), flux_factor: S::one() }
     }
 
     /// Sets the temperature factors for a winding at `temperature` (K).

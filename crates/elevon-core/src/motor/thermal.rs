@@ -5,6 +5,7 @@
 //! closes to rounding at any tick.
 
 use crate::scalar::Scalar;
+use crate::three;
 use crate::variable::Own;
 use crate::{choices, variables};
 
@@ -66,10 +67,10 @@ pub struct Network<S> {
 pub struct NetworkState<S> {
     pub winding: S,
     pub surface: S,
-    /// Heat of the phases and of the shorted turns since the last tick, J.
-    pub collected: [S; 2],
-    /// Mean of the last tick, W: phases, shorted turns, given to the air.
-    pub power: [S; 3],
+    /// Heat of the phases, of shorted turns and of contacts in the winding since the last tick, J.
+    pub collected: [S; 3],
+    /// Mean of the last tick, W: phases, shorted turns, contacts, given to the air.
+    pub power: [S; 4],
     /// Since the start, J.
     pub heat_in: S,
     pub heat_out: S,
@@ -113,8 +114,8 @@ impl<S: Scalar> Network<S> {
         NetworkState {
             winding,
             surface,
-            collected: [zero; 2],
-            power: [zero; 3],
+            collected: [zero; 3],
+            power: [zero; 4],
             heat_in: zero,
             heat_out: zero,
             begin: [winding, surface],
@@ -148,8 +149,8 @@ impl<S: Scalar> Network<S> {
     pub fn tick(&self, s: &mut NetworkState<S>) {
         let zero = S::zero();
         let quasi = self.housing_capacity.equals(zero);
-        let (copper, loops) = (s.collected[0] / self.period, s.collected[1] / self.period);
-        let power = copper + loops;
+        let [copper, loops, contact] = three!(|j| s.collected[j] / self.period);
+        let power = copper + loops + contact;
         let gain = self.period / self.winding_capacity;
         let surface = self.surface_after(s.winding, s.surface, power, gain, self.housing_capacity / self.period);
         let through = (s.winding + gain * power - surface) / (self.resistance + gain);
@@ -159,8 +160,8 @@ impl<S: Scalar> Network<S> {
         s.winding = s.winding + gain * (power - through);
         let capacity = S::select(quasi, S::one(), self.housing_capacity);
         s.surface = S::select(quasi, surface, s.surface + self.period / capacity * (through - out));
-        s.collected = [zero; 2];
-        s.power = [copper, loops, out];
+        s.collected = [zero; 3];
+        s.power = [copper, loops, contact, out];
         s.over = S::select(self.trip.lt(s.winding), S::one(), s.over);
     }
 

@@ -9,11 +9,9 @@ use crate::control::position_speed::ControlParameter as Control;
 use crate::inverter::bridge::InverterParameter as Inverter;
 use crate::motor::equivalent::LowParameter;
 use crate::motor::star::{MotorParameter as Motor, ShortModel};
-use crate::motor::tap::TapParameter as Tap;
 use crate::motor::thermal::{ThermalModel, ThermalParameter as Thermal};
 use crate::motor::unbalance::UnbalanceParameter;
 use crate::sensor::current::CurrentSensorParameter;
-use crate::sensor::resolver::ResolverParameter;
 use crate::transmission::friction::FrictionParameter;
 use crate::transmission::gear::{GearParameter, LoadParameter, StopParameter};
 use crate::transmission::play::{PlayModel, PlayParameter};
@@ -170,26 +168,17 @@ fn thermal(out: &mut Vec<Finding>, raw: &[f64]) {
     }
 }
 
-/// What holds of the parameters with every fault of a run at its whole severity.
-pub fn faulted<F: Form>(raw: &[f64]) -> Vec<Finding> {
+/// What holds of the parameters with every fault of a run at its whole severity: a fault may not make the plant faster
+/// than the step any more than a set parameter may.
+pub fn faulted_high<F: Form>(raw: &[f64]) -> Vec<Finding> {
     let mut out = F::check(raw);
-    tapped(&mut out, raw);
+    steps::<F>(&mut out, raw);
     out
 }
 
-/// A resistor at the centre tap needs legs that always hold their terminals.
-fn tapped(out: &mut Vec<Finding>, raw: &[f64]) {
-    let Some(level) = [Tap::TapLevelA, Tap::TapLevelB, Tap::TapLevelC].map(|p| raw[p.at()]).into_iter().find(|&f| f > 0.0) else {
-        return;
-    };
-    let base = Inverter::SupplyVoltage.at();
-    let detailed = Inverter::DETAIL.clone().any(|i| raw[base + i] != 0.0) || (0..3).any(|j| raw[Motor::OpenA.at() + j] != 0.0);
-    let drops =
-        FeedbackLoss::read(raw[DriveParameter::FeedbackLoss.at()]) == FeedbackLoss::Stop && raw[ResolverParameter::PowerOff.at()] != 0.0;
-    if detailed || drops || drive(raw) == DriveKind::Off {
-        let message = format!("motor.tap_level: {level} cannot go with an open phase, a drive that is off, or the details of the bridge (inverter.on_resistance, diode_drop, dead_time, trip_current, open or shorted switches): a floating terminal at a resistor is not modelled; at most 0");
-        out.push(finding("motor.tap_level", level, 0.0, message));
-    }
+/// The same for the low fidelity, whose steps are exact or implicit.
+pub fn faulted_low<F: Form>(raw: &[f64]) -> Vec<Finding> {
+    F::check(raw)
 }
 
 fn whole_multiple(out: &mut Vec<Finding>, raw: &[f64], index: usize, path: &str) {
@@ -203,39 +192,10 @@ fn whole_multiple(out: &mut Vec<Finding>, raw: &[f64], index: usize, path: &str)
 pub fn high<F: Form>(raw: &[f64]) -> Vec<Finding> {
     let mut out = Vec::new();
     common::<F>(&mut out, raw);
-    tapped(&mut out, raw);
     let dt = raw[SolverParameter::Step.at()];
-    let (r, l) = (raw[Motor::WindingResistance.at()], raw[Motor::WindingInductance.at()]);
-    let turns = (0..3).map(|j| raw[Motor::TurnsA.at() + j]).fold(1.0, f64::min);
-    step_limit(&mut out, dt, turns * l / r, "electrical pole R / L of motor.winding_resistance and motor.winding_inductance");
-    shorted_loops(&mut out, raw, dt);
-    relay_band(&mut out, raw, dt, turns * turns * l);
-    current_loop(&mut out, raw, turns * turns * l);
-    let rotor = raw[Motor::Inertia.at()]
-        + raw[GearParameter::Inertia.at()]
-        + F::screw_inertia(raw)
-        + raw[UnbalanceParameter::UnbalanceInertia.at()];
-    let user = raw[LoadParameter::Inertia.at()];
-    let ratio = F::ratio(raw);
-    let elastic = PlayModel::read(raw[PlayParameter::Model.at()]) == PlayModel::Elastic;
-    let inertia = if elastic { rotor } else { rotor + user / (ratio * ratio) };
-    derivative_inertia(&mut out, raw, inertia, dt, true);
-    let td = raw[Control::DerivativeTime.at()];
-    if td > 0.0 && raw[Control::SampleTime.at()] == 0.0 {
-        step_limit(
-            &mut out,
-            dt,
-            td / raw[Control::DerivativeFilter.at()],
-            "derivative filter's pole N / T_d of control.derivative_filter and control.derivative_time",
-        );
-    }
-    let viscous = raw[FrictionParameter::Viscous.at()] * raw[FrictionParameter::ViscousScale.at()];
-    if viscous > 0.0 {
-        step_limit(&mut out, dt, inertia / viscous, "viscous pole C / J of friction.viscous");
-    }
-    if elastic {
-        contact::<F>(&mut out, raw, dt, rotor * ratio * ratio, user);
-    }
+    steps::<F>(&mut out, raw);
+    current_loop(&mut out, raw, turns_left(raw).powi(2) * raw[Motor::WindingInductance.at()]);
+    derivative_inertia(&mut out, raw, inertia::<F>(raw).1, dt, true);
     if Commutation::read(raw[DriveParameter::Commutation.at()]) == Commutation::SixStep && drive(raw) == DriveKind::Pwm {
         out.push(finding(
             "drive.commutation",
@@ -281,24 +241,73 @@ fn current_loop(out: &mut Vec<Finding>, raw: &[f64], inductance: f64) {
     }
 }
 
-fn shorted_loops(out: &mut Vec<Finding>, raw: &[f64], dt: f64) {
-    if ShortModel::read(raw[Motor::ShortModel.at()]) != ShortModel::Loop {
-        return;
+/// Inertia of the rotor with what turns rigidly with it, and of all that the speed loop moves.
+fn inertia<F: Form>(raw: &[f64]) -> (f64, f64) {
+    let rotor = raw[Motor::Inertia.at()]
+        + raw[GearParameter::Inertia.at()]
+        + F::screw_inertia(raw)
+        + raw[UnbalanceParameter::UnbalanceInertia.at()];
+    let elastic = PlayModel::read(raw[PlayParameter::Model.at()]) == PlayModel::Elastic;
+    let ratio = F::ratio(raw);
+    let user = raw[LoadParameter::Inertia.at()] / (ratio * ratio);
+    (rotor, if elastic { rotor } else { rotor + user })
+}
+
+/// The solver's step against every pole of the plant.
+fn steps<F: Form>(out: &mut Vec<Finding>, raw: &[f64]) {
+    let dt = raw[SolverParameter::Step.at()];
+    windings(out, raw, dt);
+    let (rotor, inertia) = inertia::<F>(raw);
+    let td = raw[Control::DerivativeTime.at()];
+    if td > 0.0 && raw[Control::SampleTime.at()] == 0.0 {
+        step_limit(
+            out,
+            dt,
+            td / raw[Control::DerivativeFilter.at()],
+            "derivative filter's pole N / T_d of control.derivative_filter and control.derivative_time",
+        );
     }
-    for j in 0..3 {
-        let mu = 1.0 - raw[Motor::TurnsA.at() + j];
-        if mu > 0.0 {
-            let kappa = raw[Motor::ShortCoupling.at()];
-            let inductance = mu * mu * raw[Motor::WindingInductance.at()] * (1.0 - kappa * kappa);
-            let resistance = mu * raw[Motor::WindingResistance.at()] + raw[Motor::ShortContactResistance.at()];
-            step_limit(out, dt, inductance / resistance, "pole of the shorted turns (motor.short_model = loop)");
-        }
+    let viscous = raw[FrictionParameter::Viscous.at()] * raw[FrictionParameter::ViscousScale.at()];
+    if viscous > 0.0 {
+        step_limit(out, dt, inertia / viscous, "viscous pole C / J of friction.viscous");
+    }
+    if PlayModel::read(raw[PlayParameter::Model.at()]) == PlayModel::Elastic {
+        let ratio = F::ratio(raw);
+        contact::<F>(out, raw, dt, rotor * ratio * ratio, raw[LoadParameter::Inertia.at()]);
     }
 }
 
-fn relay_band(out: &mut Vec<Finding>, raw: &[f64], dt: f64, inductance: f64) {
+/// Missing turns make a phase faster. Turns shorted in a loop, as every other contact, do not: their currents move
+/// implicitly, and the leg's slope is limited by the phases through which its current returns.
+fn windings(out: &mut Vec<Finding>, raw: &[f64], dt: f64) {
+    let (r, l) = (raw[Motor::WindingResistance.at()], raw[Motor::WindingInductance.at()]);
+    let turns = turns_left(raw);
+    step_limit(out, dt, turns * l / r, "electrical pole R / L of motor.winding_resistance and motor.winding_inductance");
+    let reduced = ShortModel::read(raw[Motor::ShortModel.at()]) == ShortModel::Reduced;
+    let left = std::array::from_fn(|j| raw[Motor::TurnsA.at() + j]);
+    let slope = if reduced { (2.0 / 3.0) / (turns * turns * l) } else { steepest(left, raw[Motor::ShortCoupling.at()], l) };
+    relay_band(out, raw, dt, slope);
+}
+
+/// Turns of the phase that has lost most of them; those shorted in a loop are not lost.
+fn turns_left(raw: &[f64]) -> f64 {
+    if ShortModel::read(raw[Motor::ShortModel.at()]) == ShortModel::Loop {
+        return 1.0;
+    }
+    (0..3).map(|j| raw[Motor::TurnsA.at() + j]).fold(1.0, f64::min)
+}
+
+/// Largest di/dt per volt of a leg with dead shorts in loops: y (s - y) / s of the legs' admittances y and their sum s.
+fn steepest(left: [f64; 3], coupling: f64, inductance: f64) -> f64 {
+    let y = left.map(|n| (1.0 + (1.0 - n) / ((1.0 - coupling).max(1e-9) * n)) / inductance);
+    let sum: f64 = y.iter().sum();
+    y.iter().map(|y| y * (sum - y) / sum).fold(0.0, f64::max)
+}
+
+/// `slope` is di/dt per volt of the link.
+fn relay_band(out: &mut Vec<Finding>, raw: &[f64], dt: f64, slope: f64) {
     if drive(raw) == DriveKind::Hysteresis {
-        let slew = raw[Inverter::SupplyVoltage.at()] * (2.0 / 3.0) / inductance;
+        let slew = raw[Inverter::SupplyVoltage.at()] * slope;
         step_limit(
             out,
             dt,

@@ -11,8 +11,9 @@ use crate::control::position_speed::{ControlParameter, ControlStructure};
 use crate::details;
 use crate::inverter::bridge::{self, BridgeStructure};
 use crate::inverter::hysteresis::RelayCrossing;
+use crate::motor::pole::WeakPole;
+use crate::motor::short::{self, ShortStructure};
 use crate::motor::star::{interrupted, warms, MotorStructure};
-use crate::motor::tap::Tap;
 use crate::motor::thermal::Network;
 use crate::sensor::current::{CurrentSensor, CurrentSensorParameter};
 use crate::sensor::resolver::ResolverParameter;
@@ -26,7 +27,9 @@ details! {
         control: ControlStructure = ControlStructure::read(x.parts.control().raw);
         shaft: ShaftDetails = ShaftDetails::read::<F>(&ShaftNeeds::high(x.parts, x.records(F::HIGH, "energy")));
         sensing: SensingDetails = SensingDetails::read::<F>(x.parts);
-        motor: MotorStructure = MotorStructure::read(&x.parts.motor()).with_unbalance(shaft.unbalance);
+        motor: MotorStructure = MotorStructure::read(&x.parts.motor()).with_unbalance(shaft.unbalance).with_weak_pole(WeakPole::<f64>::needed(&x.parts.pole()));
+        /// Which kinds of contacts in or at the windings.
+        shorts: ShortStructure = short::kinds(&x.parts.motor(), &x.parts.tap(), &x.parts.short());
         bridge_structure: BridgeStructure = BridgeStructure::read(&x.parts.inverter(), interrupted(&x.parts.motor()));
         /// Steps from the sampling of the currents to the update of the duties.
         duty_delay: Steps = duty_delay(x.parts.0.raw, drive);
@@ -46,7 +49,7 @@ details! {
     }
     extra {
         heat = Network::<f64>::needed(&x.parts.thermal());
-        tap = Tap::<f64>::needed(&x.parts.tap());
+        shorted = shorts.contains(&true);
         current_filter = x.parts.current_sensor().value(CurrentSensorParameter::Bandwidth) > 0.0;
         six_step = Commutation::read(x.parts.drive().value(DriveParameter::Commutation)) == Commutation::SixStep;
         /// A lost resolver opens the bridge.

@@ -61,13 +61,43 @@ pub fn electrical() -> Vec<FaultKind> {
             ..attribute("gap_share", "1", "motor.unbalance_gap_share", "dynamic eccentricity per share of excess inertia")
         },
     ];
-    const CONTACT: &[Attribute] =
-        &[attribute("contact_resistance", "ohm", "motor.short_contact_resistance", "resistance of the short itself (loop model)")];
+    const CONTACT: &[Attribute] = &[attribute(
+        "contact_resistance",
+        "ohm",
+        "motor.short_contact_resistance",
+        "resistance of the short itself (loop model); without limit it is the healthy motor",
+    )];
+    const POLE: &[Attribute] = &[
+        Attribute { default: Some(0.0), ..attribute("phase", "rad", "motor.pole_loss_phase", "mechanical angle of the weak pole pair") },
+        Attribute {
+            default: Some(1.0),
+            ..attribute(
+                "concentration",
+                "1",
+                "motor.pole_concentration",
+                "1: a phase's coils stand under one pole pair, 0: evenly under all",
+            )
+        },
+    ];
+    const TOUCHING: &[Attribute] = &[Attribute {
+        default: Some(1.0),
+        ..attribute("turns", "1", "motor.phase_short_turns", "fraction of the turns between neutral and contact; 1: the terminals")
+    }];
+    const GROUNDED: &[Attribute] = &[
+        Attribute {
+            default: Some(1.0),
+            ..attribute("turns", "1", "motor.ground_short_turns", "fraction of the turns between neutral and contact; 1: the terminal")
+        },
+        Attribute {
+            default: Some(0.0),
+            ..attribute("potential", "1", "motor.ground_potential", "place of ground in the link: 0 lower rail, 1 upper rail")
+        },
+    ];
     vec![
         FaultKind {
             kind: "short", unit: "1", range: Range::Between(0.0, 0.95), attributes: CONTACT,
             places: places!("motor.phase_a": "motor.turns_a" Lose, "motor.phase_b": "motor.turns_b" Lose, "motor.phase_c": "motor.turns_c" Lose),
-            effect: "fraction of the turns of a phase shorted: R ~ N, L ~ N^2, k ~ N; ripple at twice the electrical frequency",
+            effect: "fraction of the turns of a phase shorted: R ~ N, L ~ N^2, k ~ N; ripple at twice the electrical frequency. With motor.short_model = loop the turns are there, carry a current of their own, brake and heat",
             source: "T2 (fault coefficients N_j), N 5.2",
         },
         FaultKind {
@@ -87,6 +117,18 @@ pub fn electrical() -> Vec<FaultKind> {
             places: places!("motor.phase_a": "motor.tap_level_a" Add, "motor.phase_b": "motor.tap_level_b" Add, "motor.phase_c": "motor.tap_level_c" Add),
             effect: "level f of a resistor ref (1 - f)/f from a terminal to the centre tap: it draws V/R whatever the speed and leaves the winding alone",
             source: "N 4.3 (seeded winding short)",
+        },
+        FaultKind {
+            kind: "phase_short", unit: "S", range: Range::Between(0.0, 1e3), attributes: TOUCHING,
+            places: places!("motor.phases_ab": "motor.phase_short_ab" Add, "motor.phases_bc": "motor.phase_short_bc" Add, "motor.phases_ca": "motor.phase_short_ca" Add),
+            effect: "conductance of a contact between the windings of two phases: the drive feeds it beside them, their torque falls, the contact heats",
+            source: "T3 Table 1.1 (phase-to-phase short); place and circuit ASSUMED",
+        },
+        FaultKind {
+            kind: "ground_short", unit: "S", range: Range::Between(0.0, 1e3), attributes: GROUNDED,
+            places: places!("motor.phase_a": "motor.ground_short_a" Add, "motor.phase_b": "motor.ground_short_b" Add, "motor.phase_c": "motor.ground_short_c" Add),
+            effect: "conductance of a contact from a winding to the drive's ground: its current returns by the link, so the phase currents no longer sum to zero",
+            source: "T3 Table 1.1 (turn-to-ground short); N 4.3 (resistance from a leg to the drive's ground)",
         },
         FaultKind {
             kind: "unbalance", unit: "kg m2", range: Range::Between(0.0, 2e-3), attributes: UNBALANCE,
@@ -125,6 +167,12 @@ pub fn electrical() -> Vec<FaultKind> {
             places: places!("motor": "motor.flux_fraction" Lose),
             effect: "fraction of the magnets' flux lost: more current for the same torque, higher no-load speed",
             source: "ASSUMED: uniform loss of flux, the usual first model",
+        },
+        FaultKind {
+            kind: "local_demagnetisation", unit: "1", range: Range::Unit, attributes: POLE,
+            places: places!("motor": "motor.pole_loss" Add),
+            effect: "fraction of the flux that one pole pair has lost: k_j dips once a turn while it passes, EMF sidebands at the electrical frequency +- multiples of the shaft's",
+            source: "N 4.3 (demagnetised permanent magnets); window and place of the coils ASSUMED",
         },
         FaultKind {
             kind: "sag", unit: "1", range: Range::Between(0.0, 0.99), attributes: &[],

@@ -8,8 +8,9 @@ use crate::inverter::hysteresis::{RelayParameter, RELAYS};
 use crate::motor::cogging::{CoggingParameter, COGGING};
 use crate::motor::equivalent::{LowParameter, LOW};
 use crate::motor::magnetic_pull::{MagneticPullParameter, MAGNETIC_PULL};
+use crate::motor::pole::{PoleParameter, POLE};
+use crate::motor::short::{ShortParameter, TapParameter, SHORT, TAP};
 use crate::motor::star::{MotorParameter, MOTOR};
-use crate::motor::tap::{TapParameter, TAP};
 use crate::motor::thermal::{ThermalParameter, THERMAL};
 use crate::motor::unbalance::{UnbalanceParameter, UNBALANCE};
 use crate::sensor::current::{CurrentSensorParameter, CURRENT_SENSOR};
@@ -82,6 +83,8 @@ groups! {
     bearing: "bearing", BEARING, BearingParameter;
     tooth: "gear", TOOTH, ToothParameter;
     relays: "inverter", RELAYS, RelayParameter;
+    short: "motor", SHORT, ShortParameter;
+    pole: "motor", POLE, PoleParameter;
 }
 
 pub const PORTS: &[Port] = &[

@@ -13,9 +13,9 @@ signals! {
         SpeedRef => "speed_ref", "omega_ref", "rad/s", "speed reference";
         TorqueRef => "torque_ref", "T_ref", "N m", "torque reference after its limit";
         CurrentRef => "current_ref", "i_q_ref", "A", "quadrature current reference, peak";
-        CurrentA => "current_a", "i_a", "A", "phase current a";
-        CurrentB => "current_b", "i_b", "A", "phase current b";
-        CurrentC => "current_c", "i_c", "A", "phase current c";
+        CurrentA => "current_a", "i_a", "A", "phase current a at the terminal";
+        CurrentB => "current_b", "i_b", "A", "phase current b at the terminal";
+        CurrentC => "current_c", "i_c", "A", "phase current c at the terminal";
         CurrentQ => "current_q", "i_q", "A", "quadrature current, peak";
         CurrentD => "current_d", "i_d", "A", "direct current, peak";
         VoltageA => "voltage_a", "v_a", "V", "phase-to-neutral voltage a";
@@ -31,7 +31,11 @@ signals! {
         LoopCurrentA => "loop_current_a", "i_fa", "A", "current in the shorted turns of phase a";
         LoopCurrentB => "loop_current_b", "i_fb", "A", "current in the shorted turns of phase b";
         LoopCurrentC => "loop_current_c", "i_fc", "A", "current in the shorted turns of phase c";
-        MotorTorque => "motor_torque", "T_m", "N m", "electromagnetic torque";
+        PhaseShortCurrentAb => "phase_short_current_ab", "-", "A", "current from winding a to winding b through a contact";
+        PhaseShortCurrentBc => "phase_short_current_bc", "-", "A", "current from winding b to winding c through a contact";
+        PhaseShortCurrentCa => "phase_short_current_ca", "-", "A", "current from winding c to winding a through a contact";
+        GroundCurrent => "ground_current", "-", "A", "current from the windings to ground";
+        MotorTorque => "motor_torque", "T_m", "N m", "electromagnetic torque after the flux's saturation";
         FrictionTorque => "friction_torque", "T_fric", "N m", "dry and viscous friction on the fast shaft, the brake's included";
         BrakeTorque => "brake_torque", "T_b", "N m", "torque the brake can oppose";
         LoadTorque => "load_torque", "T_load", "N m", "signed load referred to the fast shaft";
@@ -42,6 +46,7 @@ signals! {
         SurfaceTemperature => "surface_temperature", "T_s", "K", "temperature of the motor's surface";
         HeatCopper => "heat_copper", "P", "W", "copper heat of the phases, mean of the network's last tick";
         HeatLoop => "heat_loop", "-", "W", "copper heat of shorted turns, mean of the network's last tick";
+        HeatContact => "heat_contact", "-", "W", "heat of contacts in the windings, mean of the network's last tick";
         HeatAir => "heat_air", "-", "W", "heat given to the air, mean of the network's last tick";
         ThermalWarning => "thermal_warning", "-", "1", "1 while the winding is above its warning temperature";
         Limited => "limited", "-", "1", "1 while the speed or the torque reference stands at its limit";
@@ -57,7 +62,7 @@ signals! {
         ResolverSpeed => "resolver_speed", "-", "rad/s", "motor speed the resolver shows";
         LegTransitions => "leg_transitions", "-", "1", "leg transitions since the start; with sampled relays (inverter.relay_crossing) at 1 us a quarter more than relays without delay make: the step's own, as is that part of the currents' ripple";
         Tripped => "tripped", "-", "1", "1 once the drive has tripped";
-        EnergySupply => "energy_supply", "-", "J", "energy drawn from the DC link";
+        EnergySupply => "energy_supply", "-", "J", "energy drawn from the DC link; while motor.torque_limit cuts the torque, what the EMF takes beyond it is in no other account";
         EnergyCopper => "energy_copper", "-", "J", "copper losses, shorted turns included";
         EnergyInverter => "energy_inverter", "-", "J", "losses in switches and diodes";
         EnergyFriction => "energy_friction", "-", "J", "work against friction, without the brake";
@@ -65,8 +70,9 @@ signals! {
         EnergyLoad => "energy_load", "-", "J", "work against the signed loads";
         EnergyImpact => "energy_impact", "-", "J", "kinetic energy lost at the end stops and in the contact";
         EnergyKinetic => "energy_kinetic", "-", "J", "kinetic energy";
-        EnergyMagnetic => "energy_magnetic", "-", "J", "magnetic energy of the windings";
+        EnergyMagnetic => "energy_magnetic", "-", "J", "magnetic energy of the windings, shorted turns included";
         EnergyTap => "energy_tap", "-", "J", "heat of resistors at the centre tap";
+        EnergyContact => "energy_contact", "-", "J", "heat of contacts in the windings: shorted turns, phase to phase, to ground";
         EnergyHeatStored => "energy_heat_stored", "-", "J", "heat in winding and housing above that of the start";
         EnergyAir => "energy_air", "-", "J", "heat given to the air";
         CoggingTorque => "cogging_torque", "T_cog", "N m", "cogging torque of the motor, positive drives forwards";

@@ -83,7 +83,9 @@ fn choose<S: Scalar>(s: &mut State<S>, split: S::Mask, kept: &State<S>) {
     s.transitions = pick(s.transitions, kept.transitions);
     s.legs = three!(|j| pick(s.legs[j], kept.legs[j]));
     s.voltage = three!(|j| pick(s.voltage[j], kept.voltage[j]));
-    s.star.loop_current = three!(|j| pick(s.star.loop_current[j], kept.star.loop_current[j]));
+    for (mine, other) in s.star.contact.iter_mut().flatten().zip(kept.star.contact.iter().flatten()) {
+        *mine = pick(*mine, *other);
+    }
     s.bridge.keep(split, &kept.bridge);
     for (mine, other) in s.energy.iter_mut().zip(kept.energy) {
         *mine = pick(*mine, other);

@@ -1,6 +1,7 @@
 //! Windings and bridge of a step.
 
 use super::model::*;
+use super::shorted::shorted_step;
 use crate::actuator::servo::details::Structure;
 use crate::inverter::bridge::{quench, Windings};
 use crate::scalar::{three_phase, Scalar};
@@ -11,8 +12,6 @@ use crate::three;
 pub(crate) struct Coupling<S> {
     /// k_j of the phases.
     pub k: [S; 3],
-    /// k_j of the shorted turns.
-    pub loop_k: [S; 3],
 }
 
 #[inline(always)]
@@ -20,13 +19,12 @@ pub(crate) fn coupling<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &St
     let (mut shape, _) = three_phase(sin, cos);
     let eccentric = structure.motor.static_eccentricity;
     if !FULL && !eccentric {
-        return Coupling { k: m.star.even_coefficients(shape), loop_k: [S::zero(); 3] };
+        return Coupling { k: m.star.even_coefficients(shape) };
     }
     let mut gap = [S::one(); 3];
     if eccentric {
         gap = m.star.static_gap(sin, cos);
     }
-    let mut loop_k = [S::zero(); 3];
     if FULL {
         if structure.motor.trapezoidal {
             shape = m.star.trapezoid(m.star.electrical_angle(s.shaft.motor_position));
@@ -35,23 +33,28 @@ pub(crate) fn coupling<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &St
             let turning = m.star.dynamic_gap(s.shaft.motor_position);
             gap = three!(|j| gap[j] * turning[j]);
         }
+        if structure.motor.weak_pole {
+            let passing = m.extra.pole.gap(s.shaft.motor_position);
+            gap = three!(|j| gap[j] * passing[j]);
+        }
         if structure.thermal {
             gap = three!(|j| gap[j] * s.star.flux_factor);
         }
-        if structure.motor.shorted_loop {
-            loop_k = m.star.loop_coefficients(shape, gap);
-        }
     }
-    Coupling { k: m.star.coefficients(shape, gap), loop_k }
+    Coupling { k: m.star.coefficients(shape, gap) }
 }
 
 #[inline(always)]
-pub(crate) fn motor_torque<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &State<S>, c: &Coupling<S>) -> S {
-    let mut torque = m.star.torque(c.k, s.star.current);
-    if FULL && structure.motor.shorted_loop {
-        torque = torque + m.star.torque(c.loop_k, s.star.loop_current);
-    }
-    m.star.saturate(torque)
+pub(crate) fn motor_torque<S: Scalar>(m: &Model<S>, s: &State<S>, c: &Coupling<S>) -> S {
+    m.star.saturate(m.star.torque(c.k, s.star.current))
+}
+
+/// What feeds the windings during a step.
+pub(crate) struct Fed<S> {
+    pub half_supply: S,
+    pub old_legs: [S; 3],
+    /// Of the windings, warm.
+    pub resistance: [S; 3],
 }
 
 /// New phase currents and the phase-to-neutral voltages of this step.
@@ -64,19 +67,16 @@ pub(crate) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
     half_supply: S,
     old_legs: [S; 3],
 ) -> ([S; 3], [S; 3]) {
+    let mut resistance = m.star.resistance;
+    if FULL && structure.thermal {
+        resistance = three!(|j| resistance[j] * s.star.resistance_factor);
+    }
+    if EXTRA && structure.shorted {
+        return shorted_step(m, structure, s, c, &Fed { half_supply, old_legs, resistance });
+    }
     let speed = s.shaft.motor_speed;
     let i = s.star.current;
-    let mut emf: [S; 3] = three!(|j| c.k[j] * speed);
-    let mut resistance = m.star.resistance;
-    if FULL {
-        if structure.thermal {
-            resistance = three!(|j| resistance[j] * s.star.resistance_factor);
-        }
-        if structure.motor.shorted_loop {
-            let added = m.star.loop_emf(&s.star, c.loop_k, speed);
-            emf = three!(|j| emf[j] + added[j]);
-        }
-    }
+    let emf: [S; 3] = three!(|j| c.k[j] * speed);
     let mut terminal = three!(|j| s.legs[j] * half_supply);
     let mut rail = terminal;
     let mut legs = None;
@@ -97,35 +97,22 @@ pub(crate) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
         } else {
             neutral = plain;
         }
-    } else if EXTRA && structure.tap {
-        neutral = m.extra.tap.neutral(terminal, drops(&terminal), i, m.star.per_inductance);
     } else {
         neutral = m.star.neutral(drops(&terminal));
     }
     let voltage: [S; 3] = three!(|j| terminal[j] - neutral);
-    let drop = drops(&terminal);
-    let mut current = m.star.currents_after(i, drop, neutral);
+    let mut current = m.star.currents_after(i, drops(&terminal), neutral);
     if FULL {
         s.voltage = voltage;
         if let Some(legs) = &legs {
             current = quench(legs, i, current);
         }
-        let loops = if structure.motor.shorted_loop {
-            let slope = three!(|j| (drop[j] - neutral) * m.star.per_inductance[j]);
-            m.star.step_loops(&s.star, c.loop_k, speed, slope, m.dt)
-        } else {
-            s.star.loop_current
-        };
         if structure.accounts {
-            account_electric(m, s, i, current, loops, rail, terminal, resistance);
-            if EXTRA && structure.tap {
-                account_tap(m, s, voltage, rail);
-            }
+            account_electric(m, s, i, current, rail, terminal, resistance);
         }
         if EXTRA && structure.heat {
-            collect_heat(m, structure, s, i, current, loops, resistance);
+            collect_heat(m, s, i, current, resistance);
         }
-        s.star.loop_current = loops;
     }
     (current, voltage)
 }
@@ -139,7 +126,6 @@ fn account_electric<S: Scalar>(
     s: &mut State<S>,
     old: [S; 3],
     new: [S; 3],
-    loops: [S; 3],
     rail: [S; 3],
     terminal: [S; 3],
     resistance: [S; 3],
@@ -151,38 +137,14 @@ fn account_electric<S: Scalar>(
         s.energy[E_INVERTER] = s.energy[E_INVERTER] + m.dt * (rail[j] - terminal[j]) * middle[j];
         s.energy[E_COPPER] = s.energy[E_COPPER] + m.dt * resistance[j] * middle[j] * middle[j];
     }
-    let middle_loops: [S; 3] = three!(|j| half * (s.star.loop_current[j] + loops[j]));
-    s.energy[E_COPPER] = s.energy[E_COPPER] + m.dt * m.star.loop_loss(&s.star, middle_loops);
-}
-
-/// What the resistors at the centre tap draw from the link and burn.
-#[inline(always)]
-fn account_tap<S: Scalar>(m: &Model<S>, s: &mut State<S>, voltage: [S; 3], rail: [S; 3]) {
-    let drawn = m.extra.tap.currents(voltage);
-    for j in 0..3 {
-        s.energy[E_SUPPLY] = s.energy[E_SUPPLY] + m.dt * rail[j] * drawn[j];
-        s.energy[E_TAP] = s.energy[E_TAP] + m.dt * voltage[j] * drawn[j];
-    }
 }
 
 /// Copper heat of the step for the thermal network, by the same products as the energy account.
 #[inline(always)]
-fn collect_heat<S: Scalar>(
-    m: &Model<S>,
-    structure: &Structure,
-    s: &mut State<S>,
-    old: [S; 3],
-    new: [S; 3],
-    loops: [S; 3],
-    resistance: [S; 3],
-) {
+fn collect_heat<S: Scalar>(m: &Model<S>, s: &mut State<S>, old: [S; 3], new: [S; 3], resistance: [S; 3]) {
     let half = S::splat(0.5);
     let middle: [S; 3] = three!(|j| half * (old[j] + new[j]));
     let loss: [S; 3] = three!(|j| resistance[j] * middle[j] * middle[j]);
     let collected = &mut s.extra.network.collected;
     collected[0] = m.dt.fma(loss[0] + loss[1] + loss[2], collected[0]);
-    if structure.motor.shorted_loop {
-        let middle: [S; 3] = three!(|j| half * (s.star.loop_current[j] + loops[j]));
-        collected[1] = m.dt.fma(m.star.loop_loss(&s.star, middle), collected[1]);
-    }
 }

@@ -4,6 +4,7 @@ mod crossing;
 mod electric;
 pub(crate) mod model;
 pub(crate) mod observe;
+mod shorted;
 mod start;
 mod step;
 
@@ -89,7 +90,7 @@ impl<F: Form> Wiring for High<F> {
     }
 
     fn check_faulted(raw: &[f64]) -> Vec<Finding> {
-        crate::actuator::servo::checks::faulted::<F>(raw)
+        crate::actuator::servo::checks::faulted_high::<F>(raw)
     }
 
     fn derive<S: Scalar>(raw: &[S], structure: &Structure) -> Model<S> {
@@ -171,9 +172,7 @@ impl<F: Form> Wiring for High<F> {
         let currents = s.star.current[0].abs()
             + s.star.current[1].abs()
             + s.star.current[2].abs()
-            + s.star.loop_current[0].abs()
-            + s.star.loop_current[1].abs()
-            + s.star.loop_current[2].abs();
+            + s.star.contact.iter().flatten().fold(S::zero(), |sum, c| sum + c.abs());
         [
             Watch { name: "motor_speed", value: s.shaft.motor_speed, limit: 1e6 },
             Watch { name: "current_a", value: currents, limit: 1e7 },

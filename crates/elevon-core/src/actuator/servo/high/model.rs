@@ -8,8 +8,9 @@ use crate::actuator::servo::shaft::{Shaft, ShaftState};
 use crate::control::current_dq::{CurrentControl, CurrentControlState};
 use crate::control::position_speed::{ControlParameter, PositionSpeed, PositionSpeedState};
 use crate::inverter::bridge::{Bridge, BridgeState, InverterParameter};
+use crate::motor::pole::WeakPole;
+use crate::motor::short::Shorts;
 use crate::motor::star::{MotorParameter, Star, StarState};
-use crate::motor::tap::Tap;
 use crate::motor::thermal::{Network, NetworkState, ThermalParameter};
 use crate::scalar::Scalar;
 use crate::sensor::current::{CurrentSensor, CurrentSensorParameter};
@@ -38,7 +39,8 @@ pub struct Model<S> {
 /// Constants of what only some servos have.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Extra<S> {
-    pub tap: Tap<S>,
+    pub shorts: Shorts<S>,
+    pub pole: WeakPole<S>,
     pub network: Network<S>,
     /// Filter of the controlled current.
     pub closing: S,
@@ -62,7 +64,7 @@ pub struct State<S> {
     pub(crate) transitions: S,
     /// Phase-to-neutral voltages of the last step (detailed bridge).
     pub(crate) voltage: [S; 3],
-    pub(crate) energy: [S; 4],
+    pub(crate) energy: [S; 5],
     pub(crate) extra: ExtraState<S>,
 }
 
@@ -81,12 +83,15 @@ pub(crate) const E_SUPPLY: usize = 0;
 pub(crate) const E_COPPER: usize = 1;
 pub(crate) const E_INVERTER: usize = 2;
 pub(crate) const E_TAP: usize = 3;
+pub(crate) const E_CONTACT: usize = 4;
 
 impl<S: Scalar> Model<S> {
     /// The electrical part over a share of a step.
     #[inline(always)]
     pub(crate) fn over(&self, share: S) -> Self {
-        let extra = Extra { tap: self.extra.tap.over(share), ..self.extra };
+        // A contact's conductance has no meaning over no time at all.
+        let share = share.maximum(S::splat(1e-9));
+        let extra = Extra { shorts: self.extra.shorts.over(share), ..self.extra };
         Self { dt: share * self.dt, star: self.star.over(share), extra, ..*self }
     }
 
@@ -116,7 +121,8 @@ impl<S: Scalar> Model<S> {
             noise_deviation: at(ControlParameter::NoiseDeviation.at()),
             temperature: at(MotorParameter::WindingTemperature.at()),
             extra: Extra {
-                tap: Tap::derive(view.tap(), dt),
+                shorts: Shorts::derive(view.motor(), view.tap(), view.short(), &star, structure.motor.shorted_loop, dt),
+                pole: WeakPole::derive(view.pole(), at(MotorParameter::PolePairs.at())),
                 network: network(raw, dt0),
                 closing: closing(at(CurrentSensorParameter::Bandwidth.at()), dt0),
                 resolver_off: at(ResolverParameter::PowerOff.at()),

@@ -10,6 +10,7 @@ use crate::actuator::servo::layout::*;
 use crate::actuator::servo::shaft::Shown;
 use crate::actuator::servo::signals::{HighSignal as Q, HIGH};
 use crate::actuator::Inputs;
+use crate::motor::short::{GROUND, PAIR, TAPPED};
 use crate::scalar::{three_phase, Scalar};
 use crate::three;
 
@@ -30,7 +31,8 @@ pub(crate) fn high<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, inpu
     set(Q::SurfaceTemperature, warm.surface);
     set(Q::HeatCopper, warm.power[0]);
     set(Q::HeatLoop, warm.power[1]);
-    set(Q::HeatAir, warm.power[2]);
+    set(Q::HeatContact, warm.power[2]);
+    set(Q::HeatAir, warm.power[3]);
     set(Q::ThermalWarning, m.extra.network.warns(warm));
     set(Q::Limited, m.control.limited(&s.control));
     let [encoder, resolver, speed] = m.sensing.show(&structure.sensing, &s.shaft, s.held_angle);
@@ -40,7 +42,7 @@ pub(crate) fn high<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, inpu
     electrical(structure, m, inputs, s, t, out);
     let x = Instant::at(inputs, t);
     let shown = mechanical(structure, m, &x, s, out);
-    energies(m, s, out);
+    energies(m, structure, s, out);
     if F::LINEAR {
         let [position, speed, torque, efficiency, aiding] = m.shaft.show_screw(&s.shaft, &shown);
         let [friction, spall] = m.shaft.show_load_side(&structure.shaft, &x, &s.shaft, &shown);
@@ -55,21 +57,25 @@ fn electrical<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>
     let (sines, cosines) = three_phase(sin, cos);
     let supply = inputs[SUPPLY].at(t) * m.supply_scale;
     set(Q::SupplyVoltage, supply);
-    let (q, d) = park(s.star.current, sines, cosines);
+    let (turns, contact, shorts) = (s.star.current, &s.star.contact, &m.extra.shorts);
+    let phases = shorts.phases(&structure.shorts, turns, contact);
+    let loops = shorts.loops(&structure.shorts, turns, contact);
+    let (q, d) = park(phases, sines, cosines);
     set(Q::CurrentQ, q);
     set(Q::CurrentD, d);
-    let voltage = if structure.bridge || structure.tap { s.voltage } else { ideal_voltage(structure, m, s, supply, sin, cos) };
+    set(Q::GroundCurrent, contact[GROUND][0] + contact[GROUND][1] + contact[GROUND][2]);
+    let voltage = if structure.bridge || structure.shorted { s.voltage } else { ideal_voltage(structure, m, s, supply, sin, cos) };
     let measured = seen_current(m, structure, s);
-    let drawn = if structure.tap { m.extra.tap.currents(s.voltage) } else { [S::zero(); 3] };
     let legs = leg_current(m, structure, s);
     for j in 0..3 {
         out[Q::LegCurrentA as usize + j] = legs[j];
-        out[Q::TapCurrentA as usize + j] = drawn[j];
-        out[Q::CurrentA as usize + j] = s.star.current[j];
+        out[Q::TapCurrentA as usize + j] = contact[TAPPED][j];
+        out[Q::CurrentA as usize + j] = phases[j];
+        out[Q::PhaseShortCurrentAb as usize + j] = contact[PAIR][j];
         out[Q::VoltageA as usize + j] = voltage[j];
         out[Q::CurrentAMeas as usize + j] = measured[j];
         out[Q::CurrentQMeas as usize + j] = s.filtered[j];
-        out[Q::LoopCurrentA as usize + j] = s.star.loop_current[j];
+        out[Q::LoopCurrentA as usize + j] = loops[j];
     }
     out[Q::VoltageQRef as usize] = s.current_control.voltage_q;
 }
@@ -89,7 +95,7 @@ fn ideal_voltage<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, s
 fn mechanical<S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s: &State<S>, out: &mut [S]) -> Shown<S> {
     let (sin, cos) = m.star.electrical_angle(s.shaft.motor_position).sin_cos();
     let c = coupling::<S, true>(m, structure, s, sin, cos);
-    let torque = motor_torque::<S, true>(m, structure, s, &c);
+    let torque = motor_torque(m, s, &c);
     let shown = m.shaft.show(&structure.shaft, x, &s.shaft, torque);
     let mut set = |q: Q, x: S| out[q as usize] = x;
     set(Q::UserSpeed, shown.user_speed);
@@ -108,13 +114,14 @@ fn mechanical<S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s:
 }
 
 #[inline(always)]
-fn energies<S: Scalar>(m: &Model<S>, s: &State<S>, out: &mut [S]) {
+fn energies<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, out: &mut [S]) {
     let (e, w) = (&s.energy, &s.shaft.work);
     for (q, value) in [
         (Q::EnergySupply, e[E_SUPPLY]),
         (Q::EnergyCopper, e[E_COPPER]),
         (Q::EnergyInverter, e[E_INVERTER]),
         (Q::EnergyTap, e[E_TAP]),
+        (Q::EnergyContact, e[E_CONTACT]),
         (Q::EnergyFriction, w.friction),
         (Q::EnergyBrake, w.brake),
         (Q::EnergyLoad, w.load),
@@ -127,5 +134,5 @@ fn energies<S: Scalar>(m: &Model<S>, s: &State<S>, out: &mut [S]) {
     out[Q::EnergyAir as usize] = s.extra.network.heat_out;
     let half = S::splat(0.5);
     let magnetic = (0..3).fold(S::zero(), |sum, j| sum + half * s.star.current[j] * s.star.current[j] / m.star.per_inductance[j]);
-    out[Q::EnergyMagnetic as usize] = magnetic;
+    out[Q::EnergyMagnetic as usize] = magnetic + m.extra.shorts.magnetic(&structure.shorts, &s.star.contact);
 }

@@ -36,7 +36,7 @@ pub(crate) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> St
         filtered: [zero; 3],
         transitions: zero,
         voltage: [zero; 3],
-        energy: [zero; 4],
+        energy: [zero; 5],
         extra: ExtraState { network: warm, sensed: star.current, last_reference: S::splat(f64::NAN) },
     }
 }

@@ -40,7 +40,7 @@ pub(crate) fn measured_current<S: Scalar, const FULL: bool, const EXTRA: bool>(
     s: &State<S>,
 ) -> [S; 3] {
     let mut current = s.star.current;
-    if EXTRA && structure.tap {
+    if EXTRA && structure.shorted {
         current = leg_current(m, structure, s);
     }
     if FULL && structure.measured_current {
@@ -50,14 +50,13 @@ pub(crate) fn measured_current<S: Scalar, const FULL: bool, const EXTRA: bool>(
     }
 }
 
-/// What the legs carry: the windings' currents and those of resistors at the centre tap.
+/// What the legs carry: the windings' currents and those of contacts in and at the windings.
 #[inline(always)]
 pub(crate) fn leg_current<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>) -> [S; 3] {
-    if !structure.tap {
+    if !structure.shorted {
         return s.star.current;
     }
-    let drawn = m.extra.tap.currents(s.voltage);
-    three!(|j| s.star.current[j] + drawn[j])
+    m.extra.shorts.legs(&structure.shorts, s.star.current, &s.star.contact)
 }
 
 /// Phase currents as the drive sees them.
@@ -125,7 +124,7 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
 
     // Motor electromagnetics.
     let c = coupling::<S, FULL>(m, structure, s, sin, cos);
-    let torque = motor_torque::<S, FULL>(m, structure, s, &c);
+    let torque = motor_torque(m, s, &c);
     let (current, voltage) = if EXTRA && structure.located {
         let rate = if structure.sensing.resolver && structure.sensing.commutated { reading.speed } else { s.shaft.motor_speed };
         let seen = Seen { error, sines: sin_phases, cosines: cos_phases, rate };

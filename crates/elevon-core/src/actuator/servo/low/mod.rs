@@ -71,7 +71,7 @@ impl<F: Form> Wiring for Low<F> {
     }
 
     fn check_faulted(raw: &[f64]) -> Vec<Finding> {
-        super::checks::faulted::<F>(raw)
+        super::checks::faulted_low::<F>(raw)
     }
 
     fn derive<S: Scalar>(raw: &[S], structure: &Structure) -> Model<S> {

@@ -11,6 +11,7 @@ use crate::control::position_speed::{ControlParameter, ControlStructure, Mode};
 use crate::details;
 use crate::inverter::bridge::InverterParameter;
 use crate::motor::equivalent::{Circuit, LowParameter};
+use crate::motor::pole::WeakPole;
 use crate::motor::star::{interrupted, MotorParameter, MotorStructure, Star, StarState};
 use crate::motor::thermal::{Network, NetworkState, ThermalModel, ThermalParameter};
 use crate::scalar::Scalar;
@@ -27,12 +28,13 @@ details! {
         integral: bool = parts.control().value(ControlParameter::IntegralTime) > 0.0;
         shaft: ShaftDetails = ShaftDetails::read::<F>(&ShaftNeeds::low(parts));
         sensing: SensingDetails = SensingDetails::read::<F>(parts);
-        motor: MotorStructure = MotorStructure::read(&parts.motor()).with_unbalance(shaft.unbalance);
+        motor: MotorStructure = MotorStructure::read(&parts.motor()).with_unbalance(shaft.unbalance).with_weak_pole(WeakPole::<f64>::needed(&parts.pole()));
     }
     full {
         /// Coefficients vary with the rotor angle.
         angle = (sensing.resolver && sensing.commutated)
             || motor.dynamic_eccentricity
+            || motor.weak_pole
             || motor.static_eccentricity
             || interrupted(&parts.motor())
             || parts.motor().any_away([MotorParameter::TurnsA, MotorParameter::TurnsB, MotorParameter::TurnsC]);
@@ -50,6 +52,7 @@ details! {
 pub struct Model<S> {
     pub dt: S,
     pub star: Star<S>,
+    pub pole: WeakPole<S>,
     pub resistance: [S; 3],
     pub inductance: [S; 3],
     pub healthy: Phase<S>,
@@ -178,6 +181,7 @@ impl<S: Scalar> Model<S> {
             healthy: Phase::new(constant * flux_factor, circuit, &control, shaft.inertia),
             cold,
             star,
+            pole: WeakPole::derive(Raw(raw).pole(), raw[MotorParameter::PolePairs.at()]),
             control,
             drive: Drive::derive(raw, structure, dt),
             shaft,

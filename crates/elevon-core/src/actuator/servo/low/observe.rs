@@ -38,7 +38,7 @@ pub(super) fn observe<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, i
         (Q::WindingTemperature, if structure.heat { s.network.winding } else { m.temperature }),
         (Q::SurfaceTemperature, s.network.surface),
         (Q::HeatCopper, s.network.power[0]),
-        (Q::HeatAir, s.network.power[2]),
+        (Q::HeatAir, s.network.power[3]),
         (Q::ThermalWarning, m.network.warns(&s.network)),
         (Q::Limited, S::indicator(limited)),
         (Q::EncoderPosition, encoder),

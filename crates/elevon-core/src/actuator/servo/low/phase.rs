@@ -37,6 +37,10 @@ pub(super) fn phase<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Struc
         let turning = m.star.dynamic_gap(s.shaft.motor_position);
         gap = three!(|j| gap[j] * turning[j]);
     }
+    if structure.motor.weak_pole {
+        let passing = m.pole.gap(s.shaft.motor_position);
+        gap = three!(|j| gap[j] * passing[j]);
+    }
     let k = m.star.coefficients(shape, gap);
     let sines = if structure.sensing.resolver && structure.sensing.commutated {
         let (sin, cos) = m.star.electrical_angle(commutation).sin_cos();
