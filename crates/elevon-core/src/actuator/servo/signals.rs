@@ -1,10 +1,13 @@
 //! What a run of a servo can record; a form may rename and extend.
 
+use super::shaft::TRAIN;
+use crate::scalar::Scalar;
 use crate::signals;
+use crate::variable::{extended, Signal};
 
 signals! {
     /// Signals of the high fidelity.
-    HighSignal, HIGH {
+    HighSignal, HIGH_OWN {
         Command => "command", "-", "rad", "command with its noise (rad at the user, rad/s or N m by the control mode)";
         UserPosition => "user_position", "theta_u", "rad", "user position";
         UserSpeed => "user_speed", "omega_u", "rad/s", "user speed";
@@ -75,16 +78,13 @@ signals! {
         EnergyContact => "energy_contact", "-", "J", "heat of contacts in the windings: shorted turns, phase to phase, to ground";
         EnergyHeatStored => "energy_heat_stored", "-", "J", "heat in winding and housing above that of the start";
         EnergyAir => "energy_air", "-", "J", "heat given to the air";
-        CoggingTorque => "cogging_torque", "T_cog", "N m", "cogging torque of the motor, positive drives forwards";
-        BearingTorque => "bearing_torque", "-", "N m", "torque of balls passing a defect of the bearing, positive drives forwards";
-        ToothTorque => "tooth_torque", "-", "N m", "torque of worn or chipped flanks under load, positive drives forwards";
         StopTorque => "stop_torque", "-", "N m", "torque on the fast shaft that the end stop's reaction cancels";
     }
 }
 
 signals! {
     /// Signals of the low fidelity: the same names where they mean the same.
-    LowSignal, LOW {
+    LowSignal, LOW_OWN {
         Command => "command", "-", "rad", "command (rad at the user, rad/s or N m by the control mode)";
         UserPosition => "user_position", "theta_u", "rad", "user position";
         UserSpeed => "user_speed", "omega_u", "rad/s", "user speed";
@@ -115,9 +115,16 @@ signals! {
         EnergyCopper => "energy_copper", "-", "J", "copper losses, counted with a thermal network";
         EnergyHeatStored => "energy_heat_stored", "-", "J", "heat in winding and housing above that of the start";
         EnergyAir => "energy_air", "-", "J", "heat given to the air";
-        CoggingTorque => "cogging_torque", "T_cog", "N m", "cogging torque of the motor, positive drives forwards";
-        BearingTorque => "bearing_torque", "-", "N m", "torque of balls passing a defect of the bearing, positive drives forwards";
-        ToothTorque => "tooth_torque", "-", "N m", "torque of worn or chipped flanks under load, positive drives forwards";
         StopTorque => "stop_torque", "-", "N m", "torque on the fast shaft that the end stop's reaction cancels";
     }
+}
+
+/// Both fidelities show what acts on the shaft beside plain friction.
+pub const HIGH: &[Signal] = &extended::<{ HIGH_OWN.len() + TRAIN.len() }>(HIGH_OWN, &[], TRAIN);
+pub const LOW: &[Signal] = &extended::<{ LOW_OWN.len() + TRAIN.len() }>(LOW_OWN, &[], TRAIN);
+
+/// Writes what stands behind the `own` signals of a fidelity.
+#[inline(always)]
+pub(super) fn shared<S: Scalar>(own: &[Signal], shown: [S; TRAIN.len()], out: &mut [S]) {
+    out[own.len()..own.len() + TRAIN.len()].copy_from_slice(&shown);
 }

@@ -48,6 +48,16 @@ variables! {
 }
 
 impl FrictionLaw {
+    /// Does the friction have a state, which moves together with the shaft?
+    pub fn bristles(self) -> bool {
+        self == Self::LuGre
+    }
+
+    /// Does it depend on the motor's torque?
+    pub fn knows_torque(self) -> bool {
+        self == Self::LoadDependent
+    }
+
     /// The law of a run.
     pub fn chosen(own: &Own<FrictionLawParameter>) -> Self {
         Self::read(own.value(FrictionLawParameter::Law))

@@ -273,3 +273,76 @@ fn any_stiffness_runs_at_any_step() {
         }
     }
 }
+
+/// A lane among others has the bits of a run alone, whatever its neighbours do.
+#[test]
+fn lanes_have_the_bits_of_single_runs() {
+    use crate::scalar::{Portable, Scalar};
+    type Lanes = Portable<4>;
+    let speeds = [0.0, -3.7, 1e-9, 250.0];
+    let each = |i: usize, p: P| match p {
+        P::StribeckExponent => 1.0 + 0.35 * i as f64,
+        P::BristleStiffness => 100.0 * 30.0_f64.powi(i as i32),
+        p => FRICTION_LAW[p as usize].default.unwrap_or(0.0) * (1.0 + 0.1 * i as f64),
+    };
+    let all = [
+        P::Law,
+        P::StribeckSpeed,
+        P::StribeckExponent,
+        P::BristleStiffness,
+        P::BristleDamping,
+        P::LoadMotor,
+        P::LoadExternal,
+        P::LoadMotorStribeck,
+        P::LoadExternalStribeck,
+        P::LoadMotorQuadratic,
+        P::LoadExternalQuadratic,
+    ];
+    let raw: Vec<Lanes> = all.iter().map(|&p| Lanes::from_fn(|i| each(i, p))).collect();
+    let together = Law::derive(&raw, Lanes::one());
+    let given = [FIXED, MOVING].map(Lanes::splat);
+    let (torque, load) = (Lanes::from_fn(|i| 0.3 - 0.2 * i as f64), Lanes::from_fn(|i| 0.1 * i as f64));
+    let speed = Lanes::from_fn(|i| speeds[i]);
+    for kind in [FrictionLaw::Borello, FrictionLaw::Stribeck, FrictionLaw::LuGre, FrictionLaw::LoadDependent] {
+        let limits = together.limits(kind, given, speed, torque, load);
+        let push = Push { free: speed + torque, limits, dt: Lanes::splat(1e-6), dt_per_inertia: Lanes::splat(4e-4) };
+        let moved = together.bristle.advance(&push, Lanes::splat(1e-4));
+        for (i, &own) in speeds.iter().enumerate() {
+            let alone = Law::derive(&all.map(|p| each(i, p)), 1.0);
+            let limits_alone = alone.limits(kind, [FIXED, MOVING], own, torque.lane(i), load.lane(i));
+            let push = Push { free: own + torque.lane(i), limits: limits_alone, dt: 1e-6, dt_per_inertia: 4e-4 };
+            let moved_alone = alone.bristle.advance(&push, 1e-4);
+            assert_eq!(limits.map(|x| x.lane(i)), limits_alone, "{kind:?}");
+            assert_eq!(
+                [moved.speed, moved.bristle, moved.dry].map(|x| x.lane(i)),
+                [moved_alone.speed, moved_alone.bristle, moved_alone.dry]
+            );
+        }
+    }
+}
+
+/// The low model's sensitivities go through the laws: slopes are finite and those of differences.
+#[test]
+fn slopes_are_exact() {
+    use crate::scalar::{Dual, Scalar};
+    type Slope = Dual<1>;
+    for kind in [FrictionLaw::Stribeck, FrictionLaw::LuGre, FrictionLaw::LoadDependent] {
+        for p in [P::StribeckSpeed, P::StribeckExponent, P::LoadMotor, P::LoadExternalStribeck] {
+            let values = raw(&[(P::StribeckSpeed, 2.0)]);
+            let seeded: Vec<Slope> =
+                values.iter().enumerate().map(|(i, &x)| if i == p as usize { Slope::variable(x, 0) } else { Slope::splat(x) }).collect();
+            let limits = |l: &Law<Slope>, w: f64| {
+                l.limits(kind, [FIXED, MOVING].map(Slope::splat), Slope::splat(w), Slope::splat(0.7), Slope::splat(0.2))[1]
+            };
+            let plain = |h: f64| {
+                let mut moved = values.clone();
+                moved[p as usize] += h;
+                Law::derive(&moved, 1.0).limits(kind, [FIXED, MOVING], 1.3, 0.7, 0.2)[1]
+            };
+            let slope = limits(&Law::derive(&seeded, Slope::one()), 1.3).slope[0];
+            let expected = (plain(1e-6) - plain(-1e-6)) / 2e-6;
+            close(slope, expected, 1e-8);
+            assert!(limits(&Law::derive(&seeded, Slope::one()), 0.0).finite(), "{kind:?} {p:?}");
+        }
+    }
+}

@@ -8,7 +8,7 @@ use crate::actuator::servo::details::Structure;
 use crate::actuator::servo::form::Form;
 use crate::actuator::servo::layout::*;
 use crate::actuator::servo::shaft::Shown;
-use crate::actuator::servo::signals::{HighSignal as Q, HIGH};
+use crate::actuator::servo::signals::{shared, HighSignal as Q, HIGH, HIGH_OWN};
 use crate::actuator::Inputs;
 use crate::motor::short::{GROUND, PAIR, TAPPED};
 use crate::scalar::{three_phase, Scalar};
@@ -104,12 +104,10 @@ fn mechanical<S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s:
     set(Q::FrictionTorque, shown.friction);
     set(Q::BrakeTorque, shown.brake);
     set(Q::LoadTorque, shown.load);
-    set(Q::CoggingTorque, shown.added.cogging);
-    set(Q::BearingTorque, shown.added.bearing.torque);
-    set(Q::ToothTorque, shown.added.teeth);
     set(Q::StopTorque, shown.stop);
     set(Q::UserTorque, shown.user_torque);
     set(Q::TransmissionTorque, shown.through);
+    shared(HIGH_OWN, shown.added.signals(), out);
     shown
 }
 

@@ -3,7 +3,7 @@
 use super::model::{Model, State, Structure};
 use crate::actuator::servo::advance::Instant;
 use crate::actuator::servo::form::Form;
-use crate::actuator::servo::signals::{LowSignal as Q, LOW};
+use crate::actuator::servo::signals::{shared, LowSignal as Q, LOW, LOW_OWN};
 use crate::actuator::Inputs;
 use crate::scalar::Scalar;
 
@@ -30,9 +30,6 @@ pub(super) fn observe<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, i
         (Q::FrictionTorque, shown.friction),
         (Q::BrakeTorque, x.brake),
         (Q::LoadTorque, shown.load),
-        (Q::CoggingTorque, shown.added.cogging),
-        (Q::BearingTorque, shown.added.bearing.torque),
-        (Q::ToothTorque, shown.added.teeth),
         (Q::StopTorque, shown.stop),
         (Q::SupplyVoltage, x.supply * m.drive.supply_scale),
         (Q::WindingTemperature, if structure.heat { s.network.winding } else { m.temperature }),
@@ -51,6 +48,7 @@ pub(super) fn observe<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, i
     ] {
         out[q as usize] = value;
     }
+    shared(LOW_OWN, shown.added.signals(), out);
     if F::LINEAR {
         let [position, speed, torque, efficiency, aiding] = m.shaft.show_screw(&s.shaft, &shown);
         // Current and voltage of the printed L-R circuit.

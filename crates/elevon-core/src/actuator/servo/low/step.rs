@@ -8,7 +8,6 @@ use crate::actuator::servo::layout::DriveKind;
 use crate::control::position_speed::Mode;
 use crate::scalar::Scalar;
 use crate::sensor::filter::low_pass;
-use crate::transmission::friction_law::FrictionLaw;
 
 /// What the controller asks for before the derivative of the speed is known.
 struct Demand<S> {
@@ -100,7 +99,7 @@ fn step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &In
     // Equivalent phase, motor and transmission dynamics.
     electric_step::<S, FULL>(m, structure, x, s, &p);
     s.motor_torque = m.star.saturate(p.torque_constant * s.current);
-    if FULL && structure.shaft.train.law == FrictionLaw::LoadDependent {
+    if FULL && structure.shaft.train.law.knows_torque() {
         // The friction knows the torque that acts, not the one that was asked for.
         loads = m.shaft.loads::<FULL, FULL>(&structure.shaft, x, &s.shaft, s.motor_torque);
     }

@@ -8,6 +8,7 @@ mod step;
 mod train;
 
 pub(super) use self::show::Shown;
+pub(super) use self::train::TRAIN;
 use self::train::{Train, TrainDetails};
 use super::form::Form;
 use super::layout::*;

@@ -6,7 +6,6 @@ use super::{Shaft, ShaftDetails, ShaftState};
 use crate::actuator::servo::advance::Instant;
 use crate::scalar::Scalar;
 use crate::transmission::friction::Friction;
-use crate::transmission::friction_law::FrictionLaw;
 
 /// What the shaft shows to an observer.
 pub(in crate::actuator::servo) struct Shown<S> {
@@ -44,7 +43,7 @@ impl<S: Scalar> Shaft<S> {
     /// Dry friction at the instant.
     #[inline(always)]
     fn dry(&self, d: &ShaftDetails, s: &ShaftState<S>, loads: &Loads<S>, torque: S) -> S {
-        if d.train.law == FrictionLaw::LuGre {
+        if d.train.law.bristles() {
             self.train.law.bristle.torque(s.bristle, s.motor_speed, loads.dynamic)
         } else {
             Friction::dry_torque(torque - loads.load, s.motor_speed, loads.static_limit, loads.dynamic)

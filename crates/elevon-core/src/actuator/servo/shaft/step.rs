@@ -5,7 +5,7 @@ use super::{Shaft, ShaftDetails, ShaftState};
 use crate::actuator::servo::advance::Instant;
 use crate::scalar::Scalar;
 use crate::transmission::friction::Friction;
-use crate::transmission::friction_law::{FrictionLaw, Moved, Push};
+use crate::transmission::friction_law::{Moved, Push};
 
 impl<S: Scalar> Shaft<S> {
     /// Acceleration of a shaft of the inertia 1/`per_inertia` under the motor's `torque`.
@@ -18,7 +18,7 @@ impl<S: Scalar> Shaft<S> {
         torque: S,
         per_inertia: S,
     ) -> S {
-        if EXTRA && d.train.law == FrictionLaw::LuGre {
+        if EXTRA && d.train.law.bristles() {
             return (self.on_bristles(d, s, loads, torque, self.dt * per_inertia).speed - s.motor_speed) / self.dt;
         }
         self.net(d, s, loads, torque) * per_inertia
@@ -56,7 +56,7 @@ impl<S: Scalar> Shaft<S> {
     /// New speed, and the dry friction where bristles decide it.
     #[inline(always)]
     fn new_speed<const EXTRA: bool>(&self, d: &ShaftDetails, s: &mut ShaftState<S>, loads: &Loads<S>, torque: S) -> (S, Option<S>) {
-        if EXTRA && d.train.law == FrictionLaw::LuGre {
+        if EXTRA && d.train.law.bristles() {
             let moved = self.on_bristles(d, s, loads, torque, self.dt_per_inertia);
             s.bristle = moved.bristle;
             return (moved.speed, Some(moved.dry));

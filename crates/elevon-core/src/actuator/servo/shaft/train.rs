@@ -3,7 +3,6 @@
 
 use crate::actuator::servo::form::Form;
 use crate::actuator::servo::layout::*;
-use crate::details;
 use crate::motor::cogging::Cogging;
 use crate::motor::magnetic_pull::MagneticPull;
 use crate::motor::star::MotorParameter;
@@ -13,6 +12,7 @@ use crate::transmission::bearing::{Bearing, BearingTorque};
 use crate::transmission::friction::FrictionParameter;
 use crate::transmission::friction_law::{FrictionLaw, Law};
 use crate::transmission::tooth::Teeth;
+use crate::{details, signals};
 
 details! {
     /// Which of it a run needs.
@@ -43,6 +43,16 @@ pub struct Train<S> {
     teeth: Teeth<S>,
 }
 
+signals! {
+    /// Signals of both fidelities, named as they are recorded.
+    #[allow(clippy::enum_variant_names)]
+    TrainSignal, TRAIN {
+        CoggingTorque => "cogging_torque", "T_cog", "N m", "cogging torque of the motor, positive drives forwards";
+        BearingTorque => "bearing_torque", "-", "N m", "torque of balls passing a defect of the bearing, positive drives forwards";
+        ToothTorque => "tooth_torque", "-", "N m", "torque of worn or chipped flanks under load, positive drives forwards";
+    }
+}
+
 /// What it adds on the fast shaft: torques positive where they drive forwards, and dry friction.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::actuator::servo) struct Added<S> {
@@ -55,6 +65,12 @@ impl<S: Scalar> Added<S> {
     #[inline(always)]
     pub fn torque(&self) -> S {
         self.cogging + self.bearing.torque + self.teeth
+    }
+
+    /// In the order of `TRAIN`.
+    #[inline(always)]
+    pub fn signals(&self) -> [S; TRAIN.len()] {
+        [self.cogging, self.bearing.torque, self.teeth]
     }
 }
 
