@@ -34,18 +34,23 @@ def mu_of(eta: float, aiding: bool = False) -> float:
     return (1 - eta) * t / (1 + eta * t * t) if aiding else (1 - eta) * t / (eta + t * t)
 
 
-def free(values: dict[str, Any], load: float, speed: float, duration: float = 0.02) -> Any:
+def free(
+    values: dict[str, Any], load: float, speed: float, duration: float = 0.02, **options: Any
+) -> Any:
     """The shaft turns at `speed` against `load` N at the ram, undriven."""
     return run(
         FREE | values,
         duration=duration,
-        record="motor_speed,motor_position,friction_torque,screw_efficiency,"
-        "screw_efficiency_aiding,spall_torque,ram_position@50 kHz",
+        record="motor_speed,friction_torque@1 kHz"
+        if options
+        else "motor_speed,motor_position,"
+        "friction_torque,screw_efficiency,screw_efficiency_aiding,spall_torque,ram_position@50 kHz",
         scenario={
             "load": {"user": {"terms": [constant(load)]}},
             "initial": {"motor_speed": speed},
         },
         name=NAME,
+        **options,
     )
 
 
@@ -76,6 +81,83 @@ def test_preload_rubs_by_its_two_halves() -> None:
     rec = free({"screw.preload": 437.5, "friction.static": 1e-9}, 0.0, 30.0)
     expected = 437.5 * LEAD * (1 / 0.9 - 0.889)
     assert rec["friction_torque"].values == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("fidelity", ["high", "low"])
+@pytest.mark.parametrize("split", [0.0, 0.2, 0.38, 0.7, 1.0])
+def test_a_load_relieves_one_half_of_a_preloaded_nut(split: float, fidelity: str) -> None:
+    """Halves of (1 +- u)^(3/2) preloads (Hertz): their difference is the load, each rubs as borne.
+
+    At rest with itself both bear 437.5 N; from 2^(3/2) preloads on one bears all.
+    """
+    bearing, relieved = (437.5 * (1 + sign * split) ** 1.5 for sign in (1, -1))
+    load = bearing - relieved
+    values = {"screw.preload": 437.5, "friction.static": 1e-9}
+    rec = free(values, load, 30.0, 2e-3, fidelity=fidelity)
+    expected = LEAD * ((1 / 0.9 - 1) * bearing + (1 - 0.889) * relieved)
+    assert rec["friction_torque"].values[0] == pytest.approx(expected, rel=1e-4)
+    rec = free(values, -load, 30.0, 2e-3, fidelity=fidelity)
+    expected = LEAD * ((1 - 0.889) * bearing + (1 / 0.9 - 1) * relieved)
+    assert rec["friction_torque"].values[0] == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize("load", [500.0, 8500.0])
+def test_preload_drag_and_load_friction_do_not_add(load: float) -> None:
+    """500 N: 0.163 instead of 0.243 N m; 8500 N: the load's alone."""
+    rec = free({"screw.preload": 437.5, "friction.static": 1e-9}, load, 30.0)
+    alone = LEAD * (1 / 0.9 - 1) * load
+    expected = {500.0: 0.1633, 8500.0: alone}[load]
+    assert rec["friction_torque"].values[0] == pytest.approx(expected, rel=2e-4)
+
+
+def test_the_nut_is_heated_by_its_friction() -> None:
+    """T = T_a + P R (1 - exp(-t/(R C))), P half of the friction's power; nothing while it rests."""
+    values = {"thermal.model": "dynamic", "thermal.ambient": 300.0, "motor.inertia": 1e6,
+              "screw.nut_capacity": 2.0, "screw.nut_to_air": 1.5}  # fmt: skip
+    rec = run(
+        FREE | values, duration=2.0, record="nut_temperature,heat_nut,winding_temperature@10 Hz",
+        scenario={"load": {"user": {"terms": [constant(4000.0)]}},
+                  "initial": {"motor_speed": 10.0}},
+        name=NAME,
+    )  # fmt: skip
+    power = 0.5 * LEAD * (1 / 0.9 - 1) * 4000.0 * 10.0
+    assert rec.final["heat_nut"] == pytest.approx(power, rel=1e-3)
+    rise = power * 1.5 * (1 - np.exp(-rec["nut_temperature"].time / 3.0))
+    assert rec["nut_temperature"].values == pytest.approx(300.0 + rise, abs=0.02 * power)
+    assert rec["winding_temperature"].values[0] == pytest.approx(300.0)
+
+
+def test_a_return_jam_shows_in_the_nuts_temperature() -> None:
+    """Twice the friction coefficient and more: the nut warms as the efficiency says."""
+    warm = {}
+    for fault in ([], [{"kind": "return_jam", "place": "screw.return_channel", "severity": 2}]):
+        rec = run(
+            {}, duration=20.0, record="nut_temperature@1 Hz", fidelity="low", name=NAME,
+            command=[term("sine", amplitude="50 mm", frequency="0.19 Hz")],
+            scenario={"load": {"user": {"terms": [constant(4500.0)]}}, "fault": fault},
+        )  # fmt: skip
+        warm[len(fault)] = rec.final["nut_temperature"] - 293.15
+    # Mean of driving and aiding: (1/eta - eta') of 0.222 and 1.125.
+    assert warm[1] / warm[0] == pytest.approx(1.125 / 0.222, rel=0.05)
+
+
+@pytest.mark.parametrize(("place", "passes"), [("groove", 8.552), ("nut", 6.448), ("ball", 4.940)])
+def test_the_accelerometer_shows_the_passes_through_its_resonance(
+    place: str, passes: float
+) -> None:
+    """Far below the resonance the housing follows the force: lines at multiples of the passes."""
+    rec = run(
+        FREE | {f"screw.spall_{place}": 2e-3, "motor.inertia": 1e6, "vibration.model": "resonance"},
+        duration=1.0, record="vibration,motor_position@20 kHz", name=NAME,
+        scenario={"load": {"user": {"terms": [constant(4500.0)]}},
+                  "initial": {"motor_speed": 20.0}},
+    )  # fmt: skip
+    angle, shown = rec["motor_position"].values, rec["vibration"].values
+    window = np.hanning(angle.size)
+    lines = np.arange(4.0, 40.0, 0.05)
+    size = np.array([abs(np.mean(shown * window * np.exp(-1j * k * angle))) for k in lines])
+    peak = lines[int(np.argmax(size))]
+    assert abs(peak / passes - round(peak / passes)) < 0.03
 
 
 def test_starved_grease_drags_less_and_rubs_more() -> None:

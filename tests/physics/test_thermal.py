@@ -72,7 +72,6 @@ def test_resistance_follows_the_winding_and_flux_the_surface() -> None:
     expected = cold * (1 + 0.00393 * (winding - 293.15))
     assert rec["heat_copper"].values[2:] == pytest.approx(expected[2:], rel=1e-4)
     hot = {
-        "motor.winding_temperature": 393.15,
         "thermal.ambient": 393.15,
         "thermal.model": "quasi_static",
     }
@@ -192,7 +191,6 @@ def test_it_serves_the_rotary_actuator_too() -> None:
         ({"thermal.convection": 0.0, "thermal.emissivity": 0.0}, ["thermal.convection", "way out"]),
         ({"thermal.trip": "400 K"}, ["thermal.trip", "400", "403.15"]),
         ({"thermal.warning": "290 K"}, ["thermal.warning", "290", "293.15"]),
-        ({"motor.winding_temperature": "430 K"}, ["motor.winding_temperature", "430", "428.15"]),
         ({"thermal.emissivity": 1.2}, ["thermal.emissivity", "1"]),
         ({"thermal.winding_mass": 0.0}, ["thermal.winding_mass", "0"]),
         ({"thermal.ambient": -3.0}, ["thermal.ambient"]),

@@ -53,7 +53,7 @@ variables! {
             high_only("shorted turns are only missing in its one phase").when(&[SHORTED, Chosen("motor.short_model", &["loop"])]);
         ShortContactResistance => "short_contact_resistance", "R_c", "ohm", NonNegative, Plant, Some(0.0), "resistance of the short itself; without limit it is the healthy motor",
             high_only("shorted turns are only missing in its one phase").when(&[SHORTED, Chosen("motor.short_model", &["loop"])]);
-        WindingTemperature => "winding_temperature", "T_w", "K", Positive, Plant, Some(293.15), "temperature of the winding, an input unless a thermal network drives it";
+        WindingTemperature => "winding_temperature", "T_w", "K", Positive, Plant, Some(293.15), "temperature of the winding, an input unless a thermal network drives it", when(&[Chosen("thermal.model", &["off"])]);
         ReferenceTemperature => "reference_temperature", "T_0", "K", Positive, Plant, Some(293.15), "temperature at which the resistance is given",
             when(&[Either(&[Away("motor.temperature_coefficient", 0.0), Away("motor.flux_temperature_coefficient", 0.0)])]);
         TemperatureCoefficient => "temperature_coefficient", "alpha", "1/K", NonNegative, Plant, Some(0.0), "relative rise of the resistance per kelvin",

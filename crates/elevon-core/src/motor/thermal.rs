@@ -105,6 +105,12 @@ impl<S: Scalar> Network<S> {
         ThermalModel::read(own.value(ThermalParameter::Model)) != ThermalModel::Off
     }
 
+    /// The given temperatures, the air's where none is given (NaN).
+    pub fn start_at(&self, [winding, surface]: [S; 2]) -> NetworkState<S> {
+        let or = |given: S| S::select(given.equals(given), given, self.ambient);
+        self.start(or(winding), or(surface))
+    }
+
     /// Both nodes at the given temperatures; a surface without capacity follows the winding at once.
     pub fn start(&self, winding: S, surface: S) -> NetworkState<S> {
         let zero = S::zero();

@@ -25,6 +25,8 @@ variables! {
 pub struct Unbalance<S> {
     pub inertia: S,
     weight: S,
+    /// Mass times eccentricity.
+    moment: S,
     phase: S,
     gap_share: S,
 }
@@ -36,6 +38,7 @@ impl<S: Scalar> Unbalance<S> {
         let (_, level) = g(P::ShaftTilt).sin_cos();
         Self {
             inertia: g(P::UnbalanceInertia),
+            moment: g(P::UnbalanceInertia) * g(P::UnbalanceRadius),
             weight: g(P::UnbalanceInertia) * g(P::UnbalanceRadius) * S::splat(GRAVITY) * level,
             phase: g(P::UnbalancePhase),
             gap_share: g(P::UnbalanceGapShare),
@@ -51,6 +54,13 @@ impl<S: Scalar> Unbalance<S> {
     pub fn torque(&self, angle: S) -> S {
         let (_, cos) = (angle + self.phase).sin_cos();
         -(self.weight * cos)
+    }
+
+    /// Centrifugal force across the shaft, in one direction that stands still.
+    #[inline(always)]
+    pub fn force(&self, angle: S, speed: S) -> S {
+        let (_, cos) = (angle + self.phase).sin_cos();
+        self.moment * speed * speed * cos
     }
 
     /// Dynamic eccentricity and its phase, for a shaft whose whole inertia, the excess included, is `total`.

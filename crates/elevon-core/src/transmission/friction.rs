@@ -60,13 +60,15 @@ impl<S: Scalar> Friction<S> {
         own.away(FrictionParameter::JamTorque)
     }
 
-    /// Adds the friction of a preloaded screw, which sticks as much above its dynamic value as the rest; `viscous` scales
-    /// the lubricant's drag.
-    pub fn preloaded(&mut self, torque: S, viscous: S, fixed: S, moving: S) {
+    /// Static over dynamic dry friction, 1 where there is none: what else is dry sticks as much above its dynamic value.
+    pub fn stick(raw: &[S]) -> S {
+        let (fixed, moving) = (raw[FrictionParameter::Static as usize], raw[FrictionParameter::Dynamic as usize]);
         let dry = S::zero().lt(moving);
-        let stick = S::select(dry, fixed / S::select(dry, moving, S::one()), S::one());
-        self.static_limit = self.static_limit + torque * stick;
-        self.dynamic = self.dynamic + torque;
+        S::select(dry, fixed / S::select(dry, moving, S::one()), S::one())
+    }
+
+    /// Scales the lubricant's drag.
+    pub fn lubricated(&mut self, viscous: S) {
         self.viscous = self.viscous * viscous;
     }
 

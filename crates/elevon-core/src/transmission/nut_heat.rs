@@ -32,6 +32,12 @@ impl<S: Scalar> NutHeat<S> {
         Self { share, inertia: capacity / period, conductance: S::one() / resistance, ambient, per_period: S::one() / period }
     }
 
+    /// No nut: nothing warms it.
+    pub fn none() -> Self {
+        let (zero, one) = (S::zero(), S::one());
+        Self { share: zero, inertia: one, conductance: one, ambient: zero, per_period: zero }
+    }
+
     pub fn start(&self) -> NutState<S> {
         NutState { temperature: self.ambient, collected: S::zero(), power: S::zero() }
     }

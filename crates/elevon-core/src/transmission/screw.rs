@@ -50,6 +50,12 @@ variables! {
         SpallBall => "spall_ball", "w", "m", Between(0.0, 5e-3), Plant, Some(0.0), "healthy 0; length of a spall on a ball";
         SpallDepth => "spall_depth", "d", "m", Between(0.0, 1e-3), Plant, Some(2e-4), "depth of the spalls, unless their chord is shallower",
             when(&[Either(&[Away("screw.spall_groove", 0.0), Away("screw.spall_nut", 0.0), Away("screw.spall_ball", 0.0)])]);
+        NutCapacity => "nut_capacity", "C_n", "J/K", Positive, Plant, Some(700.0), "heat capacity of the nut",
+            when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);
+        NutToAir => "nut_to_air", "R_n", "K/W", Positive, Plant, Some(1.2), "thermal resistance from the nut to the air",
+            when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);
+        NutHeatShare => "nut_heat_share", "-", "1", Unit, Plant, Some(0.5), "part of the screw's friction heat that stays in the nut; the rest leaves with the screw",
+            when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);
         SpallPosition => "spall_position", "-", "m", Any, Plant, Some(0.0), "ram position at which the nut's middle stands over the groove's spall",
             when(&[Away("screw.spall_groove", 0.0)]);
     }
@@ -99,6 +105,9 @@ pub struct Screw<S> {
     pub scatter: S,
     preload: S,
     per_relief: S,
+    /// 1/eta - 1 and 1 - eta'.
+    opposing: S,
+    aiding: S,
     per_balls: S,
     defects: [Defect<S>; 3],
     position: S,
@@ -124,6 +133,8 @@ impl<S: Scalar> Screw<S> {
             scatter: zero,
             preload: zero,
             per_relief: zero,
+            opposing: zero,
+            aiding: zero,
             per_balls: zero,
             defects: [defect; 3],
             position: zero,
@@ -132,6 +143,9 @@ impl<S: Scalar> Screw<S> {
     }
 
     /// Do balls pass a spall?
+    pub fn preloaded(own: &Own<ScrewParameter>) -> bool {
+        own.away(ScrewParameter::Preload)
+    }
     pub fn spalled(own: &Own<ScrewParameter>) -> bool {
         own.any_away([ScrewParameter::SpallGroove, ScrewParameter::SpallNut, ScrewParameter::SpallBall])
     }
@@ -177,12 +191,21 @@ impl<S: Scalar> Screw<S> {
             viscous: one - g(P::LubricantLost),
             scatter: g(P::Debris).sqrt(),
             preload: g(P::Preload),
+            opposing: one / efficiency - one,
+            aiding: one - aiding,
             per_relief: S::select(zero.lt(g(P::Preload)), one / (S::splat(RELIEF) * g(P::Preload)), zero),
             per_balls: one / (balls * sin * level),
             defects: [defect(0), defect(1), defect(2)],
             position: g(P::SpallPosition),
             reach: S::splat(0.5) * g(P::NutLength),
         }
+    }
+
+    /// Friction that a force through the nut makes in it, at the nut, in the direction of motion.
+    #[inline(always)]
+    pub fn drag(&self, force: S, direction: S) -> S {
+        let opposes = S::zero().lt(force * direction);
+        force.abs() * S::select(opposes, self.opposing, self.aiding)
     }
 
     /// Load of the nut half that `force` relieves, over the preload: 1 without load, 0 from 2^(3/2) preloads on. The half
@@ -194,6 +217,25 @@ impl<S: Scalar> Screw<S> {
         let t = y.sqrt();
         let [a, b, c, d, e] = RELIEVED.map(S::splat);
         y * t * e.fma(t, d).fma(t, c).fma(t, b).fma(t, a)
+    }
+
+    /// Load that the nut misses while balls stand over spalls: deeper than `1 / per_approach`, a spall unloads them whole.
+    #[inline(always)]
+    pub fn missing(&self, angle: S, force: S, ram: S, per_approach: S) -> S {
+        let one = S::one();
+        let ball = (force.abs() + S::splat(2.0) * self.preload * self.relieved(force)) * self.per_balls;
+        let covered = (ram - self.position).abs().le(self.reach);
+        let mut sum = S::zero();
+        for (i, d) in self.defects.iter().enumerate() {
+            let turned = d.passes * angle;
+            let psi = turned - S::splat(TAU) * (turned * S::splat(1.0 / TAU)).round();
+            let u = psi * d.per_width;
+            let part = (d.drop * per_approach).minimum(one);
+            let felt = if i == 0 { S::select(covered, part, S::zero()) } else { part };
+            let gone = (one - u * u) * (one - u * u) * felt * ball;
+            sum = sum + S::select(u.abs().lt(one), gone, S::zero());
+        }
+        sum
     }
 
     /// Torque of the balls that fall into the spalls and climb out of them, and the mean friction they leave; both on

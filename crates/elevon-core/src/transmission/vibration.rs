@@ -2,6 +2,7 @@
 //! one resonance of the structure, a second-order system with a state of its own.
 
 use crate::scalar::Scalar;
+use crate::variable::Own;
 use crate::{choices, variables};
 
 choices! {
@@ -48,6 +49,16 @@ impl<S: Scalar> VibrationState<S> {
 }
 
 impl<S: Scalar> Vibration<S> {
+    /// No accelerometer.
+    pub fn none() -> Self {
+        let zero = S::zero();
+        Self { stiffness: zero, damping: zero, per_mass: zero, per_approach: zero, teeth: zero, ripple: zero }
+    }
+
+    pub fn needed(own: &Own<VibrationParameter>) -> bool {
+        VibrationModel::read(own.value(VibrationParameter::Model)) != VibrationModel::Off
+    }
+
     pub fn derive(raw: &[S]) -> Self {
         use VibrationParameter as P;
         let g = |p: P| raw[p as usize];

@@ -188,7 +188,7 @@ def _runs(
         unit = draw_units(nominal, f"block {block}", 1, seed)[0]
         for place, cell in enumerate(order.tolist()):
             warm = unit.parameters.value("thermal.ambient") + _air(place, len(cells))
-            values = {"thermal.ambient": warm, "motor.winding_temperature": warm}
+            values = {"thermal.ambient": warm}
             profile, load = cells[cell]
             label = f"{profile.name} {1e3 * profile.amplitude:g} mm {load:g} N, block {block + 1}"
             runs[block, cell] = Run(

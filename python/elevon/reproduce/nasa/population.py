@@ -131,7 +131,6 @@ def _values(actuator: Actuator, rng: np.random.Generator) -> dict[str, float]:
         if spread.name == FRICTION_COEFFICIENT:
             values |= _efficiencies(actuator, drawn)
         elif spread.name == AIR:
-            values["motor.winding_temperature"] = drawn
             thinner = math.exp(-GREASE_PER_KELVIN * (drawn - 293.15))
             values["friction.viscous"] = value("friction.viscous") * thinner
     return values

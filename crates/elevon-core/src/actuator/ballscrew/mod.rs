@@ -8,9 +8,12 @@ mod records;
 use super::servo::{layout, Form};
 use super::{Finding, Port, Setup};
 use crate::fault::FaultKind;
+use crate::motor::thermal::ThermalParameter;
 use crate::scalar::Scalar;
 use crate::transmission::gear::GearParameter;
+use crate::transmission::nut_heat::NutHeat;
 use crate::transmission::screw::{Screw, ScrewParameter};
+use crate::transmission::vibration::Vibration;
 use crate::variable::{Group, Signal};
 use layout::At;
 
@@ -35,6 +38,26 @@ impl Form for Ballscrew {
     }
     fn screw<S: Scalar>(raw: &[S]) -> Screw<S> {
         Screw::derive(records::screw(raw), raw[GearParameter::Ratio.at()])
+    }
+    fn nut<S: Scalar>(raw: &[S], period: f64) -> NutHeat<S> {
+        let screw = |p: ScrewParameter| raw[p.at()];
+        let ambient = raw[ThermalParameter::Ambient.at()];
+        NutHeat::derive(
+            screw(ScrewParameter::NutCapacity),
+            screw(ScrewParameter::NutToAir),
+            screw(ScrewParameter::NutHeatShare),
+            ambient,
+            period,
+        )
+    }
+    fn housing<S: Scalar>(raw: &[S]) -> Vibration<S> {
+        Vibration::derive(records::vibration(raw))
+    }
+    fn preloaded(setup: &Setup) -> bool {
+        Screw::<f64>::preloaded(&records::Parts(setup).screw())
+    }
+    fn vibrates(setup: &Setup) -> bool {
+        Vibration::<f64>::needed(&records::Parts(setup).vibration())
     }
     fn spalled(setup: &Setup) -> bool {
         Screw::<f64>::spalled(&records::Parts(setup).screw())

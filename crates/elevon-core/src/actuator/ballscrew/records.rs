@@ -11,6 +11,7 @@ use crate::transmission::gear::{GearParameter, LoadParameter as D, StopParameter
 use crate::transmission::play::{PlayParameter as P, PLAY};
 use crate::transmission::screw::{RatingParameter, ScrewParameter, RATING, SCREW};
 use crate::transmission::tooth::{ToothParameter as W, TOOTH};
+use crate::transmission::vibration::{VibrationParameter, VIBRATION};
 use crate::variable::{extended, relabelled, Relabel, Signal, Variable};
 
 const fn change(index: usize, name: &'static str, unit: &'static str, text: &'static str) -> Relabel {
@@ -76,6 +77,7 @@ groups! {
     }
     screw: "screw", SCREW, ScrewParameter;
     rating: "rating", RATING, RatingParameter;
+    vibration: "vibration", VIBRATION, VibrationParameter;
 }
 
 pub const PORTS: &[Port] = &[
@@ -95,6 +97,10 @@ const fn signal(name: &'static str, unit: &'static str, text: &'static str) -> S
     Signal { name, symbol: "-", unit, text }
 }
 
+const NUT: [Signal; 2] = [
+    signal("nut_temperature", "K", "temperature of the nut"),
+    signal("heat_nut", "W", "friction heat that stays in the nut, mean of the network's last tick"),
+];
 const HIGH_OWN: &[Signal] = &[
     signal("ram_position", "m", "ram position, on the nut's side of the play"),
     signal("ram_speed", "m/s", "ram speed, on the nut's side of the play"),
@@ -103,6 +109,9 @@ const HIGH_OWN: &[Signal] = &[
     signal("spall_torque", "N m", "torque of balls falling into spalls, positive drives forwards"),
     signal("screw_efficiency", "1", "applied efficiency under a load that opposes motion"),
     signal("screw_efficiency_aiding", "1", "applied efficiency under a load that aids motion"),
+    NUT[0],
+    NUT[1],
+    signal("vibration", "m/s2", "acceleration that the accelerometer on the screw's housing shows"),
 ];
 const LOW_OWN: &[Signal] = &[
     signal("ram_position", "m", "ram position, on the nut's side of the play"),
@@ -112,6 +121,8 @@ const LOW_OWN: &[Signal] = &[
     signal("screw_efficiency_aiding", "1", "applied efficiency under a load that aids motion"),
     signal("circuit_current", "A", "current of the printed L-R circuit, sqrt(3/2) i_q: its I^2 R is the heat of all phases"),
     signal("circuit_voltage", "V", "voltage of the printed L-R circuit, sqrt(3/2) v_q"),
+    NUT[0],
+    NUT[1],
 ];
 
 pub const HIGH: &[Signal] = &extended::<{ signals::HIGH.len() + HIGH_OWN.len() }>(

@@ -5,7 +5,9 @@ use super::{Finding, Port, Setup};
 use crate::fault::FaultKind;
 use crate::scalar::Scalar;
 use crate::transmission::gear::GearParameter;
+use crate::transmission::nut_heat::NutHeat;
 use crate::transmission::screw::Screw;
+use crate::transmission::vibration::Vibration;
 use crate::variable::{Group, Signal};
 use layout::At;
 
@@ -29,6 +31,18 @@ impl Form for Rotary {
     }
     fn screw<S: Scalar>(_raw: &[S]) -> Screw<S> {
         Screw::none()
+    }
+    fn nut<S: Scalar>(_raw: &[S], _period: f64) -> NutHeat<S> {
+        NutHeat::none()
+    }
+    fn housing<S: Scalar>(_raw: &[S]) -> Vibration<S> {
+        Vibration::none()
+    }
+    fn preloaded(_setup: &Setup) -> bool {
+        false
+    }
+    fn vibrates(_setup: &Setup) -> bool {
+        false
     }
     fn spalled(_setup: &Setup) -> bool {
         false

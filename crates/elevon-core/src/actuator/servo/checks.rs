@@ -157,15 +157,6 @@ fn thermal(out: &mut Vec<Finding>, raw: &[f64]) {
             out.push(finding(names[i], values[i], values[i - 1], message));
         }
     }
-    let start = raw[Motor::WindingTemperature.at()];
-    if start >= values[2] {
-        out.push(finding(
-            "motor.winding_temperature",
-            start,
-            values[2],
-            format!("motor.winding_temperature: {start} K is not below thermal.trip, {} K", values[2]),
-        ));
-    }
 }
 
 /// What holds of the parameters with every fault of a run at its whole severity: a fault may not make the plant faster

@@ -3,7 +3,9 @@
 use crate::actuator::{Finding, Port, Setup};
 use crate::fault::FaultKind;
 use crate::scalar::Scalar;
+use crate::transmission::nut_heat::NutHeat;
 use crate::transmission::screw::Screw;
+use crate::transmission::vibration::Vibration;
 use crate::variable::{Group, Signal};
 
 /// A kind of servo: its records, and how its transmission follows from them.
@@ -26,6 +28,14 @@ pub trait Form: Send + Sync + 'static {
     /// Inertia on the fast shaft besides the motor's and the gear's.
     fn screw_inertia<S: Scalar>(raw: &[S]) -> S;
     fn screw<S: Scalar>(raw: &[S]) -> Screw<S>;
+    /// The nut of a screw as a node of heat on a tick of `period` seconds.
+    fn nut<S: Scalar>(raw: &[S], period: f64) -> NutHeat<S>;
+    /// The housing under an accelerometer.
+    fn housing<S: Scalar>(raw: &[S]) -> Vibration<S>;
+    /// Are the halves of a screw's nut preloaded?
+    fn preloaded(setup: &Setup) -> bool;
+    /// Is there an accelerometer?
+    fn vibrates(setup: &Setup) -> bool;
     /// Do balls of a screw pass spalls?
     fn spalled(setup: &Setup) -> bool;
     /// Does debris scatter the friction of a screw?

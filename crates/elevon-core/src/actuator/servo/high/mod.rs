@@ -121,6 +121,7 @@ impl<F: Form> Wiring for High<F> {
             }
             TICK_THERMAL => {
                 m.extra.network.tick(&mut s.extra.network);
+                m.shaft.nut.tick(&mut s.shaft.nut);
                 (s.star.resistance_factor, s.star.flux_factor) = m.extra.network.factors(&s.extra.network);
             }
             TICK_DEBRIS => s.shaft.scatter(&m.shaft.screw, noise(4)),

@@ -134,11 +134,15 @@ impl<S: Scalar> Model<S> {
 /// The thermal network at the whole number of solver steps next to its sample time.
 pub(crate) fn network<S: Scalar>(raw: &[S], dt: f64) -> Network<S> {
     let at = |p: MotorParameter| raw[p.at()];
-    let period = (raw[ThermalParameter::SampleTime.at()].lane(0) / dt).round().max(1.0) * dt;
     let temperature = [
         at(MotorParameter::ReferenceTemperature),
         at(MotorParameter::TemperatureCoefficient),
         at(MotorParameter::FluxTemperatureCoefficient),
     ];
-    Network::derive(Raw(raw).thermal(), temperature, period)
+    Network::derive(Raw(raw).thermal(), temperature, network_period(raw, dt))
+}
+
+/// Tick of the thermal network, s.
+pub(crate) fn network_period<S: Scalar>(raw: &[S], dt: f64) -> f64 {
+    (raw[ThermalParameter::SampleTime.at()].lane(0) / dt).round().max(1.0) * dt
 }

@@ -46,7 +46,18 @@ pub(crate) fn high<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, inpu
     if F::LINEAR {
         let [position, speed, torque, efficiency, aiding] = m.shaft.show_screw(&s.shaft, &shown);
         let [friction, spall] = m.shaft.show_load_side(&structure.shaft, &x, &s.shaft, &shown);
-        out[HIGH.len()..].copy_from_slice(&[position, speed, friction, torque, spall, efficiency, aiding]);
+        out[HIGH.len()..].copy_from_slice(&[
+            position,
+            speed,
+            friction,
+            torque,
+            spall,
+            efficiency,
+            aiding,
+            s.shaft.nut.temperature,
+            s.shaft.nut.power,
+            s.shaft.vibration.acceleration,
+        ]);
     }
 }
 

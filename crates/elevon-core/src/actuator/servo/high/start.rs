@@ -11,8 +11,17 @@ use crate::scalar::Scalar;
 use crate::three;
 
 /// Signals whose initial value a scenario may set.
-pub(crate) const INITIAL: &[&str] =
-    &["motor_position", "motor_speed", "user_position", "user_speed", "current_a", "current_b", "current_c"];
+pub(crate) const INITIAL: &[&str] = &[
+    "motor_position",
+    "motor_speed",
+    "user_position",
+    "user_speed",
+    "current_a",
+    "current_b",
+    "current_c",
+    "winding_temperature",
+    "surface_temperature",
+];
 
 pub(crate) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
     let or = |i: usize, other: S| S::select(initial[i].equals(initial[i]), initial[i], other);
@@ -20,7 +29,7 @@ pub(crate) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> St
     let shaft = model.shaft.start([initial[0], initial[1]], [initial[2], initial[3]]);
     let mut star = StarState::rest();
     star.current = three!(|j| or(4 + j, zero));
-    let warm = model.extra.network.start(model.temperature, model.temperature);
+    let warm = model.extra.network.start_at([initial[7], initial[8]]);
     heat(raw, &mut star, &warm);
     State {
         star,

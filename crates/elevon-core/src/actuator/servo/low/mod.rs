@@ -33,7 +33,8 @@ impl<F: Form> Wiring for Low<F> {
     type State<S: Scalar> = State<S>;
 
     const PORTS: &'static [Port] = F::PORTS;
-    const INITIAL: &'static [&'static str] = &["motor_position", "motor_speed", "user_position"];
+    const INITIAL: &'static [&'static str] =
+        &["motor_position", "motor_speed", "user_position", "winding_temperature", "surface_temperature"];
 
     fn groups() -> &'static [Group] {
         F::GROUPS
@@ -95,6 +96,7 @@ impl<F: Form> Wiring for Low<F> {
     ) {
         if kind == TICK_THERMAL {
             m.network.tick(&mut s.network);
+            m.shaft.nut.tick(&mut s.shaft.nut);
             (s.resistance_factor, s.flux_factor) = m.network.factors(&s.network);
         } else {
             s.shaft.scatter(&m.shaft.screw, noise(4));

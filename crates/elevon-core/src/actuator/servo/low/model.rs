@@ -195,7 +195,7 @@ impl<S: Scalar> Model<S> {
     pub(super) fn start(&self, raw: &[S], initial: &[S]) -> State<S> {
         let (zero, nan) = (S::zero(), S::splat(f64::NAN));
         let shaft = self.shaft.start([initial[0], initial[1]], [initial[2], nan]);
-        let warm = self.network.start(self.temperature, self.temperature);
+        let warm = self.network.start_at([initial[3], initial[4]]);
         let (resistance_factor, flux_factor) = heat(raw, &warm);
         State {
             resistance_factor,

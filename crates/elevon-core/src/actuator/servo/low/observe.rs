@@ -53,6 +53,18 @@ pub(super) fn observe<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, i
         let [position, speed, torque, efficiency, aiding] = m.shaft.show_screw(&s.shaft, &shown);
         // Current and voltage of the printed L-R circuit.
         let root = S::splat(1.5_f64.sqrt());
-        out[LOW.len()..].copy_from_slice(&[position, speed, torque, efficiency, aiding, root * s.current, root * s.voltage]);
+        let nut = &s.shaft.nut;
+        let circuit = [root * s.current, root * s.voltage];
+        out[LOW.len()..].copy_from_slice(&[
+            position,
+            speed,
+            torque,
+            efficiency,
+            aiding,
+            circuit[0],
+            circuit[1],
+            nut.temperature,
+            nut.power,
+        ]);
     }
 }

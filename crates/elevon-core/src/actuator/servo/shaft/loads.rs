@@ -17,6 +17,8 @@ pub(in crate::actuator::servo) struct Loads<S> {
     pub static_limit: S,
     pub dynamic: S,
     pub(super) viscous: S,
+    /// Friction in the nut of a screw.
+    pub(super) nut: S,
     /// All that opposes the motion at the present speed.
     pub(super) resist: S,
 }
@@ -37,6 +39,7 @@ impl<S: Scalar> Shaft<S> {
         let mut load = through.fma(self.gear.per_ratio, x.shaft);
         let mut own = if elastic { x.shaft } else { load };
         let mut added = x.brake;
+        let mut nut = S::zero();
         if EXTRA {
             if d.linear {
                 added = S::zero();
@@ -45,16 +48,20 @@ impl<S: Scalar> Shaft<S> {
                 // Rigid: the load side's friction is felt on the fast shaft.
                 added = added + self.load_side_friction(d, x) * self.gear.per_ratio;
             }
-            let (torque, friction) = self.disturbance(d, s, through);
+            let (torque, friction, spalled) = self.disturbance(d, s, through);
             load = load - torque;
             own = own - torque;
             added = added + friction;
+            nut = spalled;
         }
         if FULL {
             if d.loaded {
                 let moving = s.motor_speed.sign();
                 let direction = S::select(s.motor_speed.equals(S::zero()), (torque - load).sign(), moving);
                 added = added + self.gear.load_friction(through, direction);
+                if EXTRA && d.nut {
+                    nut = nut + self.screw.drag(through, direction) * self.gear.per_ratio;
+                }
             }
             if d.jams {
                 added = added + s.jammed * self.friction.jam_torque;
@@ -67,18 +74,25 @@ impl<S: Scalar> Shaft<S> {
         }
         let (mut static_limit, mut dynamic) = (limits[0] + added, limits[1] + added);
         if EXTRA {
+            if d.preloaded {
+                let preload = self.screw.preload_torque * self.screw.relieved(through);
+                static_limit = static_limit + self.stick * preload;
+                dynamic = dynamic + preload;
+                nut = nut + preload;
+            }
             if d.linear {
                 brake = if elastic { S::zero() } else { x.brake * self.gear.per_ratio };
             }
             if d.debris {
                 static_limit = static_limit * s.scatter;
                 dynamic = dynamic * s.scatter;
+                nut = nut * s.scatter;
             }
         }
         let speed = s.motor_speed;
         let viscous = self.viscous::<FULL, EXTRA>(d, speed);
         let resist = load + speed.signed(dynamic) + viscous;
-        Loads { brake, user_torque, load, own, through, static_limit, dynamic, viscous, resist }
+        Loads { brake, user_torque, load, own, through, static_limit, dynamic, viscous, nut, resist }
     }
 
     #[inline(always)]
@@ -105,13 +119,15 @@ impl<S: Scalar> Shaft<S> {
         }
     }
 
-    /// Torque of unbalance, spalls and drive train on the fast shaft, positive where it drives forwards, and their friction.
+    /// Torque of unbalance, spalls and drive train on the fast shaft, positive where it drives forwards, their
+    /// friction, and that of the spalls alone.
     #[inline(always)]
-    pub(super) fn disturbance(&self, d: &ShaftDetails, s: &ShaftState<S>, through: S) -> (S, S) {
+    pub(super) fn disturbance(&self, d: &ShaftDetails, s: &ShaftState<S>, through: S) -> (S, S, S) {
         let (mut torque, mut friction) = (S::zero(), S::zero());
         if d.spall {
             (torque, friction) = self.screw.spall(s.motor_position, through, s.motor_position * self.gear.per_ratio);
         }
+        let spalled = friction;
         if d.unbalance {
             torque = torque + self.unbalance.torque(s.motor_position);
         }
@@ -120,7 +136,7 @@ impl<S: Scalar> Shaft<S> {
             torque = torque + added.torque();
             friction = friction + added.bearing.friction;
         }
-        (torque, friction)
+        (torque, friction, spalled)
     }
 
     /// Torque on the user through the elastic play.

@@ -11,15 +11,19 @@ pub(super) use self::show::Shown;
 pub(super) use self::train::TRAIN;
 use self::train::{Train, TrainDetails};
 use super::form::Form;
+use super::high::model::network_period;
 use super::layout::*;
 use crate::details;
 use crate::motor::star::MotorParameter;
+use crate::motor::thermal::Network;
 use crate::motor::unbalance::Unbalance;
 use crate::scalar::Scalar;
 use crate::transmission::friction::{Friction, FrictionParameter};
 use crate::transmission::gear::{Gear, GearParameter, LoadParameter};
+use crate::transmission::nut_heat::{NutHeat, NutState};
 use crate::transmission::play::{Play, PlayModel};
 use crate::transmission::screw::Screw;
+use crate::transmission::vibration::{Vibration, VibrationState};
 
 details! {
     /// What of the shaft a run needs.
@@ -43,9 +47,13 @@ details! {
         /// A load side with damping and dry friction of its own.
         load_side = F::LINEAR || x.parts.load().any_away([LoadParameter::Damping, LoadParameter::Friction]);
         unbalance = Unbalance::<f64>::needed(&x.parts.unbalance());
+        preloaded = F::preloaded(x.parts.0);
         spall = F::spalled(x.parts.0);
         debris = F::contaminated(x.parts.0);
         detailed_train = train.extra;
+        /// The screw's friction warms a nut.
+        nut = F::LINEAR && Network::<f64>::needed(&x.parts.thermal());
+        vibrates = !x.low && F::vibrates(x.parts.0);
     }
 }
 
@@ -55,6 +63,7 @@ pub(super) struct ShaftNeeds<'a> {
     pub semi_implicit: bool,
     pub elastic: bool,
     pub accounts: bool,
+    pub low: bool,
 }
 
 impl<'a> ShaftNeeds<'a> {
@@ -63,11 +72,11 @@ impl<'a> ShaftNeeds<'a> {
         use crate::transmission::play::PlayParameter;
         let semi_implicit = Method::read(parts.solver().value(SolverParameter::Method)) == Method::SemiImplicit;
         let elastic = PlayModel::read(parts.play().value(PlayParameter::Model)) == PlayModel::Elastic;
-        Self { parts, semi_implicit, elastic, accounts }
+        Self { parts, semi_implicit, elastic, accounts, low: false }
     }
 
     pub(super) fn low(parts: Parts<'a>) -> Self {
-        Self { parts, semi_implicit: true, elastic: false, accounts: false }
+        Self { parts, semi_implicit: true, elastic: false, accounts: false, low: true }
     }
 }
 
@@ -79,6 +88,10 @@ pub struct Shaft<S> {
     pub gear: Gear<S>,
     pub play: Play<S>,
     pub screw: Screw<S>,
+    /// Static over dynamic friction of the screw.
+    stick: S,
+    pub nut: NutHeat<S>,
+    vibration: Vibration<S>,
     pub unbalance: Unbalance<S>,
     train: Train<S>,
     /// Of the fast shaft; with a rigid transmission the user's included.
@@ -106,6 +119,8 @@ pub struct ShaftState<S> {
     pub scatter: S,
     /// Deflection of the bristles.
     bristle: S,
+    pub nut: NutState<S>,
+    pub vibration: VibrationState<S>,
     pub work: Work<S>,
 }
 
@@ -132,7 +147,7 @@ impl<S: Scalar> Shaft<S> {
         let rotor = rotor + F::screw_inertia(raw) + unbalance.inertia;
         let inertia = if d.elastic { rotor } else { rotor + reflected };
         let mut friction = Friction::derive(view.friction());
-        friction.preloaded(screw.preload_torque, screw.viscous, at(FrictionParameter::Static.at()), at(FrictionParameter::Dynamic.at()));
+        friction.lubricated(screw.viscous);
         Self {
             dt,
             friction,
@@ -140,6 +155,9 @@ impl<S: Scalar> Shaft<S> {
             play: Play::derive(view.play()),
             screw,
             train: Train::derive(raw, unbalance.eccentricity(rotor + reflected)),
+            stick: Friction::stick(view.friction()),
+            nut: F::nut(raw, network_period(raw, dt.lane(0))),
+            vibration: F::housing(raw),
             unbalance,
             inertia,
             whole_inertia: rotor + reflected,
@@ -167,6 +185,8 @@ impl<S: Scalar> Shaft<S> {
             jammed: S::select(S::splat(0.5).lt(self.friction.jam_anywhere), S::one(), zero),
             scatter: S::one(),
             bristle: zero,
+            nut: self.nut.start(),
+            vibration: VibrationState::rest(),
             work: Work { friction: zero, brake: zero, load: zero, impact: zero },
         }
     }

@@ -83,6 +83,13 @@ impl<S: Scalar> Shaft<S> {
             let dry = on_bristles.unwrap_or_else(|| Friction::dry_torque(torque - loads.load, speed, loads.static_limit, loads.dynamic));
             self.account(s, loads, [speed, new_speed, held_speed], dry);
         }
+        if EXTRA && d.nut {
+            s.nut.collected = s.nut.collected + self.dt * self.nut.share * loads.nut * speed.abs();
+        }
+        if EXTRA && d.vibrates {
+            let force = self.shaking(s, loads.through, torque);
+            self.vibration.step(&mut s.vibration, force, self.dt);
+        }
         if FULL && d.elastic {
             self.user_step::<EXTRA>(d, x, s, loads);
         } else {
@@ -95,6 +102,14 @@ impl<S: Scalar> Shaft<S> {
         }
         s.motor_position = position;
         s.motor_speed = held_speed;
+    }
+
+    /// Force on the screw's housing at the orders of its parts.
+    #[inline(always)]
+    fn shaking(&self, s: &ShaftState<S>, through: S, torque: S) -> S {
+        let angle = s.motor_position;
+        let missing = self.screw.missing(angle, through, angle * self.gear.per_ratio, self.vibration.per_approach);
+        missing + self.unbalance.force(angle, s.motor_speed) + self.vibration.mesh(angle, torque)
     }
 
     /// The user as the play operator leaves it.
