@@ -143,7 +143,9 @@ pub fn whole(raw: &[f64], faults: &[FaultSpec]) -> Vec<f64> {
         for &(index, value) in &fault.settings {
             all[index] = value;
         }
-        let label = fault.writes.first().map_or(fault.severity, |w| w.op.acting(fault.severity));
+        // What is counted is checked as given: half a thing is refused, not rounded.
+        let acting = |op: Op| if op == Op::AddWhole { fault.severity } else { op.acting(fault.severity) };
+        let label = fault.writes.first().map_or(fault.severity, |w| acting(w.op));
         let held = Held { label, factor: 1.0, pulse: fault.severity > 0.0 };
         for write in &fault.writes {
             all[write.index] = changed(all[write.index], fault.severity, write.op, held);
