@@ -58,7 +58,12 @@ def batch(count: int = 19) -> list[Any]:
             faults.append(
                 {"kind": "friction", "place": "transmission", "severity": 1.0, "profile": profile}
             )
+        if i % 7 == 6:
+            faults.append({"kind": "ground_short", "place": "motor.phase_b", "severity": 0.01 * i})
+            faults.append({"kind": "phase_short", "place": "motor.phases_ca", "severity": 0.1,
+                           "turns": 0.3, "profile": {"kind": "step", "time": "8 ms"}})  # fmt: skip
         settings = {
+            "motor.short_model": "loop" if i % 3 and i % 2 else "reduced",
             "motor.inertia": 7e-4 + 1e-5 * i,
             "sensor.current.bits": (0, 8, 10, 12)[i % 4],
             "inverter.dead_time": 2e-6 if i % 6 == 5 else 0.0,

@@ -141,22 +141,40 @@ def test_a_loop_begins_with_the_phase_current_and_leaves_nothing() -> None:
     assert np.max(np.abs(current[late] - healthy["current_a"].values[late])) < 0.1
 
 
+BRIDGES: dict[str, tuple[dict[str, Any], list[Any]]] = {
+    "hysteresis": (HYSTERESIS, []),
+    "pwm": (PWM, []),
+    "located": (HYSTERESIS | {"inverter.relay_crossing": "located"}, []),
+    "lossy": (
+        PWM
+        | {"inverter.on_resistance": 0.2, "inverter.diode_drop": 1.0, "inverter.dead_time": 2e-6},
+        [],
+    ),
+    "interrupted": (PWM, ["open_phase@motor.phase_b=1"]),
+    "open switch": (HYSTERESIS, ["open_switch@inverter.a_high=1"]),
+}
+
+
 @pytest.mark.parametrize("contact", CONTACTS)
-@pytest.mark.parametrize("drive", DRIVES)
-def test_energy_closes_with_every_contact(drive: str, contact: str) -> None:
-    """What the link gives is lost, stored or delivered, to 0.1 %."""
+@pytest.mark.parametrize("bridge", BRIDGES)
+def test_energy_closes_with_every_contact(bridge: str, contact: str) -> None:
+    """What the link gives is lost, stored or delivered, to 0.01 %, also where legs float."""
     names = ("energy_supply", *SINKS, *STORES, "energy_contact", "energy_tap")
+    values, others = BRIDGES[bridge]
     rec = run(
-        MOTOR | DRIVES[drive] | (loop(0.5) if contact == "loop" else {}),
+        MOTOR | values | (loop(0.5) if contact == "loop" else {}),
         duration=0.25,
         command=[term("sine", amplitude="7 deg", frequency="4 Hz")],
         record=",".join(names) + "@2 kHz",
-        scenario={"fault": [CONTACTS[contact]], "load": {"brake": {"terms": [constant(1.0)]}}},
+        scenario={
+            "fault": [CONTACTS[contact], *others],
+            "load": {"brake": {"terms": [constant(1.0)]}},
+        },
     )
     change = {name: float(rec[name].values[-1] - rec[name].values[0]) for name in names}
     given = change.pop("energy_supply")
-    assert abs(given - sum(change.values())) < 1e-3 * given
-    assert change["energy_tap" if contact == "resistor" else "energy_contact"] > 1e-2 * given
+    assert abs(given - sum(change.values())) < 1e-4 * given
+    assert change["energy_tap" if contact == "resistor" else "energy_contact"] > 0.0
 
 
 @pytest.mark.parametrize("conductance", [1e-12, 1e-3, 0.1, 10.0, 1e3])
@@ -308,3 +326,35 @@ def test_local_demagnetisation_puts_sidebands_beside_the_emf() -> None:
     for n, ratio in ((1, math.sin(math.pi / 2) / (math.pi * 0.75)), (2, 1 / P)):
         for order in (P - n, P + n):
             assert line(order) == pytest.approx(0.5 * depth * ratio, abs=1e-3)
+
+
+@pytest.mark.parametrize("fidelity", ["high", "low"])
+def test_a_weak_pole_pair_dips_the_torque_once_a_turn(fidelity: str) -> None:
+    """Torque per ampere over the rotor's angle: k sum of gap_j sin^2 a_j for sinusoidal currents,
+    gap_j the closed form of the window; the same in both fidelities.
+    """
+    depth, w0 = 0.4, 20.0
+    values = TURNING | PWM | {"motor.torque_limit": 1e3}
+    rec = run(
+        values,
+        duration=2 * math.pi / w0,
+        mode="torque",
+        command=[constant(4.0)],
+        record="motor_torque,current_q,motor_position@2 kHz",
+        scenario={
+            "fault": [fault("local_demagnetisation", "motor", depth)],
+            "initial": {"motor_speed": w0},
+        },
+        fidelity=fidelity,
+    )
+    # The low model shows the torque that acted in the step before.
+    before = 1 if fidelity == "low" else 0
+    angle = rec["motor_position"].values[60 - before : -1 - before]
+    shifts = 2 * math.pi / 3 * np.arange(3)[:, None]
+    away = np.abs((angle - shifts + math.pi) % (2 * math.pi) - math.pi)
+    window = np.where(away < 2 * math.pi / P, 0.5 * (1 + np.cos(P * away / 2)), 0.0)
+    expected = K * ((1 - depth * window) * np.sin(P * angle - shifts) ** 2).sum(axis=0)
+    shown = rec["motor_torque"].values[60:-1] / rec["current_q"].values[60:-1]
+    assert np.ptp(expected) > 0.2 * np.mean(expected)
+    # The ripple of the carrier is not all in the quadrature axis.
+    assert np.max(np.abs(shown - expected)) < (0.03 if fidelity == "high" else 1e-3) * K
