@@ -2,5 +2,7 @@
 
 pub mod bridge;
 pub mod hysteresis;
+pub mod link;
+pub mod losses;
 pub mod six_step;
 pub mod supply;

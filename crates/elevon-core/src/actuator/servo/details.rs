@@ -11,6 +11,8 @@ use crate::control::position_speed::{ControlParameter, ControlStructure};
 use crate::details;
 use crate::inverter::bridge::{self, BridgeStructure};
 use crate::inverter::hysteresis::RelayCrossing;
+use crate::inverter::link::DcLink;
+use crate::inverter::losses;
 use crate::motor::pole::WeakPole;
 use crate::motor::short::{self, ShortStructure};
 use crate::motor::star::{interrupted, warms, MotorStructure};
@@ -41,13 +43,16 @@ details! {
         /// More than ideal switches.
         bridge = bridge_structure.open_phases || bridge::detailed(&x.parts.inverter()) || drive == DriveKind::Off || x.stops();
         measured_current = CurrentSensor::<f64>::needed(&x.parts.current_sensor());
-        accounts = shaft.accounts;
+        /// Electrical energies are accounted: recorded, or needed by the link or the drive's heat.
+        accounts = shaft.accounts || x.link() || x.switches() || (bridge && Network::<f64>::needed(&x.parts.thermal()));
         thermal = warms(&x.parts.motor());
         detailed_motor = motor.detailed();
         detailed_shaft = shaft.full;
         detailed_sensing = sensing.full;
     }
     extra {
+        link = x.link();
+        switching = x.switches();
         heat = Network::<f64>::needed(&x.parts.thermal());
         shorted = shorts.contains(&true);
         current_filter = x.parts.current_sensor().value(CurrentSensorParameter::Bandwidth) > 0.0;
@@ -74,6 +79,15 @@ impl<'a> Needs<'a> {
     /// Is a signal recorded whose name begins so?
     fn records(&self, signals: &[crate::variable::Signal], begin: &str) -> bool {
         self.parts.0.recorded.iter().any(|&s| signals[s].name.starts_with(begin))
+    }
+
+    fn link(&self) -> bool {
+        DcLink::<f64>::needed(&self.parts.link())
+    }
+
+    fn switches(&self) -> bool {
+        let drive = DriveKind::read(self.parts.drive().value(DriveParameter::Kind));
+        losses::switches(&self.parts.switching()) && drive != DriveKind::Off
     }
 
     fn stops(&self) -> bool {

@@ -181,6 +181,12 @@ pub fn electrical() -> Vec<FaultKind> {
             source: "T3 Table 1.1 (power connector)",
         },
         FaultKind {
+            kind: "connector_open", unit: "1", range: Range::Unit, attributes: &[],
+            places: places!("supply": "inverter.connector_open" Set),
+            effect: "1: the power connector is open; the link's capacitor alone feeds the bridge: it empties under load and rises when the motor brakes (no brake chopper)",
+            source: "T3 Table 1.1 (power connector open, 6.64e-7 per hour)",
+        },
+        FaultKind {
             kind: "gain", unit: "1", range: Range::Between(-1.0, 10.0), attributes: &[],
             places: places!("sensor.current_a": "sensor.current.gain_a" Grow, "sensor.current_b": "sensor.current.gain_b" Grow, "sensor.current_c": "sensor.current.gain_c" Grow),
             effect: "relative gain error of a current sensor: the drive controls the wrong current, ripple at twice the electrical frequency",

@@ -5,6 +5,8 @@ use crate::control::current_dq::{PwmParameter, PWM};
 use crate::control::position_speed::{ControlParameter, CONTROL};
 use crate::inverter::bridge::{InverterParameter, INVERTER};
 use crate::inverter::hysteresis::{RelayParameter, RELAYS};
+use crate::inverter::link::{LinkParameter, LINK};
+use crate::inverter::losses::{DriveHeatParameter, SwitchingParameter, DRIVE_HEAT, SWITCHING};
 use crate::motor::cogging::{CoggingParameter, COGGING};
 use crate::motor::equivalent::{LowParameter, LOW};
 use crate::motor::magnetic_pull::{MagneticPullParameter, MAGNETIC_PULL};
@@ -85,6 +87,9 @@ groups! {
     relays: "inverter", RELAYS, RelayParameter;
     short: "motor", SHORT, ShortParameter;
     pole: "motor", POLE, PoleParameter;
+    link: "inverter", LINK, LinkParameter;
+    switching: "inverter", SWITCHING, SwitchingParameter;
+    drive_heat: "thermal", DRIVE_HEAT, DriveHeatParameter;
 }
 
 pub const PORTS: &[Port] = &[

@@ -65,9 +65,9 @@ signals! {
         ResolverSpeed => "resolver_speed", "-", "rad/s", "motor speed the resolver shows";
         LegTransitions => "leg_transitions", "-", "1", "leg transitions since the start; with sampled relays (inverter.relay_crossing) at 1 us a quarter more than relays without delay make: the step's own, as is that part of the currents' ripple";
         Tripped => "tripped", "-", "1", "1 once the drive has tripped";
-        EnergySupply => "energy_supply", "-", "J", "energy drawn from the DC link; while motor.torque_limit cuts the torque, what the EMF takes beyond it is in no other account";
+        EnergySupply => "energy_supply", "-", "J", "energy drawn from the DC link (given by the source, where the link has a capacitor); while motor.torque_limit cuts the torque, what the EMF takes beyond it is in no other account";
         EnergyCopper => "energy_copper", "-", "J", "copper losses, shorted turns included";
-        EnergyInverter => "energy_inverter", "-", "J", "losses in switches and diodes";
+        EnergyInverter => "energy_inverter", "-", "J", "losses in switches and diodes, switching losses included";
         EnergyFriction => "energy_friction", "-", "J", "work against friction, without the brake";
         EnergyBrake => "energy_brake", "-", "J", "work against the brake";
         EnergyLoad => "energy_load", "-", "J", "work against the signed loads";
@@ -76,8 +76,12 @@ signals! {
         EnergyMagnetic => "energy_magnetic", "-", "J", "magnetic energy of the windings, shorted turns included";
         EnergyTap => "energy_tap", "-", "J", "heat of resistors at the centre tap";
         EnergyContact => "energy_contact", "-", "J", "heat of contacts in the windings: shorted turns, phase to phase, to ground";
-        EnergyHeatStored => "energy_heat_stored", "-", "J", "heat in winding and housing above that of the start";
+        EnergyHeatStored => "energy_heat_stored", "-", "J", "heat in winding, housing and drive above that of the start";
         EnergyAir => "energy_air", "-", "J", "heat given to the air";
+        EnergySource => "energy_source", "-", "J", "lost in the source's resistance (inverter.link_capacitance)";
+        EnergyLink => "energy_link", "-", "J", "energy of the link's capacitor above that of the start";
+        DriveTemperature => "drive_temperature", "T_d", "K", "temperature of the drive, warmed by the inverter's losses (thermal network)";
+        HeatDrive => "heat_drive", "-", "W", "losses of the inverter, mean of the network's last tick";
         StopTorque => "stop_torque", "-", "N m", "torque on the fast shaft that the end stop's reaction cancels";
     }
 }

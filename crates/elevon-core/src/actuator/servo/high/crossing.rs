@@ -6,7 +6,7 @@
 
 use super::electric::{electric_step, Coupling};
 use super::model::{Model, State};
-use super::step::measured_current;
+use super::step::{lose_switching, measured_current};
 use crate::actuator::servo::details::Structure;
 use crate::inverter::hysteresis::{count_transitions, crossing, six_step};
 use crate::scalar::Scalar;
@@ -65,6 +65,9 @@ pub(crate) fn located_step<S: Scalar, const FULL: bool>(
     s.star.current = first.0;
     let turned = three!(|j| S::select(which[j], -s.legs[j], s.legs[j]));
     s.transitions = count_transitions(s.transitions, s.legs, turned);
+    if structure.switching {
+        lose_switching(m, s, half_supply + half_supply, s.legs, turned);
+    }
     let legs = s.legs;
     s.legs = turned;
     let rest = S::one() - share;

@@ -8,8 +8,8 @@ mod shorted;
 mod start;
 mod step;
 
-use self::model::{Model, State};
-use self::step::{control_step, park, seen_current, shaft_reading, HighStep};
+use self::model::{Model, State, E_INVERTER};
+use self::step::{control_step, link_voltage, park, seen_current, shaft_reading, HighStep};
 use crate::actuator::servo::advance::Stretch;
 use crate::actuator::servo::details::{sample_steps, Needs, Structure};
 use crate::actuator::servo::form::Form;
@@ -122,6 +122,7 @@ impl<F: Form> Wiring for High<F> {
             TICK_THERMAL => {
                 m.extra.network.tick(&mut s.extra.network);
                 m.shaft.nut.tick(&mut s.shaft.nut);
+                m.extra.drive_heat.tick(&mut s.extra.drive_heat, s.energy[E_INVERTER]);
                 (s.star.resistance_factor, s.star.flux_factor) = m.extra.network.factors(&s.extra.network);
             }
             TICK_DEBRIS => s.shaft.scatter(&m.shaft.screw, noise(4)),
@@ -134,7 +135,7 @@ impl<F: Form> Wiring for High<F> {
                 let (sin, cos) = angle.sin_cos();
                 let (sines, cosines) = three_phase(sin, cos);
                 let (current_q, current_d) = park(seen_current(m, structure, s), sines, cosines);
-                let supply = inputs[SUPPLY].at(t) * m.supply_scale;
+                let supply = link_voltage(m, structure, s, inputs[SUPPLY].at(t) * m.supply_scale);
                 let sample =
                     CurrentSample { reference_d: S::zero(), reference_q: s.current_ref, current_d, current_q, speed, angle, supply };
                 m.current_control.step(&mut s.current_control, &sample);

@@ -8,6 +8,8 @@ use crate::actuator::servo::shaft::{Shaft, ShaftState};
 use crate::control::current_dq::{CurrentControl, CurrentControlState};
 use crate::control::position_speed::{ControlParameter, PositionSpeed, PositionSpeedState};
 use crate::inverter::bridge::{Bridge, BridgeState, InverterParameter};
+use crate::inverter::link::{DcLink, DcLinkState};
+use crate::inverter::losses::{DriveHeat, DriveHeatState, SwitchingParameter};
 use crate::motor::pole::WeakPole;
 use crate::motor::short::Shorts;
 use crate::motor::star::{MotorParameter, Star, StarState};
@@ -41,7 +43,10 @@ pub struct Model<S> {
 pub(crate) struct Extra<S> {
     pub shorts: Shorts<S>,
     pub pole: WeakPole<S>,
+    pub link: DcLink<S>,
+    pub switching_time: S,
     pub network: Network<S>,
+    pub drive_heat: DriveHeat<S>,
     /// Filter of the controlled current.
     pub closing: S,
     pub resolver_off: S,
@@ -76,6 +81,8 @@ pub(crate) struct ExtraState<S> {
     pub sensed: [S; 3],
     /// Current reference of the last step, where crossings of the relays are located.
     pub last_reference: S,
+    pub link: DcLinkState<S>,
+    pub drive_heat: DriveHeatState<S>,
 }
 
 /// Accounts of the electrical part; those of the shaft are its own.
@@ -123,7 +130,10 @@ impl<S: Scalar> Model<S> {
             extra: Extra {
                 shorts: Shorts::derive(view.motor(), view.tap(), view.short(), &star, structure.motor.shorted_loop, dt),
                 pole: WeakPole::derive(view.pole(), at(MotorParameter::PolePairs.at())),
+                link: DcLink::derive(view.link(), dt),
+                switching_time: at(SwitchingParameter::SwitchingTime.at()),
                 network: network(raw, dt0),
+                drive_heat: DriveHeat::derive(view.drive_heat(), at(ThermalParameter::Ambient.at()), S::splat(network_period(raw, dt0))),
                 closing: closing(at(CurrentSensorParameter::Bandwidth.at()), dt0),
                 resolver_off: at(ResolverParameter::PowerOff.at()),
             },

@@ -2,7 +2,7 @@
 
 use super::electric::{coupling, motor_torque};
 use super::model::*;
-use super::step::{leg_current, park, seen_current};
+use super::step::{leg_current, link_voltage, park, seen_current};
 use crate::actuator::servo::advance::Instant;
 use crate::actuator::servo::details::Structure;
 use crate::actuator::servo::form::Form;
@@ -33,6 +33,8 @@ pub(crate) fn high<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, inpu
     set(Q::HeatLoop, warm.power[1]);
     set(Q::HeatContact, warm.power[2]);
     set(Q::HeatAir, warm.power[3]);
+    set(Q::DriveTemperature, s.extra.drive_heat.temperature);
+    set(Q::HeatDrive, s.extra.drive_heat.power);
     set(Q::ThermalWarning, m.extra.network.warns(warm));
     set(Q::Limited, m.control.limited(&s.control));
     let [encoder, resolver, speed] = m.sensing.show(&structure.sensing, &s.shaft, s.held_angle);
@@ -66,7 +68,7 @@ fn electrical<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>
     let mut set = |q: Q, x: S| out[q as usize] = x;
     let (sin, cos) = m.star.electrical_angle(s.shaft.motor_position).sin_cos();
     let (sines, cosines) = three_phase(sin, cos);
-    let supply = inputs[SUPPLY].at(t) * m.supply_scale;
+    let supply = link_voltage(m, structure, s, inputs[SUPPLY].at(t) * m.supply_scale);
     set(Q::SupplyVoltage, supply);
     let (turns, contact, shorts) = (s.star.current, &s.star.contact, &m.extra.shorts);
     let phases = shorts.phases(&structure.shorts, turns, contact);
@@ -124,9 +126,11 @@ fn mechanical<S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s:
 
 #[inline(always)]
 fn energies<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, out: &mut [S]) {
-    let (e, w) = (&s.energy, &s.shaft.work);
+    let (e, w, link) = (&s.energy, &s.shaft.work, &s.extra.link);
     for (q, value) in [
-        (Q::EnergySupply, e[E_SUPPLY]),
+        (Q::EnergySupply, if structure.link { link.given } else { e[E_SUPPLY] }),
+        (Q::EnergySource, link.lost),
+        (Q::EnergyLink, m.extra.link.stored(link)),
         (Q::EnergyCopper, e[E_COPPER]),
         (Q::EnergyInverter, e[E_INVERTER]),
         (Q::EnergyTap, e[E_TAP]),
@@ -139,8 +143,9 @@ fn energies<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, out: &
     ] {
         out[q as usize] = value;
     }
-    out[Q::EnergyHeatStored as usize] = m.extra.network.stored(&s.extra.network);
-    out[Q::EnergyAir as usize] = s.extra.network.heat_out;
+    let drive = &s.extra.drive_heat;
+    out[Q::EnergyHeatStored as usize] = m.extra.network.stored(&s.extra.network) + m.extra.drive_heat.stored(drive);
+    out[Q::EnergyAir as usize] = s.extra.network.heat_out + drive.heat_out;
     let half = S::splat(0.5);
     let magnetic = (0..3).fold(S::zero(), |sum, j| sum + half * s.star.current[j] * s.star.current[j] / m.star.per_inductance[j]);
     out[Q::EnergyMagnetic as usize] = magnetic + m.extra.shorts.magnetic(&structure.shorts, &s.star.contact);

@@ -5,6 +5,7 @@ use crate::actuator::servo::layout::*;
 use crate::control::current_dq::CurrentControlState;
 use crate::control::position_speed::PositionSpeedState;
 use crate::inverter::bridge::BridgeState;
+use crate::inverter::link::DcLinkState;
 use crate::motor::star::{MotorParameter, StarState};
 use crate::motor::thermal::{NetworkState, ThermalModel, ThermalParameter};
 use crate::scalar::Scalar;
@@ -46,7 +47,13 @@ pub(crate) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> St
         transitions: zero,
         voltage: [zero; 3],
         energy: [zero; 5],
-        extra: ExtraState { network: warm, sensed: star.current, last_reference: S::splat(f64::NAN) },
+        extra: ExtraState {
+            network: warm,
+            sensed: star.current,
+            last_reference: S::splat(f64::NAN),
+            link: DcLinkState::rest(),
+            drive_heat: model.extra.drive_heat.start(),
+        },
     }
 }
 

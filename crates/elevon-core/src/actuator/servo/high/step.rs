@@ -4,11 +4,12 @@
 
 use super::crossing::{located_step, Seen};
 use super::electric::{coupling, electric_step, motor_torque};
-use super::model::{Model, State};
+use super::model::{Model, State, E_INVERTER, E_SUPPLY};
 use crate::actuator::servo::advance::{Instant, Stepper};
 use crate::actuator::servo::details::Structure;
 use crate::actuator::servo::layout::DriveKind;
 use crate::inverter::hysteresis::{count_transitions, relays, six_step};
+use crate::inverter::losses::switching_loss;
 use crate::scalar::{three_phase, Scalar};
 use crate::sensor::filter::low_pass;
 use crate::sensor::resolver::Reading;
@@ -78,6 +79,24 @@ pub(crate) fn park<S: Scalar>(x: [S; 3], sin: [S; 3], cos: [S; 3]) -> (S, S) {
     (q, d)
 }
 
+/// Voltage that the bridge has from a source: the link's capacitor, where there is one.
+#[inline(always)]
+pub(crate) fn link_voltage<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, source: S) -> S {
+    if structure.link {
+        m.extra.link.voltage(&s.extra.link, source)
+    } else {
+        source
+    }
+}
+
+/// What the legs' transitions lose: drawn from the link, heat in the inverter.
+#[inline(always)]
+pub(crate) fn lose_switching<S: Scalar>(m: &Model<S>, s: &mut State<S>, supply: S, old: [S; 3], new: [S; 3]) {
+    let lost = switching_loss(m.extra.switching_time, supply, s.star.current, old, new);
+    s.energy[E_SUPPLY] = s.energy[E_SUPPLY] + lost;
+    s.energy[E_INVERTER] = s.energy[E_INVERTER] + lost;
+}
+
 #[inline(always)]
 fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     m: &Model<S>,
@@ -104,7 +123,9 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     let (sin_phases, cos_phases) = three_phase(sin_c, cos_c);
 
     // Power electronics.
-    let half_supply = S::splat(0.5) * (x.supply * m.supply_scale);
+    let source = x.supply * m.supply_scale;
+    let supply = if EXTRA { link_voltage(m, structure, s, source) } else { source };
+    let half_supply = S::splat(0.5) * supply;
     let old_legs = s.legs;
     let mut error = [S::zero(); 3];
     if PWM || (FULL && structure.drive == DriveKind::Pwm) {
@@ -121,6 +142,10 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
         s.legs = three!(|j| S::select(lost, S::zero(), s.legs[j]));
     }
     s.transitions = count_transitions(s.transitions, old_legs, s.legs);
+    let drawn_before = s.energy[E_SUPPLY];
+    if EXTRA && structure.switching {
+        lose_switching(m, s, supply, old_legs, s.legs);
+    }
 
     // Motor electromagnetics.
     let c = coupling::<S, FULL>(m, structure, s, sin, cos);
@@ -132,6 +157,9 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     } else {
         electric_step::<S, FULL, EXTRA>(m, structure, s, &c, half_supply, old_legs)
     };
+    if EXTRA && structure.link {
+        m.extra.link.step(&mut s.extra.link, source, s.energy[E_SUPPLY] - drawn_before);
+    }
     if structure.acquisition {
         let (q, d) = park(measured, sin_phases, cos_phases);
         let (v_q, _) = park(voltage, sin_phases, cos_phases);

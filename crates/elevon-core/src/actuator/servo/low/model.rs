@@ -10,6 +10,7 @@ use crate::control::current_dq::PwmParameter;
 use crate::control::position_speed::{ControlParameter, ControlStructure, Mode};
 use crate::details;
 use crate::inverter::bridge::InverterParameter;
+use crate::inverter::link::{DcLink, DcLinkState};
 use crate::motor::equivalent::{Circuit, LowParameter};
 use crate::motor::pole::WeakPole;
 use crate::motor::star::{interrupted, MotorParameter, MotorStructure, Star, StarState};
@@ -39,6 +40,7 @@ details! {
             || interrupted(&parts.motor())
             || parts.motor().any_away([MotorParameter::TurnsA, MotorParameter::TurnsB, MotorParameter::TurnsC]);
         heat = Network::<f64>::needed(&parts.thermal());
+        link = DcLink::<f64>::needed(&parts.link());
         detailed_shaft = shaft.full;
         detailed_sensing = sensing.full;
     }
@@ -92,10 +94,12 @@ pub struct Drive<S> {
     /// p L of the cross coupling.
     pub electrical_inductance: S,
     pub tripped: S,
+    pub link: DcLink<S>,
 }
 
 #[derive(Clone, Copy, Debug)]
 pub struct State<S> {
+    pub link: DcLinkState<S>,
     pub resistance_factor: S,
     pub flux_factor: S,
     pub network: NetworkState<S>,
@@ -153,6 +157,7 @@ impl<S: Scalar> Drive<S> {
             supply_scale: at(InverterParameter::SupplyScale.at()),
             electrical_inductance: at(MotorParameter::PolePairs.at()) * inductance,
             tripped: S::indicator(S::splat(0.5).lt(shorted)),
+            link: DcLink::derive(Raw(raw).link(), dt),
         }
     }
 }
@@ -198,6 +203,7 @@ impl<S: Scalar> Model<S> {
         let warm = self.network.start_at([initial[3], initial[4]]);
         let (resistance_factor, flux_factor) = heat(raw, &warm);
         State {
+            link: DcLinkState::rest(),
             resistance_factor,
             flux_factor,
             network: warm,

@@ -13,6 +13,7 @@ pub(super) fn observe<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, i
     let shown = m.shaft.show(&structure.shaft, &x, &s.shaft, s.motor_torque);
     let [encoder, resolver, resolver_speed] = m.sensing.show(&structure.sensing, &s.shaft, s.held_angle);
     let limited = m.control.speed_limit.le(s.speed_ref.abs()) | m.control.torque_limit.le(s.torque_ref.abs());
+    let source = x.supply * m.drive.supply_scale;
     for (q, value) in [
         (Q::Command, x.command),
         (Q::UserPosition, s.shaft.user_position),
@@ -31,7 +32,7 @@ pub(super) fn observe<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, i
         (Q::BrakeTorque, x.brake),
         (Q::LoadTorque, shown.load),
         (Q::StopTorque, shown.stop),
-        (Q::SupplyVoltage, x.supply * m.drive.supply_scale),
+        (Q::SupplyVoltage, if structure.link { m.drive.link.voltage(&s.link, source) } else { source }),
         (Q::WindingTemperature, if structure.heat { s.network.winding } else { m.temperature }),
         (Q::SurfaceTemperature, s.network.surface),
         (Q::HeatCopper, s.network.power[0]),

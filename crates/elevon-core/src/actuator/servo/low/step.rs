@@ -53,7 +53,8 @@ fn electric_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structur
         DriveKind::Off => S::zero(),
     };
     let driving = circuit.voltage(s.current, target);
-    let supply = x.supply * m.drive.supply_scale;
+    let source = x.supply * m.drive.supply_scale;
+    let supply = if FULL && structure.link { m.drive.link.voltage(&s.link, source) } else { source };
     let cross = m.drive.electrical_inductance * speed * s.current;
     let largest = m.drive.voltage_ratio * supply;
     // v_q^2 + v_d^2 stays inside the largest phase voltage; v_d is the cross coupling p omega L i_q.
@@ -69,6 +70,11 @@ fn electric_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structur
     s.tripped = s.tripped.maximum(m.drive.tripped);
     let before = s.current;
     s.current = reached * (S::one() - s.tripped);
+    if FULL && structure.link {
+        // Terminal power of the three phases, 3/2 v_q i_q, at the step's middle.
+        let power = S::splat(0.75) * s.voltage * (before + s.current);
+        m.drive.link.step(&mut s.link, source, power * m.dt);
+    }
     if FULL && structure.heat {
         // Sum of R_j i_j^2 of the three phases, at the step's middle.
         let middle = S::splat(0.5) * (before + s.current);
