@@ -35,12 +35,31 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
         "current_q",
         "current_d",
     ),
+    "gear": (
+        "command",
+        "state",
+        "fault_code",
+        "warning_code",
+        "command_refused",
+        "locked",
+        "brake_released",
+        "released",
+        "user_position",
+        "user_speed",
+        "motor_speed",
+        "current_mean",
+        "current_peak",
+        "supply_voltage",
+    ),
     "currents": ("current_a", "current_b", "current_c"),
     "voltages": ("voltage_a", "voltage_b", "voltage_c"),
 }
 
 #: What is kept when nothing is said: the rate of the Torino drive's log (T1).
 DEFAULT_RECORD = "drive_log,essential@400 Hz"
+
+#: The same for an actuator with a control unit: what a test engineer reads.
+DEFAULT_GEAR_RECORD = "gear@500 Hz"
 
 _EVERY = "every"
 _ALL = "all"
@@ -91,8 +110,9 @@ def record_plan(
     ----------
     record : str, sequence of str or None
         Texts ``SIGNALS@RATE``: names or groups (``drive_log``, ``essential``, ``currents``,
-        ``voltages``, ``all``) separated by commas, and a rate with unit, or ``every`` for every
-        solver step. None: drive log and essentials at 400 Hz.
+        ``voltages``, ``gear``, ``all``) separated by commas, and a rate with unit, or ``every`` for
+        every solver step. None: drive log and essentials at 400 Hz; of an actuator with a control
+        unit the group ``gear`` at 500 Hz.
     units : mapping
         The model's signals.
     step : float
@@ -111,7 +131,9 @@ def record_plan(
         The rate is no whole number of steps (the nearest possible rates are named), or a signal
         is asked for at two rates.
     """
-    texts = [DEFAULT_RECORD] if record is None else [record] if isinstance(record, str) else record
+    if record is None:
+        record = DEFAULT_GEAR_RECORD if "fault_code" in units else DEFAULT_RECORD
+    texts = [record] if isinstance(record, str) else record
     if not texts:
         raise InputError("record: nothing is recorded; leave it out for the default")
     chosen: dict[int, list[str]] = {}

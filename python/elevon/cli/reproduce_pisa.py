@@ -20,7 +20,7 @@ from elevon.cli.reproduce import (
     write,
 )
 
-__all__ = ["pisa_friction", "pisa_functional", "pisa_hydraulic"]
+__all__ = ["pisa_failures", "pisa_friction", "pisa_functional", "pisa_hydraulic"]
 
 
 @app.command("pisa-functional")
@@ -94,6 +94,40 @@ def pisa_hydraulic(
         write(out, hydraulic_report(result, date=date), values["rows"], force)
     columns = ("temperature_c", "nz", "direction", "hydraulic_mm_s", "electric_mm_s")
     return _answer(values, columns, as_json, "ram speed in mid-stroke")
+
+
+@app.command("pisa-failures")
+def pisa_failures(
+    *,
+    as_json: Json = False,
+    out: Out = None,
+    force: Force = False,
+    seed: Seed = 0,
+    date: Date = None,
+    fidelity: Annotated[str, typer.Option("--fidelity", help="high or low.")] = "high",
+) -> int:
+    """Every fault in every phase: what the control unit indicates, what is true, is it safe."""
+    from elevon.cli.output import progress_bar
+    from elevon.reproduce.pisa_failures import reproduce_failures
+    from elevon.reproduce.pisa_failures_page import failures_report, summary
+
+    check_folder(out, force)
+    with progress_bar("every fault in every phase") as advance:
+        result = reproduce_failures(fidelity=fidelity, seed=seed, progress=advance)
+    values = result.to_dict()
+    if out is not None:
+        write(out, failures_report(result, date=date), values["rows"], force)
+    if as_json:
+        print_json(values)
+        return exit_code(values)
+    print_table(*summary(result), title="faults in each phase: indicated falsely, detected, silent")
+    unsafe = [row for row in values["rows"] if not row["safe"]]
+    columns = ("fault", "phase", "indicated", "true_state", "detected_by", "time_s", "sensors")
+    rows = [[_cell(row[name]) for name in columns] for row in unsafe]
+    if rows:
+        print_table([name.replace("_", " ") for name in columns], rows, title="unsafe rows")
+    print_checks(values)
+    return exit_code(values)
 
 
 def _answer(values: dict[str, Any], columns: tuple[str, ...], as_json: bool, title: str) -> int:

@@ -69,9 +69,9 @@ def simulate(
         recording.plot(path=plot, force=force)
         say(f"wrote {plot}")
     if json:
-        print_json(_result(recording, out, plot))
+        print_json(_result(recording, loaded.wiring, out, plot))
     else:
-        _print_result(recording)
+        _print_result(recording, loaded.wiring)
 
 
 def _check_files(out: Path | None, plot: Path | None, *, force: bool) -> None:
@@ -88,7 +88,7 @@ def _check_files(out: Path | None, plot: Path | None, *, force: bool) -> None:
     check_outputs([out, plot], force=force)
 
 
-def _result(recording: Any, out: Path | None, plot: Path | None) -> dict[str, Any]:
+def _result(recording: Any, wiring: str, out: Path | None, plot: Path | None) -> dict[str, Any]:
     meta = recording.meta
     keys = ("status", "message", "actuator", "fidelity", "seed", "parameter_hash", "version")
     return {
@@ -99,12 +99,26 @@ def _result(recording: Any, out: Path | None, plot: Path | None) -> dict[str, An
         "steps": meta["steps"],
         "final": recording.final,
         "labels": recording.labels,
+        **_events(recording, wiring),
         "out": out,
         "plot": plot,
     }
 
 
-def _print_result(recording: Any) -> None:
+def _events(recording: Any, wiring: str) -> dict[str, Any]:
+    """Return the timeline of an actuator with a control unit; of any other nothing."""
+    from elevon.simulate.timeline import has_states, timeline
+
+    if not has_states(wiring):
+        return {}
+    events = [
+        {"time_s": event.time, "signal": event.signal, "text": event.text}
+        for event in timeline(recording, wiring)
+    ]
+    return {"events": events}
+
+
+def _print_result(recording: Any, wiring: str) -> None:
     meta = recording.meta
     speed = meta["sim_s"] / meta["wall_s"] if meta["wall_s"] > 0.0 else float("inf")
     message = f" ({meta['message']})" if meta["message"] else ""
@@ -113,13 +127,35 @@ def _print_result(recording: Any) -> None:
         f"{meta['sim_s']:g} s simulated in {meta['wall_s']:.3g} s "
         f"({speed:.3g} times real time, {meta['ns_per_step']:.3g} ns a step)\n"
     )
+    from elevon.simulate.timeline import code_names
+
+    events = _events(recording, wiring).get("events")
+    if events is not None:
+        lines = [[f"{event['time_s']:.3f}", event["text"]] for event in events]
+        print_table(("time [s]", "event"), lines or [["", "nothing changed"]])
+        typer.echo("")
     rows = []
     for channel in recording.channels:
-        low, high = (channel.values.min(), channel.values.max()) if len(channel) else ("", "")
-        final = channel.values[-1] if len(channel) else ""
-        rows.append([channel.name, channel.unit, *(_cell(x) for x in (low, high, final))])
+        name, values = channel.name, channel.values
+        words = code_names(wiring, name) if events is not None and name in _WORDS else {}
+        unit, scale = (
+            _SHOWN.get(name, (channel.unit, 1.0)) if events is not None else (channel.unit, 1.0)
+        )
+        if not len(channel):
+            rows.append([name, unit, "", "", ""])
+        elif words:
+            rows.append([name, "", "", "", words.get(round(float(values[-1])), f"{values[-1]:g}")])
+        else:
+            shown = (values.min(), values.max(), values[-1])
+            rows.append([name, unit, *(f"{scale * x:.6g}" for x in shown)])
     print_table(("signal", "unit", "least", "greatest", "last"), rows)
 
 
-def _cell(value: Any) -> str:
-    return value if isinstance(value, str) else f"{value:.6g}"
+_WORDS = ("command", "state", "fault_code", "warning_code", "command_refused")
+"""Signals of a control unit that are shown by name."""
+_SHOWN = {
+    "user_position": ("mm", 1e3),
+    "user_speed": ("mm/s", 1e3),
+    "nut_position": ("mm", 1e3),
+}
+"""Units in which a test engineer reads them."""

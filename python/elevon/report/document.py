@@ -36,6 +36,8 @@ class Table:
         Indices of rows that are set apart by colour.
     formats : sequence of str, optional
         One format a column (such as ``+.4f``) for its numbers; an empty one means `digits`.
+    folded : str
+        Heading under which a long table stands closed until it is opened; empty: shown.
     """
 
     columns: Sequence[str]
@@ -44,6 +46,7 @@ class Table:
     digits: int = 5
     marked: frozenset[int] = frozenset()
     formats: Sequence[str] = ()
+    folded: str = ""
 
     def cell(self, value: object, column: int = 0) -> str:
         """Return the text of one cell."""

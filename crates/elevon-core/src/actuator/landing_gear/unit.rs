@@ -24,7 +24,7 @@ pub struct Unit {
     line: f64,
     hall_errors: f64,
     hanging: f64,
-    told: bool,
+    reported: bool,
 }
 
 /// What the plant shows the unit at a tick.
@@ -97,7 +97,7 @@ impl Unit {
             line: 0.0,
             hall_errors: 0.0,
             hanging: 0.0,
-            told: false,
+            reported: false,
         }
     }
 
@@ -157,8 +157,8 @@ impl Unit {
     fn judge(&mut self, shown: &Shown, dt: f64) {
         let hangs = self.sequence.released && shown.locked < 0.5 && shown.nut_speed == 0.0 && !shown.rig;
         self.hanging = if hangs { self.hanging + dt } else { 0.0 };
-        if self.hanging > HANGING && !self.told {
-            self.told = true;
+        if self.hanging > HANGING && !self.reported {
+            self.reported = true;
             self.sequence.notes.add(Note::Hanging { time: shown.time, place: shown.ram });
         }
     }

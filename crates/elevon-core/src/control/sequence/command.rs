@@ -1,4 +1,4 @@
-//! Commands: taken, refused, repeated; and the notes from which a run says what went otherwise than commanded.
+//! Commands: accepted, refused, repeated; and the notes from which a run says what went otherwise than commanded.
 
 use super::codes::*;
 use super::{Phase, Seen, Sequence, SequenceParameter as P};

@@ -138,8 +138,9 @@ pub struct Sequence {
     retries: f64,
     standing: f64,
     slow: f64,
-    /// Time at rest, the count then, and the time for which the switch of the end has been off.
+    /// Time at rest, the counts at its begin and once settled, and the time for which the switch of the end has been off.
     resting: f64,
+    arrived: f64,
     anchor: f64,
     gone: f64,
     /// Furthest count of a move in its direction.
@@ -180,6 +181,7 @@ impl Sequence {
             standing: 0.0,
             slow: 0.0,
             resting: 0.0,
+            arrived: 0.0,
             anchor: 0.0,
             gone: 0.0,
             furthest: 0.0,

@@ -78,6 +78,9 @@ impl Sequence {
     /// At rest the count stands still, and the switch of the end stays on. The count is zeroed at the ends.
     fn watch_rest(&mut self, p: &[f64], see: &Seen) {
         let settled = self.resting >= p[P::RestTime as usize];
+        if self.resting == 0.0 {
+            self.arrived = see.counted;
+        }
         self.resting += see.dt;
         if !settled {
             self.anchor = see.counted;
@@ -91,10 +94,11 @@ impl Sequence {
             _ => false,
         };
         self.gone = if left { self.gone + see.dt } else { 0.0 };
-        if (see.counted - self.anchor).abs() > p[P::RestTravel as usize] {
+        let moved = |from: f64| (see.counted - from).abs() > p[P::RestTravel as usize];
+        if moved(self.anchor) {
             self.fail(see, UNCOMMANDED);
         } else if self.gone > p[P::ProximityTime as usize] {
-            self.fail(see, PROXIMITY);
+            self.fail(see, if moved(self.arrived) { UNCOMMANDED } else { PROXIMITY });
         }
     }
 

@@ -1,0 +1,330 @@
+"""Every fault of the landing gear in every phase: what the unit indicates, and what is true.
+
+Kinds, places and ranges of the faults are the core's own records; a fault that is added there is
+a row here. A row is safe unless the unit shows `locked` or `retracted` while the leg is not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.errors import SimulationError
+from elevon.report.checks import Check, all_passed
+from elevon.reproduce.pisa_gear import ACTUATOR
+from elevon.simulate.timeline import code_names
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.faults.catalogue import FaultRecord
+    from elevon.progress import Progress
+    from elevon.recording import Recording
+
+__all__ = ["LISTED", "PHASES", "FailureRow", "FailuresResult", "Phase", "reproduce_failures"]
+
+RECORD = (
+    "state,fault_code,warning_code,locked,user_position,user_speed,nut_position,"
+    "brake_released@500 Hz"
+)
+EXTENDED = 0.267
+RETRACTED_WITHIN = 3e-3
+"""The switch at 0 %, its hysteresis and the way in which the brake stops the motor [m]."""
+RESPONSE = 0.05
+"""A false indication that lasts no longer is the response of switches and watches [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Phase:
+    """A phase in which a fault comes.
+
+    Attributes
+    ----------
+    name : str
+        As printed.
+    start : float or None
+        Nut position at power-up in m; None: retracted.
+    action : str
+        What is commanded at 0.1 s; empty: nothing.
+    fault : float
+        Time at which the fault comes, in s.
+    duration : float
+        Of the run, in s: at rest long enough to fall, in a move long enough for all retries.
+    """
+
+    name: str
+    start: float | None
+    action: str
+    fault: float
+    duration: float
+
+
+PHASES = (
+    Phase("extend, before the start", None, "extend", 0.05, 30.0),
+    Phase("extend", None, "extend", 2.5, 30.0),
+    Phase("extend, last quarter", None, "extend", 5.5, 30.0),
+    Phase("retract, before the start", EXTENDED, "retract", 0.05, 20.0),
+    Phase("retract", EXTENDED, "retract", 2.5, 20.0),
+    Phase("retract, last quarter", EXTENDED, "retract", 5.5, 20.0),
+    Phase("at rest, retracted", None, "", 0.5, 4.0),
+    Phase("at rest, mid-stroke", 0.13, "", 0.5, 4.0),
+    Phase("at rest, locked", EXTENDED, "", 0.5, 4.0),
+    Phase("free fall, before the start", None, "free_fall", 0.05, 12.0),
+    Phase("free fall", None, "free_fall", 1.5, 12.0),
+    Phase("free fall, last quarter", None, "free_fall", 3.2, 12.0),
+)
+
+LISTED: Mapping[tuple[str, str, str], str] = {
+    ("proximity_on", "sensor.proximity_100", "free fall, last quarter"): (
+        "the lock's switch, the failed one, is the only sensor that sees the lock once the stages "
+        "are apart; the switch at 75 % agrees"
+    ),
+}
+"""Unsafe rows that no sensor could prevent: kind, place and phase, with who could have seen it."""
+
+
+@dataclass(frozen=True, slots=True)
+class FailureRow:
+    """One fault in one phase."""
+
+    fault: str
+    phase: str
+    indicated: str
+    true_state: str
+    safe: bool
+    detected_by: str
+    time_s: float | None
+    sensors: str
+    listed: bool
+    position_mm: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return one row of the command's JSON object."""
+        return {
+            "fault": self.fault,
+            "phase": self.phase,
+            "indicated": self.indicated,
+            "true_state": self.true_state,
+            "safe": self.safe,
+            "detected_by": self.detected_by,
+            "time_s": self.time_s,
+            "sensors": self.sensors,
+            "position_mm": self.position_mm,
+        }
+
+
+@dataclass(frozen=True)
+class FailuresResult:
+    """Everything `elevon reproduce pisa-failures` reports."""
+
+    rows: list[FailureRow]
+    fidelity: str
+    checks: list[Check]
+    seed: int
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object of the command."""
+        return {
+            "status": "pass" if all_passed(self.checks) else "fail",
+            "fidelity": self.fidelity,
+            "rows": [row.to_dict() for row in self.rows],
+            "checks": [check.to_dict() for check in self.checks],
+            "seed": self.seed,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class _Case:
+    record: FaultRecord
+    place: str
+    severity: float
+    phase: Phase
+
+    @property
+    def fault(self) -> str:
+        from elevon.units import format_quantity
+
+        return f"{self.record.kind}@{self.place}={format_quantity(self.severity, self.record.unit)}"
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        return (self.record.kind, self.place, self.phase.name)
+
+
+def reproduce_failures(
+    *,
+    fidelity: str = "high",
+    seed: int = 0,
+    faults: Sequence[str] | None = None,
+    progress: Progress | None = None,
+) -> FailuresResult:
+    """Run every fault of the catalogue in every phase and judge what the unit indicates.
+
+    Parameters
+    ----------
+    fidelity : str
+        ``high`` or ``low``; faults that the fidelity does not carry are left out.
+    seed : int
+        Of the random numbers.
+    faults : sequence of str, optional
+        Only these kinds; None: all. The listed rows are held against what was run.
+    progress : Progress, optional
+        Called with the fraction done.
+
+    Raises
+    ------
+    SimulationError
+        A run diverged or was interrupted.
+    """
+    from elevon.actuator import Actuator
+    from elevon.simulate import Run, simulate_batch
+
+    actuator = Actuator.load(ACTUATOR)
+    cases = list(_cases(actuator, fidelity, faults))
+    runs = [
+        Run(actuator, _scenario(case), seed, f"{case.fault}, {case.phase.name}", number)
+        for number, case in enumerate(cases)
+    ]
+    recordings = simulate_batch(runs, fidelity=fidelity, record=RECORD, progress=progress)
+    for recording in recordings:
+        if recording.status not in {"ok", "tripped"}:
+            raise SimulationError(
+                f"{recording.meta['label']}: {recording.meta['message']}", recording.status
+            )
+    rows = [
+        judge(recording, case.phase, case.fault, LISTED.get(case.key), actuator.wiring)
+        for case, recording in zip(cases, recordings, strict=True)
+    ]
+    return FailuresResult(rows, fidelity, _checks(rows, cases), seed)
+
+
+def _cases(actuator: Actuator, fidelity: str, faults: Sequence[str] | None) -> Iterator[_Case]:
+    from elevon.faults.catalogue import catalogue
+
+    for record in catalogue(actuator.wiring):
+        if fidelity not in record.fidelities or (faults is not None and record.kind not in faults):
+            continue
+        for place in record.places:
+            for severity in severities(record):
+                for phase in PHASES:
+                    yield _Case(record, place, severity, phase)
+
+
+def severities(record: FaultRecord) -> tuple[float, ...]:
+    """Return what is tried of a kind: all of it where it is a share, else half its range.
+
+    A range with both signs is tried with both.
+    """
+    top = record.maximum
+    chosen = top if record.unit == "1" and top == 1.0 else 0.5 * top
+    return (chosen, -chosen) if record.minimum < 0.0 else (chosen,)
+
+
+def _scenario(case: _Case) -> Any:
+    from elevon.scenario import Scenario
+
+    phase = case.phase
+    steps = [{"time": 0.1, "action": phase.action}] if phase.action else []
+    fault = {
+        "kind": case.record.kind,
+        "place": case.place,
+        "severity": case.severity,
+        "profile": {"kind": "step", "time": phase.fault},
+        **{item["name"]: 0.0 for item in case.record.attributes if item["default"] is None},
+    }
+    data: dict[str, Any] = {
+        "duration": phase.duration,
+        "command": {"mode": "gear", "steps": steps},
+        "fault": [fault],
+    }
+    if phase.start is not None:
+        data["initial"] = {"nut_position": phase.start}
+    return Scenario.from_dict(data)
+
+
+def judge(
+    recording: Recording, phase: Phase, fault: str, listed: str | None, wiring: str
+) -> FailureRow:
+    """Compare what the unit indicated with what was true, from the fault on.
+
+    Parameters
+    ----------
+    recording : Recording
+        With the signals of `RECORD`.
+    phase : Phase
+        When the fault came.
+    fault : str
+        As printed.
+    listed : str or None
+        Who could have seen it, for a row of the listed set.
+    wiring : str
+        Whose codes they are.
+    """
+    state, locked = recording["state"], recording["locked"].values > 0.5
+    ram = recording["user_position"].values
+    names = code_names(wiring, "state")
+    code = {word: number for number, word in names.items()}
+    false = ((state.values == code["locked"]) & ~locked) | (
+        (state.values == code["retracted"]) & (ram > RETRACTED_WITHIN)
+    )
+    lasting = _lasting(false, state.time)
+    at = int(lasting[0]) if lasting.size else -1
+    detected, time = _detected(recording, phase, wiring)
+    return FailureRow(
+        fault,
+        phase.name,
+        names[int(state.values[at])],
+        _true_state(bool(locked[at]), float(ram[at]), float(recording["user_speed"].values[at])),
+        not lasting.size,
+        detected,
+        time,
+        listed or "",
+        listed is not None,
+        1e3 * float(ram[at]),
+    )
+
+
+def _lasting(false: npt.NDArray[np.bool_], time: npt.NDArray[np.float64]) -> npt.NDArray[np.intp]:
+    """Return the first sample of each false indication at which it outlasts the response."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], false.astype(int), [0]])))
+    found = [
+        int(np.searchsorted(time, time[first] + RESPONSE))
+        for first, last in zip(edges[::2], edges[1::2], strict=True)
+        if time[last - 1] - time[first] > RESPONSE
+    ]
+    return np.array(found, dtype=np.intp)
+
+
+def _true_state(locked: bool, ram: float, speed: float) -> str:
+    if locked:
+        return "locked"
+    if ram <= RETRACTED_WITHIN:
+        return "retracted"
+    return "between, moving" if abs(speed) > 1e-6 else "between, at rest"
+
+
+def _detected(recording: Recording, phase: Phase, wiring: str) -> tuple[str, float | None]:
+    """Return what the unit reported first, and how long after the fault."""
+    for signal, word in (("fault_code", "fault"), ("warning_code", "warning")):
+        channel = recording[signal]
+        after = np.flatnonzero((channel.values > 0.0) & (channel.time >= phase.fault))
+        if after.size:
+            code = int(channel.values[after[0]])
+            name = code_names(wiring, signal).get(code, str(code))
+            return f"{word}: {name}", float(channel.time[after[0]]) - phase.fault
+    return "-", None
+
+
+def _checks(rows: Sequence[FailureRow], cases: Sequence[_Case]) -> list[Check]:
+    unsafe = [row for row in rows if not row.safe]
+    stale = [row for row in rows if row.listed and row.safe]
+    return [
+        Check(
+            "unsafe rows outside the listed set", sum(not row.listed for row in unsafe), 0.0, "rows"
+        ),
+        Check("listed rows that are safe", len(stale), 0.0, "rows"),
+        Check("rows, one a fault, place, severity and phase", len(rows), len(cases), "rows", True),
+    ]

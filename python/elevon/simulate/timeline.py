@@ -1,0 +1,135 @@
+"""What happened when: the codes of a control unit in words, and a run as a list of events."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from elevon.recording import Recording
+
+__all__ = ["Event", "code_names", "has_states", "timeline"]
+
+_CODES = ("command", "command_refused", "state", "fault_code", "warning_code")
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that changed.
+
+    Attributes
+    ----------
+    time : float
+        s from the start of the run.
+    signal : str
+        The signal that changed.
+    text : str
+        To what, in words.
+    """
+
+    time: float
+    signal: str
+    text: str
+
+
+@lru_cache
+def code_names(wiring: str, signal: str) -> dict[int, str]:
+    """Return the words for the codes of a signal, read from the core's own record of it.
+
+    Parameters
+    ----------
+    wiring : str
+        Such as ``landing_gear``.
+    signal : str
+        Such as ``state``.
+
+    Returns
+    -------
+    dict
+        Word by code; empty for a signal without codes or one the wiring does not have.
+    """
+    from elevon import _core
+
+    texts = {item["name"]: item["text"] for item in _core.signals(wiring, "high")}
+    found = re.findall(r"(\d+) ([^,;:]+)", texts.get(signal, ""))
+    return {int(code): word.strip() for code, word in found}
+
+
+def has_states(wiring: str) -> bool:
+    """Tell whether a wiring has a control unit with states."""
+    return len(code_names(wiring, "state")) > 1
+
+
+def timeline(recording: Recording, wiring: str) -> list[Event]:
+    """Return what commands, states, faults, warnings, lock and brake did, in order of time.
+
+    Parameters
+    ----------
+    recording : Recording
+        A run of an actuator with a control unit; signals that were not recorded are left out.
+    wiring : str
+        Its wiring.
+
+    Returns
+    -------
+    list of Event
+        The times are those of the first sample that shows the change.
+    """
+    events: list[Event] = []
+    for name in _CODES:
+        if name in recording.names:
+            words = code_names(wiring, name)
+            none = words.get(0) in {"none", "accepted"}
+            events += [
+                Event(time, name, _phrase(name, words.get(code, str(code))))
+                for time, code in _changes(recording, name)
+                if code != 0 or not none
+            ]
+    for name, on, off in (
+        ("locked", "down-lock engaged", "down-lock free"),
+        ("brake_released", "brake open", "brake set"),
+        ("released", "free-fall release open", ""),
+    ):
+        if name in recording.names:
+            events += [
+                Event(time, name, on if code else off) for time, code in _changes(recording, name)
+            ]
+    # In one instant the command comes before what it causes.
+    rank = {name: index for index, name in enumerate(_CODES)}
+    return _since_command(sorted(events, key=lambda e: (e.time, rank.get(e.signal, 9))))
+
+
+def _since_command(events: list[Event]) -> list[Event]:
+    """Return the events with, at each state, the time since the command."""
+    dated: list[Event] = []
+    asked: Event | None = None
+    for event in events:
+        text = event.text
+        if event.signal == "command":
+            asked = event
+        elif event.signal == "state" and asked is not None and event.time > asked.time + 0.05:
+            action = asked.text.removeprefix("command: ")
+            text = f"{text} ({event.time - asked.time:.2f} s after {action})"
+        dated.append(Event(event.time, event.signal, text))
+    return dated
+
+
+def _phrase(name: str, word: str) -> str:
+    start = {
+        "command": "command: ",
+        "command_refused": "command refused: ",
+        "fault_code": "fault: ",
+        "warning_code": "warning: ",
+    }
+    return start.get(name, "") + word
+
+
+def _changes(recording: Recording, name: str) -> list[tuple[float, int]]:
+    channel = recording[name]
+    values = np.rint(channel.values).astype(int)
+    places = np.flatnonzero(np.diff(values)) + 1
+    return [(float(channel.time[place]), int(values[place])) for place in places]
