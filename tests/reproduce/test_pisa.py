@@ -8,8 +8,9 @@ import pytest
 
 from elevon.reproduce.hydraulic import HydraulicActuator, reproduce_hydraulic
 from elevon.reproduce.pisa_friction import reproduce_friction
+from elevon.reproduce.pisa_friction_page import friction_report
 from elevon.reproduce.pisa_functional import reproduce_functional
-from elevon.reproduce.pisa_pages import friction_report, functional_report, hydraulic_report
+from elevon.reproduce.pisa_pages import functional_report, hydraulic_report
 
 
 def test_functional_runs_meet_their_requirements() -> None:
@@ -35,20 +36,31 @@ def test_friction_tests_recover_what_was_put_in() -> None:
     assert result.to_dict()["status"] == "pass"
     kinds = {row.quantity for row in result.rows}
     assert kinds == {"mass", "friction_ffm", "friction_ff", "preload_efficiency", "efficiency",
-                     *(f"harmonic_{order}" for order in range(1, 6))}  # fmt: skip
+                     *(f"harmonic_{order}" for order in range(1, 6)),
+                     *(f"harmonic_ffm_{order}" for order in range(1, 6))}  # fmt: skip
+    # Rows of the functional runs come first.
+    assert result.rows[0].quantity == "efficiency"
     for kind in ("friction_ffm", "friction_ff"):
         mine = [row for row in result.rows if row.quantity == kind]
         assert {row.direction for row in mine} == {"extension", "retraction"}
         assert min(row.speed_mm_s for row in mine) == 1.0
         assert max(row.speed_mm_s for row in mine) == 10.0
-    assert friction_report(result, date="2000-01-01").html()
+    page = friction_report(result, date="2000-01-01").html()
+    assert "extrapolated" in page
+    assert "<details>" in page
+    # The spectrum of P Figs. 4.5, 4.6: lines at whole orders, the first the highest.
+    trace = next(t for t in result.traces if t.released and t.speed_mm_s == pytest.approx(2.0))
+    lines = dict(zip(trace.order, trace.amplitude_n, strict=True))
+    assert max(lines, key=lines.__getitem__) == 1.0
+    assert lines[1.5] < 0.1 * lines[1.0]
 
 
 @pytest.mark.long
 def test_other_seed_other_noise() -> None:
     """The recovered numbers come from the logs, not from the set."""
     first, second = reproduce_friction(seed=1), reproduce_friction(seed=2)
-    assert first.rows[0].recovered != second.rows[0].recovered
+    mass = [next(r for r in result.rows if r.quantity == "mass") for result in (first, second)]
+    assert mass[0].recovered != mass[1].recovered
 
 
 @pytest.mark.long

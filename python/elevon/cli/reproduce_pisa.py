@@ -61,7 +61,7 @@ def pisa_friction(
     """Run the free-fall tests and recover weight, friction, harmonics and efficiency."""
     from elevon.cli.output import progress_bar
     from elevon.reproduce.pisa_friction import reproduce_friction
-    from elevon.reproduce.pisa_pages import friction_report
+    from elevon.reproduce.pisa_friction_page import friction_report
 
     check_folder(out, force)
     with progress_bar("simulating 32 tests and 8 strokes") as advance:
@@ -87,12 +87,13 @@ def pisa_hydraulic(
     from elevon.reproduce.pisa_pages import hydraulic_report
 
     check_folder(out, force)
-    with progress_bar("simulating 24 strokes") as advance:
+    with progress_bar("simulating 48 strokes") as advance:
         result = reproduce_hydraulic(progress=advance)
     values = result.to_dict()
     if out is not None:
         write(out, hydraulic_report(result, date=date), values["rows"], force)
-    columns = ("temperature_c", "nz", "direction", "hydraulic_mm_s", "electric_mm_s")
+    columns = ("temperature_c", "nz", "direction", "hydraulic_mm_s", "electric_mm_s",
+               "electric_winding_mm_s", "electric_a", "electric_winding_a")  # fmt: skip
     return _answer(values, columns, as_json, "ram speed in mid-stroke")
 
 

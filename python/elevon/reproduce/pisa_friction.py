@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.recording import Recording
 
-__all__ = ["FrictionResult", "FrictionRow", "reproduce_friction"]
+__all__ = ["FrictionResult", "FrictionRow", "Trace", "reproduce_friction"]
 
 Floats = npt.NDArray[np.float64]
 
@@ -67,12 +67,38 @@ class FrictionRow:
 
 
 @dataclass(frozen=True)
+class Trace:
+    """One test as the paper shows it: friction, position and speed over time."""
+
+    released: bool
+    direction: int
+    speed_mm_s: float
+    time: Floats
+    position_mm: Floats
+    ram_mm_s: Floats
+    motor_rad_s: Floats
+    friction_n: Floats
+    order: Floats
+    """Of the spectrum: periods a turn of the screw."""
+    amplitude_n: Floats
+
+    @property
+    def name(self) -> str:
+        """Such as ``FF, extension, 1 mm/s``."""
+        way = "extension" if self.direction > 0 else "retraction"
+        return f"{'FF' if self.released else 'FFM'}, {way}, {self.speed_mm_s:g} mm/s"
+
+
+@dataclass(frozen=True)
 class FrictionResult:
-    """Everything `elevon reproduce pisa-friction` reports."""
+    """Everything `elevon reproduce pisa-friction` reports; the rows of functional runs first."""
 
     rows: list[FrictionRow]
     checks: list[Check]
     seed: int
+    traces: list[Trace]
+    tables: dict[str, list[tuple[float, float]]]
+    """The set's own friction: kind and direction to pairs of mm/s and N."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object of the command."""
@@ -129,8 +155,41 @@ def reproduce_friction(*, seed: int = 0, progress: Progress | None = None) -> Fr
     rows = [FrictionRow("mass", "both", None, None, put_mass, mass, "kg")]
     for test, log in zip(tests, forces, strict=True):
         rows += _friction_rows(actuator, test, log, mass, lead)
-    rows += _efficiency_rows(actuator, seed, progress)
-    return FrictionResult(rows, _checks(rows), seed)
+    rows = _efficiency_rows(actuator, seed, progress) + rows
+    traces = [_trace(test, log, mass, lead) for test, log in zip(tests, logs, strict=True)]
+    return FrictionResult(rows, _checks(rows), seed, traces, _tables(actuator))
+
+
+def _trace(test: _Test, log: Recording, mass: float, lead: float) -> Trace:
+    force, position = log["load_cell"].values, log["nut_position"].values
+    over, resisting = _settled(log, lead)
+    ripple = test.direction * (resisting - resisting.mean())
+    order = np.arange(1, 16) * 0.5
+    waves = np.exp(2j * math.pi * np.outer(order, over) / lead)
+    return Trace(
+        test.released,
+        test.direction,
+        1e3 * test.speed,
+        log["load_cell"].time,
+        1e3 * position,
+        1e3 * log["user_speed"].values,
+        log["motor_speed"].values,
+        -(force + mass * GRAVITY),
+        order,
+        np.asarray(np.abs(2.0 * (waves @ ripple) / over.size), dtype=np.float64),
+    )
+
+
+def _tables(actuator: Actuator) -> dict[str, list[tuple[float, float]]]:
+    value = actuator.parameters.value
+    knots = [1e3 * value(f"friction.speed_{k}") for k in range(1, 9)]
+    return {
+        f"{kind}_{way}": [
+            (knot, value(f"friction.{kind}_{way}_{k}")) for k, knot in enumerate(knots, 1)
+        ]
+        for kind in ("ff", "ffm")
+        for way in ("extension", "retraction")
+    }
 
 
 def _run_rig(
@@ -163,7 +222,10 @@ def _run_rig(
         label = f"{'FF' if test.released else 'FFM'}, {test.way}, {1e3 * test.speed:g} mm/s"
         runs.append(Run(actuator, scenario, seed, label, number))
     logs = simulate_batch(
-        runs, fidelity="low", record="nut_position,load_cell@500 Hz", progress=progress
+        runs,
+        fidelity="low",
+        record="nut_position,load_cell,user_speed,motor_speed@500 Hz",
+        progress=progress,
     )
     for log in logs:
         if log.status != "ok":
@@ -190,14 +252,17 @@ def _friction_rows(
     rows = [
         FrictionRow(f"friction_{kind}", test.way, speed, None, put, float(resisting.mean()), "N")
     ]
-    if not test.released:
-        return rows
     ripple = resisting - resisting.mean()
+    # P 4.1.1 takes the amplitudes from FF; Fig. 3.50 shows those of FFM, in which the detent of the
+    # motor is too, at other orders.
+    name = "harmonic" if test.released else "harmonic_ffm"
     for order in range(1, HARMONICS + 1):
         wave = np.exp(2j * math.pi * order * position / lead)
         found = float(np.abs(2.0 * np.mean(ripple * wave)))
         put = _table(actuator, f"harmonic_{order}", test.speed)
-        rows.append(FrictionRow(f"harmonic_{order}", test.way, speed, None, put, found, "N"))
+        rows.append(FrictionRow(f"{name}_{order}", test.way, speed, None, put, found, "N"))
+    if not test.released:
+        return rows
     preload = 2.0 * actuator.parameters.value("screw.preload")
     put = _table(actuator, f"ff_{test.way}", test.speed)
     apparent = 1.0 / (1.0 + float(resisting.mean()) / preload)
@@ -260,7 +325,8 @@ def _checks(rows: Sequence[FrictionRow]) -> list[Check]:
         "mass": ("mass",),
         "mean friction, FFM": ("friction_ffm",),
         "mean friction, FF": ("friction_ff",),
-        "harmonics": tuple(f"harmonic_{order}" for order in range(1, HARMONICS + 1)),
+        "harmonics, FF": tuple(f"harmonic_{order}" for order in range(1, HARMONICS + 1)),
+        "harmonics, FFM": tuple(f"harmonic_ffm_{order}" for order in range(1, HARMONICS + 1)),
         "efficiency at the preload": ("preload_efficiency",),
         "efficiency over load": ("efficiency",),
     }
