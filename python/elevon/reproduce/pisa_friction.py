@@ -164,7 +164,7 @@ def _trace(test: _Test, log: Recording, mass: float, lead: float) -> Trace:
     force, position = log["load_cell"].values, log["nut_position"].values
     over, resisting = _settled(log, lead)
     ripple = test.direction * (resisting - resisting.mean())
-    order = np.arange(1, 16) * 0.5
+    order: Floats = np.arange(1, 16, dtype=np.float64) * np.float64(0.5)
     waves = np.exp(2j * math.pi * np.outer(order, over) / lead)
     return Trace(
         test.released,
@@ -174,7 +174,7 @@ def _trace(test: _Test, log: Recording, mass: float, lead: float) -> Trace:
         1e3 * position,
         1e3 * log["user_speed"].values,
         log["motor_speed"].values,
-        -(force + mass * GRAVITY),
+        np.asarray(-(force + mass * GRAVITY), dtype=np.float64),
         order,
         np.asarray(np.abs(2.0 * (waves @ ripple) / over.size), dtype=np.float64),
     )

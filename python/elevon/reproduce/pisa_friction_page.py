@@ -88,7 +88,7 @@ def _mean_figure(result: FrictionResult) -> Figure:
                 _crosses(one, result, f"friction_{kind}", way, colour)
             one.axvline(10.0, color=COLOURS["grey"], lw=0.8)
             one.set(ylabel=f"{kind.upper()} [N]", ylim=(0, None))
-            one.legend(ncols=2, loc="lower right")
+            one.legend(ncols=2, loc="upper left")
         axes[1].set(xlabel="Ram speed [mm/s]")
     return figure
 

@@ -1,0 +1,77 @@
+"""Failure cases of the landing gear: what the unit indicates is true, or no sensor could know."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import elevon
+from elevon.faults.catalogue import catalogue
+from elevon.reproduce.pisa_failures import (
+    LISTED,
+    PHASES,
+    judge,
+    reproduce_failures,
+    severities,
+)
+from elevon.reproduce.pisa_failures_page import failures_report, summary
+from elevon.reproduce.pisa_gear import ACTUATOR
+from tests.physics.gear import gear
+
+COLUMNS = {"fault", "phase", "indicated", "true_state", "safe", "detected_by", "time_s"}
+
+
+def test_a_slipping_brake_never_gives_a_false_indication() -> None:
+    """All phases of one fault: rows, report and summary; at rest it is found."""
+    result = reproduce_failures(fidelity="low", faults=["brake_slipping"])
+    values = result.to_dict()
+    assert [row["phase"] for row in values["rows"]] == [phase.name for phase in PHASES]
+    assert all(set(row) >= COLUMNS for row in values["rows"])
+    assert all(row["safe"] for row in values["rows"])
+    rest = {row["phase"]: row for row in values["rows"]}["at rest, retracted"]
+    assert rest["indicated"] == "fault"
+    assert rest["detected_by"] == "fault: uncommanded motion"
+    assert 0.0 < rest["time_s"] < 0.3
+    assert "at rest, retracted" in failures_report(result, date="2000-01-01").html()
+    assert len(summary(result)[1]) == len(PHASES)
+
+
+def test_a_false_indication_is_judged_unsafe() -> None:
+    """The judge itself: a healthy stroke with the truth turned round."""
+    rec = gear((0.1, "extend"), duration=9.0, record="all@500 Hz")
+    phase = PHASES[1]
+    assert judge(rec, phase, "none", None, "landing_gear").safe
+    channels = {name: rec[name] for name in rec.names}
+    open_lock = SimpleNamespace(time=rec["locked"].time, values=0.0 * rec["locked"].values)
+    false: Any = {**channels, "locked": open_lock}
+    row = judge(false, phase, "none", None, "landing_gear")
+    assert not row.safe
+    assert (row.indicated, row.true_state) == ("locked", "between, at rest")
+
+
+def test_severities_follow_the_record() -> None:
+    """A share whole, any other range half, a range with both signs from both sides."""
+    wiring = elevon.Actuator.load(ACTUATOR).wiring
+    records = {record.kind: record for record in catalogue(wiring)}
+    assert severities(records["hall_high"]) == (1.0,)
+    assert severities(records["jam"]) == (50e3,)
+    assert severities(records["offset"]) == (0.25, -0.25)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("fidelity", ["low", "high"])
+def test_every_fault_in_every_phase(fidelity: str) -> None:
+    """No unsafe row but the listed one, and the listed one is there; sensors are named."""
+    result = reproduce_failures(fidelity=fidelity)
+    values = result.to_dict()
+    assert values["status"] == "pass"
+    unsafe = [row for row in result.rows if not row.safe]
+    assert len(unsafe) == len(LISTED)
+    assert all(row.sensors for row in unsafe)
+    records = catalogue(elevon.Actuator.load(ACTUATOR).wiring)
+    carried = sum(len(r.places) * len(severities(r)) for r in records if fidelity in r.fidelities)
+    assert len(result.rows) == carried * len(PHASES)
+    assert np.isfinite([row.position_mm for row in result.rows]).all()
