@@ -31,6 +31,27 @@ def test_a_table_for_the_reader(elevon_cli):
     assert "user_position" in out
 
 
+GEAR = ("simulate", "pisa-landing-gear", "--fidelity", "low")
+
+
+def test_a_gear_shows_states_by_name_and_a_timeline(elevon_cli):
+    """What a test engineer reads, recorded and printed without being asked for."""
+    out = elevon_cli(*GEAR).out
+    assert "locked (7.0" in out
+    assert "s after extend)" in out
+    last = {line.split()[0]: line.split() for line in out.splitlines() if line.strip()}
+    assert last["state"][-1] == "locked"
+    assert last["fault_code"][-1] == "none"
+    assert last["user_position"][1] == "mm"
+    assert {"brake_released", "current_mean", "motor_speed", "supply_voltage"} <= set(last)
+
+
+def test_a_gears_json_has_its_events(elevon_cli):
+    events = elevon_cli(*GEAR, "--duration", "1 s", "--json").json["events"]
+    assert [event["text"] for event in events] == ["command: extend", "extending", "brake open"]
+    assert [set(event) for event in events] == [{"time_s", "signal", "text"}] * 3
+
+
 @pytest.mark.parametrize("ending", [".parquet", ".nc", ".csv", ".mat"])
 def test_out(elevon_cli, tmp_path, ending):
     out = tmp_path / f"run{ending}"

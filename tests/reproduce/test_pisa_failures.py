@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,10 +18,11 @@ from elevon.reproduce.pisa_failures import (
     reproduce_failures,
     severities,
 )
-from elevon.reproduce.pisa_failures_page import failures_report, summary
+from elevon.reproduce.pisa_failures_page import failures_report, matrix, summary
 from elevon.reproduce.pisa_gear import ACTUATOR
 from tests.physics.gear import gear
 
+PAGE = Path(__file__).parents[2] / "docs" / "landing-gear-failures.md"
 COLUMNS = {"fault", "phase", "indicated", "true_state", "safe", "detected_by", "time_s"}
 
 
@@ -37,6 +39,7 @@ def test_a_slipping_brake_never_gives_a_false_indication() -> None:
     assert 0.0 < rest["time_s"] < 0.3
     assert "at rest, retracted" in failures_report(result, date="2000-01-01").html()
     assert len(summary(result)[1]) == len(PHASES)
+    assert matrix(result).splitlines()[2] in PAGE.read_text(encoding="utf-8")
 
 
 def test_a_false_indication_is_judged_unsafe() -> None:
@@ -74,4 +77,6 @@ def test_every_fault_in_every_phase(fidelity: str) -> None:
     records = catalogue(elevon.Actuator.load(ACTUATOR).wiring)
     carried = sum(len(r.places) * len(severities(r)) for r in records if fidelity in r.fidelities)
     assert len(result.rows) == carried * len(PHASES)
+    if fidelity == "low":
+        assert matrix(result) in PAGE.read_text(encoding="utf-8")
     assert np.isfinite([row.position_mm for row in result.rows]).all()
