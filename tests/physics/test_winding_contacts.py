@@ -210,6 +210,23 @@ def test_contacts_of_any_resistance_run_at_the_default_step(
             assert apart > 0.3
 
 
+@pytest.mark.parametrize("contact", ["phases", "ground", "terminals", "grounded terminal"])
+def test_a_cleared_contact_leaves_the_healthy_motor(contact: str) -> None:
+    """Gone, it carries nothing from the next step on and heats no more; 50 ms later, some
+    time constants of the current control's integral, the phase currents are the healthy run's.
+    """
+    profile = {"kind": "intermittent", "start": "0.05 s", "period": "1 s", "duty": 0.02}
+    names = "current_a,phase_short_current_ab,phase_short_current_bc,ground_current,energy_contact"
+    rec = turning(PWM, [CONTACTS[contact] | {"profile": profile}], names)
+    through = sum(np.abs(rec[name].values) for name in names.split(",")[1:4])
+    assert np.max(through[50_000:70_000]) > 1.0
+    assert np.all(through[:50_000] == 0.0)
+    assert np.all(through[70_002:] == 0.0)
+    assert np.ptp(rec["energy_contact"].values[70_003:]) == 0.0
+    healthy = turning(PWM, [], "current_a")["current_a"].values
+    assert np.max(np.abs(rec["current_a"].values[120_000:] - healthy[120_000:])) < 0.05
+
+
 @pytest.mark.parametrize(("drive", "turns"), [("pwm", 1.0), ("pwm", 0.5), ("hysteresis", 0.5)])
 def test_phase_short_draws_the_voltage_between_the_windings(drive: str, turns: float) -> None:
     """c = mu (v_a - v_b) / (1/G + 2 mu N R + jw 2 (1 - kappa) mu N L), beside what the windings

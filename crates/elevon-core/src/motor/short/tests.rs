@@ -28,40 +28,48 @@ struct Rig {
     structure: ShortStructure,
 }
 
+/// Parameters of the motor, the centre tap and the other contacts.
+fn parameters(case: Option<Case>, kappa: f64) -> [Vec<f64>; 3] {
+    let mut motor: Vec<f64> = MOTOR.iter().map(|v| v.default.unwrap_or(1.0)).collect();
+    let mut tap: Vec<f64> = TAP.iter().map(|v| v.default.unwrap_or(0.0)).collect();
+    let mut short: Vec<f64> = SHORT.iter().map(|v| v.default.unwrap_or(0.0)).collect();
+    for (parameter, value) in [
+        (MotorParameter::WindingResistance, R),
+        (MotorParameter::WindingInductance, L),
+        (MotorParameter::EmfConstant, K),
+        (MotorParameter::PolePairs, POLES),
+        (MotorParameter::ShortCoupling, kappa),
+    ] {
+        motor[parameter as usize] = value;
+    }
+    short[ShortParameter::ContactCoupling as usize] = kappa;
+    if let Some(case) = case {
+        match case.kind {
+            LOOP => {
+                motor[MotorParameter::TurnsA as usize + case.phase] = 1.0 - case.turns;
+                motor[MotorParameter::ShortContactResistance as usize] = case.resistance;
+            }
+            TAPPED => tap[case.phase] = 25.0 / (25.0 + case.resistance),
+            PAIR => {
+                short[ShortParameter::PhaseShortAb as usize + case.phase] = 1.0 / case.resistance;
+                short[ShortParameter::PhaseShortTurns as usize] = case.turns;
+            }
+            _ => {
+                short[ShortParameter::GroundShortA as usize + case.phase] = 1.0 / case.resistance;
+                short[ShortParameter::GroundShortTurns as usize] = case.turns;
+                short[ShortParameter::GroundPotential as usize] = 0.5;
+            }
+        }
+    }
+    [motor, tap, short]
+}
+
 impl Rig {
     fn new(case: Option<Case>, kappa: f64) -> Self {
-        let mut motor: Vec<f64> = MOTOR.iter().map(|v| v.default.unwrap_or(1.0)).collect();
-        let mut tap: Vec<f64> = TAP.iter().map(|v| v.default.unwrap_or(0.0)).collect();
-        let mut short: Vec<f64> = SHORT.iter().map(|v| v.default.unwrap_or(0.0)).collect();
-        for (parameter, value) in [
-            (MotorParameter::WindingResistance, R),
-            (MotorParameter::WindingInductance, L),
-            (MotorParameter::EmfConstant, K),
-            (MotorParameter::PolePairs, POLES),
-            (MotorParameter::ShortCoupling, kappa),
-        ] {
-            motor[parameter as usize] = value;
-        }
-        short[ShortParameter::ContactCoupling as usize] = kappa;
+        let [motor, tap, short] = parameters(case, kappa);
         let mut structure = [false; KINDS];
         if let Some(case) = case {
             structure[case.kind] = true;
-            match case.kind {
-                LOOP => {
-                    motor[MotorParameter::TurnsA as usize + case.phase] = 1.0 - case.turns;
-                    motor[MotorParameter::ShortContactResistance as usize] = case.resistance;
-                }
-                TAPPED => tap[case.phase] = 25.0 / (25.0 + case.resistance),
-                PAIR => {
-                    short[ShortParameter::PhaseShortAb as usize + case.phase] = 1.0 / case.resistance;
-                    short[ShortParameter::PhaseShortTurns as usize] = case.turns;
-                }
-                _ => {
-                    short[ShortParameter::GroundShortA as usize + case.phase] = 1.0 / case.resistance;
-                    short[ShortParameter::GroundShortTurns as usize] = case.turns;
-                    short[ShortParameter::GroundPotential as usize] = 0.5;
-                }
-            }
         }
         let plain = MotorStructure { shorted_loop: true, ..MotorStructure::default() };
         let star = Star::derive(&motor, &plain, DT);
@@ -355,6 +363,42 @@ fn loose_legs_carry_nothing() {
                     assert!(out.legs[j].abs() < 1e-10, "kind {} leg {j}: {}", case.kind, out.legs[j]);
                 }
             }
+        }
+    }
+}
+
+/// Twenty steps with loose and held legs, their switches' resistance and accounts: ampere-turns, contacts and heats.
+fn stepped<S: Scalar>(raw: &[Vec<S>; 3]) -> Vec<S> {
+    let plain = MotorStructure { shorted_loop: true, ..MotorStructure::default() };
+    let star = Star::derive(&raw[0], &plain, S::splat(DT));
+    let shorts = Shorts::derive(&raw[0], &raw[1], &raw[2], &star, true, S::splat(DT));
+    let splat = |x: [f64; 3]| three!(|j| S::splat(x[j]));
+    let (mut m, mut c, mut out) = (splat([1.0, -0.4, -0.6]), [[S::splat(0.0); 3]; KINDS], Vec::new());
+    for k in 0..20 {
+        let drop = splat(sines(40.0, 0.1 * k as f64));
+        let ground = S::splat(-190.0);
+        let net = Network::new(&shorts, [true; KINDS], star.dt_per_inductance, m, &c, drop, S::splat(1.1), ground, splat([0.0; 3]));
+        let connected = three!(|j| S::mask((k + j) % 4 != 0));
+        let (v, neutral) = net.solve(splat(chopped(40 * k)), splat([0.2; 3]), connected);
+        let new = net.outcome(v, neutral);
+        let x = net.account(m, &c, &new, v, neutral, splat([R; 3]), S::splat(1.1));
+        (m, c) = (new.turns, new.contact);
+        out.extend([m[0], m[1], m[2], neutral, x.copper, x.contact, x.tap, x.loops, x.ground]);
+        out.extend(c.iter().flatten().chain(&x.legs).copied());
+    }
+    out
+}
+
+#[test]
+fn lanes_have_the_bits_of_single_runs() {
+    type Lanes = crate::scalar::Portable<4>;
+    let single = ALL.map(|case| parameters(Some(case), KAPPA));
+    let packed: [Vec<Lanes>; 3] = std::array::from_fn(|g| (0..single[0][g].len()).map(|i| Lanes::from_fn(|l| single[l][g][i])).collect());
+    let together = stepped(&packed);
+    for (lane, raw) in single.iter().enumerate() {
+        for (a, b) in stepped(raw).iter().zip(&together) {
+            assert!(a.is_finite());
+            assert_eq!(a.to_bits(), b.lane(lane).to_bits());
         }
     }
 }
