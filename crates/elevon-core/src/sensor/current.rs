@@ -20,6 +20,18 @@ variables! {
             high_only("the offset of one sensor is a ripple of the torque at the electrical frequency");
         OffsetC => "current.offset_c", "-", "A", Any, Sensor, Some(0.0), "offset of the sensor of phase c",
             high_only("the offset of one sensor is a ripple of the torque at the electrical frequency");
+        StuckA => "current.stuck_a", "-", "1", Unit, Sensor, Some(0.0), "1: the sensor of phase a stands still at its last value",
+            high_only("its drive controls the equivalent current itself, not three of which one stands still");
+        StuckB => "current.stuck_b", "-", "1", Unit, Sensor, Some(0.0), "1: the sensor of phase b stands still at its last value",
+            high_only("its drive controls the equivalent current itself, not three of which one stands still");
+        StuckC => "current.stuck_c", "-", "1", Unit, Sensor, Some(0.0), "1: the sensor of phase c stands still at its last value",
+            high_only("its drive controls the equivalent current itself, not three of which one stands still");
+        DeadA => "current.dead_a", "-", "1", Unit, Sensor, Some(0.0), "1: the sensor of phase a shows nothing",
+            high_only("its drive controls the equivalent current itself, not three of which one is not seen");
+        DeadB => "current.dead_b", "-", "1", Unit, Sensor, Some(0.0), "1: the sensor of phase b shows nothing",
+            high_only("its drive controls the equivalent current itself, not three of which one is not seen");
+        DeadC => "current.dead_c", "-", "1", Unit, Sensor, Some(0.0), "1: the sensor of phase c shows nothing",
+            high_only("its drive controls the equivalent current itself, not three of which one is not seen");
         NoiseDeviation => "current.noise_deviation", "-", "A", NonNegative, Sensor, Some(0.0), "standard deviation of the noise of each sensor",
             high_only("the noise of single phase currents is none of its one");
         NoiseSampleTime => "current.noise_sample_time", "-", "s", Positive, Sensor, Some(5e-5), "the noise is held over this time, which sets its band",
@@ -42,6 +54,8 @@ pub struct CurrentSensor<S> {
     resolution: S,
     per_resolution: S,
     full_scale: S,
+    stuck: [S; 3],
+    dead: [S; 3],
 }
 
 impl<S: Scalar> CurrentSensor<S> {
@@ -59,17 +73,22 @@ impl<S: Scalar> CurrentSensor<S> {
             resolution,
             per_resolution: S::select(quantised, S::one() / S::select(quantised, resolution, S::one()), S::zero()),
             full_scale: g(P::FullScale),
+            stuck: three!(|j| raw[P::StuckA as usize + j]),
+            dead: three!(|j| raw[P::DeadA as usize + j]),
         }
     }
 
-    /// What the three sensors show; `noise` has unit deviation.
+    /// What the three sensors show; `noise` has unit deviation, `held` is what they showed last.
     #[inline(always)]
-    pub fn measure(&self, current: [S; 3], noise: [S; 3]) -> [S; 3] {
+    pub fn measure(&self, current: [S; 3], noise: [S; 3], held: [S; 3]) -> [S; 3] {
+        let half = S::splat(0.5);
         let quantised = S::zero().lt(self.resolution);
         three!(|j| {
             let raw = self.gain[j] * current[j] + (self.offset[j] + self.noise_deviation * noise[j]);
             let steps = (raw.clamp_abs(self.full_scale) * self.per_resolution).round();
-            S::select(quantised, steps * self.resolution, raw)
+            let shown = S::select(quantised, steps * self.resolution, raw);
+            let live = S::select(half.lt(self.dead[j]), S::zero(), shown);
+            S::select(half.lt(self.stuck[j]), held[j], live)
         })
     }
 
@@ -77,5 +96,20 @@ impl<S: Scalar> CurrentSensor<S> {
     pub fn needed(own: &Own<CurrentSensorParameter>) -> bool {
         use CurrentSensorParameter as P;
         own.any_away_among(P::GainA, P::NoiseDeviation) || own.away(P::Bits)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use CurrentSensorParameter as P;
+
+    #[test]
+    fn a_stuck_sensor_holds_a_dead_one_shows_nothing_the_others_read_on() {
+        let mut raw: Vec<f64> = CURRENT_SENSOR.iter().map(|v| v.default.unwrap_or(0.0)).collect();
+        raw[P::StuckA as usize] = 1.0;
+        raw[P::DeadB as usize] = 1.0;
+        let shown = CurrentSensor::derive(&raw).measure([3.0, -1.0, -2.0], [0.0; 3], [0.5, 0.6, 0.7]);
+        assert_eq!(shown, [0.5, 0.0, -2.0]);
     }
 }

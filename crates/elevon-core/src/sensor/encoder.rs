@@ -1,6 +1,7 @@
 //! Incremental encoder driven through a wheel pair (reference sheet 1.1: 5000 pulses, x4, wheels 22:88).
 
 use crate::scalar::Scalar;
+use crate::variable::Own;
 use crate::variables;
 
 variables! {
@@ -12,6 +13,13 @@ variables! {
         Offset => "encoder.offset", "-", "rad", Any, Sensor, Some(0.0), "offset of the shown user position";
         Gain => "encoder.gain", "-", "1", Any, Sensor, Some(1.0), "gain of the shown user position";
         MissingCounts => "encoder.missing_counts", "-", "1", Unit, Sensor, Some(0.0), "fraction of the counts that are lost, spread evenly over the disc";
+        DarkShare => "encoder.dark_share", "-", "1", Unit, Sensor, Some(0.0), "share of the disc in whose sectors no counts come";
+        DarkSectors => "encoder.dark_sectors", "-", "1", Between(1.0, 1000.0), Sensor, Some(1.0), "number of dark sectors, equal and evenly spread; its whole part counts",
+            when(&[Away("sensor.encoder.dark_share", 0.0)]);
+        DarkPosition => "encoder.dark_position", "-", "rad", Any, Sensor, Some(0.0), "angle of the disc at the middle of a dark sector",
+            when(&[Away("sensor.encoder.dark_share", 0.0)]);
+        Dead => "encoder.dead", "-", "1", Unit, Sensor, Some(0.0), "1: no counts come at all";
+        Stuck => "encoder.stuck", "-", "1", Unit, Sensor, Some(0.0), "1: the shown position stands still at its last value while the counter goes on";
     }
 }
 
@@ -20,6 +28,22 @@ pub struct Encoder<S> {
     per_count: S,
     count: S,
     offset: S,
+    /// Dark sectors per unit of user travel, and where the first lies.
+    sectors: S,
+    first: S,
+    half_dark: S,
+    dead: S,
+    stuck: S,
+}
+
+/// The counter of an encoder that loses counts. It is incremental: what was lost stays lost, until the disc turns back
+/// through where it was.
+#[derive(Clone, Copy, Debug)]
+pub struct EncoderState<S> {
+    /// Counts a whole disc would have given, and those that did not come.
+    counts: S,
+    lost: S,
+    pub shown: S,
 }
 
 impl<S: Scalar> Encoder<S> {
@@ -30,12 +54,114 @@ impl<S: Scalar> Encoder<S> {
         let counts = g(P::Pulses) * g(P::Edges) * g(P::WheelRatio);
         let tau = S::splat(turn);
         let kept = S::one() - g(P::MissingCounts);
-        Self { per_count: counts / tau * kept, count: g(P::Gain) * tau / counts, offset: g(P::Offset) }
+        let sectors = g(P::DarkSectors).floor();
+        Self {
+            per_count: counts / tau * kept,
+            count: g(P::Gain) * tau / counts,
+            offset: g(P::Offset),
+            sectors: sectors * g(P::WheelRatio) / tau,
+            first: sectors * g(P::DarkPosition) * S::splat(1.0 / std::f64::consts::TAU),
+            half_dark: S::splat(0.5) * g(P::DarkShare),
+            dead: g(P::Dead),
+            stuck: g(P::Stuck),
+        }
+    }
+
+    /// Does it ever lose counts, or stand still?
+    pub fn loses(own: &Own<EncoderParameter>) -> bool {
+        own.any_away([EncoderParameter::DarkShare, EncoderParameter::Dead, EncoderParameter::Stuck])
+    }
+
+    pub fn start(&self, user: S) -> EncoderState<S> {
+        EncoderState { counts: (user * self.per_count).floor(), lost: S::zero(), shown: self.read(user) }
+    }
+
+    /// Counts on to the user position, and shows what came.
+    #[inline(always)]
+    pub fn advance(&self, user: S, s: &mut EncoderState<S>) {
+        let half = S::splat(0.5);
+        let place = user * self.sectors - self.first;
+        let dark = (place - place.round()).abs().lt(self.half_dark) | half.lt(self.dead);
+        let counts = (user * self.per_count).floor();
+        s.lost = s.lost + S::select(dark, counts - s.counts, S::zero());
+        s.counts = counts;
+        let now = (counts - s.lost) * self.count + self.offset;
+        s.shown = S::select(half.lt(self.stuck), s.shown, now);
     }
 
     /// Shown user position: whole counts since the user's zero.
     #[inline(always)]
     pub fn read(&self, user: S) -> S {
         (user * self.per_count).floor() * self.count + self.offset
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+    use EncoderParameter as P;
+
+    fn encoder(changed: &[(P, f64)]) -> Encoder<f64> {
+        let mut raw: Vec<f64> = ENCODER.iter().map(|v| v.default.unwrap_or(0.0)).collect();
+        for &(p, value) in changed {
+            raw[p as usize] = value;
+        }
+        Encoder::derive(&raw, TAU)
+    }
+
+    /// Shown after moving in small steps through the given user positions.
+    fn moved(e: &Encoder<f64>, s: &mut EncoderState<f64>, from: f64, to: f64) -> f64 {
+        for i in 0..=10_000 {
+            e.advance(from + (to - from) * f64::from(i) * 1e-4, s);
+        }
+        s.shown
+    }
+
+    #[test]
+    fn a_whole_disc_shows_what_it_did() {
+        let e = encoder(&[]);
+        let mut s = e.start(0.0);
+        for user in [0.1, 0.77, -0.3] {
+            e.advance(user, &mut s);
+            assert_eq!(s.shown, e.read(user));
+        }
+    }
+
+    #[test]
+    fn a_dark_sector_takes_its_share_of_every_turn_of_the_disc_and_gives_it_back_on_the_way_back() {
+        for sectors in [1.0, 3.0] {
+            let dark = [(P::DarkShare, 0.1), (P::DarkSectors, sectors), (P::DarkPosition, 0.3 * TAU)];
+            let e = encoder(&dark);
+            let mut s = e.start(0.0);
+            // Half a user turn is two turns of the disc.
+            let there = moved(&e, &mut s, 0.0, 0.5 * TAU);
+            assert!((there - 0.9 * 0.5 * TAU).abs() < 3e-3, "{there}");
+            let back = moved(&e, &mut s, 0.5 * TAU, 0.0);
+            assert!(back.abs() < 3e-3, "{back}");
+        }
+    }
+
+    #[test]
+    fn inside_a_dark_sector_the_shown_position_stands() {
+        let e = encoder(&[(P::DarkShare, 0.2), (P::DarkPosition, 0.5 * TAU)]);
+        let mut s = e.start(0.0);
+        let before = moved(&e, &mut s, 0.0, 0.45 * TAU / 4.0);
+        let inside = moved(&e, &mut s, 0.45 * TAU / 4.0, 0.55 * TAU / 4.0);
+        assert!((before - 0.4 * TAU / 4.0).abs() < 1e-3);
+        assert_eq!(inside, before);
+    }
+
+    #[test]
+    fn counts_of_a_dead_encoder_stay_lost_those_of_a_stuck_one_do_not() {
+        let free = encoder(&[]);
+        for (p, after) in [(P::Dead, 1.0), (P::Stuck, 2.0)] {
+            let broken = encoder(&[(p, 1.0)]);
+            let mut s = free.start(0.0);
+            let at = moved(&free, &mut s, 0.0, 1.0);
+            assert_eq!(moved(&broken, &mut s, 1.0, 2.0), at);
+            let later = moved(&free, &mut s, 2.0, 2.5) - 0.5;
+            assert!((later - after).abs() < 1e-3, "{later}");
+        }
     }
 }

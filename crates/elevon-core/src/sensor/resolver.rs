@@ -1,7 +1,8 @@
 //! Motor resolver: commutation angle, motor position and, through its converter, motor speed (N 4.5).
 //!
-//! Channel mismatch scales the sine channel: the shown angle is atan2(g sin, cos). While its power is off the
-//! converter shows a shaft at rest: the held angle or zero, and no speed.
+//! Channel mismatch scales the sine channel: the shown angle is atan2(g sin, cos). Shorted turns of a secondary winding do
+//! the same to its channel, an open one leaves a residue; the converter divides the channels, so that a weaker excitation
+//! turns no angle. Without power, or with too little signal, it shows a shaft at rest: the held angle or zero, no speed.
 
 use crate::scalar::Scalar;
 use crate::variable::Own;
@@ -20,18 +21,51 @@ variables! {
         Gain => "resolver.gain", "-", "1", Any, Sensor, Some(1.0), "gain of the shown motor position and speed (not of the commutation angle)";
         PowerOff => "resolver.power_off", "-", "1", Unit, Sensor, Some(0.0), "1 while the resolver has no power";
         LossShows => "resolver.loss_shows", "-", "1", Choice(LossShows::NAMES), Sensor, Some(0.0), "what the converter shows without power",
-            when(&[Away("sensor.resolver.power_off", 0.0)]);
+            when(&[Either(&[
+                Away("sensor.resolver.power_off", 0.0), Away("sensor.resolver.excitation_short", 0.0), Away("sensor.resolver.sine_open", 0.0),
+                Away("sensor.resolver.cosine_open", 0.0), Away("sensor.resolver.sine_short", 0.0), Away("sensor.resolver.cosine_short", 0.0),
+            ])]);
+        SineShort => "resolver.sine_short", "-", "1", Between(0.0, 0.99), Sensor, Some(0.0), "fraction of the turns of the sine winding shorted";
+        CosineShort => "resolver.cosine_short", "-", "1", Between(0.0, 0.99), Sensor, Some(0.0), "fraction of the turns of the cosine winding shorted";
+        ExcitationShort => "resolver.excitation_short", "-", "1", Between(0.0, 0.99), Sensor, Some(0.0), "fraction of the excitation lost by shorted turns: both channels weaken, the angle stays until too little is left";
+        SineOpen => "resolver.sine_open", "-", "1", Unit, Sensor, Some(0.0), "1: the sine winding is interrupted";
+        CosineOpen => "resolver.cosine_open", "-", "1", Unit, Sensor, Some(0.0), "1: the cosine winding is interrupted";
+        OpenResidue => "resolver.open_residue", "-", "1", Between(1e-6, 0.5), Sensor, Some(1e-3), "amplitude left in the channel of an open winding by stray coupling; ASSUMED: 0.1 %, a capacitive path of the cable",
+            when(&[Either(&[Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0)])]);
+        LeastSignal => "resolver.least_signal", "-", "1", Unit, Sensor, Some(0.7), "amplitude of the stronger channel below which the converter has no signal; ASSUMED: where common converters report the loss",
+            when(&[Either(&[
+                Away("sensor.resolver.excitation_short", 0.0), Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0),
+                Away("sensor.resolver.sine_short", 0.0), Away("sensor.resolver.cosine_short", 0.0),
+            ])]);
+        TrackingLimit => "resolver.tracking_limit", "-", "rad/s", Positive, Sensor, Some(6283.185_307_179_586), "largest speed the converter shows; ASSUMED: 1000 turns/s, a common converter of 12 bits",
+            when(&[Either(&[
+                Away("sensor.resolver.mismatch", 0.0), Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0),
+                Away("sensor.resolver.sine_short", 0.0), Away("sensor.resolver.cosine_short", 0.0),
+            ])]);
+        Stuck => "resolver.stuck", "-", "1", Unit, Sensor, Some(0.0), "1: the converter's reading stands still at its last value, angle and speed";
     }
 }
 
 #[derive(Clone, Copy, Debug)]
 pub struct Resolver<S> {
+    /// Difference of the channels' amplitudes, sine less cosine.
     gain_less: S,
-    channel: S,
+    sine: S,
+    cosine: S,
     offset: S,
     gain: S,
-    power_off: S,
+    /// 1 without power or signal.
+    pub off: S,
     zero_when_off: S,
+    stuck: S,
+    tracking_limit: S,
+}
+
+/// The last reading with power on.
+#[derive(Clone, Copy, Debug)]
+pub struct ResolverState<S> {
+    pub angle: S,
+    pub speed: S,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -46,13 +80,23 @@ impl<S: Scalar> Resolver<S> {
     pub fn derive(raw: &[S]) -> Self {
         use ResolverParameter as P;
         let g = |p: P| raw[p as usize];
-        let channel = S::one() - g(P::Mismatch);
+        let (half, one) = (S::splat(0.5), S::one());
+        let open = one - g(P::OpenResidue);
+        let mismatch = g(P::Mismatch);
+        let sine_lost = S::select(half.lt(g(P::SineOpen)), open, mismatch + g(P::SineShort) * (one - mismatch));
+        let cosine_lost = S::select(half.lt(g(P::CosineOpen)), open, g(P::CosineShort));
+        let (sine, cosine) = (one - sine_lost, one - cosine_lost);
+        let signal = (one - g(P::ExcitationShort)) * sine.maximum(cosine);
+        let off = half.lt(g(P::PowerOff)) | signal.lt(g(P::LeastSignal));
         Self {
-            gain_less: -g(P::Mismatch),
-            channel,
+            gain_less: cosine_lost - sine_lost,
+            sine,
+            cosine,
             offset: g(P::Offset),
             gain: g(P::Gain),
-            power_off: g(P::PowerOff),
+            off: S::indicator(off),
+            stuck: g(P::Stuck),
+            tracking_limit: g(P::TrackingLimit),
             zero_when_off: S::indicator(S::mask(LossShows::read(g(P::LossShows)) == LossShows::Zero)),
         }
     }
@@ -60,24 +104,100 @@ impl<S: Scalar> Resolver<S> {
     /// Does it ever show another angle than the shaft's?
     pub fn needed(own: &Own<ResolverParameter>) -> bool {
         use ResolverParameter as P;
-        own.any_away([P::Mismatch, P::Offset, P::Gain, P::PowerOff])
+        own.any_away([P::Mismatch, P::Offset, P::Gain, P::PowerOff, P::Stuck]) || Self::signal_fails(own)
     }
 
-    /// Reading at angle `theta`, speed `omega`; `held` is the last angle shown with power on.
+    /// Is a winding ever shorted or open?
+    fn signal_fails(own: &Own<ResolverParameter>) -> bool {
+        own.any_away_among(ResolverParameter::SineShort, ResolverParameter::CosineOpen)
+    }
+
+    /// Is it ever without power or signal?
+    pub fn lost(own: &Own<ResolverParameter>) -> bool {
+        own.away(ResolverParameter::PowerOff) || Self::signal_fails(own)
+    }
+
+    /// Reading at angle `theta`, speed `omega`; `held` is the last one with power on.
     #[inline(always)]
-    pub fn read(&self, theta: S, omega: S, held: &mut S) -> Reading<S> {
-        let off = S::splat(0.5).lt(self.power_off);
+    pub fn read(&self, theta: S, omega: S, held: &mut ResolverState<S>) -> Reading<S> {
+        let half = S::splat(0.5);
+        let (off, stuck) = (half.lt(self.off), half.lt(self.stuck));
         let (sin, cos) = theta.sin_cos();
-        // atan2(g s, c) = theta + atan2((g - 1) s c, c^2 + g s^2): unwrapped, and exact.
+        // atan2(a s, b c) = theta + atan2((a - b) s c, b c^2 + a s^2): unwrapped, and exact.
         let (ss, cc) = (sin * sin, cos * cos);
-        let error = S::atan2_right(self.gain_less * sin * cos, cc + self.channel * ss);
-        // d/dt atan2(g s, c) = omega g / (c^2 + g^2 s^2): the converter tracks what it shows.
-        let rate = self.channel / (cc + self.channel * self.channel * ss);
+        let error = S::atan2_right(self.gain_less * sin * cos, self.cosine * cc + self.sine * ss);
+        // d/dt atan2(a s, b c) = omega a b / (b^2 c^2 + a^2 s^2): the converter tracks what it shows.
+        let rate = self.sine * self.cosine / (self.cosine * self.cosine * cc + self.sine * self.sine * ss);
         let shown = theta + error + self.offset;
-        *held = S::select(off, *held, shown);
-        let lost = S::select(S::splat(0.5).lt(self.zero_when_off), S::zero(), *held);
-        let angle = S::select(off, lost, shown);
-        let speed = S::select(off, S::zero(), omega * rate);
-        Reading { angle, position: self.gain * angle, speed: self.gain * speed }
+        let turning = S::select(off, S::zero(), (omega * rate).clamp_abs(self.tracking_limit));
+        held.angle = S::select(off | stuck, held.angle, shown);
+        held.speed = S::select(stuck, held.speed, turning);
+        let lost = S::select(half.lt(self.zero_when_off), S::zero(), held.angle);
+        let angle = S::select(off & !stuck, lost, held.angle);
+        Reading { angle, position: self.gain * angle, speed: self.gain * held.speed }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::{FRAC_PI_2, PI};
+    use ResolverParameter as P;
+
+    fn resolver(changed: &[(P, f64)]) -> Resolver<f64> {
+        let mut raw: Vec<f64> = RESOLVER.iter().map(|v| v.default.unwrap_or(0.0)).collect();
+        for &(p, value) in changed {
+            raw[p as usize] = value;
+        }
+        Resolver::derive(&raw)
+    }
+
+    fn fresh() -> ResolverState<f64> {
+        ResolverState { angle: 0.0, speed: 0.0 }
+    }
+
+    #[test]
+    fn a_shorted_winding_shows_the_angle_of_the_weaker_channel() {
+        for (p, a, b) in [(P::SineShort, 0.6, 1.0), (P::CosineShort, 1.0, 0.6)] {
+            let r = resolver(&[(p, 0.4)]);
+            for theta in [-1.4_f64, -0.3, 0.2, 0.9, 1.5] {
+                let shown = r.read(theta, 2.0, &mut fresh());
+                assert!((shown.angle - (a * theta.sin()).atan2(b * theta.cos())).abs() < 1e-13);
+                let ahead = r.read(theta + 1e-6, 2.0, &mut fresh()).angle - r.read(theta - 1e-6, 2.0, &mut fresh()).angle;
+                assert!((shown.speed - ahead / 1e-6).abs() < 1e-8);
+            }
+        }
+    }
+
+    #[test]
+    fn an_open_sine_winding_shows_multiples_of_half_a_turn() {
+        let r = resolver(&[(P::SineOpen, 1.0)]);
+        for (theta, shown) in [(0.4, 0.0), (1.2, 0.0), (2.0, PI), (4.0, PI), (5.0, 2.0 * PI), (-2.0, -PI)] {
+            assert!((r.read(theta, 1.0, &mut fresh()).angle - shown).abs() < 0.01, "{theta}");
+        }
+        let crossing = r.read(FRAC_PI_2, 100.0, &mut fresh());
+        assert_eq!(crossing.speed, 6283.185_307_179_586);
+    }
+
+    #[test]
+    fn a_weaker_excitation_turns_no_angle_until_the_signal_is_lost() {
+        let mut held = fresh();
+        let weak = resolver(&[(P::ExcitationShort, 0.29)]).read(1.0, 3.0, &mut held);
+        assert_eq!((weak.angle, weak.speed), (1.0, 3.0));
+        let lost = resolver(&[(P::ExcitationShort, 0.31)]).read(2.0, 3.0, &mut held);
+        assert_eq!((lost.angle, lost.speed), (1.0, 0.0));
+        let both = resolver(&[(P::SineOpen, 1.0), (P::CosineOpen, 1.0)]).read(2.0, 3.0, &mut held);
+        assert_eq!((both.angle, both.speed), (1.0, 0.0));
+    }
+
+    #[test]
+    fn a_stuck_reading_holds_and_comes_back_true() {
+        let (free, stuck) = (resolver(&[]), resolver(&[(P::Stuck, 1.0)]));
+        let mut held = fresh();
+        free.read(1.0, 3.0, &mut held);
+        let shown = stuck.read(5.0, 7.0, &mut held);
+        assert_eq!((shown.angle, shown.speed), (1.0, 3.0));
+        let again = free.read(6.0, 8.0, &mut held);
+        assert_eq!((again.angle, again.speed), (6.0, 8.0));
     }
 }

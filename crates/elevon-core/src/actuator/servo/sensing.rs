@@ -6,8 +6,8 @@ use super::shaft::ShaftState;
 use crate::control::position_speed::{ControlParameter, Feedback};
 use crate::details;
 use crate::scalar::Scalar;
-use crate::sensor::encoder::Encoder;
-use crate::sensor::resolver::{Reading, Resolver};
+use crate::sensor::encoder::{Encoder, EncoderState};
+use crate::sensor::resolver::{Reading, Resolver, ResolverState};
 
 details! {
     /// What of the position sensors a run needs.
@@ -21,6 +21,8 @@ details! {
     full {
         resolver = Resolver::<f64>::needed(&parts.resolver());
         shown = feedback != Feedback::User;
+        /// The encoder loses counts, or stands still: it has a counter to follow.
+        counting = Encoder::<f64>::loses(&parts.encoder());
     }
     extra {
         /// The commutation has a track of its own.
@@ -35,27 +37,63 @@ pub struct Sensing<S> {
     resolver: Resolver<S>,
 }
 
+/// What the position sensors remember.
+#[derive(Clone, Copy, Debug)]
+pub struct Sensed<S> {
+    resolver: ResolverState<S>,
+    encoder: EncoderState<S>,
+}
+
 impl<S: Scalar> Sensing<S> {
     pub(super) fn derive(raw: &[S], d: &SensingDetails) -> Self {
         let turn = if d.linear { 1.0 } else { std::f64::consts::TAU };
         Self { encoder: Encoder::derive(Raw(raw).encoder(), turn), resolver: Resolver::derive(Raw(raw).resolver()) }
     }
 
-    /// The resolver's reading; `held` is the last angle shown with power on.
+    pub(super) fn start(&self, s: &ShaftState<S>) -> Sensed<S> {
+        let resolver = ResolverState { angle: s.motor_position, speed: s.motor_speed };
+        Sensed { resolver, encoder: self.encoder.start(s.user_position) }
+    }
+
+    /// The resolver has no power or no signal.
     #[inline(always)]
-    pub(super) fn shaft<const FULL: bool>(&self, d: &SensingDetails, s: &ShaftState<S>, held: &mut S) -> Reading<S> {
+    pub(super) fn lost(&self) -> S::Mask {
+        S::splat(0.5).lt(self.resolver.off)
+    }
+
+    /// The resolver's reading.
+    #[inline(always)]
+    pub(super) fn shaft<const FULL: bool>(&self, d: &SensingDetails, s: &ShaftState<S>, sensed: &mut Sensed<S>) -> Reading<S> {
         if FULL && d.resolver {
-            self.resolver.read(s.motor_position, s.motor_speed, held)
+            self.resolver.read(s.motor_position, s.motor_speed, &mut sensed.resolver)
         } else {
             Reading { angle: s.motor_position, position: s.motor_position, speed: s.motor_speed }
         }
     }
 
+    /// Position of the encoder, which counts on to the present.
+    #[inline(always)]
+    pub(super) fn count<const FULL: bool>(&self, d: &SensingDetails, s: &ShaftState<S>, sensed: &mut Sensed<S>) -> S {
+        if FULL && d.counting {
+            self.encoder.advance(s.user_position, &mut sensed.encoder);
+            sensed.encoder.shown
+        } else {
+            self.encoder.read(s.user_position)
+        }
+    }
+
     /// What closes the position loop.
     #[inline(always)]
-    pub(super) fn user<const FULL: bool>(&self, d: &SensingDetails, s: &ShaftState<S>, reading: &Reading<S>, per_ratio: S) -> S {
+    pub(super) fn user<const FULL: bool>(
+        &self,
+        d: &SensingDetails,
+        s: &ShaftState<S>,
+        sensed: &mut Sensed<S>,
+        reading: &Reading<S>,
+        per_ratio: S,
+    ) -> S {
         match d.feedback {
-            Feedback::Encoder if FULL => self.encoder.read(s.user_position),
+            Feedback::Encoder if FULL => self.count::<true>(d, s, sensed),
             Feedback::Resolver if FULL => reading.position * per_ratio,
             _ => s.user_position,
         }
@@ -63,9 +101,9 @@ impl<S: Scalar> Sensing<S> {
 
     /// Position of the encoder, position and speed of the resolver.
     #[inline(always)]
-    pub(super) fn show(&self, d: &SensingDetails, s: &ShaftState<S>, held: S) -> [S; 3] {
-        let mut held = held;
-        let reading = self.shaft::<true>(d, s, &mut held);
-        [self.encoder.read(s.user_position), reading.position, reading.speed]
+    pub(super) fn show(&self, d: &SensingDetails, s: &ShaftState<S>, sensed: Sensed<S>) -> [S; 3] {
+        let mut sensed = sensed;
+        let reading = self.shaft::<true>(d, s, &mut sensed);
+        [self.count::<true>(d, s, &mut sensed), reading.position, reading.speed]
     }
 }

@@ -3,7 +3,7 @@
 use crate::actuator::servo::details::Structure;
 use crate::actuator::servo::form::Form;
 use crate::actuator::servo::layout::*;
-use crate::actuator::servo::sensing::Sensing;
+use crate::actuator::servo::sensing::{Sensed, Sensing};
 use crate::actuator::servo::shaft::{Shaft, ShaftState};
 use crate::control::current_dq::{CurrentControl, CurrentControlState};
 use crate::control::position_speed::{ControlParameter, PositionSpeed, PositionSpeedState};
@@ -17,7 +17,6 @@ use crate::motor::thermal::{Network, NetworkState, ThermalParameter};
 use crate::scalar::Scalar;
 use crate::sensor::current::{CurrentSensor, CurrentSensorParameter};
 use crate::sensor::filter::closing;
-use crate::sensor::resolver::ResolverParameter;
 
 /// Constants of a run.
 #[derive(Clone, Copy, Debug)]
@@ -49,7 +48,6 @@ pub(crate) struct Extra<S> {
     pub drive_heat: DriveHeat<S>,
     /// Filter of the controlled current.
     pub closing: S,
-    pub resolver_off: S,
 }
 
 /// All that changes during a run.
@@ -64,7 +62,9 @@ pub struct State<S> {
     pub(crate) shaft: ShaftState<S>,
     pub(crate) command_noise: S,
     pub(crate) current_noise: [S; 3],
-    pub(crate) held_angle: S,
+    pub(crate) sensed: Sensed<S>,
+    /// What the current sensors showed last.
+    pub(crate) current_shown: [S; 3],
     pub(crate) filtered: [S; 3],
     pub(crate) transitions: S,
     /// Phase-to-neutral voltages of the last step (detailed bridge).
@@ -135,7 +135,6 @@ impl<S: Scalar> Model<S> {
                 network: network(raw, dt0),
                 drive_heat: DriveHeat::derive(view.drive_heat(), at(ThermalParameter::Ambient.at()), S::splat(network_period(raw, dt0))),
                 closing: closing(at(CurrentSensorParameter::Bandwidth.at()), dt0),
-                resolver_off: at(ResolverParameter::PowerOff.at()),
             },
         }
     }

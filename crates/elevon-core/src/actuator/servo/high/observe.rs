@@ -37,7 +37,7 @@ pub(crate) fn high<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, inpu
     set(Q::HeatDrive, s.extra.drive_heat.power);
     set(Q::ThermalWarning, m.extra.network.warns(warm));
     set(Q::Limited, m.control.limited(&s.control));
-    let [encoder, resolver, speed] = m.sensing.show(&structure.sensing, &s.shaft, s.held_angle);
+    let [encoder, resolver, speed] = m.sensing.show(&structure.sensing, &s.shaft, s.sensed);
     set(Q::EncoderPosition, encoder);
     set(Q::ResolverPosition, resolver);
     set(Q::ResolverSpeed, speed);

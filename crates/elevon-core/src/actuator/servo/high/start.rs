@@ -42,7 +42,8 @@ pub(crate) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> St
         shaft,
         command_noise: zero,
         current_noise: [zero; 3],
-        held_angle: shaft.motor_position,
+        sensed: model.sensing.start(&shaft),
+        current_shown: star.current,
         filtered: [zero; 3],
         transitions: zero,
         voltage: [zero; 3],
@@ -59,7 +60,6 @@ pub(crate) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> St
 
 pub(crate) fn refresh<S: Scalar>(raw: &[S], state: &mut State<S>) {
     heat(raw, &mut state.star, &state.extra.network);
-    state.shaft.refresh(raw);
 }
 
 /// Temperature factors: of the network where there is one, else of the given winding temperature.

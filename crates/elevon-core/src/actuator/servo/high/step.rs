@@ -18,7 +18,7 @@ use crate::three;
 /// What the controller sees of the shaft.
 #[inline(always)]
 pub(crate) fn shaft_reading<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &mut State<S>) -> Reading<S> {
-    m.sensing.shaft::<FULL>(&structure.sensing, &s.shaft, &mut s.held_angle)
+    m.sensing.shaft::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed)
 }
 
 #[inline(always)]
@@ -29,7 +29,7 @@ pub(crate) fn control_step<S: Scalar, const FULL: bool>(
     s: &mut State<S>,
     reading: &Reading<S>,
 ) {
-    let position = m.sensing.user::<FULL>(&structure.sensing, &s.shaft, reading, m.shaft.gear.per_ratio);
+    let position = m.sensing.user::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed, reading, m.shaft.gear.per_ratio);
     let command = command + s.command_noise;
     s.current_ref = m.control.step(&structure.control, &mut s.control, command, position, reading.speed);
 }
@@ -45,7 +45,7 @@ pub(crate) fn measured_current<S: Scalar, const FULL: bool, const EXTRA: bool>(
         current = leg_current(m, structure, s);
     }
     if FULL && structure.measured_current {
-        m.sensor.measure(current, s.current_noise)
+        m.sensor.measure(current, s.current_noise, s.current_shown)
     } else {
         current
     }
@@ -106,11 +106,17 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
 ) {
     // Sensors and control electronics.
     let reading = shaft_reading::<S, FULL>(m, structure, s);
+    if FULL && structure.sensing.counting {
+        m.sensing.count::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed);
+    }
     if structure.control_every_step {
         control_step::<S, FULL>(m, structure, x.command, s, &reading);
     }
     let (sin, cos) = m.star.electrical_angle(s.shaft.motor_position).sin_cos();
     let mut measured = measured_current::<S, FULL, EXTRA>(m, structure, s);
+    if FULL && structure.measured_current {
+        s.current_shown = measured;
+    }
     if EXTRA && structure.current_filter {
         s.extra.sensed = three!(|j| low_pass(m.extra.closing, s.extra.sensed[j], measured[j]));
         measured = s.extra.sensed;
@@ -138,7 +144,7 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
         s.legs = relays(m.half_band, old_legs, error);
     }
     if EXTRA && structure.stops {
-        let lost = S::splat(0.5).lt(m.extra.resolver_off);
+        let lost = m.sensing.lost();
         s.legs = three!(|j| S::select(lost, S::zero(), s.legs[j]));
     }
     s.transitions = count_transitions(s.transitions, old_legs, s.legs);

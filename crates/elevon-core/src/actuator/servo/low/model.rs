@@ -4,7 +4,7 @@ use super::phase::Phase;
 use crate::actuator::servo::form::Form;
 use crate::actuator::servo::high::model::network;
 use crate::actuator::servo::layout::*;
-use crate::actuator::servo::sensing::{Sensing, SensingDetails};
+use crate::actuator::servo::sensing::{Sensed, Sensing, SensingDetails};
 use crate::actuator::servo::shaft::{Shaft, ShaftDetails, ShaftNeeds, ShaftState};
 use crate::control::current_dq::PwmParameter;
 use crate::control::position_speed::{ControlParameter, ControlStructure, Mode};
@@ -112,7 +112,7 @@ pub struct State<S> {
     pub speed_ref: S,
     pub torque_ref: S,
     pub motor_torque: S,
-    pub held_angle: S,
+    pub sensed: Sensed<S>,
     pub filtered: [S; 2],
     pub tripped: S,
     pub shaft: ShaftState<S>,
@@ -215,7 +215,7 @@ impl<S: Scalar> Model<S> {
             speed_ref: zero,
             torque_ref: zero,
             motor_torque: zero,
-            held_angle: shaft.motor_position,
+            sensed: self.sensing.start(&shaft),
             filtered: [zero; 2],
             tripped: zero,
             shaft,
@@ -226,7 +226,6 @@ impl<S: Scalar> Model<S> {
 impl<S: Scalar> State<S> {
     pub(super) fn refresh(&mut self, raw: &[S]) {
         (self.resistance_factor, self.flux_factor) = heat(raw, &self.network);
-        self.shaft.refresh(raw);
     }
 }
 

@@ -11,7 +11,7 @@ use crate::scalar::Scalar;
 pub(super) fn observe<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
     let x = Instant::at(inputs, t);
     let shown = m.shaft.show(&structure.shaft, &x, &s.shaft, s.motor_torque);
-    let [encoder, resolver, resolver_speed] = m.sensing.show(&structure.sensing, &s.shaft, s.held_angle);
+    let [encoder, resolver, resolver_speed] = m.sensing.show(&structure.sensing, &s.shaft, s.sensed);
     let limited = m.control.speed_limit.le(s.speed_ref.abs()) | m.control.torque_limit.le(s.torque_ref.abs());
     let source = x.supply * m.drive.supply_scale;
     for (q, value) in [

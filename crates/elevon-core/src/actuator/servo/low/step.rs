@@ -87,8 +87,11 @@ fn electric_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structur
 #[inline(always)]
 fn step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &Instant<S>, s: &mut State<S>) {
     // Sensors and control electronics.
-    let reading = m.sensing.shaft::<FULL>(&structure.sensing, &s.shaft, &mut s.held_angle);
-    let position = m.sensing.user::<FULL>(&structure.sensing, &s.shaft, &reading, m.shaft.gear.per_ratio);
+    let reading = m.sensing.shaft::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed);
+    if FULL && structure.sensing.counting {
+        m.sensing.count::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed);
+    }
+    let position = m.sensing.user::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed, &reading, m.shaft.gear.per_ratio);
     let asked = demand(m, structure, s, x.command, position, reading.speed);
 
     // Loads, and the acceleration that the derivative of the speed takes part in.

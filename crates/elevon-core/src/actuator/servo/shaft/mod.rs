@@ -193,14 +193,6 @@ impl<S: Scalar> Shaft<S> {
 }
 
 impl<S: Scalar> ShaftState<S> {
-    /// After a fault changed parameters: a jam at a position has not been passed before.
-    pub(super) fn refresh(&mut self, raw: &[S]) {
-        let position = raw[FrictionParameter::JamPosition.at()];
-        let free = self.jammed.equals(S::zero());
-        let side = (self.user_position - position).sign();
-        self.jam_side = S::select(free & self.jam_side.equals(S::zero()), side, self.jam_side);
-    }
-
     /// The friction of a screw with debris in it, until the next tick; `noise` has unit deviation.
     pub(super) fn scatter(&mut self, screw: &Screw<S>, noise: S) {
         self.scatter = screw.scatter.fma(noise, S::one()).maximum(S::zero());

@@ -96,9 +96,7 @@ impl<S: Scalar> Shaft<S> {
             s.user_position = self.drag::<EXTRA>(d, position, s.user_position);
         }
         if FULL && d.jams {
-            let passed = ((s.user_position - self.friction.jam_position) * s.jam_side).le(S::zero());
-            let seized = passed | S::splat(0.5).lt(self.friction.jam_anywhere);
-            s.jammed = S::select(seized, S::one(), s.jammed);
+            self.friction.seize(s.user_position, &mut s.jam_side, &mut s.jammed);
         }
         s.motor_position = position;
         s.motor_speed = held_speed;
