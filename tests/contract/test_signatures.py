@@ -43,6 +43,16 @@ SIGNATURES = {
     ("local_demagnetisation", "motor"): (
         "test_local_demagnetisation_puts_sidebands_beside_the_emf"
     ),
+    ("winding_short", "resolver"): (
+        "test_shorted_resolver_winding_shows_the_angle_of_its_channels"
+    ),
+    ("winding_open", "resolver"): "test_open_resolver_winding_leaves_multiples_of_half_a_turn",
+    ("dark_sectors", "encoder"): "test_dark_sector_takes_its_share_of_the_disc",
+    ("stuck", "encoder"): "test_encoder_that_stood_still_comes_back",
+    ("dead", "encoder"): "test_encoder_that_stood_still_comes_back",
+    ("stuck", "resolver"): "test_stuck_resolver_holds_angle_and_speed",
+    ("stuck", "current"): "test_current_sensor_that_stands_still_frees_its_leg",
+    ("dead", "current"): "test_current_sensor_that_stands_still_frees_its_leg",
     ("missing_counts", "encoder"): "test_missing_counts_make_the_encoder_read_short",
     ("bearing", "bearing"): "test_bearing_defect_shows_at_its_shaft_order",
     ("tooth_wear", "gear"): "test_tooth_wear_opens_the_play_over_each_mesh",

@@ -327,7 +327,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             range: Range::Unit,
             attributes: &[],
             places: places!("sensor.current_a": "sensor.current.stuck_a" Set, "sensor.current_b": "sensor.current.stuck_b" Set, "sensor.current_c": "sensor.current.stuck_c" Set),
-            effect: "1: the current sensor stands still at its value of the onset: its leg no longer controls the current",
+            effect: "1: the current sensor stands still at its value of the onset: its leg controls nothing; between relays the other two legs leave its phase what the star allows, a carrier drive controls a wrong current",
             source: "ASSUMED: the usual failure of a sensor's electronics, beside gain and offset of T2",
         },
         FaultKind {
@@ -345,7 +345,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             range: Range::Unit,
             attributes: &[],
             places: places!("sensor.current_a": "sensor.current.dead_a" Set, "sensor.current_b": "sensor.current.dead_b" Set, "sensor.current_c": "sensor.current.dead_c" Set),
-            effect: "1: the current sensor shows nothing: its leg drives the current up to what the voltage allows",
+            effect: "1: the current sensor shows nothing: its leg controls nothing; between relays the other two legs leave its phase what the star allows, a carrier drive controls a wrong current",
             source: "ASSUMED: broken wire, beside gain and offset of T2",
         },
     ]

@@ -1,0 +1,183 @@
+"""Sensors that fail: resolver windings, dark sectors of the encoder, readings that stand still."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.physics.rig import FREE_SHAFT, HYSTERESIS, MOTOR, PWM, RATIO, P, constant, run, term
+
+SHOWN = "resolver_speed,user_position,encoder_position"
+CURRENTS = "current_a,current_a_meas,current_b,current_b_meas"
+BOTH = pytest.mark.parametrize("fidelity", ["high", "low"])
+
+
+def spun(fidelity: str, faults: list[dict[str, Any]], speed: float = 100.0, **more: Any) -> Any:
+    """A free shaft that turns at a constant speed, its drive off."""
+    return run(
+        FREE_SHAFT | more,
+        duration=1.0,
+        mode="speed",
+        command=[constant(0.0)],
+        record=f"motor_position,resolver_position,{SHOWN}@1 kHz",
+        scenario={"initial": {"motor_speed": speed}, "fault": faults},
+        fidelity=fidelity,
+    )
+
+
+def fault(kind: str, place: str, severity: float, **rest: Any) -> dict[str, Any]:
+    """One fault as a scenario spells it."""
+    return {"kind": kind, "place": place, "severity": severity, **rest}
+
+
+def there(start: float, end: float) -> dict[str, Any]:
+    """A profile: present between two instants of a second."""
+    return {"kind": "intermittent", "start": start, "period": 10.0, "duty": (end - start) / 10.0}
+
+
+@BOTH
+@pytest.mark.parametrize(("place", "a", "b"), [("sine", 0.6, 1.0), ("cosine", 1.0, 0.6)])
+def test_shorted_resolver_winding_shows_the_angle_of_its_channels(
+    fidelity: str, place: str, a: float, b: float
+) -> None:
+    """atan2(a sin, b cos), unwrapped; sampling error none, rounding of some hundred radians."""
+    rec = spun(fidelity, [fault("winding_short", f"sensor.resolver.{place}", 0.4)])
+    theta = rec["motor_position"].values
+    error = np.angle(np.exp(1j * (np.arctan2(a * np.sin(theta), b * np.cos(theta)) - theta)))
+    assert rec["resolver_position"].values == pytest.approx(theta + error, abs=1e-9)
+    assert np.max(np.abs(error)) == pytest.approx(math.asin(0.4 / 1.6), rel=1e-2)
+
+
+@BOTH
+def test_shorted_excitation_turns_no_angle_until_the_signal_is_lost(fidelity: str) -> None:
+    """70 % of the amplitude is where the converter gives up (ASSUMED)."""
+    weak = spun(fidelity, [fault("winding_short", "sensor.resolver.excitation", 0.29)])
+    assert np.array_equal(weak["resolver_position"].values, weak["motor_position"].values)
+    lost = spun(fidelity, [fault("winding_short", "sensor.resolver.excitation", 0.31)])
+    assert np.ptp(lost["resolver_position"].values) == 0.0
+    assert np.all(lost["resolver_speed"].values == 0.0)
+
+
+@BOTH
+@pytest.mark.parametrize(("place", "zero"), [("sine", 0.0), ("cosine", math.pi / 2)])
+def test_open_resolver_winding_leaves_multiples_of_half_a_turn(
+    fidelity: str, place: str, zero: float
+) -> None:
+    """One channel alone tells only on which side the shaft stands; 0.1 % stray coupling."""
+    rec = spun(fidelity, [fault("winding_open", f"sensor.resolver.{place}", 1)])
+    theta, shown = rec["motor_position"].values, rec["resolver_position"].values
+    halves = zero + math.pi * np.round((theta - zero) / math.pi)
+    away = np.abs(np.angle(np.exp(2j * (theta - zero - math.pi / 2)))) > 0.1
+    assert shown[away] == pytest.approx(halves[away], abs=0.021)
+    none = spun(fidelity, [fault("winding_open", "sensor.resolver.excitation", 1)])
+    assert np.ptp(none["resolver_position"].values) == 0.0
+
+
+@BOTH
+def test_dark_sector_takes_its_share_of_the_disc(fidelity: str) -> None:
+    """Three turns of the disc with a quarter of it dark: a quarter of the travel is lost, and
+    inside the sector the shown position stands.
+    """
+    speed = 3.0 / 4.0 * 2.0 * math.pi * 20.0
+    dark = fault("dark_sectors", "sensor.encoder", 0.25, position="180 deg", sectors=1)
+    rec = spun(fidelity, [dark], speed, **{"gear.ratio": 20.0})
+    user, shown = rec["user_position"].values, rec["encoder_position"].values
+    assert shown[-1] == pytest.approx(0.75 * user[-1], abs=2.0 * math.pi / 80e3 * 2)
+    disc = np.mod(4.0 * user / (2.0 * math.pi), 1.0)
+    inside = (disc[:-1] > 0.38) & (disc[:-1] < 0.62) & (disc[1:] < 0.62) & (disc[1:] > 0.38)
+    assert np.all(np.diff(shown)[inside] == 0.0)
+    assert np.all(np.diff(shown)[(disc[:-1] > 0.65) | (disc[1:] < 0.35)] > 0.0)
+
+
+@BOTH
+@pytest.mark.parametrize(("kind", "lost"), [("stuck", 0.0), ("dead", 0.4)])
+def test_encoder_that_stood_still_comes_back(fidelity: str, kind: str, lost: float) -> None:
+    """A stuck reading is the true one again, a dead encoder has lost the counts of its time."""
+    rec = spun(fidelity, [fault(kind, "sensor.encoder", 1, profile=there(0.3, 0.7))], RATIO)
+    time, user = rec["user_position"].time, rec["user_position"].values
+    shown = rec["encoder_position"].values
+    gone = (time > 0.3) & (time < 0.699)
+    assert np.ptp(shown[gone]) == 0.0
+    assert shown[gone][0] == pytest.approx(0.3, abs=2e-3)
+    assert user[-1] - shown[-1] == pytest.approx(lost, abs=2e-3)
+
+
+@BOTH
+def test_stuck_resolver_holds_angle_and_speed(fidelity: str) -> None:
+    """What it showed at the onset; the true reading afterwards."""
+    rec = spun(fidelity, [fault("stuck", "sensor.resolver", 1, profile=there(0.3, 0.7))])
+    time, shown = rec["motor_position"].time, rec["resolver_position"].values
+    gone = (time > 0.3) & (time < 0.699)
+    assert np.ptp(shown[gone]) == 0.0
+    assert rec["resolver_speed"].values == pytest.approx(100.0, rel=1e-12)
+    assert np.array_equal(shown[time > 0.71], rec["motor_position"].values[time > 0.71])
+
+
+@pytest.mark.parametrize("kind", ["stuck", "dead"])
+@pytest.mark.parametrize("drive", [HYSTERESIS, PWM], ids=["hysteresis", "pwm"])
+def test_current_sensor_that_stands_still_frees_its_leg(kind: str, drive: dict[str, Any]) -> None:
+    """Its reading holds, or is zero, and the true current of its phase leaves the reference: with
+    relays by what the star's other two leave it, with a carrier by far more.
+    """
+    onset = {"kind": "step", "time": 0.2}
+    rec = run(
+        FREE_SHAFT | drive,
+        duration=0.3,
+        mode="speed",
+        command=[constant(40.0)],
+        record=f"{CURRENTS},current_ref,motor_position@10 kHz",
+        scenario={
+            "initial": {"motor_speed": 40.0},
+            "load": {"shaft": {"terms": [constant(2.0)]}},
+            "fault": [fault(kind, "sensor.current_a", 1, profile=onset)],
+        },
+    )
+    late = rec["current_a"].time > 0.2001
+    shown = rec["current_a_meas"].values[late]
+    assert np.ptp(shown) == 0.0
+    assert (shown[0] == 0.0) == (kind == "dead")
+    asked = rec["current_ref"].values * np.sin(P * rec["motor_position"].values)
+    error = np.abs(rec["current_a"].values - asked)
+    settled = (rec["current_a"].time > 0.1) & ~late
+    assert np.max(error[late]) > 2.0 * np.max(error[settled])
+    assert np.array_equal(rec["current_b"].values, rec["current_b_meas"].values)
+
+
+@BOTH
+def test_dark_sector_carries_a_loop_on_the_encoder_too_far(fidelity: str) -> None:
+    """The output must turn until as many counts have come as were asked for."""
+    dark = fault("dark_sectors", "sensor.encoder", 0.1, position="45 deg")
+    rec = run(
+        MOTOR | HYSTERESIS | {"control.position_feedback": "encoder"},
+        duration=3.0,
+        command=[term("ramp", slope="12 deg/s", end=2.0)],
+        record="user_position,encoder_position@1 kHz",
+        scenario={"fault": [dark]},
+        fidelity=fidelity,
+    )
+    assert math.degrees(rec.final["encoder_position"]) == pytest.approx(24.0, abs=0.3)
+    # A tenth of the disc is a fortieth of a user turn.
+    assert math.degrees(rec.final["user_position"]) == pytest.approx(24.0 + 9.0, abs=0.3)
+
+
+@BOTH
+def test_jam_waits_for_a_passage_after_its_onset(fidelity: str) -> None:
+    """A triangle of 6 deg passes 3 deg at 0.6 s and 1.4 s; a jam that comes at 1 s holds at the
+    second passage, and what it is labelled with acts from its onset on.
+    """
+    jam = fault("jam", "transmission", 100.0, position="3 deg", profile={"kind": "step", "time": 1})
+    rec = run(
+        MOTOR | HYSTERESIS,
+        duration=2.0,
+        command=[term("triangle", amplitude="5 deg", frequency="0.25 Hz")],
+        record="user_position@1 kHz",
+        scenario={"fault": [jam]},
+        fidelity=fidelity,
+    )
+    time, position = rec["user_position"].time, np.degrees(rec["user_position"].values)
+    assert np.max(position) == pytest.approx(5.0, abs=0.6)
+    assert position[-1] == pytest.approx(3.0, abs=0.6)
+    assert np.array_equal(rec["fault_1"].values, np.where(time >= 1.0, 100.0, 0.0))
