@@ -18,7 +18,7 @@ use crate::motor::star::MotorParameter;
 use crate::motor::thermal::Network;
 use crate::motor::unbalance::Unbalance;
 use crate::scalar::Scalar;
-use crate::transmission::friction::{Friction, FrictionParameter};
+use crate::transmission::friction::Friction;
 use crate::transmission::gear::{Gear, GearParameter, LoadParameter};
 use crate::transmission::nut_heat::{NutHeat, NutState};
 use crate::transmission::play::{Play, PlayModel};
