@@ -147,6 +147,32 @@ def test_the_load_drives_back_only_through_an_efficient_train() -> None:
 
 
 @pytest.mark.parametrize("fidelity", ["high", "low"])
+def test_no_cut_off_stops_a_rectified_current(fidelity: str) -> None:
+    """An EMF far above the link: the diodes carry more than the 60 A at which switches open."""
+    scenario = elevon.Scenario.from_dict(
+        {
+            "duration": 0.03,
+            "command": {"mode": "gear", "steps": []},
+            "initial": {"nut_position": 0.1, "motor_speed": 1200.0},
+            "parameters": {"inverter.supply_voltage": 14.0},
+            "fault": ["brake_slipping@brake=1"],
+        }
+    )
+    rec = elevon.simulate(elevon.Actuator.load(NAME), scenario, fidelity=fidelity,
+                          record=["current_mean,motor_speed@1 kHz"])  # fmt: skip
+    assert rec["current_mean"].values.min() < -1.2 * value("inverter.current_cutoff")
+    assert rec["motor_speed"].values[-1] < 800.0
+
+
+def test_what_decays_to_nothing_is_nothing() -> None:
+    """No signal of a stroke holds numbers without full precision: they are slow."""
+    rec = gear((0.1, "extend"), duration=8.0, record="all@1 kHz")
+    for name in rec.names:
+        size = np.abs(rec[name].values)
+        assert not np.any((size > 0.0) & (size < np.finfo(float).tiny)), name
+
+
+@pytest.mark.parametrize("fidelity", ["high", "low"])
 def test_free_fall_extends_and_locks_without_the_motor(fidelity: str) -> None:
     """Gravity alone, motor apart and standing, no current; the lock engages by its spring."""
     rec = gear((0.1, "free_fall"), duration=6.0, fidelity=fidelity)

@@ -1,6 +1,9 @@
 //! Motor shaft, gearbox, screw, ram, leg and lock: one shaft while connected, two after the free-fall release.
 //! `kick` changes the speeds, `drift` the positions; forces towards extension are positive.
 
+mod apart;
+mod rig;
+
 use super::layout::*;
 use crate::motor::star::MotorParameter;
 use crate::piecewise::{Curve, Knots};
@@ -341,65 +344,6 @@ impl<S: Scalar> Mechanics<S> {
         e[E_IMPACT] = e[E_IMPACT] + moved.impact;
     }
 
-    /// Motor with the first stage, and screw with ram and leg, each for itself.
-    #[inline(always)]
-    fn apart(&self, s: &mut Motion<S>, a: &Acting<S>, f: &Forces<S>) {
-        let zero = S::zero();
-        let never = S::mask(false);
-        let detent = self.detent_torque(s.motor_position);
-        let brake = self.brake.torque(a.brake_free);
-        let pushed = a.motor_torque + detent;
-        let heading = S::select(s.motor_speed.equals(zero), pushed, s.motor_speed);
-        let own = self.friction.at(s.motor_speed * self.travel, zero.le(heading), s.nut_position, self.screw.turns);
-        let rubbing = self.travel * (own.train - own.screw).maximum(zero);
-        let other = brake + self.bearing;
-        let motor = Shaft {
-            speed: s.motor_speed,
-            active: pushed,
-            fixed: self.friction.breakaway * rubbing + other,
-            kinetic: rubbing + other,
-            inertia: self.inertia_motor,
-            blocked_up: never,
-            blocked_down: never,
-        };
-        let turned = self.move_shaft(&motor);
-
-        let v = s.nut_speed;
-        let axial = f.load + f.spring;
-        let heading = S::select(v.equals(zero), axial, v);
-        let resistance = self.friction.at(v, zero.le(heading), s.nut_position, self.screw.turns).screw;
-        let loss = RollerScrew::load_friction(axial, f.efficiency * self.gear.efficiency_second);
-        let jam = self.screw.jam(s.nut_position);
-        let governor = self.governor.force(v);
-        let (up, down) = self.ends(s);
-        let rate = self.rate_term * s.carrying * self.leg * f.arm.rate * v * v;
-        let ram = Shaft {
-            speed: v,
-            active: axial - governor - rate,
-            fixed: self.friction.breakaway * resistance + loss + jam,
-            kinetic: resistance + loss + jam,
-            inertia: self.mass_released(s, &f.arm),
-            blocked_up: up,
-            blocked_down: down,
-        };
-        let fallen = self.move_shaft(&ram);
-        s.motor_speed = turned.speed;
-        s.nut_speed = fallen.speed;
-        let tiny = S::splat(1e-300);
-        let (share, share_ram) = (turned.rubbed / motor.kinetic.maximum(tiny), fallen.rubbed / ram.kinetic.maximum(tiny));
-        let (work, work_ram) = (self.dt * turned.middle, self.dt * fallen.middle);
-        let e = &mut s.energy;
-        e[E_MOTOR] = e[E_MOTOR] + a.motor_torque * work;
-        e[E_LOAD] = e[E_LOAD] - f.load * work_ram;
-        e[E_LOCK] = e[E_LOCK] - f.spring * work_ram;
-        e[E_DETENT] = e[E_DETENT] - detent * work;
-        e[E_FRICTION] = e[E_FRICTION] + share * (rubbing + self.bearing) + share_ram * (resistance + jam);
-        e[E_EFFICIENCY] = e[E_EFFICIENCY] + share_ram * loss;
-        e[E_BRAKE] = e[E_BRAKE] + share * brake;
-        e[E_GOVERNOR] = e[E_GOVERNOR] + governor * work_ram;
-        e[E_IMPACT] = e[E_IMPACT] + (turned.impact + fallen.impact);
-    }
-
     /// Borello's friction: at rest it holds what it can; a speed that would change sign stops first.
     #[inline(always)]
     fn move_shaft(&self, x: &Shaft<S>) -> Moved<S> {
@@ -416,28 +360,5 @@ impl<S: Scalar> Mechanics<S> {
         let reversed = !kept.equals(free);
         let rubbed = self.dt * dry * middle + S::select(reversed, residue, zero);
         Moved { speed, middle, rubbed, impact: S::select(hit & !reversed, residue, zero) }
-    }
-
-    /// The rig moves the ram; the motor follows unless the stages are apart. The ram hangs from the load cell.
-    #[inline(always)]
-    fn imposed(&self, s: &mut Motion<S>, a: &Acting<S>, f: &Forces<S>) {
-        let zero = S::zero();
-        let half = S::splat(0.5);
-        let apart = half.lt(a.released);
-        let mut coasting = *s;
-        self.apart(&mut coasting, a, f);
-        let (old, new) = (s.nut_speed, a.rig_speed);
-        let way = new.sign();
-        let rubs = self.friction.at(new, zero.le(new), s.nut_position, self.screw.turns);
-        let detent = self.detent_torque(s.motor_position);
-        let jam = self.screw.jam(s.nut_position);
-        let torque = a.motor_torque + detent - way * (self.brake.torque(a.brake_free) + self.bearing);
-        let inertia = self.inertia_train * self.per_travel * self.per_travel;
-        let connected = way * (rubs.train + jam) - torque * self.per_travel + inertia * (new - old) / self.dt;
-        let released = way * (rubs.screw + jam) + self.governor.force(new) + self.mass_screw * (new - old) / self.dt;
-        let weight = self.mass * S::splat(GRAVITY);
-        s.rig_force = S::select(apart, released, connected) - weight - f.spring;
-        s.nut_speed = new;
-        s.motor_speed = S::select(apart, coasting.motor_speed, new * self.per_travel);
     }
 }
