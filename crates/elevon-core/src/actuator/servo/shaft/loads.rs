@@ -69,7 +69,7 @@ impl<S: Scalar> Shaft<S> {
         }
         let mut brake = x.brake;
         let mut limits = [self.friction.static_limit, self.friction.dynamic];
-        if EXTRA {
+        if EXTRA && d.train.lawful {
             limits = self.train.law.limits(d.train.law, limits, s.motor_speed, torque, load);
         }
         let (mut static_limit, mut dynamic) = (limits[0] + added, limits[1] + added);
