@@ -87,7 +87,10 @@ def failures_report(result: FailuresResult, *, date: str | None = None) -> Repor
     )
     section = report.section("Unsafe cases")
     if unsafe:
-        section.table(Table(_COLUMNS, _cells(unsafe), "With the sensors that could have seen it."))
+        section.table(Table(_COLUMNS, _cells(unsafe), formats=_FORMATS))
+        section.points(
+            [f"{row.fault}, {row.phase}: {row.sensors or 'not listed'}" for row in unsafe]
+        )
     else:
         section.text("None.")
     section = report.section("All cases")
@@ -110,14 +113,14 @@ def failures_report(result: FailuresResult, *, date: str | None = None) -> Repor
     return report
 
 
-_COLUMNS = ("Fault", "Phase", "Indicated", "True", "Safe", "Found by", "after [s]", "Ram [mm]",
-            "Sensors")  # fmt: skip
-_FORMATS = ("", "", "", "", "", "", ".3f", ".1f", "")
+_COLUMNS = ("Fault", "Phase", "Indicated", "True", "Safe", "Found by", "after [s]",
+            "Ram [mm]")  # fmt: skip
+_FORMATS = ("", "", "", "", "", "", ".3f", ".1f")
 
 
 def _cells(rows: Sequence[FailureRow]) -> list[list[object]]:
     return [
         [r.fault, r.phase, r.indicated, r.true_state, r.safe, r.detected_by, r.time_s,
-         r.position_mm, r.sensors]
+         r.position_mm]
         for r in rows
     ]  # fmt: skip
