@@ -14,6 +14,7 @@ from elevon.faults.catalogue import catalogue
 from elevon.reproduce.pisa_failures import (
     LISTED,
     PHASES,
+    failure_checks,
     judge,
     reproduce_failures,
     severities,
@@ -53,6 +54,12 @@ def test_a_false_indication_is_judged_unsafe() -> None:
     row = judge(false, phase, "none", None, "landing_gear")
     assert not row.safe
     assert (row.indicated, row.true_state) == ("locked", "between, at rest")
+    # The status fails on it unless it is listed, and on a listed row that has become safe.
+    assert [check.passed for check in failure_checks([row], 1)] == [False, True, True]
+    named = judge(false, phase, "none", "who could see it", "landing_gear")
+    assert all(check.passed for check in failure_checks([named], 1))
+    stale = judge(rec, phase, "none", "who could see it", "landing_gear")
+    assert [check.passed for check in failure_checks([stale], 2)] == [True, False, False]
 
 
 def test_severities_follow_the_record() -> None:

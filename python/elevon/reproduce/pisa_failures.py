@@ -24,7 +24,17 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.recording import Recording
 
-__all__ = ["LISTED", "PHASES", "FailureRow", "FailuresResult", "Phase", "reproduce_failures"]
+__all__ = [
+    "LISTED",
+    "PHASES",
+    "FailureRow",
+    "FailuresResult",
+    "Phase",
+    "failure_checks",
+    "judge",
+    "reproduce_failures",
+    "severities",
+]
 
 RECORD = (
     "state,fault_code,warning_code,locked,user_position,user_speed,nut_position,"
@@ -198,7 +208,7 @@ def reproduce_failures(
         judge(recording, case.phase, case.fault, LISTED.get(case.key), actuator.wiring)
         for case, recording in zip(cases, recordings, strict=True)
     ]
-    return FailuresResult(rows, fidelity, _checks(rows, cases), seed)
+    return FailuresResult(rows, fidelity, failure_checks(rows, len(cases)), seed)
 
 
 def _cases(actuator: Actuator, fidelity: str, faults: Sequence[str] | None) -> Iterator[_Case]:
@@ -318,13 +328,20 @@ def _detected(recording: Recording, phase: Phase, wiring: str) -> tuple[str, flo
     return "-", None
 
 
-def _checks(rows: Sequence[FailureRow], cases: Sequence[_Case]) -> list[Check]:
-    unsafe = [row for row in rows if not row.safe]
-    stale = [row for row in rows if row.listed and row.safe]
+def failure_checks(rows: Sequence[FailureRow], expected: int) -> list[Check]:
+    """Return the checks: nothing unsafe but what is listed, nothing listed that is safe, all run.
+
+    Parameters
+    ----------
+    rows : sequence of FailureRow
+        All cases.
+    expected : int
+        How many there must be.
+    """
+    unlisted = sum(not row.safe and not row.listed for row in rows)
+    stale = sum(row.safe and row.listed for row in rows)
     return [
-        Check(
-            "unsafe rows outside the listed set", sum(not row.listed for row in unsafe), 0.0, "rows"
-        ),
-        Check("listed rows that are safe", len(stale), 0.0, "rows"),
-        Check("rows, one a fault, place, severity and phase", len(rows), len(cases), "rows", True),
+        Check("unsafe rows outside the listed set", unlisted, 0.0, "rows"),
+        Check("listed rows that are safe", stale, 0.0, "rows"),
+        Check("rows, one a fault, place, severity and phase", len(rows), expected, "rows", True),
     ]
