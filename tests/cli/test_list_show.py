@@ -102,3 +102,33 @@ def test_bad_usage(elevon_cli, arguments, message):
 
 def test_version(elevon_cli):
     assert elevon_cli("--version").out.strip() == _core.version()
+
+
+def test_the_faults_of_an_actuator_are_its_own(elevon_cli):
+    """Circuits end at the nut's four; namesakes are told apart."""
+    rows = elevon_cli("list", "faults", "nasa-ballscrew", "--json").json["faults"]
+    kinds = {row["kind"]: row for row in rows}
+    assert kinds["return_jam"]["range"] == "[0, 4]"
+    for first, second in (
+        ("jam", "return_jam"),
+        ("lubrication", "lubrication_loss"),
+        ("play", "adapter_gap"),
+    ):
+        assert f"`{second}`" in kinds[first]["effect"]
+        assert f"`{first}`" in kinds[second]["effect"]
+
+
+def test_places_that_nothing_reads_are_not_listed(elevon_cli):
+    """Every shipped actuator lists a part of its wiring's catalogue."""
+    every = elevon_cli("list", "faults", "--json").json["faults"]
+    for name in ("torino-rotary", "nasa-ballscrew"):
+        own = elevon_cli("list", "faults", name, "--json").json["faults"]
+        whole = {
+            (row["kind"], place)
+            for row in every
+            if row["wiring"] == own[0]["wiring"]
+            for place in row["places"]
+        }
+        shown = {(row["kind"], place) for row in own for place in row["places"]}
+        assert shown <= whole
+        assert ("short", "motor.phase_a") in shown

@@ -75,12 +75,21 @@ def faults(
     *,
     json: JsonOption = False,
 ) -> None:
-    """List the fault catalogue: kind, places, unit, range, fidelities, effect, source."""
+    """List the fault catalogue: kind, places, unit, range, fidelities, effect, source.
+
+    With an actuator: only what acts in it, in its own ranges.
+    """
     from elevon.actuator import Actuator
     from elevon.faults import catalogue
     from elevon.parameters.records import wiring_names
 
-    wirings = wiring_names() if actuator is None else [Actuator.load(actuator).wiring]
+    if actuator is None:
+        records = [(wiring, record) for wiring in wiring_names() for record in catalogue(wiring)]
+    else:
+        from elevon.simulate.own_faults import own_faults
+
+        model = Actuator.load(actuator)
+        records = [(model.wiring, record) for record in own_faults(model)]
     rows = [
         {
             "wiring": wiring,
@@ -94,10 +103,9 @@ def faults(
             "effect": record.effect,
             "source": record.source,
         }
-        for wiring in wirings
-        for record in catalogue(wiring)
+        for wiring, record in records
     ]
-    first = ("wiring",) if len(wirings) > 1 else ()
+    first = ("wiring",) if actuator is None else ()
     columns = ("kind", "places", "unit", "range", "fidelities", "effect", "source", "declined")
     _print("faults", rows, json, (*first, *columns))
 

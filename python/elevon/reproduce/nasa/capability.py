@@ -25,7 +25,9 @@ class Capability:
     voltage : float
         V, largest phase voltage, link / sqrt 3.
     friction, viscous : float
-        N m and N m s/rad on the motor, preload included.
+        N m and N m s/rad on the motor, without the preload.
+    preload, preload_torque : float
+        N, and N m on the motor without load.
     load_friction : float
         N on the load side.
     efficiency : float
@@ -45,6 +47,8 @@ class Capability:
     voltage: float
     friction: float
     viscous: float
+    preload: float
+    preload_torque: float
     load_friction: float
     efficiency: float
     inertia: float
@@ -79,8 +83,10 @@ class Capability:
             resistance=value("motor.winding_resistance"),
             reactance=value("motor.pole_pairs") * value("motor.winding_inductance"),
             voltage=value("inverter.supply_voltage") / math.sqrt(3.0),
-            friction=value("friction.dynamic") + preload,
+            friction=value("friction.dynamic"),
             viscous=value("friction.viscous"),
+            preload=value("screw.preload"),
+            preload_torque=preload,
             load_friction=value("load.friction"),
             efficiency=eta * value("gear.efficiency"),
             inertia=rotor + value("load.mass") * travel**2,
@@ -94,7 +100,20 @@ class Capability:
         """Return the quadrature current [A] of steady motion at `rate` [m/s] against `load` [N]."""
         force = (abs(load) + self.load_friction) * self.travel_per_radian / self.efficiency
         drag = self.viscous * rate / self.travel_per_radian
+        drag += self.preload_torque * self._relieved(abs(load) + self.load_friction)
         return (force + self.friction + drag) / (1.5 * self.emf)
+
+    def _relieved(self, force: float) -> float:
+        """Load that the relieved half of the nut keeps, over the preload."""
+        if self.preload <= 0.0 or force >= 2.0**1.5 * self.preload:
+            return 0.0
+        from scipy.optimize import brentq
+
+        # Halves of (1 +- u)^(3/2) preloads, by Hertz; their difference is the force.
+        def excess(u: float) -> float:
+            return float((1.0 + u) ** 1.5 - (1.0 - u) ** 1.5 - force / self.preload)
+
+        return float((1.0 - float(brentq(excess, 0.0, 1.0))) ** 1.5)
 
     def voltage_rate(self, load: float) -> float:
         """Return the rate [m/s] at which the link's voltage is used up against `load` [N]."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elevon.report import Report
+from elevon.report import Report, Table
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.nasa.baseline_rows import BaselineResult
+from elevon.reproduce.nasa.dema import DemaFit
 from elevon.reproduce.nasa.page_baseline import baseline_page
 from elevon.reproduce.nasa.page_separation import separation_page
 from elevon.reproduce.nasa.separation_rows import SeparationResult
@@ -52,7 +53,31 @@ def _thermal(result: ThermalResult, date: str | None) -> Report:
     report.fact("Surface", f"{surface[-1]:.1f} degC", "after one hour")
     section = report.section("Temperatures")
     section.figure(_thermal_figure(result), "Winding and surface; the load rises at half time.")
+    if result.fit is not None:
+        rows = [[r.parameter, r.put_in, r.recovered, r.low, r.high] for r in result.fit.rows]
+        section = report.section(
+            "The fit's procedure on a bench with hidden values",
+            "The paper fits its network to an hour on a smaller stand (surface within 0.84 K, "
+            "0.42 K rms) and prints neither temperatures nor parameters. Here a bench with hidden "
+            "values is measured in the same way (surface and nut, averaged over 1 s) and fitted.",
+        )
+        section.figure(_fit_figure(result.fit), "Surface and nut as measured and as fitted.")
+        section.table(Table(["Parameter, SI", "Put in", "Recovered", "from", "to"], rows, digits=4))
     return report
+
+
+def _fit_figure(fit: DemaFit) -> Figure:
+    with new_figure(width=8.0, height=3.4) as (figure, axes):
+        minutes = fit.time / 60.0
+        for row, (name, colour) in enumerate((("surface", "blue"), ("nut", "green"))):
+            axes.plot(minutes, fit.measured[row] - 273.15, ".", ms=1, color=COLOURS["grey"])
+            shown = fit.fitted[row] - 273.15
+            axes.plot(minutes, shown, color=COLOURS[colour], label=f"{name}, fitted")
+        label = "winding, not measured"
+        axes.plot(minutes, fit.fitted[2] - 273.15, color=COLOURS["orange"], label=label, lw=0.8)
+        axes.set(xlabel="Time [min]", ylabel="Temperature [degC]")
+        axes.legend(loc="upper left")
+    return figure
 
 
 def _thermal_figure(result: ThermalResult) -> Figure:

@@ -23,17 +23,20 @@ pub fn catalogue() -> Vec<FaultKind> {
         text: "ram position at which the nut's middle stands over it (groove only)",
     };
     let mut all = common(LINEAR);
+    for fault in &mut all {
+        fault.effect = told_apart(fault.kind).unwrap_or(fault.effect);
+    }
     all.extend([
         FaultKind {
             kind: "return_jam", unit: "1", range: Range::Between(0.0, 64.0), attributes: &[],
             places: places!("screw.return_channel": "screw.blocked_circuits" AddWhole),
-            effect: "whole number of circuits whose balls slide instead of rolling: efficiency falls, preload friction grows; the position follows, the current rises",
+            effect: "whole number of return channels that are blocked, so that the balls of their circuits slide: the screw's efficiency falls and its preload rubs more, the nut warms; `jam` is the seizure of the whole mechanism",
             source: "N 4.2 and 5.3",
         },
         FaultKind {
             kind: "lubrication_loss", unit: "1", range: Range::Unit, attributes: &[],
             places: places!("screw": "screw.lubricant_lost" Add),
-            effect: "fraction of the lubricant lost: friction coefficient up as the film thins, viscous drag down (laws ASSUMED)",
+            effect: "fraction of the screw's lubricant lost: friction coefficient up as the film thins, viscous drag down (laws ASSUMED); `lubrication` only scales the viscous drag",
             source: "N 6.1",
         },
         FaultKind {
@@ -51,9 +54,19 @@ pub fn catalogue() -> Vec<FaultKind> {
         FaultKind {
             kind: "adapter_gap", unit: "m", range: Range::Between(0.0, 5e-3), attributes: &[],
             places: places!("adapter": "play.extra" Add),
-            effect: "gap between load cell and ram: impacts at each reversal",
+            effect: "gap of the backlash adapter between load cell and ram, the stand's way to seed play: impacts at each reversal; `play` is the same lost motion of worn parts",
             source: "N 4.1",
         },
     ]);
     all
+}
+
+/// Sentences for kinds of the common catalogue that have a namesake among the screw's own.
+fn told_apart(kind: &str) -> Option<&'static str> {
+    match kind {
+        "jam" => Some("torque on the fast shaft at which the whole mechanism seizes; a blocked return channel of the nut is `return_jam`"),
+        "lubrication" => Some("fraction added to the viscous drag (negative: thinner lubricant); a screw that loses its lubricant is `lubrication_loss`"),
+        "play" => Some("total play added between ram and load by worn parts: lost motion and impacts; the gap that the stand sets on purpose is `adapter_gap`"),
+        _ => None,
+    }
 }
