@@ -21,6 +21,7 @@ from elevon.progress import part
 from elevon.report.checks import Check
 from elevon.reproduce.nasa.baseline_rows import MEASURES, BaselineResult, BaselineRow
 from elevon.reproduce.nasa.capability import Capability
+from elevon.reproduce.nasa.corners import corner_rows
 from elevon.reproduce.nasa.design import (
     Factor,
     FactorEffect,
@@ -155,7 +156,9 @@ def reproduce_baseline(
         checks += [*_order_checks(rows), *found]
     return BaselineResult(
         rows, checks, load_kind, seed, replicates, effects, _sheet(cells, orders),
-        time_histories(actuator, part(progress, 0.9, 1.0)) if whole else [], meta,
+        time_histories(actuator, part(progress, 0.9, 0.97)) if whole else [],
+        corner_rows(actuator, part(progress, 0.97, 1.0)) if whole else [],
+        meta,
     )  # fmt: skip
 
 

@@ -95,6 +95,8 @@ class BaselineResult:
         The runs in the order in which they were done: block, order, air temperature, cell.
     histories : list of History
         Figures 5, 6 and 7 of the paper.
+    corners : list of dict
+        Sharp against rounded corners.
     """
 
     rows: list[BaselineRow]
@@ -105,6 +107,7 @@ class BaselineResult:
     effects: dict[str, list[FactorEffect]] = field(default_factory=dict)
     sheet: list[dict[str, Any]] = field(default_factory=list)
     histories: list[History] = field(default_factory=list)
+    corners: list[dict[str, Any]] = field(default_factory=list)
     meta: dict[str, Any] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
@@ -120,6 +123,7 @@ class BaselineResult:
             "load_kind": self.load_kind,
             "rows": [row.to_dict() for row in self.rows],
             "effects": effects,
+            "corners": self.corners,
             "runs": self.sheet,
             "checks": [check.to_dict() for check in self.checks],
             "seed": self.seed,

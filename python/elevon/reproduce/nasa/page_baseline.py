@@ -45,8 +45,24 @@ def baseline_page(result: BaselineResult, date: str | None) -> Report:
         )
         for history in result.histories:
             section.figure(_history_figure(history), f"Figure {history.figure}: {history.title}.")
+    if result.corners:
+        _corners(report, result)
     report.section("All cells").table(_rows_table(result))
     return report
+
+
+def _corners(report: Report, result: BaselineResult) -> None:
+    columns = ["Profile", "Load [N]", "Acceleration [m/s2]", "Peak current [A]", "RMS current [A]",
+               "Tracking max [mm]"]  # fmt: skip
+    rows = [list(row.values()) for row in result.corners]
+    report.section(
+        "Corners",
+        "The paper draws sharp corners, which ask for infinite acceleration: the current limit of "
+        "20 A is then every peak. With the corners rounded the peak is that of the motion.",
+    ).table(
+        Table(columns, rows, "Acceleration 0: sharp, as drawn.",
+              formats=("", ".0f", ".1f", ".2f", ".3f", ".3f"))
+    )  # fmt: skip
 
 
 def _effects(report: Report, result: BaselineResult) -> None:
