@@ -10,7 +10,7 @@ variables! {
     /// The current controller and its carrier.
     PwmParameter, PWM {
         Frequency => "frequency", "f_pwm", "Hz", Positive, Controller, Some(4000.0), "frequency of the triangular carrier",
-            high_only("a first-order lag stands for carrier, sampling and integral").when(&[Chosen("drive.kind", &["pwm"])]);
+            when(&[Chosen("drive.kind", &["pwm"]), In(Low, &[Away("inverter.dead_time", 0.0)])]);
         SampleTime => "sample_time", "T_i", "s", Positive, Controller, Some(125e-6), "sample time of the current controller, half a carrier period: sampled at its peaks and valleys",
             high_only("a first-order lag stands for carrier, sampling and integral").when(&[Chosen("drive.kind", &["pwm"])]);
         ProportionalGain => "proportional_gain", "K_pi", "V/A", NonNegative, Controller, Some(0.0), "proportional gain of the current PI; L / tau gives the closed-loop time constant tau",

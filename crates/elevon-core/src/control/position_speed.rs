@@ -49,10 +49,9 @@ variables! {
             high_only("its PID integrates without anti-windup").when(&[Chosen("control.mode", &["position", "speed"]), Away("control.integral_time", 0.0)]);
         SampleTime => "sample_time", "T_s", "s", NonNegative, Controller, Some(0.0), "sample time of the controller; 0: every solver step",
             when(&[In(Low, &[Away("screw.debris", 0.0)])]);
-        NoiseDeviation => "noise_deviation", "-", "rad", NonNegative, Controller, Some(0.0), "standard deviation of the band-limited noise on the command line (unit of the user position)",
-            high_only("its command has no noise");
+        NoiseDeviation => "noise_deviation", "-", "rad", NonNegative, Controller, Some(0.0), "standard deviation of the band-limited noise on the command line (unit of the user position)";
         NoiseSampleTime => "noise_sample_time", "-", "s", Positive, Controller, Some(1e-3), "the noise is held over this time, which sets its band",
-            high_only("its command has no noise").when(&[Away("control.noise_deviation", 0.0)]);
+            when(&[Away("control.noise_deviation", 0.0)]);
         PositionFeedback => "position_feedback", "-", "1", Choice(Feedback::NAMES), Controller, Some(0.0), "what closes the position loop: the user position itself (the papers' model), the user encoder's counts, or the motor resolver divided by the ratio",
             when(&[Chosen("control.mode", &["position"])]);
     }

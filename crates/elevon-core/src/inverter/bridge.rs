@@ -10,8 +10,22 @@
 
 use crate::scalar::Scalar;
 use crate::three;
+use crate::variable::acts::{Fidelity, When};
 use crate::variable::Own;
 use crate::variables;
+
+/// The bridge is without gates at some time.
+const GATELESS: When = When::Either(&[
+    When::Chosen("drive.kind", &["off"]),
+    When::Away("inverter.trip_current", 0.0),
+    When::Away("inverter.shorted_a_high", 0.0),
+    When::Away("inverter.shorted_a_low", 0.0),
+    When::Away("inverter.shorted_b_high", 0.0),
+    When::Away("inverter.shorted_b_low", 0.0),
+    When::Away("inverter.shorted_c_high", 0.0),
+    When::Away("inverter.shorted_c_low", 0.0),
+    When::In(Fidelity::Low, &[When::Away("sensor.resolver.power_off", 0.0), When::Chosen("drive.feedback_loss", &["stop"])]),
+]);
 
 variables! {
     /// The bridge and its supply.
@@ -21,13 +35,12 @@ variables! {
         HysteresisBand => "hysteresis_band", "h", "A", Positive, Controller, Some(0.5), "half band of the relays around the commanded phase current",
             when(&[Chosen("drive.kind", &["hysteresis"])]);
         OnResistance => "on_resistance", "R_on", "ohm", NonNegative, Plant, Some(0.0), "resistance of a conducting switch",
-            high_only("its voltages have no switches");
+            when(&[In(Low, &[GATELESS])]);
         DiodeDrop => "diode_drop", "V_d", "V", NonNegative, Plant, Some(0.0), "forward voltage of a free-wheeling diode",
-            high_only("its voltages have no switches");
+            when(&[In(Low, &[GATELESS])]);
         DeadTime => "dead_time", "t_d", "s", NonNegative, Plant, Some(0.0), "both switches of a leg are off for this time at each transition",
-            high_only("its voltages have no switches");
-        TripCurrent => "trip_current", "I_trip", "A", NonNegative, Controller, Some(0.0), "the drive trips when a phase current exceeds it; 0: no over-current trip",
-            high_only("it has no phase currents to trip on");
+            when(&[In(Low, &[Chosen("drive.kind", &["pwm"])])]);
+        TripCurrent => "trip_current", "I_trip", "A", NonNegative, Controller, Some(0.0), "the drive trips when a phase current exceeds it; 0: no over-current trip";
         OpenAHigh => "open_a_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg a never closes",
             high_only("half waves of one phase are missing: its one phase has none");
         OpenALow => "open_a_low", "-", "1", Unit, Plant, Some(0.0), "1: the lower switch of leg a never closes",

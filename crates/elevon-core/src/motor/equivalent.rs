@@ -38,20 +38,23 @@ pub fn equivalent<S: Scalar>(k: [S; 3], resistance: [S; 3], inductance: [S; 3], 
     Equivalent { torque_constant: dot(k, imposed), resistance: dot(resistance, weight), inductance: dot(inductance, weight) }
 }
 
-/// Shape of the phase currents per ampere of i_q: sin a_j; with phase j interrupted the other two carry half
-/// the difference of theirs, so that the star's sum stays zero.
+/// Shape of the phase currents per ampere of the reference. A drive brings gain times current to its reference in each
+/// phase up to an error that all share, since the star's currents sum to zero: h_j = w_j (r_j + e), w_j one over the
+/// sensor's gain, none of an interrupted phase. One phase interrupted: the other two carry half the difference of their
+/// references; two: nothing flows.
 #[inline(always)]
-pub fn imposed_shape<S: Scalar>(sines: [S; 3], open: [S; 3]) -> [S; 3] {
-    let mut shape = sines;
-    for j in 0..3 {
-        let (x, y) = ((j + 1) % 3, (j + 2) % 3);
-        let half = S::splat(0.5) * (shape[x] - shape[y]);
-        let cut = S::splat(0.5).lt(open[j]);
-        shape[j] = S::select(cut, S::zero(), shape[j]);
-        shape[x] = S::select(cut, half, shape[x]);
-        shape[y] = S::select(cut, -half, shape[y]);
-    }
-    shape
+pub fn imposed_shape<S: Scalar>(reference: [S; 3], weight: [S; 3]) -> [S; 3] {
+    let sum = weight[0] + weight[1] + weight[2];
+    let uneven = weight[0] * reference[0] + weight[1] * reference[1] + weight[2] * reference[2];
+    let none = sum.equals(S::zero());
+    let shared = uneven / S::select(none, S::one(), sum);
+    three!(|j| weight[j] * (reference[j] - shared))
+}
+
+/// Quadrature component of three phase quantities over the sines of an angle.
+#[inline(always)]
+pub fn quadrature<S: Scalar>(x: [S; 3], sines: [S; 3]) -> S {
+    S::splat(2.0 / 3.0) * (x[0] * sines[0] + x[1] * sines[1] + x[2] * sines[2])
 }
 
 /// One step of the equivalent R-L circuit, exact for held voltages and stable at any step: exp(-x) by its

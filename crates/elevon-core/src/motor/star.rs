@@ -30,10 +30,9 @@ variables! {
         WindingInductance => "winding_inductance", "L", "H", Positive, Plant, None, "phase inductance, mutual part included";
         EmfConstant => "emf_constant", "k", "V s/rad", Positive, Plant, None, "peak phase EMF per mechanical rad/s; torque per peak ampere is 1.5 k";
         TorqueLimit => "torque_limit", "T_max", "N m", Positive, Plant, None, "the flux saturates the torque at this value";
-        EmfShape => "emf_shape", "-", "1", Choice(EmfShape::NAMES), Plant, Some(0.0), "shape of the EMF over the electrical angle",
-            high_only("its one phase has sinusoidal coefficients");
+        EmfShape => "emf_shape", "-", "1", Choice(EmfShape::NAMES), Plant, Some(0.0), "shape of the EMF over the electrical angle";
         EmfFlatWidth => "emf_flat_width", "beta", "rad", Between(0.0, 3.0), Plant, Some(2.094_395_102_393_195_3), "width of the trapezoid's flat",
-            high_only("its one phase has sinusoidal coefficients").when(&[Chosen("motor.emf_shape", &["trapezoidal"])]);
+            when(&[Chosen("motor.emf_shape", &["trapezoidal"])]);
         TurnsA => "turns_a", "N_a", "1", Fraction, Plant, Some(1.0), "healthy fraction of the turns of phase a";
         TurnsB => "turns_b", "N_b", "1", Fraction, Plant, Some(1.0), "healthy fraction of the turns of phase b";
         TurnsC => "turns_c", "N_c", "1", Fraction, Plant, Some(1.0), "healthy fraction of the turns of phase c";
@@ -48,11 +47,11 @@ variables! {
         OpenB => "open_b", "-", "1", Unit, Plant, Some(0.0), "1: phase b is interrupted (from its next current zero on)";
         OpenC => "open_c", "-", "1", Unit, Plant, Some(0.0), "1: phase c is interrupted (from its next current zero on)";
         ShortModel => "short_model", "-", "1", Choice(ShortModel::NAMES), Plant, Some(0.0), "shorted turns only missing (the paper), or a loop of their own with circulating current",
-            high_only("shorted turns are only missing in its one phase").when(&[SHORTED]);
+            when(&[SHORTED]);
         ShortCoupling => "short_coupling", "kappa", "1", Unit, Plant, Some(0.9), "magnetic coupling of shorted and healthy turns of a phase: mutual inductance kappa N mu L",
-            high_only("shorted turns are only missing in its one phase").when(&[SHORTED, Chosen("motor.short_model", &["loop"])]);
+            when(&[SHORTED, Chosen("motor.short_model", &["loop"])]);
         ShortContactResistance => "short_contact_resistance", "R_c", "ohm", NonNegative, Plant, Some(0.0), "resistance of the short itself; without limit it is the healthy motor",
-            high_only("shorted turns are only missing in its one phase").when(&[SHORTED, Chosen("motor.short_model", &["loop"])]);
+            when(&[SHORTED, Chosen("motor.short_model", &["loop"])]);
         WindingTemperature => "winding_temperature", "T_w", "K", Positive, Plant, Some(293.15), "temperature of the winding, an input unless a thermal network drives it", when(&[Chosen("thermal.model", &["off"])]);
         ReferenceTemperature => "reference_temperature", "T_0", "K", Positive, Plant, Some(293.15), "temperature at which the resistance is given",
             when(&[Either(&[Away("motor.temperature_coefficient", 0.0), Away("motor.flux_temperature_coefficient", 0.0)])]);
@@ -65,6 +64,8 @@ variables! {
                 SHORTED, Away("motor.open_a", 0.0), Away("motor.open_b", 0.0), Away("motor.open_c", 0.0),
                 Away("motor.eccentricity_static", 0.0), Away("motor.eccentricity_dynamic", 0.0), Away("motor.unbalance_inertia", 0.0),
                 Away("motor.pole_loss", 0.0),
+                Chosen("motor.emf_shape", &["trapezoidal"]), Chosen("drive.commutation", &["six_step"]), Chosen("drive.kind", &["off"]),
+                Away("sensor.current.gain_a", 1.0), Away("sensor.current.gain_b", 1.0), Away("sensor.current.gain_c", 1.0),
                 Away("sensor.resolver.mismatch", 0.0), Away("sensor.resolver.offset", 0.0), Away("sensor.resolver.power_off", 0.0),
             ])])]);
     }

@@ -8,12 +8,9 @@ use crate::variables;
 variables! {
     /// The three phase current sensors and the acquisition filter.
     CurrentSensorParameter, CURRENT_SENSOR {
-        GainA => "current.gain_a", "-", "1", Any, Sensor, Some(1.0), "gain of the sensor of phase a",
-            high_only("its drive controls the equivalent current itself");
-        GainB => "current.gain_b", "-", "1", Any, Sensor, Some(1.0), "gain of the sensor of phase b",
-            high_only("its drive controls the equivalent current itself");
-        GainC => "current.gain_c", "-", "1", Any, Sensor, Some(1.0), "gain of the sensor of phase c",
-            high_only("its drive controls the equivalent current itself");
+        GainA => "current.gain_a", "-", "1", Any, Sensor, Some(1.0), "gain of the sensor of phase a";
+        GainB => "current.gain_b", "-", "1", Any, Sensor, Some(1.0), "gain of the sensor of phase b";
+        GainC => "current.gain_c", "-", "1", Any, Sensor, Some(1.0), "gain of the sensor of phase c";
         OffsetA => "current.offset_a", "-", "A", Any, Sensor, Some(0.0), "offset of the sensor of phase a",
             high_only("the offset of one sensor is a ripple of the torque at the electrical frequency");
         OffsetB => "current.offset_b", "-", "A", Any, Sensor, Some(0.0), "offset of the sensor of phase b",

@@ -102,6 +102,8 @@ const GEAR_INVERTER: [Variable; INVERTER.len()] = {
                 P::HysteresisBand as usize,
                 acts::nowhere("its bridge is commutated by Hall sensors and a carrier, not by relays"),
             ),
+            Relabel::acts(P::TripCurrent as usize, acts::high_only("its mean current shows no peaks to trip on")),
+            Relabel::acts(P::DeadTime as usize, acts::high_only("its mean voltages have no switches")),
             Relabel::acts(P::OnResistance as usize, acts::ALWAYS),
             Relabel::acts(P::DiodeDrop as usize, acts::ALWAYS),
             Relabel::acts(P::ShortedAHigh as usize, SHORTED),

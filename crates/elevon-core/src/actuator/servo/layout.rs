@@ -39,7 +39,7 @@ variables! {
     DriveParameter, DRIVE {
         Kind => "kind", "-", "1", Choice(DriveKind::NAMES), Plant, Some(0.0), "three hysteresis relays (the papers' model), a carrier-PWM current controller (the real bench), or no drive: the motor is turned by torques on its shaft alone";
         Commutation => "commutation", "-", "1", Choice(Commutation::NAMES), Controller, Some(0.0), "shape of the phase current references over the electrical angle (hysteresis drive)",
-            high_only("its one phase has sinusoidal currents").when(&[Chosen("drive.kind", &["hysteresis"])]);
+            when(&[Chosen("drive.kind", &["hysteresis"])]);
         CommutationSource => "commutation_source", "-", "1", Choice(CommutationSource::NAMES), Controller, Some(0.0), "angle (and its rate) that the current references, and the current controller of a carrier drive, turn with: the resolver's, or a track of its own that a lost or offset resolver does not touch",
             when(&[Either(&[
                 Away("sensor.resolver.mismatch", 0.0), Away("sensor.resolver.offset", 0.0), Away("sensor.resolver.power_off", 0.0),
@@ -47,7 +47,7 @@ variables! {
                 Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0), Away("sensor.resolver.stuck", 0.0),
             ])]);
         FeedbackLoss => "feedback_loss", "-", "1", Choice(FeedbackLoss::NAMES), Controller, Some(0.0), "without resolver power the drive runs on with what it is shown, or opens its bridge until it returns",
-            high_only("its drive never opens").when(&[Either(&[
+            when(&[Either(&[
                 Away("sensor.resolver.power_off", 0.0), Away("sensor.resolver.sine_short", 0.0), Away("sensor.resolver.cosine_short", 0.0),
                 Away("sensor.resolver.excitation_short", 0.0), Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0),
             ])]);

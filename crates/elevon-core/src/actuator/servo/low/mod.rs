@@ -1,8 +1,10 @@
 //! Low fidelity: one equivalent phase (reference sheet 1.9). Same blocks, same parameters where shared; PID
 //! without anti-windup and derivative filter; the shaft and its loads are those of the high fidelity.
 
+mod loops;
 mod model;
 mod observe;
+mod passive;
 mod phase;
 mod step;
 
@@ -26,6 +28,7 @@ pub struct Low<F>(PhantomData<F>);
 
 const TICK_THERMAL: u8 = 0;
 const TICK_DEBRIS: u8 = 1;
+const TICK_COMMAND_NOISE: u8 = 2;
 
 impl<F: Form> Wiring for Low<F> {
     type Structure = Structure;
@@ -65,6 +68,9 @@ impl<F: Form> Wiring for Low<F> {
         if structure.shaft.debris {
             ticks.push(Tick::every(period(raw[ControlParameter::SampleTime.at()]), TICK_DEBRIS));
         }
+        if raw[ControlParameter::NoiseDeviation.at()] != 0.0 {
+            ticks.push(Tick::every(period(raw[ControlParameter::NoiseSampleTime.at()]), TICK_COMMAND_NOISE));
+        }
         ticks
     }
     fn check(raw: &[f64]) -> Vec<Finding> {
@@ -94,12 +100,14 @@ impl<F: Form> Wiring for Low<F> {
         _t: S,
         noise: &mut dyn FnMut(u64) -> S,
     ) {
-        if kind == TICK_THERMAL {
-            m.network.tick(&mut s.network);
-            m.shaft.nut.tick(&mut s.shaft.nut);
-            (s.resistance_factor, s.flux_factor) = m.network.factors(&s.network);
-        } else {
-            s.shaft.scatter(&m.shaft.screw, noise(4));
+        match kind {
+            TICK_THERMAL => {
+                m.network.tick(&mut s.network);
+                m.shaft.nut.tick(&mut s.shaft.nut);
+                (s.resistance_factor, s.flux_factor) = m.network.factors(&s.network);
+            }
+            TICK_COMMAND_NOISE => s.command_noise = m.control.noise_deviation * noise(0),
+            _ => s.shaft.scatter(&m.shaft.screw, noise(4)),
         }
     }
 

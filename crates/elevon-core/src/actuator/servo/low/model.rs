@@ -1,5 +1,6 @@
 //! Constants and state of a run at low fidelity.
 
+use super::loops::Loops;
 use super::phase::Phase;
 use crate::actuator::servo::form::Form;
 use crate::actuator::servo::high::model::network;
@@ -9,15 +10,16 @@ use crate::actuator::servo::shaft::{Shaft, ShaftDetails, ShaftNeeds, ShaftState}
 use crate::control::current_dq::PwmParameter;
 use crate::control::position_speed::{ControlParameter, ControlStructure, Mode};
 use crate::details;
-use crate::inverter::bridge::InverterParameter;
+use crate::inverter::bridge::{Bridge, BridgeState, BridgeStructure, InverterParameter};
 use crate::inverter::link::{DcLink, DcLinkState};
 use crate::motor::equivalent::{Circuit, LowParameter};
 use crate::motor::pole::WeakPole;
-use crate::motor::star::{interrupted, MotorParameter, MotorStructure, Star, StarState};
+use crate::motor::star::{interrupted, MotorParameter, MotorStructure, ShortModel, Star, StarState};
 use crate::motor::thermal::{Network, NetworkState, ThermalModel, ThermalParameter};
 use crate::scalar::Scalar;
 use crate::sensor::current::CurrentSensorParameter;
 use crate::sensor::filter::closing;
+use crate::sensor::resolver::Resolver;
 use crate::three;
 
 details! {
@@ -25,6 +27,9 @@ details! {
     Structure, read<F>(parts: Parts)
     always {
         drive: DriveKind = DriveKind::read(parts.drive().value(DriveParameter::Kind));
+        bridge: BridgeStructure = BridgeStructure::read(&parts.inverter(), true);
+        /// The references are blocks, not sines.
+        six_step: bool = Commutation::read(parts.drive().value(DriveParameter::Commutation)) == Commutation::SixStep;
         control: ControlStructure = ControlStructure::read(parts.control().raw);
         integral: bool = parts.control().value(ControlParameter::IntegralTime) > 0.0;
         shaft: ShaftDetails = ShaftDetails::read::<F>(&ShaftNeeds::low(parts));
@@ -32,13 +37,30 @@ details! {
         motor: MotorStructure = MotorStructure::read(&parts.motor()).with_unbalance(shaft.unbalance).with_weak_pole(WeakPole::<f64>::needed(&parts.pole()));
     }
     full {
+        shorted = parts.motor().any_away([MotorParameter::TurnsA, MotorParameter::TurnsB, MotorParameter::TurnsC]);
+        /// A lost resolver opens the bridge.
+        stops = Resolver::<f64>::lost(&parts.resolver())
+            && FeedbackLoss::read(parts.drive().value(DriveParameter::FeedbackLoss)) == FeedbackLoss::Stop;
+        /// The bridge is without gates, now or later.
+        passive = drive == DriveKind::Off || stops || bridge.trips;
+        /// The current sensors of the phases differ.
+        gains = parts.current_sensor().any_away([
+            CurrentSensorParameter::GainA, CurrentSensorParameter::GainB, CurrentSensorParameter::GainC,
+        ]);
+        /// Shorted turns have currents of their own.
+        loops = shorted && ShortModel::read(parts.motor().value(MotorParameter::ShortModel)) == ShortModel::Loop;
         /// Coefficients vary with the rotor angle.
         angle = (sensing.resolver && sensing.commutated)
             || motor.dynamic_eccentricity
             || motor.weak_pole
             || motor.static_eccentricity
+            || motor.trapezoidal
+            || loops
+            || six_step
+            || passive
+            || gains
             || interrupted(&parts.motor())
-            || parts.motor().any_away([MotorParameter::TurnsA, MotorParameter::TurnsB, MotorParameter::TurnsC]);
+            || shorted;
         heat = Network::<f64>::needed(&parts.thermal());
         link = DcLink::<f64>::needed(&parts.link());
         detailed_shaft = shaft.full;
@@ -62,6 +84,7 @@ pub struct Model<S> {
     pub cold: [S; 3],
     pub control: Control<S>,
     pub drive: Drive<S>,
+    pub circuits: Loops<S>,
     pub shaft: Shaft<S>,
     pub sensing: Sensing<S>,
     pub filter: S,
@@ -78,6 +101,7 @@ pub struct Control<S> {
     pub speed_gain: S,
     pub integral_step: S,
     pub derivative_inertia: S,
+    pub noise_deviation: S,
     pub speed_limit: S,
     pub torque_limit: S,
     pub per_torque_constant: S,
@@ -93,7 +117,17 @@ pub struct Drive<S> {
     pub supply_scale: S,
     /// p L of the cross coupling.
     pub electrical_inductance: S,
-    pub tripped: S,
+    pub bridge: Bridge<S>,
+    /// (1 - exp(-R dt / L)) / R of each winding: exact for voltages held over a step.
+    pub per_winding: [S; 3],
+    /// 1: a switch is shorted, the first gate of its partner trips the drive.
+    pub shorted: S,
+    pub trip_current: S,
+    /// Largest excess of a phase current over its reference.
+    pub half_band: S,
+    /// One over the gain of each current sensor; none of an interrupted phase.
+    pub weight: [S; 3],
+    pub gain: [S; 3],
     pub link: DcLink<S>,
 }
 
@@ -106,7 +140,16 @@ pub struct State<S> {
     /// Command of the last step; NaN before the first.
     pub command: S,
     pub copper: S,
+    /// Amplitude of the imposed currents.
     pub current: S,
+    /// Its quadrature component in the rotor's frame, and as drive and acquisition see it.
+    pub current_q: S,
+    pub current_seen: S,
+    /// Phase currents; stepped while the bridge has no gates, else the imposed ones.
+    pub phases: [S; 3],
+    pub loops: [S; 3],
+    pub bridge: BridgeState<S>,
+    pub command_noise: S,
     pub voltage: S,
     pub integral: S,
     pub speed_ref: S,
@@ -134,6 +177,7 @@ impl<S: Scalar> Control<S> {
             speed_gain: gain,
             integral_step: S::select(integrates, gain / S::select(integrates, ti, one) * dt, zero),
             derivative_inertia: if torque_mode { zero } else { gain * at(ControlParameter::DerivativeTime) },
+            noise_deviation: at(ControlParameter::NoiseDeviation),
             speed_limit: at(ControlParameter::SpeedLimit),
             torque_limit: at(ControlParameter::TorqueConstant) * at(ControlParameter::CurrentLimit),
             per_torque_constant: one / at(ControlParameter::TorqueConstant),
@@ -142,13 +186,20 @@ impl<S: Scalar> Control<S> {
 }
 
 impl<S: Scalar> Drive<S> {
-    fn derive(raw: &[S], structure: &Structure, dt: S) -> Self {
+    fn derive(raw: &[S], structure: &Structure, star: &Star<S>, dt: S) -> Self {
         let at = |i: usize| raw[i];
-        let one = S::one();
+        let (zero, one, half) = (S::zero(), S::one(), S::splat(0.5));
         let inductance = at(MotorParameter::WindingInductance.at());
+        let gain: [S; 3] = three!(|j| at(CurrentSensorParameter::GainA.at() + j));
+        // A dead sensor: its phase takes whatever lets the others follow.
+        let tiny = S::splat(1e-9);
+        let followed: [S; 3] = three!(|j| one / gain[j].signed(gain[j].abs().maximum(tiny)));
         let shorted = (0..6).fold(S::zero(), |sum, i| sum + at(InverterParameter::ShortedAHigh.at() + i));
         Self {
-            voltage_ratio: at(LowParameter::VoltageRatio.at()),
+            voltage_ratio: match structure.drive {
+                DriveKind::Hysteresis | DriveKind::Off => at(LowParameter::VoltageRatio.at()),
+                DriveKind::Pwm => linear_range(at(InverterParameter::DeadTime.at()) * at(PwmParameter::Frequency.at())),
+            },
             band: at(LowParameter::BandRatio.at()) * at(InverterParameter::HysteresisBand.at()),
             tracking: match structure.drive {
                 DriveKind::Pwm => one - (-(at(PwmParameter::ProportionalGain.at()) / inductance * dt)).exp(),
@@ -156,10 +207,26 @@ impl<S: Scalar> Drive<S> {
             },
             supply_scale: at(InverterParameter::SupplyScale.at()),
             electrical_inductance: at(MotorParameter::PolePairs.at()) * inductance,
-            tripped: S::indicator(S::splat(0.5).lt(shorted)),
+            bridge: Bridge::derive(Raw(raw).inverter()),
+            per_winding: three!(|j| (one - (-(dt * star.resistance[j] * star.per_inductance[j])).exp()) / star.resistance[j]),
+            shorted: S::indicator(half.le(shorted)),
+            trip_current: at(InverterParameter::TripCurrent.at()),
+            half_band: match structure.drive {
+                DriveKind::Hysteresis => at(InverterParameter::HysteresisBand.at()),
+                DriveKind::Pwm | DriveKind::Off => zero,
+            },
+            weight: three!(|j| S::select(half.lt(star.open[j]), zero, followed[j])),
+            gain,
             link: DcLink::derive(Raw(raw).link(), dt),
         }
     }
+}
+
+/// Largest phase voltage of a min-max modulated carrier drive over its link: 1 / sqrt 3, less the fundamental of the
+/// volt-seconds that the dead times take, a square wave of `dead` (their share of a carrier period) times the link.
+fn linear_range<S: Scalar>(dead: S) -> S {
+    let fundamental = S::splat(4.0 / std::f64::consts::PI) * dead;
+    (S::splat(1.0 / 3.0_f64.sqrt()) - fundamental).maximum(S::zero())
 }
 
 impl<S: Scalar> Model<S> {
@@ -185,10 +252,11 @@ impl<S: Scalar> Model<S> {
             inductance: three!(|j| one / star.per_inductance[j]),
             healthy: Phase::new(constant * flux_factor, circuit, &control, shaft.inertia),
             cold,
+            drive: Drive::derive(raw, structure, &star, dt),
+            circuits: Loops::derive(raw, dt),
             star,
             pole: WeakPole::derive(Raw(raw).pole(), raw[MotorParameter::PolePairs.at()]),
             control,
-            drive: Drive::derive(raw, structure, dt),
             shaft,
             sensing: Sensing::derive(raw, &structure.sensing),
             filter: closing(raw[CurrentSensorParameter::FilterCutoff.at()], dt.lane(0)),
@@ -210,6 +278,12 @@ impl<S: Scalar> Model<S> {
             command: nan,
             copper: zero,
             current: zero,
+            current_q: zero,
+            current_seen: zero,
+            phases: [zero; 3],
+            loops: [zero; 3],
+            bridge: BridgeState::rest(),
+            command_noise: zero,
             voltage: zero,
             integral: zero,
             speed_ref: zero,

@@ -15,7 +15,7 @@ pub(super) fn observe<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, i
     let limited = m.control.speed_limit.le(s.speed_ref.abs()) | m.control.torque_limit.le(s.torque_ref.abs());
     let source = x.supply * m.drive.supply_scale;
     for (q, value) in [
-        (Q::Command, x.command),
+        (Q::Command, x.command + s.command_noise),
         (Q::UserPosition, s.shaft.user_position),
         (Q::UserSpeed, shown.user_speed),
         (Q::MotorPosition, s.shaft.motor_position),
@@ -23,7 +23,7 @@ pub(super) fn observe<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, i
         (Q::SpeedRef, s.speed_ref),
         (Q::TorqueRef, s.torque_ref),
         (Q::CurrentRef, s.torque_ref * m.control.per_torque_constant),
-        (Q::CurrentQ, s.current),
+        (Q::CurrentQ, s.current_q),
         (Q::CurrentQMeas, s.filtered[0]),
         (Q::VoltageQRef, s.voltage),
         (Q::VoltageQMeas, s.filtered[1]),

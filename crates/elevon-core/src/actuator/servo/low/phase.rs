@@ -1,7 +1,8 @@
 //! The equivalent phase at one rotor angle (docs/theory/low-fidelity.md, "From three phases to one").
 
 use super::model::{Control, Model, State, Structure};
-use crate::motor::equivalent::{equivalent, imposed_shape, Circuit};
+use crate::inverter::hysteresis::six_step;
+use crate::motor::equivalent::{equivalent, imposed_shape, quadrature, Circuit};
 use crate::scalar::{three_phase, Scalar};
 use crate::three;
 
@@ -13,6 +14,16 @@ pub struct Phase<S> {
     pub efficacy: S,
     /// 1 / (J + efficacy K_p T_d): the derivative of the speed acts as inertia.
     pub per_effective_inertia: S,
+    /// k_j of the phases, and the currents per ampere of the reference.
+    pub coefficients: [S; 3],
+    pub imposed: [S; 3],
+    /// Sines that the references follow.
+    pub reference: [S; 3],
+    /// Sines of the rotor's own angle.
+    pub rotor: [S; 3],
+    /// Quadrature component of the imposed currents in the rotor's frame, and as the drive's sensors show it.
+    pub quadrature: S,
+    pub seen: S,
 }
 
 impl<S: Scalar> Phase<S> {
@@ -20,7 +31,19 @@ impl<S: Scalar> Phase<S> {
     pub(super) fn new(torque_constant: S, circuit: Circuit<S>, control: &Control<S>, inertia: S) -> Self {
         let efficacy = torque_constant * control.per_torque_constant;
         let per_effective_inertia = S::one() / efficacy.fma(control.derivative_inertia, inertia);
-        Self { torque_constant, circuit, efficacy, per_effective_inertia }
+        let (zero, one) = ([S::zero(); 3], S::one());
+        Self {
+            torque_constant,
+            circuit,
+            efficacy,
+            per_effective_inertia,
+            coefficients: zero,
+            imposed: zero,
+            reference: zero,
+            rotor: zero,
+            quadrature: one,
+            seen: one,
+        }
     }
 }
 
@@ -31,7 +54,8 @@ pub(super) fn phase<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Struc
         return if FULL && structure.heat { warm(m, s) } else { m.healthy };
     }
     let (sin, cos) = m.star.electrical_angle(s.shaft.motor_position).sin_cos();
-    let (shape, _) = three_phase(sin, cos);
+    let (rotor, _) = three_phase(sin, cos);
+    let shape = if structure.motor.trapezoidal { m.star.trapezoid(m.star.electrical_angle(s.shaft.motor_position)) } else { rotor };
     let mut gap = m.star.static_gap(sin, cos);
     if structure.motor.dynamic_eccentricity {
         let turning = m.star.dynamic_gap(s.shaft.motor_position);
@@ -46,12 +70,26 @@ pub(super) fn phase<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Struc
         let (sin, cos) = m.star.electrical_angle(commutation).sin_cos();
         three_phase(sin, cos).0
     } else {
-        shape
+        rotor
     };
+    let reference = if structure.six_step { six_step(sines) } else { sines };
+    let imposed = imposed_shape(reference, m.drive.weight);
     let resistance = three!(|j| m.resistance[j] * s.resistance_factor);
-    let e = equivalent(k, resistance, m.inductance, imposed_shape(sines, m.star.open));
-    let circuit = Circuit::new(e.resistance, e.inductance, m.dt);
-    Phase::new(e.torque_constant * s.flux_factor, circuit, &m.control, m.shaft.inertia)
+    let e = equivalent(k, resistance, m.inductance, imposed);
+    // No current has a place where two phases are interrupted.
+    let none = e.inductance.equals(S::zero());
+    let [_, healthy, inductance] = m.cold;
+    let circuit = Circuit::new(S::select(none, healthy, e.resistance), S::select(none, inductance, e.inductance), m.dt);
+    let shown = three!(|j| m.drive.gain[j] * imposed[j]);
+    Phase {
+        coefficients: three!(|j| k[j] * s.flux_factor),
+        imposed,
+        reference: sines,
+        rotor,
+        quadrature: quadrature(imposed, rotor),
+        seen: quadrature(shown, sines),
+        ..Phase::new(e.torque_constant * s.flux_factor, circuit, &m.control, m.shaft.inertia)
+    }
 }
 
 /// The healthy phase at the present temperatures.

@@ -2,12 +2,15 @@
 //! speed is solved with the acceleration (docs/theory/low-fidelity.md, "The speed derivative as inertia").
 
 use super::model::{Model, State, Structure};
+use super::passive::passive_step;
 use super::phase::{phase, Phase};
 use crate::actuator::servo::advance::{Instant, Stepper};
 use crate::actuator::servo::layout::DriveKind;
 use crate::control::position_speed::Mode;
+use crate::motor::equivalent::quadrature;
 use crate::scalar::Scalar;
 use crate::sensor::filter::low_pass;
+use crate::three;
 
 /// What the controller asks for before the derivative of the speed is known.
 struct Demand<S> {
@@ -43,7 +46,10 @@ fn demand<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, comm
 #[inline(always)]
 fn electric_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &Instant<S>, s: &mut State<S>, p: &Phase<S>) {
     let speed = s.shaft.motor_speed;
-    let emf = S::splat(2.0 / 3.0) * p.torque_constant * speed;
+    let mut emf = S::splat(2.0 / 3.0) * p.torque_constant * speed;
+    if FULL && structure.loops {
+        emf = emf + m.circuits.voltage(s, p);
+    }
     let current_ref = s.torque_ref * m.control.per_torque_constant;
     let circuit = &p.circuit;
     let target = match structure.drive {
@@ -67,21 +73,76 @@ fn electric_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structur
         s.voltage = S::select(limited, held, s.voltage);
         reached = S::select(limited, circuit.current(s.current, held - emf), target);
     }
-    s.tripped = s.tripped.maximum(m.drive.tripped);
     let before = s.current;
-    s.current = reached * (S::one() - s.tripped);
+    s.current = reached;
+    s.current_q = reached * p.quadrature;
+    s.current_seen = reached * p.seen;
+    s.motor_torque = p.torque_constant * reached;
+    // Sum of R_j i_j^2 of the three phases, at the step's middle.
+    let middle = S::splat(0.5) * (before + reached);
+    let mut loss = S::splat(1.5) * middle * middle / p.circuit.per_resistance;
+    // Terminal power of the three phases, 3/2 v_q i_q.
+    let mut power = S::splat(1.5) * s.voltage * middle;
+    let phases = s.phases;
+    if FULL && structure.angle {
+        s.phases = three!(|j| p.imposed[j] * reached);
+    }
+    if FULL && structure.passive {
+        (loss, power) = without_gates(m, structure, supply, s, p, phases, [loss, power]);
+    }
     if FULL && structure.link {
-        // Terminal power of the three phases, 3/2 v_q i_q, at the step's middle.
-        let power = S::splat(0.75) * s.voltage * (before + s.current);
         m.drive.link.step(&mut s.link, source, power * m.dt);
     }
+    if FULL && structure.loops {
+        let added = m.circuits.step(s, p, phases, s.phases);
+        s.motor_torque = s.motor_torque + added.torque;
+        s.network.collected[1] = m.dt.fma(added.copper, s.network.collected[1]);
+        s.network.collected[2] = m.dt.fma(added.contact, s.network.collected[2]);
+        s.copper = m.dt.fma(added.copper, s.copper);
+    }
     if FULL && structure.heat {
-        // Sum of R_j i_j^2 of the three phases, at the step's middle.
-        let middle = S::splat(0.5) * (before + s.current);
-        let heat = S::splat(1.5) * middle * middle * m.dt / p.circuit.per_resistance;
+        let heat = loss * m.dt;
         s.network.collected[0] = s.network.collected[0] + heat;
         s.copper = s.copper + heat;
     }
+}
+
+/// Trips the drive, and where the bridge has no gates lets the EMFs drive the windings. Copper loss of the step and power drawn from the link.
+#[inline(always)]
+fn without_gates<S: Scalar>(
+    m: &Model<S>,
+    structure: &Structure,
+    supply: S,
+    s: &mut State<S>,
+    p: &Phase<S>,
+    before: [S; 3],
+    [loss, power]: [S; 2],
+) -> (S, S) {
+    let (zero, half) = (S::zero(), S::splat(0.5));
+    let imposed = s.phases;
+    if structure.drive != DriveKind::Off {
+        let largest = imposed[0].abs().maximum(imposed[1].abs()).maximum(imposed[2].abs()) + m.drive.half_band;
+        let over = zero.lt(m.drive.trip_current) & m.drive.trip_current.lt(largest);
+        s.tripped = s.tripped.maximum(m.drive.shorted).maximum(S::indicator(over));
+    }
+    let mut passive = S::mask(structure.drive == DriveKind::Off) | half.lt(s.tripped);
+    if structure.stops {
+        passive = passive | m.sensing.lost();
+    }
+    if !S::any(passive) {
+        return (loss, power);
+    }
+    let (after, rail) = passive_step(m, structure, supply, s, p, before);
+    s.phases = three!(|j| S::select(passive, after[j], imposed[j]));
+    s.current = S::select(passive, quadrature(s.phases, p.reference), s.current);
+    s.current_q = S::select(passive, quadrature(s.phases, p.rotor), s.current_q);
+    s.current_seen = S::select(passive, s.current, s.current_seen);
+    // The EMF is that of the step's begin: it lags by half a step, and so does the mean of the currents lead.
+    let middle: [S; 3] = three!(|j| half * (before[j] + after[j]));
+    s.motor_torque = S::select(passive, m.star.torque(p.coefficients, middle), s.motor_torque);
+    let squares = (0..3).fold(zero, |sum, j| sum + m.resistance[j] * s.resistance_factor * middle[j] * middle[j]);
+    let drawn = rail[0] * middle[0] + rail[1] * middle[1] + rail[2] * middle[2];
+    (S::select(passive, squares, loss), S::select(passive, drawn, power))
 }
 
 #[inline(always)]
@@ -92,7 +153,7 @@ fn step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &In
         m.sensing.count::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed);
     }
     let position = m.sensing.user::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed, &reading, m.shaft.gear.per_ratio);
-    let asked = demand(m, structure, s, x.command, position, reading.speed);
+    let asked = demand(m, structure, s, x.command + s.command_noise, position, reading.speed);
 
     // Loads, and the acceleration that the derivative of the speed takes part in.
     let p = phase::<S, FULL>(m, structure, s, reading.angle);
@@ -107,7 +168,7 @@ fn step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &In
 
     // Equivalent phase, motor and transmission dynamics.
     electric_step::<S, FULL>(m, structure, x, s, &p);
-    s.motor_torque = m.star.saturate(p.torque_constant * s.current);
+    s.motor_torque = m.star.saturate(s.motor_torque);
     if FULL && structure.shaft.train.law.knows_torque() {
         // The friction knows the torque that acts, not the one that was asked for.
         loads = m.shaft.loads::<FULL, FULL>(&structure.shaft, x, &s.shaft, s.motor_torque);
@@ -115,7 +176,7 @@ fn step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &In
     m.shaft.step::<FULL, FULL>(&structure.shaft, x, &mut s.shaft, &loads, s.motor_torque);
 
     // Acquisition.
-    s.filtered[0] = low_pass(m.filter, s.filtered[0], s.current);
+    s.filtered[0] = low_pass(m.filter, s.filtered[0], s.current_seen);
     s.filtered[1] = low_pass(m.filter, s.filtered[1], s.voltage);
 }
 

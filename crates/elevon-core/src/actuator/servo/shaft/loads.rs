@@ -58,9 +58,10 @@ impl<S: Scalar> Shaft<S> {
             if d.loaded {
                 let moving = s.motor_speed.sign();
                 let direction = S::select(s.motor_speed.equals(S::zero()), (torque - load).sign(), moving);
-                added = added + self.gear.load_friction(through, direction);
+                let force = self.through_gear::<EXTRA>(d, x, s, through, direction);
+                added = added + self.gear.load_friction(force, direction);
                 if EXTRA && d.nut {
-                    nut = nut + self.screw.drag(through, direction) * self.gear.per_ratio;
+                    nut = nut + self.screw.drag(force, direction) * self.gear.per_ratio;
                 }
             }
             if d.jams {
@@ -102,6 +103,17 @@ impl<S: Scalar> Shaft<S> {
             viscous = viscous + self.load_damping * self.gear.per_ratio * self.gear.per_ratio * speed;
         }
         viscous
+    }
+
+    /// What gear and screw carry in the `direction` of motion, at the user: the signed load and, behind a rigid joint, the
+    /// load side's friction and damping. All of it passes their efficiency.
+    #[inline(always)]
+    fn through_gear<const EXTRA: bool>(&self, d: &ShaftDetails, x: &Instant<S>, s: &ShaftState<S>, through: S, direction: S) -> S {
+        if !EXTRA || !d.load_side || d.elastic {
+            return through;
+        }
+        let damping = self.load_damping * self.gear.per_ratio * s.motor_speed;
+        direction.fma(self.load_side_friction(d, x), through + damping)
     }
 
     #[inline(always)]

@@ -29,8 +29,8 @@ impl<S: Scalar> Shaft<S> {
         let dry = self.dry(d, s, &loads, torque);
         Shown {
             user_speed: self.user_speed(d, s),
-            friction: dry + self.friction.viscous_torque(s.motor_speed),
-            brake: loads.brake,
+            friction: dry + loads.viscous,
+            brake: x.brake,
             load: loads.load,
             user_torque: loads.user_torque,
             through: loads.through,
@@ -95,10 +95,10 @@ impl<S: Scalar> Shaft<S> {
         shown: &Shown<S>,
     ) -> [S; 2] {
         let limit = self.load_side_friction(d, x);
-        let dry = Friction::dry_torque(shown.through - shown.user_torque, s.user_speed, limit, limit);
+        let dry = Friction::dry_torque(shown.through - shown.user_torque, shown.user_speed, limit, limit);
         let spall =
             if d.spall { self.screw.spall(s.motor_position, shown.through, s.motor_position * self.gear.per_ratio).0 } else { S::zero() };
-        [dry + self.load_damping * s.user_speed, spall]
+        [dry + self.load_damping * shown.user_speed, spall]
     }
 
     #[inline(always)]
