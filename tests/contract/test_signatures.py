@@ -19,6 +19,9 @@ SIGNATURES = {
     ("shorted_switch", "inverter"): ("test_shorted_switch_trips_the_drive_and_the_status_says_so"),
     ("demagnetisation", "motor"): "test_demagnetisation_needs_more_current_for_the_same_torque",
     ("sag", "supply"): "test_supply_sag_lowers_the_speed_that_can_be_reached",
+    ("connector_open", "supply"): (
+        "test_at_constant_power_the_square_of_the_voltage_falls_straight"
+    ),
     ("gain", "current"): "test_current_sensor_gain_changes_what_the_drive_delivers",
     ("offset", "current"): "test_current_sensor_offset_ripples_at_the_electrical_frequency",
     ("friction", "transmission"): "test_friction_raises_the_moving_current_by_the_torque_balance",
