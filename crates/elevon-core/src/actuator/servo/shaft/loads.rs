@@ -54,14 +54,15 @@ impl<S: Scalar> Shaft<S> {
             added = added + friction;
             nut = spalled;
         }
+        let mut carried = through;
         if FULL {
             if d.loaded {
                 let moving = s.motor_speed.sign();
                 let direction = S::select(s.motor_speed.equals(S::zero()), (torque - load).sign(), moving);
-                let force = self.through_gear::<EXTRA>(d, x, s, through, direction);
-                added = added + self.gear.load_friction(force, direction);
+                carried = self.through_gear::<EXTRA>(d, x, s, through, direction);
+                added = added + self.gear.load_friction(carried, direction);
                 if EXTRA && d.nut {
-                    nut = nut + self.screw.drag(force, direction) * self.gear.per_ratio;
+                    nut = nut + self.screw.drag(carried, direction) * self.gear.per_ratio;
                 }
             }
             if d.jams {
@@ -76,7 +77,7 @@ impl<S: Scalar> Shaft<S> {
         let (mut static_limit, mut dynamic) = (limits[0] + added, limits[1] + added);
         if EXTRA {
             if d.preloaded {
-                let preload = self.screw.preload_torque * self.screw.relieved(through);
+                let preload = self.screw.preload_torque * self.screw.relieved(carried);
                 static_limit = static_limit + self.stick * preload;
                 dynamic = dynamic + preload;
                 nut = nut + preload;
