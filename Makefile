@@ -1,7 +1,7 @@
 # Needs python3 (3.11 or newer), cargo, a C compiler and make. Everything else goes into .venv.
 #   make setup   the environment and the extension        make test    all checks but the long ones
 #   make demo    the first result, out/demo/report.html   make check   a changed line of physics, in a minute
-#   make help    the other targets
+#   make help    the other targets                        CONTRIBUTING.md: how to add what
 
 PYTHON ?= python3
 VENV   := .venv

@@ -7,6 +7,7 @@ parameter costs seconds; that lanes change no bit is the contract of `test_actua
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -15,7 +16,9 @@ from typing import Any
 import numpy as np
 
 import elevon
+from elevon.errors import ElevonWarning, NotActingWarning
 from elevon.parameters import records
+from elevon.simulate.prepare import prepare
 from tests.contract import sets
 
 Values = Mapping[str, Any]
@@ -54,12 +57,16 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Cell:
-    """An actuator at one fidelity, in one drive, under one load (SI, at its output)."""
+    """An actuator at one fidelity, in one drive, under one load (SI, at its output).
+
+    It swings, or with `onwards` it moves in the positive direction only, up to its stops.
+    """
 
     name: str
     fidelity: str
     choices: tuple[tuple[str, str], ...] = ()
     load: float = 0.0
+    onwards: bool = False
 
     @property
     def title(self) -> str:
@@ -70,29 +77,47 @@ class Cell:
 
     def actuator(self, values: Values | None = None) -> Any:
         """The actuator of this cell with some values changed."""
-        return sets.actuator(self.name).with_values({**dict(self.choices), **(values or {})})
+        chosen = sets.actuator(self.name).with_values(dict(self.choices), asked=False)
+        return chosen.with_values(values or {})
 
     def scenario(self, faults: Sequence[Values] = (), duration: float | None = None) -> Any:
         """The short motion in which everything moves, under the cell's load."""
-        data = sets.motion(self.name)
+        data = sets.onwards(self.name) if self.onwards else sets.motion(self.name)
         if self.load:
             data["load"] = {"user": {"terms": [{"kind": "constant", "value": self.load}]}}
         if duration is not None:
             data["duration"] = duration
         return elevon.Scenario.from_dict({**data, "fault": list(faults)})
 
+    def of(self, variant: Variant, duration: float | None = None) -> Any:
+        """The run of a variant."""
+        scenario = self.scenario(variant.faults, duration)
+        return elevon.Run(self.actuator(variant.values), scenario, 5, variant.name)
+
     def run(self, variants: Sequence[Variant], duration: float | None = None) -> list[Outcome]:
-        """Every variant's outcome, from one batch."""
-        runs = [
-            elevon.Run(
-                self.actuator(item.values), self.scenario(item.faults, duration), 5, item.name
+        """Every variant's outcome, from one batch; what does not act is no matter here."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ElevonWarning)
+            recordings = elevon.simulate_batch(
+                [self.of(item, duration) for item in variants],
+                fidelity=self.fidelity,
+                record=f"all@{RATE}",
+                threads=1,
             )
-            for item in variants
-        ]
-        recordings = elevon.simulate_batch(
-            runs, fidelity=self.fidelity, record=f"all@{RATE}", threads=1
-        )
         return [_outcome(recording) for recording in recordings]
+
+    def refused(self, variant: Variant) -> str:
+        """Why the variant cannot run; empty: it can."""
+        try:
+            prepare(self.of(variant), self.fidelity, f"all@{RATE}")
+        except elevon.InputError as error:
+            return str(error)
+        return ""
+
+    def resting(self, variant: Variant) -> list[str]:
+        """What the variant sets and the program says does not act."""
+        prepared = prepare(self.of(variant), self.fidelity, f"all@{RATE}")
+        return [item.text for item in prepared.doubts if item.category is NotActingWarning]
 
     def faults(self) -> list[tuple[str, str, dict[str, Any]]]:
         """Kind, place and record of every fault that this fidelity carries."""
@@ -111,11 +136,13 @@ def _outcome(recording: Any) -> Outcome:
     )
 
 
-def fault(kind: str, place: str, record: Values, severity: float, **profile: Any) -> Values:
+def fault(
+    kind: str, place: str, record: Values, severity: float, profile: Values | None = None
+) -> Values:
     """A fault with its obligatory attributes at zero."""
     own = {a["name"]: 0.0 for a in record["attributes"] if a["default"] is None}
     given = {"kind": kind, "place": place, "severity": severity, **own}
-    return given | {"profile": profile} if profile else given
+    return given | {"profile": profile} if profile else dict(given)
 
 
 def severe(record: Values) -> float:
@@ -126,8 +153,12 @@ def severe(record: Values) -> float:
     return min(0.5 * top, 1.0) if top > 0 else 0.5 * record["minimum"]
 
 
+@cache
 def drives(name: str) -> list[tuple[tuple[str, str], ...]]:
-    """Own drive of a set, then each other choice of each choice of the group ``drive``."""
+    """Own drive of a set, then each other choice of each choice of the group ``drive``.
+
+    A choice under which the set does not move (no drive) can show no fault.
+    """
     actuator = sets.actuator(name)
     others = [
         ((path, choice),)
@@ -135,7 +166,17 @@ def drives(name: str) -> list[tuple[tuple[str, str], ...]]:
         for choice in record.choices or ()
         if path.startswith("drive.") and choice != actuator.parameters[path].value
     ]
-    return [(), *others]
+    return [(), *(choices for choices in others if _moves(name, choices))]
+
+
+def _moves(name: str, choices: tuple[tuple[str, str], ...]) -> bool:
+    ways = []
+    for chosen in ((), choices):
+        cell = Cell(name, "low", chosen)
+        if cell.refused(Variant()):
+            return False
+        ways.append(float(np.ptp(cell.run([Variant()])[0].signals["user_position"])))
+    return ways[1] > 0.5 * ways[0]
 
 
 @cache

@@ -112,8 +112,13 @@ def still(name: str) -> Any:
 
 
 def forward(name: str) -> Any:
-    """A command in the positive direction."""
+    """The run of `onwards`."""
+    return elevon.Scenario.from_dict(onwards(name))
+
+
+def onwards(name: str) -> dict[str, Any]:
+    """A command in the positive direction, as data."""
     command: dict[str, Any] = {"mode": "speed", "terms": [{"kind": "constant", "value": 30.0}]}
     if takes_actions(name):
         command = {"mode": "gear", "steps": [step(0.01, "extend")]}
-    return elevon.Scenario.from_dict({"duration": "0.5 s", "command": command})
+    return {"duration": "0.5 s", "command": command}

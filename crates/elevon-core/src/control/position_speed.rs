@@ -16,7 +16,8 @@ choices! {
 variables! {
     /// What the actuator control electronics believe and do.
     ControlParameter, CONTROL {
-        Mode => "mode", "-", "1", Choice(Mode::NAMES), Controller, Some(0.0), "what the command is: a position, a speed (bypasses the position loop) or a torque (bypasses both loops)";
+        Mode => "mode", "-", "1", Choice(Mode::NAMES), Controller, Some(0.0), "what the command is: a position, a speed (bypasses the position loop) or a torque (bypasses both loops)",
+            nowhere("the command of the scenario says what it is");
         PositionGain => "position_gain", "G", "1/s", NonNegative, Controller, None, "user position error to fast-shaft speed reference",
             when(&[Chosen("control.mode", &["position"])]);
         PositionGainScale => "position_gain_scale", "-", "1", NonNegative, Controller, Some(1.0), "healthy 1; drift of the position gain",

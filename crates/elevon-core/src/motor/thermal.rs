@@ -36,8 +36,7 @@ variables! {
             when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);
         Emissivity => "emissivity", "epsilon", "1", Unit, Plant, Some(0.9), "emissivity of the surface; 0: no radiation",
             when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);
-        Ambient => "ambient", "T_a", "K", Positive, Plant, Some(293.15), "temperature of the air",
-            when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);
+        Ambient => "ambient", "T_a", "K", Positive, Plant, Some(293.15), "temperature of the air; without a thermal model, the shown temperature of the surface";
         Warning => "warning", "-", "K", Positive, Controller, Some(403.15), "winding temperature above which the warning is set";
         Trip => "trip", "-", "K", Positive, Controller, Some(428.15), "winding temperature at which the drive opens its bridge and the run ends",
             when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);

@@ -1,0 +1,201 @@
+"""For every parameter the values that should show it, and the company it needs, from its record."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+from elevon.parameters import records
+from tests.contract.cells import Cell, Variant, fault, severe
+
+#: Steps away from a value, and numbers of every size for those that are zero.
+FACTORS = (1.3, 0.7, 0.02, 50.0)
+SIZES = (0.1, 1e-3, 1.0, 30.0, 1e-6, 1e3, -0.1, -1.0, 0.0)
+#: What a companion that must be away from neutral is set to, tried in this order.
+COMPANY = (0.2, 1e-3, 1.0, 20.0, 1e-5)
+
+_CHOSEN = re.compile(r"(\S+) = (\S+)")
+_AWAY = re.compile(r"(\S+) away from (\S+)")
+
+
+def inside(record: Any, value: float) -> bool:
+    """Is the value in the record's range?"""
+    try:
+        record.check(value)
+    except ValueError:
+        return False
+    return True
+
+
+def others(record: Any, value: float | str) -> list[float | str]:
+    """Other values of a parameter: every other choice, or numbers from near to far."""
+    if record.choices is not None:
+        return [choice for choice in record.choices if choice != value]
+    assert isinstance(value, float)
+    numbers = [value * factor for factor in FACTORS if value] + list(SIZES)
+    numbers += [value + size for size in (1.0, -1.0) if value]
+    return [
+        number for number in dict.fromkeys(numbers) if number != value and inside(record, number)
+    ]
+
+
+def company(
+    cell: Cell, path: str, size: float, seen: tuple[str, ...] = ()
+) -> Iterator[dict[str, Any]]:
+    """Yield settings under which the record says that a parameter acts, one an alternative."""
+    actuator = cell.actuator()
+    known = records(actuator.wiring)
+    met: list[dict[str, Any]] = [{}]
+    for condition in known[path].when:
+        ways = [way for part in _alternatives(condition, cell.fidelity)
+                for way in _met(cell, part, size, (*seen, path))]  # fmt: skip
+        met = [{**one, **way} for one in met for way in ways or [{}]]
+    yield from met[:6]
+
+
+def _alternatives(condition: str, fidelity: str) -> list[str]:
+    """Split ``a or b`` into its conditions; those of another fidelity ask nothing."""
+    words, _, other = condition.partition(" (fidelity ")
+    if other and other.rstrip(")") != fidelity:
+        return []
+    parts: list[str] = []
+    for piece in re.split(r" or | and ", words):
+        if " = " in piece or " away from " in piece:
+            parts.append(piece)
+    return parts
+
+
+def _met(
+    cell: Cell, condition: str, size: float, seen: tuple[str, ...]
+) -> Iterator[dict[str, Any]]:
+    actuator = cell.actuator()
+    known = records(actuator.wiring)
+    if match := _CHOSEN.match(condition):
+        path, wanted = match[1], match[2]
+    else:
+        match = _AWAY.match(condition)
+        assert match is not None, condition
+        path, wanted = match[1], ""
+    if path not in known or path in seen:
+        return
+    setting = wanted or _moved(known[path], actuator.parameters.value(path), match[2], size)
+    below = list(company(cell, path, size, seen)) or [{}]
+    for one in below:
+        yield {**one, path: setting}
+
+
+def _moved(record: Any, value: float, neutral: str, size: float) -> float:
+    """A number away from neutral: as it is if it is away already."""
+    try:
+        rest = float(neutral)
+    except ValueError:
+        rest = value
+    if value != rest:
+        return value
+    top = record.maximum if math.isfinite(record.maximum) else math.inf
+    for number in (
+        rest + size,
+        rest - size,
+        rest - 0.5 * size,
+        rest + min(size, 0.5 * (top - rest)),
+    ):
+        if number != rest and inside(record, number):
+            return float(number)
+    return value
+
+
+def companies(cell: Cell, path: str) -> Iterator[Variant]:
+    """Yield what a parameter is tried with, from what its record asks to wider circles.
+
+    First its conditions, met by values; then with each fault that moves what it asks for, coming
+    in the middle of the run; then with each neighbour of its group moved.
+    """
+    plain = [Variant(values=one) for one in _accepted(cell, path)]
+    yield from plain
+    first = plain[0] if plain else Variant()
+    for broken in _faults(cell, path):
+        yield Variant(values=first.values, faults=(broken,))
+    for company in plain[:2] or [Variant()]:
+        for values in _neighbours(cell, path):
+            yield Variant(values={**company.values, **values})
+
+
+def _accepted(cell: Cell, path: str) -> Iterator[dict[str, Any]]:
+    tried: list[dict[str, Any]] = []
+    for size in COMPANY:
+        for one in company(cell, path, size):
+            if one not in tried and not cell.refused(Variant(values=one)):
+                yield one
+            tried.append(one)
+
+
+def _faults(cell: Cell, path: str) -> Iterator[Any]:
+    """Yield the faults that move what the parameter asks for; and one that grows smoothly."""
+    asked = " ".join(records(cell.actuator().wiring)[path].when)
+    half = 0.5 * cell.scenario().seconds
+    for kind, place, record in cell.faults():
+        if any(target in asked for target in record["targets"][place]):
+            yield fault(kind, place, record, severe(record), {"kind": "step", "time": half})
+    kind, place, record = cell.faults()[0]
+    yield fault(kind, place, record, 0.5 * severe(record), {"kind": "ramp", "end": 2.0 * half})
+
+
+def _neighbours(cell: Cell, path: str) -> Iterator[dict[str, Any]]:
+    """Yield other values of the parameters of the same group, all at once and one at a time."""
+    group = path.rpartition(".")[0]
+    actuator = cell.actuator()
+    moved = {
+        other: others(record, actuator.parameters[other].value)[:6]
+        for other, record in records(actuator.wiring).items()
+        if other.rpartition(".")[0] == group and other != path
+    }
+    for factor in FACTORS:
+        yield {
+            other: actuator.parameters.value(other) * factor
+            for other in moved
+            if records(actuator.wiring)[other].choices is None
+        }
+    yield from ({other: value} for other, values in moved.items() for value in values)
+
+
+def variants(cell: Cell, path: str, base: Variant) -> list[Variant]:
+    """Other values of a parameter in some company, those that the cell accepts."""
+    actuator = cell.actuator(base.values)
+    record = records(actuator.wiring)[path]
+    found = [
+        Variant(f"{path}={value}", {**base.values, path: value}, base.faults)
+        for value in others(record, actuator.parameters[path].value)
+    ]
+    return [variant for variant in found if not cell.refused(variant)]
+
+
+def changed(cell: Cell, base: Variant, tried: Sequence[Variant]) -> dict[str, list[str]]:
+    """Signals that each variant changes against its company alone."""
+    if not tried:
+        return {}
+    healthy, *moved = cell.run([base, *tried])
+    return {item.name: outcome.differs(healthy) for item, outcome in zip(tried, moved, strict=True)}
+
+
+def says(cell: Cell, path: str, variant: Variant) -> bool:
+    """Does the program say of this variant that the parameter does not act?"""
+    return any(text.startswith(f"{path} = ") for text in cell.resting(variant))
+
+
+def shows(cell: Cell, path: str) -> bool:
+    """Does the parameter change some signal in some company, where nothing says that it rests?"""
+    return any(_shows(replace(cell, onwards=onwards), path) for onwards in (False, True))
+
+
+def _shows(cell: Cell, path: str) -> bool:
+    for base in companies(cell, path):
+        if cell.refused(base):
+            continue
+        tried = [item for item in variants(cell, path, base) if not says(cell, path, item)]
+        for part in (tried[:2], tried[2:]):
+            if any(changed(cell, base, part).values()):
+                return True
+    return False

@@ -1,0 +1,66 @@
+"""Every parameter of every actuator either changes something, or is said not to act.
+
+Both ways: what is said not to act changes no bit. What a parameter needs to show itself comes from
+its record and, failing that, from its neighbours; nothing here is a list kept by hand.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from elevon import _core
+from elevon.parameters import records
+from tests.contract import sets
+from tests.contract.acting import changed, says, shows, variants
+from tests.contract.cells import Cell, Variant, load
+
+CASES = [(name, fidelity) for name in sets.names() for fidelity in sets.fidelities(name)]
+EVERY = pytest.mark.parametrize(("name", "fidelity"), CASES)
+
+
+def resting(cell: Cell) -> list[str]:
+    """Parameters that the core says do not act in a plain run of the cell."""
+    actuator = cell.actuator()
+    rows = _core.not_acting(actuator.wiring, cell.fidelity, actuator.parameters.vector(), [])
+    return [row["path"] for row in rows]
+
+
+def idle(name: str, fidelity: str, paths: list[str]) -> list[str]:
+    """Parameters that change nothing in any company, though nothing says so."""
+    cell = Cell(name, fidelity, load=load(name))
+    known = records(cell.actuator().wiring)
+    return [path for path in paths if fidelity in known[path].fidelities and not shows(cell, path)]
+
+
+def false(name: str, fidelity: str, count: int | None) -> list[str]:
+    """Parameters that are said not to act, but change something; `count` values of each."""
+    cell = Cell(name, fidelity)
+    tried = [
+        variant
+        for path in resting(cell)
+        for variant in variants(cell, path, Variant())[:count]
+        if says(cell, path, variant)
+    ]
+    return [
+        f"{what}: {signals}" for what, signals in changed(cell, Variant(), tried).items() if signals
+    ]
+
+
+@pytest.mark.parametrize("name", sets.names())
+def test_what_is_said_not_to_act_changes_no_bit_of_the_low_model(name: str) -> None:
+    """One other value of each."""
+    assert false(name, "low", 1) == []
+
+
+@pytest.mark.long
+@EVERY
+def test_what_is_said_not_to_act_changes_no_bit_at_any_value(name: str, fidelity: str) -> None:
+    """From near to extreme."""
+    assert false(name, fidelity, None) == []
+
+
+@pytest.mark.long
+@EVERY
+def test_every_parameter_shows_or_is_said_not_to_act(name: str, fidelity: str) -> None:
+    """All of them."""
+    assert idle(name, fidelity, list(records(sets.actuator(name).wiring))) == []
