@@ -20,10 +20,10 @@ def shaft(torque: float) -> dict[str, object]:
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_stuck_exactly_just_below_the_static_limit(sign: int) -> None:
-    """0.99 FSJ for 10 s: zero motion, not a small one."""
+    """0.99 FSJ for 2 s: zero motion, not a small one."""
     rec = run(
         RUBBING,
-        duration=10.0,
+        duration=2.0,
         record="motor_position,motor_speed,friction_torque@1 kHz",
         scenario=shaft(sign * 0.99 * STATIC),
     )
