@@ -191,14 +191,15 @@ def test_screw_current_against_the_closed_form(
     if blocked:
         scenario["fault"] = [fault("return_jam", "screw.return_channel", blocked)]
     speed = 0.06 / LEAD
-    names = "current_q_meas,motor_speed,screw_efficiency,screw_efficiency_aiding@1 kHz"
+    names = "current_q_meas,motor_speed,screw_efficiency@1 kHz"
     rec = run(NASA | {"play.model": play}, duration=0.7, mode="speed",
               command=[term("constant", value=f"{speed!r} rad/s")], record=names,
               scenario=scenario, fidelity=fidelity, name="nasa-ballscrew")  # fmt: skip
     w = float(np.mean(rec["motor_speed"].values[-300:]))
-    eta, aiding = rec.final["screw_efficiency"], rec.final["screw_efficiency_aiding"]
+    eta = rec.final["screw_efficiency"]
     force = 4003.0 + 50.0 + 500.0 * w * LEAD + brake
-    torque = force * LEAD / eta + 0.3 + 437.5 * LEAD * (1 / eta - aiding) + 0.002 * w
+    # The load relieves the preloaded nut far beyond the 2^(3/2) 437.5 N at which its drag ends.
+    torque = force * LEAD / eta + 0.3 + 0.002 * w
     current = float(np.mean(rec["current_q_meas"].values[-300:]))
     assert current == pytest.approx(torque / 1.65, rel=0.01)
 
