@@ -58,6 +58,8 @@ pub(super) trait Stepper<S> {
     type Model;
     type Structure;
     type State: Copy;
+    /// The state of one chunk may stay in registers over some steps: worth a copy of the step's code where that is short.
+    const IN_REGISTERS: bool;
     fn dt(model: &Self::Model) -> S;
     fn step(model: &Self::Model, structure: &Self::Structure, instant: &Instant<S>, state: &mut Self::State);
 }
@@ -107,8 +109,7 @@ fn advance<T: Stepper<S>, S: Scalar>(x: Stretch<'_, T::Model, T::Structure, T::S
                 *command = inputs[COMMAND].at(S::splat((k + i as Steps) as f64) * T::dt(model));
             }
         }
-        if let ([model], [inputs], [state]) = (models, inputs, &mut *states) {
-            // One chunk: its state may stay in registers.
+        if let (true, [model], [inputs], [state]) = (T::IN_REGISTERS, models, inputs, &mut *states) {
             let (mut s, mut instant, steady) = (*state, instants[0], steady[0]);
             for (i, &command) in commands[0][..some].iter().enumerate() {
                 let t = S::splat((k + i as Steps) as f64) * T::dt(model);

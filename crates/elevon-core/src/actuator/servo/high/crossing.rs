@@ -4,12 +4,12 @@
 //! (on the straight line between the errors at both ends, exact to the order of the step), the relay turns, and the rest
 //! follows. A second crossing within the same step is found at the begin of the next.
 
-use super::electric::{electric_step, Coupling};
+use super::electric::{Coupling, Detailed};
 use super::model::{Model, State};
 use super::step::{lose_switching, measured_current};
 use crate::actuator::servo::details::Structure;
 use crate::inverter::hysteresis::{count_transitions, crossing, six_step};
-use crate::scalar::Scalar;
+use crate::scalar::{Kernel, Scalar};
 use crate::sensor::filter::low_pass;
 use crate::three;
 
@@ -40,9 +40,36 @@ fn error_after<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, cur
     three!(|j| reference * shape[j] - measured[j])
 }
 
-/// As `electric_step`, in two parts where a relay crosses its threshold within the step.
+/// As `electric_step`, in two parts where a relay crosses its threshold within the step. A function of its own: few runs need
+/// it, and its copies of the state would slow the compilation of every step.
+pub(crate) struct Located<'a, S: Scalar> {
+    pub model: &'a Model<S>,
+    pub structure: &'a Structure,
+    pub state: &'a mut State<S>,
+    pub coupling: &'a Coupling<S>,
+    pub half_supply: S,
+    pub old_legs: [S; 3],
+    pub seen: Seen<S>,
+}
+
+impl<S: Scalar> Located<'_, S> {
+    #[inline(never)]
+    pub(crate) fn step(self) -> ([S; 3], [S; 3]) {
+        S::vectorize(self)
+    }
+}
+
+impl<S: Scalar> Kernel for Located<'_, S> {
+    type Output = ([S; 3], [S; 3]);
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let Self { model, structure, state, coupling, half_supply, old_legs, seen } = self;
+        located_step(model, structure, state, coupling, half_supply, old_legs, &seen)
+    }
+}
+
 #[inline(always)]
-pub(crate) fn located_step<S: Scalar, const FULL: bool>(
+fn located_step<S: Scalar>(
     m: &Model<S>,
     structure: &Structure,
     s: &mut State<S>,
@@ -51,8 +78,10 @@ pub(crate) fn located_step<S: Scalar, const FULL: bool>(
     old_legs: [S; 3],
     x: &Seen<S>,
 ) -> ([S; 3], [S; 3]) {
+    let electric =
+        |model: &Model<S>, state: &mut State<S>, old_legs| Detailed { model, structure, state, coupling: c, half_supply, old_legs }.step();
     let before = *s;
-    let whole = electric_step::<S, FULL, true>(m, structure, s, c, half_supply, old_legs);
+    let whole = electric(m, s, old_legs);
     let end = error_after(m, structure, s, whole.0, x);
     s.extra.last_reference = s.current_ref;
     let Some((share, which)) = crossing(m.half_band, s.legs, x.error, end) else {
@@ -61,7 +90,7 @@ pub(crate) fn located_step<S: Scalar, const FULL: bool>(
     let split = which[0] | which[1] | which[2];
     let kept = *s;
     *s = before;
-    let first = electric_step::<S, FULL, true>(&m.over(share), structure, s, c, half_supply, old_legs);
+    let first = electric(&m.over(share), s, old_legs);
     s.star.current = first.0;
     let turned = three!(|j| S::select(which[j], -s.legs[j], s.legs[j]));
     s.transitions = count_transitions(s.transitions, s.legs, turned);
@@ -71,7 +100,7 @@ pub(crate) fn located_step<S: Scalar, const FULL: bool>(
     let legs = s.legs;
     s.legs = turned;
     let rest = S::one() - share;
-    let second = electric_step::<S, FULL, true>(&m.over(rest), structure, s, c, half_supply, legs);
+    let second = electric(&m.over(rest), s, legs);
     s.star.current = before.star.current;
     s.extra.last_reference = kept.extra.last_reference;
     choose(s, split, &kept);

@@ -4,7 +4,7 @@ use super::model::*;
 use super::shorted::shorted_step;
 use crate::actuator::servo::details::Structure;
 use crate::inverter::bridge::{quench, Windings};
-use crate::scalar::{three_phase, Scalar};
+use crate::scalar::{three_phase, Kernel, Scalar};
 use crate::three;
 
 /// Electromagnetic coefficients of the present rotor angle.
@@ -115,6 +115,33 @@ pub(crate) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
         }
     }
     (current, voltage)
+}
+
+/// `electric_step` with every detail, as a function of its own: contacts and bridge are the largest code of a step, and four
+/// places call them.
+pub(crate) struct Detailed<'a, S: Scalar> {
+    pub model: &'a Model<S>,
+    pub structure: &'a Structure,
+    pub state: &'a mut State<S>,
+    pub coupling: &'a Coupling<S>,
+    pub half_supply: S,
+    pub old_legs: [S; 3],
+}
+
+impl<S: Scalar> Detailed<'_, S> {
+    #[inline(never)]
+    pub(crate) fn step(self) -> ([S; 3], [S; 3]) {
+        S::vectorize(self)
+    }
+}
+
+impl<S: Scalar> Kernel for Detailed<'_, S> {
+    type Output = ([S; 3], [S; 3]);
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let Self { model, structure, state, coupling, half_supply, old_legs } = self;
+        electric_step::<S, true, true>(model, structure, state, coupling, half_supply, old_legs)
+    }
 }
 
 /// Energies of a step at its midpoint: products at the start of a step are wrong by tens of percent, since the

@@ -187,6 +187,7 @@ impl<S: Scalar, const FULL: bool> Stepper<S> for LowStep<FULL> {
     type Model = Model<S>;
     type Structure = Structure;
     type State = State<S>;
+    const IN_REGISTERS: bool = false;
 
     #[inline(always)]
     fn dt(model: &Model<S>) -> S {
