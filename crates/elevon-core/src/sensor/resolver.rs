@@ -37,7 +37,7 @@ variables! {
                 Away("sensor.resolver.excitation_short", 0.0), Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0),
                 Away("sensor.resolver.sine_short", 0.0), Away("sensor.resolver.cosine_short", 0.0),
             ])]);
-        TrackingLimit => "resolver.tracking_limit", "-", "rad/s", Positive, Sensor, Some(6283.185_307_179_586), "largest speed the converter shows; ASSUMED: 1000 turns/s, a common converter of 12 bits",
+        TrackingLimit => "resolver.tracking_limit", "-", "rad/s", Positive, Sensor, Some(6_283.185_307_179_586), "largest speed the converter shows; ASSUMED: 1000 turns/s, a common converter of 12 bits",
             when(&[Either(&[
                 Away("sensor.resolver.mismatch", 0.0), Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0),
                 Away("sensor.resolver.sine_short", 0.0), Away("sensor.resolver.cosine_short", 0.0),
@@ -176,7 +176,7 @@ mod tests {
             assert!((r.read(theta, 1.0, &mut fresh()).angle - shown).abs() < 0.01, "{theta}");
         }
         let crossing = r.read(FRAC_PI_2, 100.0, &mut fresh());
-        assert_eq!(crossing.speed, 6283.185_307_179_586);
+        assert_eq!(crossing.speed, 6_283.185_307_179_586);
     }
 
     #[test]

@@ -378,7 +378,7 @@ fn stepped<S: Scalar>(raw: &[Vec<S>; 3]) -> Vec<S> {
         let drop = splat(sines(40.0, 0.1 * k as f64));
         let ground = S::splat(-190.0);
         let net = Network::new(&shorts, [true; KINDS], star.dt_per_inductance, m, &c, drop, S::splat(1.1), ground, splat([0.0; 3]));
-        let connected = three!(|j| S::mask((k + j) % 4 != 0));
+        let connected = three!(|j| S::mask(!(k + j).is_multiple_of(4)));
         let (v, neutral) = net.solve(splat(chopped(40 * k)), splat([0.2; 3]), connected);
         let new = net.outcome(v, neutral);
         let x = net.account(m, &c, &new, v, neutral, splat([R; 3]), S::splat(1.1));
