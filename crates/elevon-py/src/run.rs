@@ -102,13 +102,18 @@ impl<'py> Times<'py> {
     }
 }
 
+/// What was asked to be recorded: the clocks and their names, and the names of all signals.
+struct Asked {
+    clocks: Vec<Clock>,
+    names: Vec<String>,
+    signals: Vec<&'static str>,
+}
+
 /// A result as a dictionary. `width` numbers stand for each value (1, or 1 + derivatives).
 fn result<'py>(
     py: Python<'py>,
     dt: f64,
-    clocks: &[Clock],
-    names: &[String],
-    signals: &[&'static str],
+    asked: &Asked,
     width: usize,
     output: RunOutput,
     times: &mut Times<'py>,
@@ -119,12 +124,12 @@ fn result<'py>(
     d.set_item("steps", output.steps)?;
     d.set_item("wall_s", output.wall)?;
     let last = PyDict::new(py);
-    for (i, name) in signals.iter().enumerate() {
+    for (i, name) in asked.signals.iter().enumerate() {
         last.set_item(name, output.last[i * width])?;
     }
     d.set_item("final", last)?;
     let kept = PyDict::new(py);
-    for (((clock, name), values), columns) in clocks.iter().zip(names).zip(output.clocks).zip(output.columns) {
+    for (((clock, name), values), columns) in asked.clocks.iter().zip(&asked.names).zip(output.clocks).zip(output.columns) {
         let rows = values.len().checked_div(columns).unwrap_or(0);
         let entry = PyDict::new(py);
         entry.set_item("time", times.get(py, dt, clock.period, rows))?;
@@ -162,11 +167,11 @@ pub fn simulate<'py>(
     let steps: Vec<f64> = specs.iter().map(|r| model.step(&r.parameters)).collect();
     let total = specs.iter().zip(&steps).map(|(r, dt)| (r.duration / dt).round() as u64).sum();
     let outputs = polled(py, total, progress, |monitor| model.run_all(&specs, &clocks, threads, width, monitor))?;
-    let signals: Vec<&'static str> = model.signals().iter().map(|s| s.name).collect();
+    let asked = Asked { clocks, names, signals: model.signals().iter().map(|s| s.name).collect() };
     let list = PyList::empty(py);
     let mut times = Times::default();
     for (output, dt) in outputs.into_iter().zip(steps) {
-        list.append(result(py, dt, &clocks, &names, &signals, 1, output, &mut times)?)?;
+        list.append(result(py, dt, &asked, 1, output, &mut times)?)?;
     }
     Ok(list)
 }
@@ -202,12 +207,12 @@ pub fn sensitivities<'py>(
     let outputs = outputs.ok_or_else(|| {
         bad("sensitivities need the low fidelity of an actuator without a state machine: switching has no useful derivative")
     })?;
-    let signals: Vec<&'static str> = model.signals().iter().map(|s| s.name).collect();
+    let asked = Asked { clocks, names, signals: model.signals().iter().map(|s| s.name).collect() };
     let list = PyList::empty(py);
     let mut times = Times::default();
     for (i, output) in outputs.into_iter().enumerate() {
         let width = 1 + (chosen - 8 * i).min(8);
-        list.append(result(py, dt, &clocks, &names, &signals, width, output, &mut times)?)?;
+        list.append(result(py, dt, &asked, width, output, &mut times)?)?;
     }
     Ok(list)
 }
