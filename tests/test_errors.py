@@ -49,10 +49,24 @@ def test_every_error_is_of_the_family_and_says_its_exit_code():
     family = [
         value
         for value in vars(errors).values()
-        if isinstance(value, type) and issubclass(value, Exception)
+        if isinstance(value, type)
+        and issubclass(value, Exception)
+        and not issubclass(value, Warning)
     ]
     assert len(family) > 8
     for error in family:
         assert issubclass(error, ElevonError)
         expected = 2 if issubclass(error, InputError) else 1
         assert error.exit_code == (130 if error is errors.Interrupted else expected)
+
+
+def test_every_warning_is_of_the_family_and_says_the_exit_code_of_its_refusal():
+    family = [
+        value
+        for value in vars(errors).values()
+        if isinstance(value, type) and issubclass(value, Warning)
+    ]
+    assert len(family) > 2
+    for warning in family:
+        assert issubclass(warning, errors.ElevonWarning)
+        assert warning.exit_code == InputError.exit_code

@@ -88,7 +88,10 @@ def test_lists_say_where_it_acts(elevon_cli):
     }
     assert rows["solver.step"]["fidelities"] == ["high"]
     assert rows["solver.step"]["declined"]["low"] in elevon_cli("show", "torino-rotary").out
-    assert rows["pwm.frequency"]["when"] == ["drive.kind = pwm"]
+    assert rows["pwm.frequency"]["when"] == [
+        "drive.kind = pwm",
+        "inverter.dead_time away from 0 (fidelity low)",
+    ]
     faults = elevon_cli("list", "faults", "torino-rotary")
     declined = [
         row

@@ -98,7 +98,7 @@ BAD = {
     "negative inertia": ((*RUN, "--set", "motor.inertia=-1"), "outside (0, inf)"),
     "no turns": ((*RUN, "--set", "motor.turns_a=0"), "outside (0, 1]"),
     "too many turns": ((*RUN, "--set", "motor.turns_a=1.1"), "outside (0, 1]"),
-    "zero step": ((*RUN, "--set", "solver.step=0"), "outside (0, inf)"),
+    "zero step": ((*RUN, "--set", "solver.step=0"), "outside [1e-12, 1] s"),
     "step and electrical pole": ((*RUN, "--set", "solver.step=20 ms"), "electrical pole"),
     "step and filter": ((*RUN, "--set", "solver.step=20 us"), "derivative filter"),
     "step and contact": (

@@ -12,10 +12,20 @@ from elevon import _core
 from elevon.parameters import records
 from tests.contract import sets
 from tests.contract.acting import changed, says, shows, variants
-from tests.contract.cells import Cell, Variant, load
+from tests.contract.cells import Cell, Variant, fault, load
 
 CASES = [(name, fidelity) for name in sets.names() for fidelity in sets.fidelities(name)]
 EVERY = pytest.mark.parametrize(("name", "fidelity"), CASES)
+#: The longest motion at high fidelity takes ten seconds: only in the long run.
+SHORT = pytest.mark.parametrize(
+    ("name", "fidelity"),
+    [
+        pytest.param(
+            *case, marks=[pytest.mark.long] if case == ("pisa-landing-gear", "high") else []
+        )
+        for case in CASES
+    ],
+)
 
 
 def resting(cell: Cell) -> list[str]:
@@ -50,6 +60,29 @@ def false(name: str, fidelity: str, count: int | None) -> list[str]:
 def test_what_is_said_not_to_act_changes_no_bit_of_the_low_model(name: str) -> None:
     """One other value of each."""
     assert false(name, "low", 1) == []
+
+
+@SHORT
+def test_a_switch_is_as_it_was_below_one_half_by_value_and_by_fault(
+    name: str, fidelity: str
+) -> None:
+    """Every parameter that a fault switches on or off."""
+    cell = Cell(name, fidelity)
+    known = records(cell.actuator().wiring)
+    switched = [item for item in cell.faults() if "1: " in item[2]["effect"]]
+    assert switched
+    broken = [
+        Variant(f"{kind}@{place}", faults=(fault(kind, place, record, 0.23),))
+        for kind, place, record in switched
+    ]
+    off = [
+        Variant(path, values={path: 0.23})
+        for path in dict.fromkeys(path for _, place, r in switched for path in r["targets"][place])
+        if cell.actuator().parameters.value(path) == 0.0 and known[path].text.startswith("1")
+    ]
+    assert off
+    found = changed(cell, Variant(), [*broken, *off])
+    assert {what: signals for what, signals in found.items() if signals} == {}
 
 
 @pytest.mark.long

@@ -82,7 +82,7 @@ REFUSED = {
     ),
     "no turns": (entry("motor.turns_a", "0.0", None), RangeError, r"outside \(0, 1\]"),
     "too many turns": (entry("motor.turns_a", "1.2", None), RangeError, r"outside \(0, 1\]"),
-    "zero step": (entry("solver.step", "0.0", '"s"'), RangeError, r"outside \(0, inf\)"),
+    "zero step": (entry("solver.step", "0.0", '"s"'), RangeError, r"outside \[1e-12, 1\] s"),
     "interval": (entry(interval="[9.5, 8.5]"), InputError, "ends before it starts"),
     "loose key": ("[motor]\ninertia = 3\n", InputError, "a parameter is a table"),
 }

@@ -81,9 +81,12 @@ def test_default_scenario_keeps_the_promised_limits():
     assert found.q_current_nrmse <= 0.05
 
 
-def test_every_kind_of_fault_is_in_the_default_table():
-    from elevon.faults import Fault, catalogue
+def test_every_line_of_the_catalogue_is_in_the_default_table():
+    from elevon.faults import Fault, catalogue, find_record
     from elevon.reproduce.fault_sensitivity import ROTARY_FAULTS
 
-    asked = {Fault.parse(text).kind for text in ROTARY_FAULTS}
-    assert asked == {record.kind for record in catalogue("rotary")}
+    faults = [Fault.parse(text) for text in ROTARY_FAULTS]
+    asked = [find_record(fault.kind, fault.place, "rotary") for fault in faults]
+    assert {(record.kind, record.places) for record in asked} == {
+        (record.kind, record.places) for record in catalogue("rotary")
+    }

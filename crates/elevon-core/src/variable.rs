@@ -42,6 +42,8 @@ pub enum Range {
     Fraction,
     /// `[0, 1]`.
     Unit,
+    /// `[0, 1]`, on from one half: between the two nothing differs.
+    Flag,
     Between(f64, f64),
     AtLeast(f64),
     /// The index of one of these names.
@@ -57,7 +59,7 @@ impl Range {
             Self::Positive => (0.0, inf, true),
             Self::NonNegative => (0.0, inf, false),
             Self::Fraction => (0.0, 1.0, true),
-            Self::Unit => (0.0, 1.0, false),
+            Self::Unit | Self::Flag => (0.0, 1.0, false),
             Self::Between(low, high) => (low, high, false),
             Self::AtLeast(low) => (low, inf, false),
             Self::Choice(names) => (0.0, names.len() as f64 - 1.0, false),
@@ -68,6 +70,14 @@ impl Range {
         let (low, high, open) = self.bounds();
         let integral = !matches!(self, Self::Choice(_)) || value.fract() == 0.0;
         value.is_finite() && integral && value <= high && if open { value > low } else { value >= low }
+    }
+
+    /// Do two values act differently?
+    pub fn differ(self, a: f64, b: f64) -> bool {
+        match self {
+            Self::Flag => (a >= 0.5) != (b >= 0.5),
+            _ => a != b,
+        }
     }
 }
 
@@ -142,8 +152,7 @@ impl<'a, P: Parameter> Own<'a, P> {
 
     /// Is the parameter away from its neutral value, that of its record, now or later?
     pub fn away(&self, parameter: P) -> bool {
-        let neutral = P::TABLE[parameter.index()].default.unwrap_or(0.0);
-        self.value(parameter) != neutral || self.touched[parameter.index()]
+        self.apart(parameter.index())
     }
 
     pub fn any_away(&self, parameters: impl IntoIterator<Item = P>) -> bool {
@@ -152,8 +161,12 @@ impl<'a, P: Parameter> Own<'a, P> {
 
     /// The same of all rows from `first` to `last`.
     pub fn any_away_among(&self, first: P, last: P) -> bool {
-        let neutral = |i: usize| P::TABLE[i].default.unwrap_or(0.0);
-        (first.index()..=last.index()).any(|i| self.raw[i] != neutral(i) || self.touched[i])
+        (first.index()..=last.index()).any(|i| self.apart(i))
+    }
+
+    fn apart(&self, row: usize) -> bool {
+        let record = &P::TABLE[row];
+        record.range.differ(self.raw[row], record.default.unwrap_or(0.0)) || self.touched[row]
     }
 }
 

@@ -40,22 +40,44 @@ ROTARY_FAULTS = (
     "open_switch@inverter.a_high=1",
     "shorted_switch@inverter.a_high=1",
     "demagnetisation@motor=0.1",
+    "local_demagnetisation@motor=0.3",
+    "phase_short@motor.phases_ab=0.01",
+    "ground_short@motor.phase_a=0.01",
     "sag@supply=0.5",
+    "connector_open@supply=1",
     "gain@sensor.current_a=0.1",
     "offset@sensor.current_a=0.3 A",
+    "stuck@sensor.current_a=1",
+    "dead@sensor.current_a=1",
     "friction@transmission=0.25",
     "lubrication@transmission=1",
     "play@transmission=0.3 deg",
+    "bearing@bearing.outer=1 mm",
+    "bearing@bearing.cage=0.05 N m",
+    "tooth_wear@gear=0.3 deg",
+    "chipped_tooth@gear=0.3 deg",
     "jam@transmission=20 N m",
     "gain_drift@control.position=-0.2",
     "gain_drift@control.speed=-0.2",
     "dropout@sensor.resolver=0.2",
     "mismatch@sensor.resolver=0.2",
     "offset@sensor.resolver=5 deg",
+    "winding_short@sensor.resolver.sine=0.2",
+    "winding_open@sensor.resolver.sine=1",
+    "offset@sensor.encoder=1 deg",
     "gain@sensor.encoder=0.01",
     "missing_counts@sensor.encoder=0.01",
+    "dark_sectors@sensor.encoder=0.05",
+    "stuck@sensor.encoder=1",
+    "dead@sensor.encoder=1",
 )
-"""One severity of each kind, of the size a diagnosis has to see."""
+"""One severity of each line of the catalogue, of the size a diagnosis has to see (ASSUMED).
+
+What is on or off is on; mechanical wear is that of `play`; a contact between or from windings is
+100 ohm, which the drive feeds beside them without tripping; a resolver's winding loses what
+`mismatch` does. A sensor fails that the loops of the shipped set do not close over, where the
+catalogue offers one: a loop around a failed sensor runs away, and nothing is left to compare.
+"""
 
 RECORD = (
     "command,user_position,encoder_position,motor_position,motor_speed,current_q,voltage_q_meas"
@@ -188,7 +210,13 @@ def _rows(
     low = dict(zip((str(fault) for fault in in_low), broken_low, strict=True))
     floors = {name: abs(floor_run[name] - value) for name, value in healthy.items()}
     return [
-        _strongest(str(fault), (healthy, found), (healthy_low, low.get(str(fault))), floors)
+        _strongest(
+            str(fault),
+            (healthy, found),
+            (healthy_low, low.get(str(fault))),
+            floors,
+            find_record(fault.kind, fault.place, run.actuator.wiring).declined.get("low", ""),
+        )
         for fault, found in zip(parsed, broken, strict=True)
     ]
 
@@ -284,6 +312,7 @@ def _strongest(
     high: tuple[Mapping[str, float], Mapping[str, float]],
     low: tuple[Mapping[str, float], Mapping[str, float] | None],
     floors: Mapping[str, float],
+    declined: str,
 ) -> Sensitivity:
     """Choose the feature in which the high model's change stands highest above the floor."""
     changes = {name: high[1][name] - value for name, value in high[0].items()}
@@ -295,6 +324,6 @@ def _strongest(
 
     name = max(changes, key=height)
     if low[1] is None:
-        reason = "not in the low model: it has no single phases, switches or phase sensors"
+        reason = f"not in the low model: {declined}"
         return Sensitivity(fault, name, changes[name], math.nan, floors[name], reason)
     return Sensitivity(fault, name, changes[name], low[1][name] - low[0][name], floors[name])

@@ -25,10 +25,10 @@ pub struct FaultSpec {
 }
 
 impl FaultSpec {
-    /// Parameters that differ from healthy at some time; none when the severity is zero.
+    /// Parameters that differ from healthy at some time; none when nothing acts of the severity, as of a switch below
+    /// one half.
     pub fn touched(&self) -> impl Iterator<Item = usize> + '_ {
-        let live = self.severity != 0.0;
-        self.writes.iter().filter(move |_| live).map(|w| w.index)
+        self.writes.iter().filter(|w| w.op.acting(self.severity) != 0.0).map(|w| w.index)
     }
 
     /// Parameters that the fault or its attributes move at some time; none when the severity is zero.
@@ -196,6 +196,14 @@ mod tests {
         }
         assert_eq!(acting(fault(Op::Set, 0.3, Profile::Constant, 0.0), 0.0, 1.0), (0.0, 0.0));
         assert_eq!(acting(fault(Op::Lose, 0.5, ramp, 0.0), 1.0, 2.0), (0.5, 0.5));
+    }
+
+    #[test]
+    fn what_does_not_act_touches_nothing() {
+        let touched = |op, severity| fault(op, severity, Profile::Constant, 0.1).touched().count();
+        for (op, below, from) in [(Op::Set, 0.499, 0.5), (Op::AddWhole, 0.9, 1.0), (Op::Lose, 0.0, 1e-9)] {
+            assert_eq!((touched(op, below), touched(op, from)), (0, 1), "{op:?}");
+        }
     }
 
     #[test]

@@ -41,24 +41,24 @@ variables! {
         DeadTime => "dead_time", "t_d", "s", NonNegative, Plant, Some(0.0), "both switches of a leg are off for this time at each transition",
             when(&[In(Low, &[Chosen("drive.kind", &["pwm"])])]);
         TripCurrent => "trip_current", "I_trip", "A", NonNegative, Controller, Some(0.0), "the drive trips when a phase current exceeds it; 0: no over-current trip";
-        OpenAHigh => "open_a_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg a never closes",
+        OpenAHigh => "open_a_high", "-", "1", Flag, Plant, Some(0.0), "1: the upper switch of leg a never closes",
             high_only("half waves of one phase are missing: its one phase has none");
-        OpenALow => "open_a_low", "-", "1", Unit, Plant, Some(0.0), "1: the lower switch of leg a never closes",
+        OpenALow => "open_a_low", "-", "1", Flag, Plant, Some(0.0), "1: the lower switch of leg a never closes",
             high_only("half waves of one phase are missing: its one phase has none");
-        OpenBHigh => "open_b_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg b never closes",
+        OpenBHigh => "open_b_high", "-", "1", Flag, Plant, Some(0.0), "1: the upper switch of leg b never closes",
             high_only("half waves of one phase are missing: its one phase has none");
-        OpenBLow => "open_b_low", "-", "1", Unit, Plant, Some(0.0), "1: the lower switch of leg b never closes",
+        OpenBLow => "open_b_low", "-", "1", Flag, Plant, Some(0.0), "1: the lower switch of leg b never closes",
             high_only("half waves of one phase are missing: its one phase has none");
-        OpenCHigh => "open_c_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg c never closes",
+        OpenCHigh => "open_c_high", "-", "1", Flag, Plant, Some(0.0), "1: the upper switch of leg c never closes",
             high_only("half waves of one phase are missing: its one phase has none");
-        OpenCLow => "open_c_low", "-", "1", Unit, Plant, Some(0.0), "1: the lower switch of leg c never closes",
+        OpenCLow => "open_c_low", "-", "1", Flag, Plant, Some(0.0), "1: the lower switch of leg c never closes",
             high_only("half waves of one phase are missing: its one phase has none");
-        ShortedAHigh => "shorted_a_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg a is always closed";
-        ShortedALow => "shorted_a_low", "-", "1", Unit, Plant, Some(0.0), "1: the lower switch of leg a is always closed";
-        ShortedBHigh => "shorted_b_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg b is always closed";
-        ShortedBLow => "shorted_b_low", "-", "1", Unit, Plant, Some(0.0), "1: the lower switch of leg b is always closed";
-        ShortedCHigh => "shorted_c_high", "-", "1", Unit, Plant, Some(0.0), "1: the upper switch of leg c is always closed";
-        ShortedCLow => "shorted_c_low", "-", "1", Unit, Plant, Some(0.0), "1: the lower switch of leg c is always closed";
+        ShortedAHigh => "shorted_a_high", "-", "1", Flag, Plant, Some(0.0), "1: the upper switch of leg a is always closed";
+        ShortedALow => "shorted_a_low", "-", "1", Flag, Plant, Some(0.0), "1: the lower switch of leg a is always closed";
+        ShortedBHigh => "shorted_b_high", "-", "1", Flag, Plant, Some(0.0), "1: the upper switch of leg b is always closed";
+        ShortedBLow => "shorted_b_low", "-", "1", Flag, Plant, Some(0.0), "1: the lower switch of leg b is always closed";
+        ShortedCHigh => "shorted_c_high", "-", "1", Flag, Plant, Some(0.0), "1: the upper switch of leg c is always closed";
+        ShortedCLow => "shorted_c_low", "-", "1", Flag, Plant, Some(0.0), "1: the lower switch of leg c is always closed";
     }
 }
 
@@ -115,6 +115,13 @@ impl BridgeStructure {
         use InverterParameter as P;
         let switch_faults = own.any_away_among(P::OpenAHigh, P::ShortedCLow);
         Self { switch_faults, open_phases, trips: switch_faults || own.away(P::TripCurrent) }
+    }
+
+    /// Of a bridge that is looked at without gates only: switches that never close are then like any other.
+    pub fn gateless(own: &Own<InverterParameter>) -> Self {
+        use InverterParameter as P;
+        let switch_faults = own.any_away_among(P::ShortedAHigh, P::ShortedCLow);
+        Self { switch_faults, open_phases: true, trips: switch_faults || own.away(P::TripCurrent) }
     }
 }
 
@@ -200,10 +207,10 @@ impl<S: Scalar> Bridge<S> {
     /// Mean of diode and switch over a step in which a leg is off for the share `off` of its begin.
     #[inline(always)]
     fn blank(&self, legs: &mut Legs<S>, off: [S; 3], half_supply: S, current: [S; 3]) {
-        let (zero, one, tiny) = (S::zero(), S::one(), S::splat(0.5));
+        let (zero, one, half) = (S::zero(), S::one(), S::splat(0.5));
         let diode = half_supply + self.diode_drop;
         for j in 0..3 {
-            let held = tiny.lt(self.shorted[j][0]) | tiny.lt(self.shorted[j][1]);
+            let held = half.le(self.shorted[j][0]) | half.le(self.shorted[j][1]);
             let within = zero.lt(off[j]) & off[j].lt(one) & !current[j].equals(zero) & !held;
             let positive = zero.lt(current[j]);
             let voltage = off[j].fma(S::select(positive, -diode, diode) - legs.voltage[j], legs.voltage[j]);
@@ -228,12 +235,12 @@ impl<S: Scalar> Bridge<S> {
         dt: S,
     ) -> Connection<S> {
         let current = w.currents();
-        let tiny = S::splat(0.5);
+        let half = S::splat(0.5);
         let (mut gates, off) = self.gates(s, old, new, dt);
         if structure.switch_faults {
             gates = three!(|j| [
-                (gates[j][0] & self.open[j][0].le(tiny)) | tiny.lt(self.shorted[j][0]),
-                (gates[j][1] & self.open[j][1].le(tiny)) | tiny.lt(self.shorted[j][1]),
+                (gates[j][0] & self.open[j][0].lt(half)) | half.le(self.shorted[j][0]),
+                (gates[j][1] & self.open[j][1].lt(half)) | half.le(self.shorted[j][1]),
             ]);
         }
         if structure.trips {
@@ -273,7 +280,7 @@ impl<S: Scalar> Bridge<S> {
             let off = legs.passive[j];
             legs.voltage[j] = S::select(off, S::select(positive, -diode, diode), legs.voltage[j]);
             legs.rail[j] = S::select(off, S::select(positive, -half_supply, half_supply), legs.rail[j]);
-            let interrupted = S::splat(0.5).lt(open[j]);
+            let interrupted = S::splat(0.5).le(open[j]);
             legs.connected[j] = carrying | !(off | interrupted);
             legs.passive[j] = off | interrupted;
         }
@@ -291,12 +298,12 @@ impl<S: Scalar> Bridge<S> {
     #[inline(always)]
     fn turn_on(&self, legs: &mut Legs<S>, half_supply: S, w: &impl Circuit<S>) -> S {
         let diode = half_supply + self.diode_drop;
-        let tiny = S::splat(0.5);
+        let half = S::splat(0.5);
         let open = w.open();
         let (terminal, neutral) = w.potentials(legs.voltage, legs.connected);
         let mut any = S::mask(false);
         for j in 0..3 {
-            let floating = !legs.connected[j] & open[j].le(tiny);
+            let floating = !legs.connected[j] & open[j].lt(half);
             let up = floating & diode.lt(terminal[j]);
             let down = floating & terminal[j].lt(-diode);
             legs.voltage[j] = S::select(up, diode, S::select(down, -diode, legs.voltage[j]));
@@ -407,6 +414,20 @@ mod tests {
             old = legs;
         }
         sum
+    }
+
+    #[test]
+    fn a_switch_below_one_half_is_a_healthy_one() {
+        for switch in [InverterParameter::OpenAHigh, InverterParameter::ShortedCLow] {
+            for (value, acts) in [(0.0, false), (0.499, false), (0.5, true), (1.0, true)] {
+                let (mut raw, touched) = (vec![0.0; INVERTER.len()], vec![false; INVERTER.len()]);
+                raw[InverterParameter::SupplyScale as usize] = 1.0;
+                raw[switch as usize] = value;
+                let own = Own::new(&raw, &touched);
+                assert_eq!(BridgeStructure::read(&own, false).switch_faults, acts, "{switch:?} {value}");
+                assert_eq!(BridgeStructure::gateless(&own).trips, acts && switch == InverterParameter::ShortedCLow);
+            }
+        }
     }
 
     #[test]

@@ -20,7 +20,7 @@ variables! {
             when(&[Away("inverter.link_capacitance", 0.0)]);
         SourceRegeneration => "source_regeneration", "-", "1", Choice(SourceRegeneration::NAMES), Plant, Some(0.0), "does the source take current back, or (a rectifier) does a braking motor charge the link; there is no brake chopper",
             when(&[Away("inverter.link_capacitance", 0.0)]);
-        ConnectorOpen => "connector_open", "-", "1", Unit, Plant, Some(0.0), "1: the power connector is open, the link's capacitor alone feeds the bridge",
+        ConnectorOpen => "connector_open", "-", "1", Flag, Plant, Some(0.0), "1: the power connector is open, the link's capacitor alone feeds the bridge",
             when(&[Away("inverter.link_capacitance", 0.0)]);
     }
 }
@@ -88,7 +88,7 @@ impl<S: Scalar> DcLink<S> {
         let settled = source - self.resistance * bus;
         let fed = self.decay.fma(before - settled, settled);
         let refused = half.lt(self.blocks) & source.le(before.minimum(fed));
-        let off = half.lt(self.open) | refused;
+        let off = half.le(self.open) | refused;
         s.voltage = S::select(off, alone, fed.maximum(S::splat(EMPTY)));
         // i(t) = bus + first exp(-t / (R C)), integrated.
         let first = (settled - before) / self.resistance;

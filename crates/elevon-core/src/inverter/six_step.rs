@@ -17,7 +17,7 @@ variables! {
         SwitchingPeriod => "switching_period", "T_PWM", "s", Positive, Controller, None, "period of the carrier";
         CurrentCutoff => "current_cutoff", "I_cut", "A", Positive, Controller, None, "phase current above which the legs stay at ZERO until the next carrier period";
         Chopping => "chopping", "-", "1", Choice(Chopping::NAMES), Controller, Some(0.0), "legs that the carrier switches: the LOW one alone (P 2.1.2: +V_s, OPEN, or PWM between ground and OPEN), or both together";
-        TerminalsShorted => "terminals_shorted", "-", "1", Unit, Plant, Some(0.0), "1: the motor's terminals are shorted to the lower rail";
+        TerminalsShorted => "terminals_shorted", "-", "1", Flag, Plant, Some(0.0), "1: the motor's terminals are shorted to the lower rail";
     }
 }
 

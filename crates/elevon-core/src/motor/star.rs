@@ -43,9 +43,9 @@ variables! {
         EccentricityDynamic => "eccentricity_dynamic", "zeta_d", "1", Unit, Plant, Some(0.0), "dynamic eccentricity, fraction of the air gap; its modulation turns with the shaft";
         EccentricityDynamicPhase => "eccentricity_dynamic_phase", "phi_d", "rad", Any, Plant, Some(0.0), "its mechanical phase angle",
             when(&[Away("motor.eccentricity_dynamic", 0.0)]);
-        OpenA => "open_a", "-", "1", Unit, Plant, Some(0.0), "1: phase a is interrupted (from its next current zero on)";
-        OpenB => "open_b", "-", "1", Unit, Plant, Some(0.0), "1: phase b is interrupted (from its next current zero on)";
-        OpenC => "open_c", "-", "1", Unit, Plant, Some(0.0), "1: phase c is interrupted (from its next current zero on)";
+        OpenA => "open_a", "-", "1", Flag, Plant, Some(0.0), "1: phase a is interrupted (from its next current zero on)";
+        OpenB => "open_b", "-", "1", Flag, Plant, Some(0.0), "1: phase b is interrupted (from its next current zero on)";
+        OpenC => "open_c", "-", "1", Flag, Plant, Some(0.0), "1: phase c is interrupted (from its next current zero on)";
         ShortModel => "short_model", "-", "1", Choice(ShortModel::NAMES), Plant, Some(0.0), "shorted turns only missing (the paper), or a loop of their own with circulating current",
             when(&[SHORTED]);
         ShortCoupling => "short_coupling", "kappa", "1", Unit, Plant, Some(0.9), "magnetic coupling of shorted and healthy turns of a phase: mutual inductance kappa N mu L",

@@ -17,17 +17,17 @@ variables! {
             high_only("the offset of one sensor is a ripple of the torque at the electrical frequency");
         OffsetC => "current.offset_c", "-", "A", Any, Sensor, Some(0.0), "offset of the sensor of phase c",
             high_only("the offset of one sensor is a ripple of the torque at the electrical frequency");
-        StuckA => "current.stuck_a", "-", "1", Unit, Sensor, Some(0.0), "1: the sensor of phase a stands still at its last value",
+        StuckA => "current.stuck_a", "-", "1", Flag, Sensor, Some(0.0), "1: the sensor of phase a stands still at its last value",
             high_only("its drive controls the equivalent current itself, not three of which one stands still");
-        StuckB => "current.stuck_b", "-", "1", Unit, Sensor, Some(0.0), "1: the sensor of phase b stands still at its last value",
+        StuckB => "current.stuck_b", "-", "1", Flag, Sensor, Some(0.0), "1: the sensor of phase b stands still at its last value",
             high_only("its drive controls the equivalent current itself, not three of which one stands still");
-        StuckC => "current.stuck_c", "-", "1", Unit, Sensor, Some(0.0), "1: the sensor of phase c stands still at its last value",
+        StuckC => "current.stuck_c", "-", "1", Flag, Sensor, Some(0.0), "1: the sensor of phase c stands still at its last value",
             high_only("its drive controls the equivalent current itself, not three of which one stands still");
-        DeadA => "current.dead_a", "-", "1", Unit, Sensor, Some(0.0), "1: the sensor of phase a shows nothing",
+        DeadA => "current.dead_a", "-", "1", Flag, Sensor, Some(0.0), "1: the sensor of phase a shows nothing",
             high_only("its drive controls the equivalent current itself, not three of which one is not seen");
-        DeadB => "current.dead_b", "-", "1", Unit, Sensor, Some(0.0), "1: the sensor of phase b shows nothing",
+        DeadB => "current.dead_b", "-", "1", Flag, Sensor, Some(0.0), "1: the sensor of phase b shows nothing",
             high_only("its drive controls the equivalent current itself, not three of which one is not seen");
-        DeadC => "current.dead_c", "-", "1", Unit, Sensor, Some(0.0), "1: the sensor of phase c shows nothing",
+        DeadC => "current.dead_c", "-", "1", Flag, Sensor, Some(0.0), "1: the sensor of phase c shows nothing",
             high_only("its drive controls the equivalent current itself, not three of which one is not seen");
         NoiseDeviation => "current.noise_deviation", "-", "A", NonNegative, Sensor, Some(0.0), "standard deviation of the noise of each sensor",
             high_only("the noise of single phase currents is none of its one");
@@ -84,8 +84,8 @@ impl<S: Scalar> CurrentSensor<S> {
             let raw = self.gain[j] * current[j] + (self.offset[j] + self.noise_deviation * noise[j]);
             let steps = (raw.clamp_abs(self.full_scale) * self.per_resolution).round();
             let shown = S::select(quantised, steps * self.resolution, raw);
-            let live = S::select(half.lt(self.dead[j]), S::zero(), shown);
-            S::select(half.lt(self.stuck[j]), held[j], live)
+            let live = S::select(half.le(self.dead[j]), S::zero(), shown);
+            S::select(half.le(self.stuck[j]), held[j], live)
         })
     }
 

@@ -18,8 +18,8 @@ variables! {
             when(&[Away("sensor.encoder.dark_share", 0.0)]);
         DarkPosition => "encoder.dark_position", "-", "rad", Any, Sensor, Some(0.0), "angle of the disc at the middle of a dark sector",
             when(&[Away("sensor.encoder.dark_share", 0.0)]);
-        Dead => "encoder.dead", "-", "1", Unit, Sensor, Some(0.0), "1: no counts come at all";
-        Stuck => "encoder.stuck", "-", "1", Unit, Sensor, Some(0.0), "1: the shown position stands still at its last value while the counter goes on";
+        Dead => "encoder.dead", "-", "1", Flag, Sensor, Some(0.0), "1: no counts come at all";
+        Stuck => "encoder.stuck", "-", "1", Flag, Sensor, Some(0.0), "1: the shown position stands still at its last value while the counter goes on";
     }
 }
 
@@ -96,13 +96,13 @@ impl<S: Scalar> Encoder<S> {
     pub fn advance(&self, user: S, s: &mut EncoderState<S>) {
         let half = S::splat(0.5);
         let ((pitch0, dark0, sum0), (pitch, dark, sum)) = (self.dark(s.user), self.dark(user));
-        let none = half.lt(self.dead) | (dark0 & dark & pitch0.equals(pitch));
+        let none = half.le(self.dead) | (dark0 & dark & pitch0.equals(pitch));
         let moved = (user - s.user) * self.per_count;
         s.lost = s.lost + S::select(none, moved, (sum - sum0) * self.pitch);
         s.user = user;
         s.counts = S::select(none, s.counts, (user * self.per_count - s.lost).floor());
         let now = s.counts * self.count + self.offset;
-        s.shown = S::select(half.lt(self.stuck), s.shown, now);
+        s.shown = S::select(half.le(self.stuck), s.shown, now);
     }
 
     /// Shown user position: whole counts since the user's zero.

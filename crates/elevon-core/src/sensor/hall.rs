@@ -12,13 +12,13 @@ variables! {
         OffsetA => "offset_a", "-", "rad", Between(-1.0, 1.0), Sensor, Some(0.0), "electrical angle by which sensor a alone is early";
         OffsetB => "offset_b", "-", "rad", Between(-1.0, 1.0), Sensor, Some(0.0), "electrical angle by which sensor b alone is early";
         OffsetC => "offset_c", "-", "rad", Between(-1.0, 1.0), Sensor, Some(0.0), "electrical angle by which sensor c alone is early";
-        StuckHighA => "stuck_high_a", "-", "1", Unit, Sensor, Some(0.0), "1: sensor a always reads high";
-        StuckHighB => "stuck_high_b", "-", "1", Unit, Sensor, Some(0.0), "1: sensor b always reads high";
-        StuckHighC => "stuck_high_c", "-", "1", Unit, Sensor, Some(0.0), "1: sensor c always reads high";
-        StuckLowA => "stuck_low_a", "-", "1", Unit, Sensor, Some(0.0), "1: sensor a always reads low";
-        StuckLowB => "stuck_low_b", "-", "1", Unit, Sensor, Some(0.0), "1: sensor b always reads low";
-        StuckLowC => "stuck_low_c", "-", "1", Unit, Sensor, Some(0.0), "1: sensor c always reads low";
-        PowerOff => "power_off", "-", "1", Unit, Sensor, Some(0.0), "1 while the sensors have no power: all read low";
+        StuckHighA => "stuck_high_a", "-", "1", Flag, Sensor, Some(0.0), "1: sensor a always reads high";
+        StuckHighB => "stuck_high_b", "-", "1", Flag, Sensor, Some(0.0), "1: sensor b always reads high";
+        StuckHighC => "stuck_high_c", "-", "1", Flag, Sensor, Some(0.0), "1: sensor c always reads high";
+        StuckLowA => "stuck_low_a", "-", "1", Flag, Sensor, Some(0.0), "1: sensor a always reads low";
+        StuckLowB => "stuck_low_b", "-", "1", Flag, Sensor, Some(0.0), "1: sensor b always reads low";
+        StuckLowC => "stuck_low_c", "-", "1", Flag, Sensor, Some(0.0), "1: sensor c always reads low";
+        PowerOff => "power_off", "-", "1", Flag, Sensor, Some(0.0), "1 while the sensors have no power: all read low";
         Timeout => "timeout", "-", "s", Positive, Sensor, None, "without an edge for this long the speed reads zero";
     }
 }

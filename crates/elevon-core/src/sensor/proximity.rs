@@ -10,14 +10,14 @@ variables! {
         Position75 => "position_75", "-", "m", Positive, Sensor, None, "ram position from which the switch at 75 % is on";
         Hysteresis => "hysteresis", "-", "m", NonNegative, Sensor, None, "travel back before a switch lets go";
         Delay => "delay", "-", "s", NonNegative, Sensor, None, "response time";
-        On0 => "on_0", "-", "1", Unit, Sensor, Some(0.0), "1: the switch at 0 % always reads on";
-        On25 => "on_25", "-", "1", Unit, Sensor, Some(0.0), "1: the switch at 25 % always reads on";
-        On75 => "on_75", "-", "1", Unit, Sensor, Some(0.0), "1: the switch at 75 % always reads on";
-        On100 => "on_100", "-", "1", Unit, Sensor, Some(0.0), "1: the switch on the lock sleeve always reads on";
-        Off0 => "off_0", "-", "1", Unit, Sensor, Some(0.0), "1: the switch at 0 % never reads on";
-        Off25 => "off_25", "-", "1", Unit, Sensor, Some(0.0), "1: the switch at 25 % never reads on";
-        Off75 => "off_75", "-", "1", Unit, Sensor, Some(0.0), "1: the switch at 75 % never reads on";
-        Off100 => "off_100", "-", "1", Unit, Sensor, Some(0.0), "1: the switch on the lock sleeve never reads on";
+        On0 => "on_0", "-", "1", Flag, Sensor, Some(0.0), "1: the switch at 0 % always reads on";
+        On25 => "on_25", "-", "1", Flag, Sensor, Some(0.0), "1: the switch at 25 % always reads on";
+        On75 => "on_75", "-", "1", Flag, Sensor, Some(0.0), "1: the switch at 75 % always reads on";
+        On100 => "on_100", "-", "1", Flag, Sensor, Some(0.0), "1: the switch on the lock sleeve always reads on";
+        Off0 => "off_0", "-", "1", Flag, Sensor, Some(0.0), "1: the switch at 0 % never reads on";
+        Off25 => "off_25", "-", "1", Flag, Sensor, Some(0.0), "1: the switch at 25 % never reads on";
+        Off75 => "off_75", "-", "1", Flag, Sensor, Some(0.0), "1: the switch at 75 % never reads on";
+        Off100 => "off_100", "-", "1", Flag, Sensor, Some(0.0), "1: the switch on the lock sleeve never reads on";
     }
 }
 

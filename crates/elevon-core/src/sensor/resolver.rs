@@ -19,7 +19,7 @@ variables! {
         Mismatch => "resolver.mismatch", "-", "1", Between(0.0, 0.99), Sensor, Some(0.0), "amplitude lost by the sine channel";
         Offset => "resolver.offset", "-", "rad", Any, Sensor, Some(0.0), "offset of the shown motor angle";
         Gain => "resolver.gain", "-", "1", Any, Sensor, Some(1.0), "gain of the shown motor position and speed (not of the commutation angle)";
-        PowerOff => "resolver.power_off", "-", "1", Unit, Sensor, Some(0.0), "1 while the resolver has no power";
+        PowerOff => "resolver.power_off", "-", "1", Flag, Sensor, Some(0.0), "1 while the resolver has no power";
         LossShows => "resolver.loss_shows", "-", "1", Choice(LossShows::NAMES), Sensor, Some(0.0), "what the converter shows without power",
             when(&[Either(&[
                 Away("sensor.resolver.power_off", 0.0), Away("sensor.resolver.excitation_short", 0.0), Away("sensor.resolver.sine_open", 0.0),
@@ -28,8 +28,8 @@ variables! {
         SineShort => "resolver.sine_short", "-", "1", Between(0.0, 0.99), Sensor, Some(0.0), "fraction of the turns of the sine winding shorted";
         CosineShort => "resolver.cosine_short", "-", "1", Between(0.0, 0.99), Sensor, Some(0.0), "fraction of the turns of the cosine winding shorted";
         ExcitationShort => "resolver.excitation_short", "-", "1", Between(0.0, 0.99), Sensor, Some(0.0), "fraction of the excitation lost by shorted turns: both channels weaken, the angle stays until too little is left";
-        SineOpen => "resolver.sine_open", "-", "1", Unit, Sensor, Some(0.0), "1: the sine winding is interrupted";
-        CosineOpen => "resolver.cosine_open", "-", "1", Unit, Sensor, Some(0.0), "1: the cosine winding is interrupted";
+        SineOpen => "resolver.sine_open", "-", "1", Flag, Sensor, Some(0.0), "1: the sine winding is interrupted";
+        CosineOpen => "resolver.cosine_open", "-", "1", Flag, Sensor, Some(0.0), "1: the cosine winding is interrupted";
         OpenResidue => "resolver.open_residue", "-", "1", Between(1e-6, 0.5), Sensor, Some(1e-3), "amplitude left in the channel of an open winding by stray coupling; ASSUMED: 0.1 %, a capacitive path of the cable",
             when(&[Either(&[Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0)])]);
         LeastSignal => "resolver.least_signal", "-", "1", Unit, Sensor, Some(0.7), "amplitude of the stronger channel below which the converter has no signal; ASSUMED: where common converters report the loss",
@@ -42,7 +42,7 @@ variables! {
                 Away("sensor.resolver.mismatch", 0.0), Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0),
                 Away("sensor.resolver.sine_short", 0.0), Away("sensor.resolver.cosine_short", 0.0),
             ])]);
-        Stuck => "resolver.stuck", "-", "1", Unit, Sensor, Some(0.0), "1: the converter's reading stands still at its last value, angle and speed";
+        Stuck => "resolver.stuck", "-", "1", Flag, Sensor, Some(0.0), "1: the converter's reading stands still at its last value, angle and speed";
     }
 }
 
@@ -83,11 +83,11 @@ impl<S: Scalar> Resolver<S> {
         let (half, one) = (S::splat(0.5), S::one());
         let open = one - g(P::OpenResidue);
         let mismatch = g(P::Mismatch);
-        let sine_lost = S::select(half.lt(g(P::SineOpen)), open, mismatch + g(P::SineShort) * (one - mismatch));
-        let cosine_lost = S::select(half.lt(g(P::CosineOpen)), open, g(P::CosineShort));
+        let sine_lost = S::select(half.le(g(P::SineOpen)), open, mismatch + g(P::SineShort) * (one - mismatch));
+        let cosine_lost = S::select(half.le(g(P::CosineOpen)), open, g(P::CosineShort));
         let (sine, cosine) = (one - sine_lost, one - cosine_lost);
         let signal = (one - g(P::ExcitationShort)) * sine.maximum(cosine);
-        let off = half.lt(g(P::PowerOff)) | signal.lt(g(P::LeastSignal));
+        let off = half.le(g(P::PowerOff)) | signal.lt(g(P::LeastSignal));
         Self {
             gain_less: cosine_lost - sine_lost,
             sine,
@@ -121,7 +121,7 @@ impl<S: Scalar> Resolver<S> {
     #[inline(always)]
     pub fn read(&self, theta: S, omega: S, held: &mut ResolverState<S>) -> Reading<S> {
         let half = S::splat(0.5);
-        let (off, stuck) = (half.lt(self.off), half.lt(self.stuck));
+        let (off, stuck) = (half.le(self.off), half.le(self.stuck));
         let (sin, cos) = theta.sin_cos();
         // atan2(a s, b c) = theta + atan2((a - b) s c, b c^2 + a s^2): unwrapped, and exact.
         let (ss, cc) = (sin * sin, cos * cos);

@@ -16,7 +16,7 @@ variables! {
         EngageDelay => "engage_delay", "-", "s", NonNegative, Plant, None, "from power off to set";
         Drag => "drag", "-", "N m", NonNegative, Plant, Some(0.0), "torque left when released; healthy 0";
         Powered => "powered", "-", "1", Choice(Powered::NAMES), Plant, Some(0.0), "always: the bench holds the brake open whatever the drive does (modified free-fall test)";
-        Stuck => "stuck", "-", "1", Unit, Plant, Some(0.0), "1: the brake stays set under power";
+        Stuck => "stuck", "-", "1", Flag, Plant, Some(0.0), "1: the brake stays set under power";
     }
 }
 

@@ -19,7 +19,7 @@ variables! {
         JamTorque => "jam_torque", "T_jam", "N m", NonNegative, Plant, Some(0.0), "resistive torque once the mechanism has seized; 0: none";
         JamPosition => "jam_position", "-", "rad", Any, Plant, Some(0.0), "user position at which it seizes when first reached",
             when(&[Away("friction.jam_torque", 0.0), Away("friction.jam_anywhere", 1.0)]);
-        JamAnywhere => "jam_anywhere", "-", "1", Unit, Plant, Some(1.0), "1: seized wherever it is, 0: only from jam_position on",
+        JamAnywhere => "jam_anywhere", "-", "1", Flag, Plant, Some(1.0), "1: seized wherever it is, 0: only from jam_position on",
             when(&[Away("friction.jam_torque", 0.0)]);
     }
 }
@@ -107,7 +107,7 @@ impl<S: Scalar> Friction<S> {
         let from = user - self.jam_position;
         let seized = S::select((from * *side).le(S::zero()), S::one(), *jammed);
         let here = S::select(present, seized, S::zero());
-        *jammed = S::select(S::splat(0.5).lt(self.jam_anywhere), S::one(), here);
+        *jammed = S::select(S::splat(0.5).le(self.jam_anywhere), S::one(), here);
         *side = S::select(present, *side, from.sign());
     }
 

@@ -16,9 +16,9 @@ variables! {
         Stiffness => "stiffness", "k_lock", "N/m", Positive, Plant, None, "ram against the locked segments";
         Strength => "strength", "-", "N", Positive, Plant, None, "load that breaks the segments: the run ends";
         Overtravel => "overtravel", "-", "m", NonNegative, Plant, Some(1e-3), "travel left behind s_max before the nut meets its stop";
-        Blocked => "blocked", "-", "1", Unit, Plant, Some(0.0), "1: the sleeve blocks, the lock does not engage";
+        Blocked => "blocked", "-", "1", Flag, Plant, Some(0.0), "1: the sleeve blocks, the lock does not engage";
         BlockTravel => "block_travel", "-", "m", NonNegative, Plant, Some(5e-4), "travel at which a blocked sleeve stops the nut";
-        Stuck => "stuck", "-", "1", Unit, Plant, Some(0.0), "1: the segments of an engaged lock stay";
+        Stuck => "stuck", "-", "1", Flag, Plant, Some(0.0), "1: the segments of an engaged lock stay";
     }
 }
 

@@ -28,7 +28,7 @@ variables! {
         GovernorSpeed => "governor_speed", "v_0", "m/s", NonNegative, Plant, None, "ram speed above which the governor brakes a released extension";
         GovernorCoefficient => "governor_coefficient", "c", "N s2/m2", NonNegative, Plant, None, "governor force c (v^2 - v_0^2)";
         Open => "open", "-", "1", Choice(ReleaseOpen::NAMES), Plant, Some(0.0), "yes: released from the start";
-        CableFailed => "cable_failed", "-", "1", Unit, Plant, Some(0.0), "1: the cable of the free-fall release does not pull";
+        CableFailed => "cable_failed", "-", "1", Flag, Plant, Some(0.0), "1: the cable of the free-fall release does not pull";
     }
 }
 

@@ -85,7 +85,7 @@ impl Standing<'_> {
     }
 
     fn away(&self, path: &str, neutral: f64) -> bool {
-        self.find(path).is_none_or(|(i, _)| self.raw[i] != neutral || self.touched[i])
+        self.find(path).is_none_or(|(i, v)| v.range.differ(self.raw[i], neutral) || self.touched[i])
     }
 
     fn chosen(&self, path: &str, names: &[&str]) -> bool {

@@ -64,7 +64,7 @@ fn pair<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>) -> Pair<S>
         pair.constant = pair.constant + demand[j] * k[j];
         pair.winding = pair.winding + used * resistance[j];
         pair.inductance = pair.inductance + used * m.inductance[j];
-        open = open + used * S::indicator(S::splat(0.5).lt(m.c.star.open[j]));
+        open = open + used * S::indicator(S::splat(0.5).le(m.c.star.open[j]));
         pair.closed = pair.closed + used;
     }
     pair.resistance = pair.winding + m.on_resistance + m.on_resistance;

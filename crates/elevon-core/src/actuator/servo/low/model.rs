@@ -27,7 +27,7 @@ details! {
     Structure, read<F>(parts: Parts)
     always {
         drive: DriveKind = DriveKind::read(parts.drive().value(DriveParameter::Kind));
-        bridge: BridgeStructure = BridgeStructure::read(&parts.inverter(), true);
+        bridge: BridgeStructure = BridgeStructure::gateless(&parts.inverter());
         /// The references are blocks, not sines.
         six_step: bool = Commutation::read(parts.drive().value(DriveParameter::Commutation)) == Commutation::SixStep;
         control: ControlStructure = ControlStructure::read(parts.control().raw);
@@ -194,7 +194,7 @@ impl<S: Scalar> Drive<S> {
         // A dead sensor: its phase takes whatever lets the others follow.
         let tiny = S::splat(1e-9);
         let followed: [S; 3] = three!(|j| one / gain[j].signed(gain[j].abs().maximum(tiny)));
-        let shorted = (0..6).fold(S::zero(), |sum, i| sum + at(InverterParameter::ShortedAHigh.at() + i));
+        let shorted = (0..6).fold(S::zero(), |most, i| most.maximum(at(InverterParameter::ShortedAHigh.at() + i)));
         Self {
             voltage_ratio: match structure.drive {
                 DriveKind::Hysteresis | DriveKind::Off => at(LowParameter::VoltageRatio.at()),
@@ -215,7 +215,7 @@ impl<S: Scalar> Drive<S> {
                 DriveKind::Hysteresis => at(InverterParameter::HysteresisBand.at()),
                 DriveKind::Pwm | DriveKind::Off => zero,
             },
-            weight: three!(|j| S::select(half.lt(star.open[j]), zero, followed[j])),
+            weight: three!(|j| S::select(half.le(star.open[j]), zero, followed[j])),
             gain,
             link: DcLink::derive(Raw(raw).link(), dt),
         }

@@ -182,7 +182,7 @@ impl<S: Scalar> Shaft<S> {
             user_position,
             user_speed: or(user[1], zero),
             jam_side: (user_position - self.friction.jam_position).sign(),
-            jammed: S::select(S::splat(0.5).lt(self.friction.jam_anywhere), S::one(), zero),
+            jammed: S::select(S::splat(0.5).le(self.friction.jam_anywhere), S::one(), zero),
             scatter: S::one(),
             bristle: zero,
             nut: self.nut.start(),
