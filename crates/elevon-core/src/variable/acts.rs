@@ -80,8 +80,17 @@ pub fn records(groups: &[Group]) -> impl Iterator<Item = (String, &'static Varia
 }
 
 impl Standing<'_> {
+    /// The place and record of a path; without writing out the paths of all records, since every run asks.
     fn find(&self, path: &str) -> Option<(usize, &'static Variable)> {
-        records(self.groups).enumerate().find(|(_, (p, _))| p == path).map(|(i, (_, v))| (i, v))
+        let mut begin = 0;
+        for group in self.groups {
+            let rest = if group.prefix.is_empty() { Some(path) } else { path.strip_prefix(group.prefix).and_then(|p| p.strip_prefix('.')) };
+            if let Some(i) = rest.and_then(|rest| group.variables.iter().position(|v| v.path == rest)) {
+                return Some((begin + i, &group.variables[i]));
+            }
+            begin += group.variables.len();
+        }
+        None
     }
 
     fn away(&self, path: &str, neutral: f64) -> bool {
