@@ -46,6 +46,7 @@ def not_acting(
     fidelity: str,
     parameters: npt.NDArray[np.float64],
     faults: list[dict[str, Any]],
+    paths: list[str] | None = None,
 ) -> list[dict[str, str]]: ...
 def widths() -> dict[str, Any]: ...
 def simulate(

@@ -118,12 +118,12 @@ impl Model {
         self.catalogue().into_iter().filter(|f| f.declined(groups, fidelity).is_none()).collect()
     }
     /// The parameters that do not act in a run with these values and faults, and why.
-    pub fn not_acting(self, raw: &[f64], faults: &[FaultSpec]) -> Vec<(String, String)> {
+    pub fn not_acting(self, raw: &[f64], faults: &[FaultSpec], paths: Option<&[String]>) -> Vec<(String, String)> {
         let mut touched = vec![false; raw.len()];
         for index in faults.iter().flat_map(FaultSpec::moved) {
             touched[index] = true;
         }
-        Standing { groups: self.groups(), raw, touched: &touched, fidelity: self.fidelity() }.not_acting()
+        Standing { groups: self.groups(), raw, touched: &touched, fidelity: self.fidelity() }.not_acting(paths)
     }
     pub fn check(self, raw: &[f64]) -> Vec<Finding> {
         dispatch!(self, W => W::check(raw))

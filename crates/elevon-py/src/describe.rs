@@ -226,17 +226,19 @@ pub fn check<'py>(py: Python<'py>, wiring: &str, fidelity: &str, parameters: PyR
 
 /// Why parameters of a run do not act: over all parameters of the wiring, with what its faults move.
 #[pyfunction]
+#[pyo3(signature = (wiring, fidelity, parameters, faults, paths=None))]
 pub fn not_acting<'py>(
     py: Python<'py>,
     wiring: &str,
     fidelity: &str,
     parameters: PyReadonlyArray1<'py, f64>,
     faults: &Bound<'py, PyList>,
+    paths: Option<Vec<String>>,
 ) -> Dicts<'py> {
     let resolver = Resolver::new(wiring, fidelity)?;
     let raw = vector(resolver.model, &parameters)?;
     let faults = resolver.faults(faults)?;
-    dicts(py, resolver.model.not_acting(&raw, &faults), |d, (path, reason)| {
+    dicts(py, resolver.model.not_acting(&raw, &faults, paths.as_deref()), |d, (path, reason)| {
         d.set_item("path", path)?;
         d.set_item("reason", reason)
     })

@@ -84,12 +84,20 @@ def _asked(actuator: Actuator, compiled: CompiledScenario, fidelity: str) -> dic
     if not changed and not faults:
         return {}
     vector = _with_mode(actuator, compiled.command_mode)
-    rows = _core.not_acting(actuator.wiring, fidelity, vector, compiled.faults)
+    paths = [*changed, *(path for fault in faults for path in _touched(fault, actuator.wiring))]
+    rows = _core.not_acting(actuator.wiring, fidelity, vector, compiled.faults, paths)
     idle = {item["path"]: item["reason"] for item in rows}
     asked = {f"{path} = {item.text}": idle.get(path, "") for path, item in changed.items()}
     for fault in faults:
         asked.update(_of_fault(fault, actuator.wiring, idle))
     return asked
+
+
+def _touched(fault: Mapping[str, Any], wiring: str) -> Iterator[str]:
+    """Yield the parameters that a fault and its attributes set."""
+    record = find_record(fault["kind"], fault["place"], wiring)
+    yield from record.targets[fault["place"]]
+    yield from (item["parameter"] for item in record.attributes if item.get("parameter"))
 
 
 def _with_mode(actuator: Actuator, mode: str) -> npt.NDArray[np.float64]:

@@ -127,9 +127,12 @@ impl Standing<'_> {
         Some(format!("acts only with {failed}{}", here.unwrap_or_default()))
     }
 
-    /// Every parameter that does not act in the run, and why.
-    pub fn not_acting(&self) -> Vec<(String, String)> {
-        records(self.groups).filter_map(|(path, v)| Some((path, self.idle(v)?))).collect()
+    /// Every parameter that does not act in the run, and why; of some `paths` only, where they are given.
+    pub fn not_acting(&self, paths: Option<&[String]>) -> Vec<(String, String)> {
+        match paths {
+            None => records(self.groups).filter_map(|(path, v)| Some((path, self.idle(v)?))).collect(),
+            Some(paths) => paths.iter().filter_map(|path| Some((path.clone(), self.idle(self.find(path)?.1)?))).collect(),
+        }
     }
 }
 
