@@ -15,6 +15,8 @@ LONG = (
     "reproduce torino-compliance",
     "compare torino-rotary",
     "--faults-table",
+    "reproduce nasa-",
+    "reproduce pisa-",
 )
 """These take ten seconds and more; the short ones run with every `make test`, once."""
 
