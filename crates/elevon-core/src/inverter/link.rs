@@ -183,7 +183,10 @@ mod tests {
             // The current of a step is that of the unfed link: an error of first order in the step.
             assert!((v / exact - 1.0).abs() < 0.1 * dt, "{dt}: {v} {exact}");
             let stored = link(dt, 0.0, 0.0).stored(&state);
-            assert!((state.given - state.lost - stored - drawn).abs() < 2e-3 * drawn, "{dt}");
+            // That current is too large by P dt / (2 C v^2), and so is what the source gives for it.
+            let excess = 2000.0 * dt / (2.0 * CAPACITANCE * exact * exact);
+            let open_books = (state.given - state.lost - stored - drawn) / drawn;
+            assert!((open_books / excess - 1.0).abs() < 0.1, "{dt}: {open_books} {excess}");
         }
     }
 
