@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 from elevon import Actuator
-from elevon.bench.brake import BrakeRig, CellState, brake_loop
-from elevon.bench.loadcell import read_loadcell
-from elevon.bench.logs.importing import import_log
+from elevon.bench.brake_rig import BrakeRig, CellState, brake_loop
 from elevon.bench.micrometer import INTRINSIC_PLAY
 from elevon.bench.procedure import Procedure, load_procedure, procedure_names
 from elevon.bench.rig import setups
@@ -17,6 +15,8 @@ from elevon.bench.run import claim_bench, run_procedure
 from elevon.cli import main
 from elevon.documents import Document, validated
 from elevon.errors import InputError, Interrupted, OutputExistsError
+from elevon.logs.formats.loadcell import read_loadcell
+from elevon.logs.importing import import_log
 from elevon.scenario.scenario import Term
 
 HEADER = (

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from elevon import Actuator, Scenario
-from elevon.bench.loadcell import write_loadcell
-from elevon.bench.logs.drive import write_drive_csv
+from elevon.logs.formats.drive import write_drive_csv
+from elevon.logs.formats.loadcell import write_loadcell
 from elevon.simulate import Run, simulate_batch
 
 ARM, CHAIN = 0.1, 4.5

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from elevon import Actuator
-from elevon.bench.logs.drive import write_drive_csv
 from elevon.calibrate import calibrate, read_logs
 from elevon.calibrate.candidates import candidates
 from elevon.calibrate.identify import choose
 from elevon.calibrate.problem import Problem
 from elevon.cli.runner import run
 from elevon.errors import InputError, Interrupted, UnknownNameError
+from elevon.logs.formats.drive import write_drive_csv
 
 
 def still(folder, **changes):

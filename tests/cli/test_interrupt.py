@@ -48,7 +48,7 @@ def press(*_arguments, **_options):
 HALF = {
     "design": ("elevon.bench.spring.design_spring", ["design", "spring", "--json"]),
     "import": (
-        "elevon.bench.logs.importing.import_log",
+        "elevon.logs.importing.import_log",
         ["import", "LOG", "--out", "OUT/r.parquet", "--json"],
     ),
     "saving": (

@@ -19,9 +19,9 @@ ROWS = [
     ["actuator", "faults", "waveforms"],
     ["scenario", "diagram"],
     ["record_plan"],
+    ["logs"],
     ["simulate"],
-    ["bench", "campaign"],
-    ["calibrate", "compare"],
+    ["bench", "campaign", "calibrate", "compare"],
     ["lowfit"],
     ["reproduce"],
     ["demo"],
@@ -37,15 +37,7 @@ def _room(path):
 
 def _imported(tree):
     """Yield the rooms of the package that a module imports at run time, also inside functions."""
-    skipped = {
-        id(inner)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
-        for inner in ast.walk(node)
-    }
-    for node in ast.walk(tree):
-        if id(node) in skipped:
-            continue
+    for node in _at_run_time(tree):
         names = []
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
@@ -77,3 +69,73 @@ def test_imports_point_left(path):
         place = f"{path.relative_to(PACKAGE)}:{line}"
         assert other in RANK, f"{place}: {other} is no room"
         assert other == room or RANK[other] < RANK.get(room, -1), f"{place}: {room} imports {other}"
+
+
+@pytest.mark.parametrize("room", ["logs", "calibrate"])
+def test_logs_are_read_without_the_bench(room):
+    """A real log has no bench of ours behind it: who reads logs knows of none."""
+    for path in (PACKAGE / room).rglob("*.py"):
+        rooms = [other for other, _ in _imported(ast.parse(path.read_text(encoding="utf-8")))]
+        assert "bench" not in rooms, path.relative_to(PACKAGE)
+
+
+def _module_names():
+    return {
+        ".".join(("elevon", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(
+            ".__init__"
+        ): path
+        for path in MODULES
+    }
+
+
+def _imported_modules(tree, modules):
+    """Yield the modules of the package that a module imports, also inside functions."""
+    for node in _at_run_time(tree):
+        names = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+            names = [name if name in modules else node.module for name in names]
+        yield from (name for name in names if name in modules)
+
+
+def _at_run_time(tree):
+    skipped = {
+        id(inner)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+        for inner in ast.walk(node)
+    }
+    return (node for node in ast.walk(tree) if id(node) not in skipped)
+
+
+def circles(edges):
+    """Return every set of modules that reach each other (Tarjan's strong components)."""
+    order, low, stack, result = {}, {}, [], []
+
+    def visit(node):
+        order[node] = low[node] = len(order)
+        stack.append(node)
+        for other in edges.get(node, ()):
+            if other not in order:
+                visit(other)
+                low[node] = min(low[node], low[other])
+            elif other in stack:
+                low[node] = min(low[node], order[other])
+        if low[node] == order[node]:
+            at = stack.index(node)
+            members = stack[at:]
+            del stack[at:]
+            if len(members) > 1 or node in edges.get(node, ()):
+                result.append(sorted(members))
+
+    for node in edges:
+        if node not in order:
+            visit(node)
+    return result
+
+
+def test_circles_are_seen():
+    assert circles({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == [["b", "c"]]
+    assert circles({"a": {"b", "c"}, "b": {"c"}}) == []

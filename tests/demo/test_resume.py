@@ -179,8 +179,8 @@ class Chain:
         replaced = {
             "elevon.reproduce.backlash.reproduce_backlash": self.backlash,
             "elevon.reproduce.backlash.page.backlash_report": lambda _result: Report("plays"),
-            "elevon.bench.logs.importing.import_log": lambda path: path,
-            "elevon.bench.logs.importing.same_rate": lambda _logs: None,
+            "elevon.logs.importing.import_log": lambda path: path,
+            "elevon.logs.importing.same_rate": lambda _logs: None,
             "elevon.calibrate.log.bench_log": lambda path: SimpleNamespace(name=path.name),
             "elevon.calibrate.calibrate": self.calibrate,
             "elevon.calibrate.write.write_calibration": self.write,

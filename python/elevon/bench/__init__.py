@@ -1,4 +1,1 @@
-"""The test bench: what it writes, how its logs are read, and the parts it is made of.
-
-Modules are imported by name (`from elevon.bench import command`); nothing is loaded here.
-"""
+"""The virtual bench: its rig, its procedures, the parts it is made of, and the logs it writes."""

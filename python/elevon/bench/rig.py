@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elevon.bench.brake import BrakeRig, BrakeRun, CellState, brake_loop
+from elevon.bench.brake_rig import BrakeRig, BrakeRun, CellState, brake_loop
 from elevon.bench.load_module import Springs, Weights, springs_of, weights_of
 from elevon.bench.procedure import (
     BrakeStep,

@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from elevon.bench.logs.drive import DriveFormat
 from elevon.bench.rig import Setup, setups
 from elevon.bench.state import BenchState
 from elevon.bench.traces import recorded, write_traces
 from elevon.files import check_output, write_text
+from elevon.logs.formats.drive import DriveFormat
 from elevon.progress import Progress, part
 
 if TYPE_CHECKING:

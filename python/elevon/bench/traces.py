@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.bench.guess_command import FREE
-from elevon.bench.loadcell import Hx711, write_loadcell
-from elevon.bench.logs.drive import DriveFormat, write_drive_csv
+from elevon.bench.converter import Hx711
 from elevon.bench.rig import RATE, Setup
 from elevon.files import write_text
+from elevon.logs.command.guess import FREE
+from elevon.logs.formats.drive import DriveFormat, write_drive_csv
+from elevon.logs.formats.loadcell import write_loadcell
 from elevon.units import parse_quantity
 
 if TYPE_CHECKING:

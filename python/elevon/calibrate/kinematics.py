@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.bench.command import reconstruct
-from elevon.bench.covariance import robust_covariance
-from elevon.bench.fit_command import FREE, WaveformFit, best_waveform, fit_waveform
 from elevon.calibrate.blocks import block_covariance
 from elevon.calibrate.direct import saturated_speed
 from elevon.calibrate.log import BenchLog
 from elevon.errors import InputError
+from elevon.logs.command.fit import FREE, WaveformFit, best_waveform, fit_waveform
+from elevon.logs.command.reconstruct import reconstruct
+from elevon.logs.covariance import robust_covariance
 from elevon.waveforms import evaluate
 
 __all__ = ["KINEMATIC", "CommandFit", "command_fit", "speed_limit", "speed_sensor"]

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from elevon.calibrate.brake import Brake, brake_of
+from elevon.calibrate.brake_level import Brake, brake_of
 from elevon.errors import InputError, did_you_mean
 
 if TYPE_CHECKING:
-    from elevon.bench.logs.importing import ImportedLog
-    from elevon.bench.logs.sidecar import CommandNote
+    from elevon.logs.command.note import CommandNote
+    from elevon.logs.importing import ImportedLog
     from elevon.recording import Recording
 
 __all__ = ["BenchLog", "bench_log", "read_logs"]
@@ -95,7 +95,7 @@ def read_logs(
     Parameters
     ----------
     paths : sequence of path
-        Logs in any format that `elevon.bench.logs.importing.import_log` reads.
+        Logs in any format that `elevon.logs.importing.import_log` reads.
     loadcells, commands : sequence of path or None
         One for each log, or none at all.
     column_map : path, optional
@@ -115,7 +115,7 @@ def read_logs(
     InputError
         No log, two rates, a log that cannot be read or lacks what is needed.
     """
-    from elevon.bench.logs.importing import import_log, same_rate
+    from elevon.logs.importing import import_log, same_rate
 
     if not paths:
         raise InputError("calibration needs at least one log")

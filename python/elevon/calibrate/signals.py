@@ -22,8 +22,8 @@ from elevon.calibrate.plant import (
     static_estimate,
     torque_scale,
 )
-from elevon.calibrate.positions import encoder_count, gain_estimate, position_estimates
 from elevon.calibrate.regression import Regression
+from elevon.calibrate.zeros import encoder_count, gain_estimate, position_estimates
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.bench.command import reconstruct
 from elevon.calibrate.kinematics import command_fit
 from elevon.calibrate.log import BenchLog
 from elevon.errors import InputError, Interrupted, unknown
+from elevon.logs.command.reconstruct import reconstruct
 from elevon.progress import Progress
 
 if TYPE_CHECKING:

@@ -70,10 +70,10 @@ def run(
     json: JsonOption = False,
 ) -> None:
     """Carry out a procedure and write what the bench writes: traces, load cell, command notes."""
-    from elevon.bench.logs.drive import DriveFormat
     from elevon.bench.procedure import load_procedure
     from elevon.bench.run import run_procedure
     from elevon.faults import Fault
+    from elevon.logs.formats.drive import DriveFormat
 
     asked = load_procedure(procedure)
     loaded = read_actuator(actuator, settings)

@@ -135,7 +135,7 @@ def without_companions(logs: list[Path]) -> list[Path]:
 
     A shell's ``DIR/*.csv`` names them too; they are read with their log.
     """
-    from elevon.bench.logs.importing import find_sidecars
+    from elevon.logs.importing import find_sidecars
 
     beside = {path for log in logs for path in find_sidecars(log) if path is not None}
     kept = [log for log in logs if log.expanduser() not in beside]

@@ -12,8 +12,8 @@ from elevon.cli.output import print_json, print_table, say
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
-    from elevon.bench.logs.importing import ImportedLog
-    from elevon.bench.logs.report import ImportReport
+    from elevon.logs.importing import ImportedLog
+    from elevon.logs.report import ImportReport
 
 app = typer.Typer(
     rich_markup_mode=None, help="Read bench and drive logs into recordings; report what was seen."
@@ -55,8 +55,8 @@ def import_(
     force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
 ) -> int:
     """Read logs into recordings, and say everything that was seen on the way."""
-    from elevon.bench.logs.detect import FORMATS
     from elevon.errors import unknown
+    from elevon.logs.formats.detect import FORMATS
 
     if log_format not in FORMATS:
         raise unknown("format", log_format, FORMATS, "--format")
@@ -87,7 +87,7 @@ def _read_all(
     notes: list[Path | None],
     **options: Any,
 ) -> list[ImportedLog]:
-    from elevon.bench.logs.importing import import_log, same_rate
+    from elevon.logs.importing import import_log, same_rate
 
     imported = []
     for path, cell, note in zip(logs, cells, notes, strict=True):
@@ -172,7 +172,7 @@ def _number(value: Any) -> str:
 
 
 def _cranfield(logs: list[Path], out: Path, *, force: bool, json: bool) -> int:
-    from elevon.bench.logs.cranfield import read_cranfield
+    from elevon.logs.formats.cranfield import read_cranfield
 
     if out.suffix.lower() in {".parquet", ".nc", ".mat", ".csv"}:
         raise InputError(f"--out {out}: a Cranfield file holds many recordings; give a folder")

@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 from elevon.calibrate.estimate import LEVEL
-from elevon.calibrate.positions import encoder_count
 from elevon.calibrate.validation import SIGNALS
+from elevon.calibrate.zeros import encoder_count
 from elevon.demo.bench_figure import bench_figure
 from elevon.demo.page_parameters import parameters_section
 from elevon.report import Report, Table

@@ -18,8 +18,8 @@ from elevon.report.checks import Check, all_passed
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.bench.logs.importing import ImportedLog
     from elevon.calibrate import BenchLog, Validation
+    from elevon.logs.importing import ImportedLog
 
 __all__ = ["Demo", "demo_files", "run_demo"]
 
@@ -163,7 +163,7 @@ class Demo:
 
 def encoder_count(actuator: Actuator) -> float:
     """Angle of one encoder edge at the user [rad]."""
-    from elevon.calibrate.positions import encoder_count as count
+    from elevon.calibrate.zeros import encoder_count as count
 
     return count(actuator)
 
@@ -279,8 +279,8 @@ def _bench(demo: Demo, progress: Progress | None) -> list[Path]:
 
 
 def _read(demo: Demo) -> None:
-    from elevon.bench.logs.importing import import_log, same_rate
     from elevon.calibrate.log import bench_log
+    from elevon.logs.importing import import_log, same_rate
 
     def work() -> None:
         names = [log["name"] for log in demo.bench_truth["logs"]]

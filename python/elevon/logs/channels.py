@@ -1,0 +1,97 @@
+"""What the channels of a log look like: missing samples, clipping, standing still."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from elevon.logs.clocks.quality import clipped_share, stuck_spans
+from elevon.logs.command.reconstruct import SPEED_LIMIT
+from elevon.logs.formats.table import FloatArray
+from elevon.logs.report import ImportReport
+
+__all__ = ["examine_channels"]
+
+_CLIP_SHARE = 0.01
+_FREE_TRAVEL = 0.08  # rad at the user: more than the widest play the bench can set (0.0457)
+_CLIPPING = {"speed_ref", "motor_speed", "current_ref", "current_q_meas", "current_d_meas",
+             "voltage_q_ref", "load_cell_force"}  # fmt: skip
+
+
+def examine_channels(
+    time: FloatArray, values: Mapping[str, FloatArray], ratio: float, report: ImportReport
+) -> None:
+    """Add findings about every channel of one clock.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        Seconds.
+    values : mapping of str to ndarray, shape (n,)
+        SI values by signal.
+    ratio : float
+        Gear ratio, fast over slow.
+    report : ImportReport
+        Findings are added to it.
+    """
+    for name, data in values.items():
+        missing = int(np.isnan(data).sum())
+        if missing == len(data):
+            report.warn(name, "empty", "no value at all")
+            continue
+        if missing:
+            report.warn(name, "missing", f"{missing} of {len(data)} samples are missing")
+        _constant(name, data, values, report)
+        if name in _CLIPPING:
+            _clipping(name, data, report)
+    _stuck(time, values, ratio, report)
+
+
+def _constant(
+    name: str, data: FloatArray, values: Mapping[str, FloatArray], report: ImportReport
+) -> None:
+    good = data[np.isfinite(data)]
+    moved = any(
+        np.nanmax(v) > np.nanmin(v)
+        for other, v in values.items()
+        if other != name and np.isfinite(v).any()
+    )
+    if good.size > 1 and np.ptp(good) == 0.0 and moved:
+        if name == "trigger":
+            report.note(name, "no-edge", f"the trigger stays at {good[0]:g}")
+        else:
+            report.warn(name, "stuck", f"stands at {good[0]:.6g} through the whole log")
+
+
+def _clipping(name: str, data: FloatArray, report: ImportReport) -> None:
+    shares = clipped_share(data)
+    for share, value in zip(shares, (np.nanmin(data), np.nanmax(data)), strict=True):
+        if share <= _CLIP_SHARE or value == 0.0:
+            continue
+        if name == "speed_ref" and abs(abs(value) - SPEED_LIMIT) < 0.01 * SPEED_LIMIT:
+            report.note(
+                name,
+                "saturated",
+                f"at its limit of {np.sign(value) * 500:g} rpm for {100 * share:.1f} % of the log",
+            )
+        else:
+            report.warn(
+                name, "clipped", f"{100 * share:.1f} % of the samples sit at {value:.6g} in runs"
+            )
+
+
+def _stuck(
+    time: FloatArray, values: Mapping[str, FloatArray], ratio: float, report: ImportReport
+) -> None:
+    motor, encoder = values.get("resolver_position"), values.get("encoder_position")
+    if motor is None or encoder is None:
+        return
+    both = np.isfinite(motor) & np.isfinite(encoder)
+    t, motor, encoder = time[both], motor[both] / ratio, encoder[both]
+    for name, data, drive in (
+        ("encoder_position", encoder, motor),
+        ("resolver_position", motor, encoder),
+    ):
+        for start, end in stuck_spans(t, data, drive, _FREE_TRAVEL)[:10]:
+            report.warn(name, "stuck", f"stands still from {start:.3f} s to {end:.3f} s")

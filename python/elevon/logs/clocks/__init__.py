@@ -1,0 +1,1 @@
+"""Clocks of a log: their quality, and two logs brought onto one time."""

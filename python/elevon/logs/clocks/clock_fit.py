@@ -1,0 +1,328 @@
+"""Offset and drift of a second clock from what two logs saw, with honest deviations.
+
+The load cell's value is a linear combination of the drive's signals, so only the two numbers of the
+clock are searched for; the weights follow from them (variable projection). Three things are known
+beside the logs and enter as observations: the trigger's edge, what a resonator may be off, and how
+late one log may be against the other for reasons that are no clock's (a converter settles, a
+current passes a filter). Without the last the trigger would turn every such delay into a drift.
+
+The residuals of such a fit are anything but white: how much less the logs tell than white noise
+would let them is estimated, and both the weight against what is known beforehand and the deviations
+follow it. The weights and the clock take their share of the few independent samples that they are
+worth; where none are left there is no fit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.logs.covariance import correlated, long_run_covariance
+
+__all__ = ["RESONATOR_STD", "RESONATOR_TOLERANCE", "Estimate", "SharedLogs", "fit_clock"]
+
+FloatArray = npt.NDArray[np.float64]
+
+RESONATOR_TOLERANCE = 0.005
+"""Relative: a ceramic resonator keeps within 0.5 %."""
+
+RESONATOR_STD = RESONATOR_TOLERANCE / math.sqrt(3.0)
+"""Its deviation: anywhere within alike."""
+
+_DELAY = 2.0
+"""Periods of the slower log: a delta-sigma converter as the load cell's settles in four samples,
+so what it shows is late by about two."""
+
+_DETERMINED = 1.0 / 3.0  # of a resonator's deviation: a drift known no better is not used
+_APART = 2e-3
+"""Seconds: the drive passes its current through a filter (100 Hz: 1.6 ms) and its speed not, so
+its signals are late by different amounts, and whichever counts most decides when."""
+
+_RANK = 1e-6  # of the largest singular value: a combination below it says nothing of its own
+_ROUNDS = 6  # of estimating how coloured the residuals are
+_STEPS = 25
+_DONE = 1e-8  # s
+_LONGEST = 0.05  # s a step: the filter's width, within which the derivative means something
+_FEWEST = 20  # samples
+_LEAST_FREEDOM = 2.0  # independent samples beyond the unknowns: Student's has no variance for fewer
+
+_TWICE = [0, 1, 0]  # the unknowns' columns: a delay moves the prediction as the offset does
+_DRIFT = np.array([0.0, 1.0, 0.0])
+_LATE = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class SharedLogs:
+    """Two logs of one thing, passed through one filter.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n,)
+        Drive's clock [s].
+    signals : ndarray, shape (n, m)
+        Drive's signals.
+    second : ndarray, shape (k,)
+        The other clock [s].
+    value : ndarray, shape (k,)
+        What is explained by the signals and a constant.
+    period : float
+        Of the slower log [s].
+    width : float
+        Standard deviation of the filter [s].
+    """
+
+    time: FloatArray
+    signals: FloatArray
+    second: FloatArray
+    value: FloatArray
+    period: float
+    width: float
+
+    def basis(self, at: FloatArray) -> FloatArray:
+        """Return a constant and the signals at instants of the drive's clock, (len, 1 + m)."""
+        return _columns(self.time, self.signals, at, 1.0)
+
+    def inside(self, offset: float) -> npt.NDArray[np.bool_]:
+        """Which samples of the second log fall into the first, for an offset [s]."""
+        at = self.second + offset
+        return np.asarray((at >= self.time[0]) & (at <= self.time[-1]))
+
+    def explained(self, offset: float) -> float:
+        """Share of the value's variance explained where the logs overlap; 0 without overlap."""
+        inside = self.inside(offset)
+        if int(inside.sum()) < _FEWEST:
+            return 0.0
+        target = self.value[inside]
+        power = float(np.sum((target - target.mean()) ** 2))
+        if power == 0.0:
+            return 0.0
+        rest, _ = self.rest(offset, inside)
+        return 1.0 - float(rest @ rest) / power
+
+    def rest(self, offset: float, among: npt.NDArray[np.bool_]) -> tuple[FloatArray, int]:
+        """Return what the signals leave of some samples for an offset [s], and their rank."""
+        basis = self.basis(self.second[among] + offset)
+        weights, _, rank, _ = np.linalg.lstsq(basis, self.value[among], rcond=_RANK)
+        return self.value[among] - basis @ weights, int(rank)
+
+    def alike(self) -> float:
+        """How many samples of the second log one filter makes one of."""
+        step = float(np.median(np.diff(self.second)))
+        return max(1.0, 2.0 * math.sqrt(math.pi) * self.width / step)
+
+    def independent(self, rest: FloatArray) -> float:
+        """Return how many independent samples residuals in the order of time are worth."""
+        return len(rest) / max(self.alike(), correlated(rest))
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """What the logs and what is known beforehand say together; deviations with each.
+
+    Attributes
+    ----------
+    offset, drift, residual : tuple of (float, float)
+        Seconds, relative, seconds: where the second clock's zero lies, how much it loses, by how
+        much the first log's signals are late against the second's.
+    explained : float
+        Share of the value's variance.
+    refused : tuple of (float, float) or None
+        The drift that the logs hint at but do not determine; `drift` is then none, give or take
+        what a resonator may be off, and the others are what they are without a drift.
+    """
+
+    offset: tuple[float, float]
+    drift: tuple[float, float]
+    residual: tuple[float, float]
+    explained: float
+    refused: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """The samples that count, their clock seen from its middle, and what is known beforehand.
+
+    Unknowns, all in seconds: the offset in the middle of the second log, what the drift adds by its
+    end, and the delay. `known` and `guess` are their information matrix and their values; `rates`
+    the derivatives of the signals by time.
+    """
+
+    logs: SharedLogs
+    rates: FloatArray
+    second: FloatArray
+    value: FloatArray
+    middle: float
+    half: float
+    known: FloatArray
+    guess: FloatArray
+
+    def linear(self, unknown: FloatArray) -> tuple[FloatArray, FloatArray, int]:
+        """Return residual, derivative of the prediction by the first two unknowns, and rank."""
+        turn = (self.second - self.middle) / self.half
+        at = self.second + unknown[0] + unknown[1] * turn + unknown[2]
+        basis = self.logs.basis(at)
+        space, weights = _range(basis, self.value)
+        rest = self.value - space @ (space.T @ self.value)
+        rate = _columns(self.logs.time, self.rates, at, 0.0) @ weights
+        jacobian = np.column_stack((rate, rate * turn))
+        return rest, jacobian - space @ (space.T @ jacobian), space.shape[1]
+
+    def cost(self, unknown: FloatArray, noise: float) -> float:
+        """Misfit to minimise, for a variance of the residuals."""
+        rest, *_ = self.linear(unknown)
+        off = unknown - self.guess
+        return float(rest @ rest) / noise + float(off @ self.known @ off)
+
+
+def fit_clock(logs: SharedLogs, guess: float, edge: tuple[float, float] | None) -> Estimate | None:
+    """Estimate offset and drift from a first guess of the offset.
+
+    Parameters
+    ----------
+    logs : SharedLogs
+        Filtered alike.
+    guess : float
+        Offset [s], right within the filter's width.
+    edge : tuple of (float, float) or None
+        The trigger's instant and its deviation [s].
+
+    Returns
+    -------
+    Estimate or None
+        None where the logs hardly overlap, hold nothing that moves in time, or are worth hardly
+        more independent samples than there are unknowns.
+    """
+    frame = _frame(logs, guess, edge)
+    if frame is None:
+        return None
+    unknown = frame.guess
+    inflation, few = logs.alike(), 1.0  # of a guess that is off the residuals are no noise
+    for _ in range(_ROUNDS):
+        rest, jacobian, rank = frame.linear(unknown)
+        normal = jacobian.T @ jacobian
+        if not np.all(np.isfinite(normal)) or normal[0, 0] <= 0.0:
+            return None
+        unknown = _descend(frame, unknown, _noise(frame, rest) * inflation)
+        rest, jacobian, rank = frame.linear(unknown)
+        worth = logs.independent(rest)
+        free = worth - rank - jacobian.shape[1] - _LEAST_FREEDOM
+        if free <= 0.0:
+            return None
+        few = worth / free
+        inflation = few * max(len(rest) / worth, _coloured(jacobian, rest))
+    return _estimate(frame, unknown, inflation, few)
+
+
+def _coloured(jacobian: FloatArray, rest: FloatArray) -> float:
+    """How many times white noise's variance is theirs, of the residuals or of their scores."""
+    power = max(float(rest @ rest), 1e-300)
+    scores = long_run_covariance(jacobian * rest[:, None])
+    normal = np.linalg.pinv(jacobian.T @ jacobian, rcond=_RANK)
+    of_scores = 0.5 * float(np.trace(normal @ scores)) * len(rest) / power
+    return max(float(long_run_covariance(rest[:, None])[0, 0]) / power, of_scores)
+
+
+def _frame(logs: SharedLogs, guess: float, edge: tuple[float, float] | None) -> _Frame | None:
+    inside = logs.inside(guess)
+    if int(inside.sum()) < _FEWEST:
+        return None
+    second, value = logs.second[inside], logs.value[inside]
+    middle, half = 0.5 * float(second[0] + second[-1]), 0.5 * float(second[-1] - second[0])
+    known = np.zeros((3, 3))
+    known[1, 1] = (RESONATOR_STD * half) ** -2
+    known[2, 2] = (_DELAY * logs.period) ** -2
+    if edge is not None:
+        lever = _lever(middle, half)
+        known += np.outer(lever, lever) / max(edge[1], _DONE) ** 2
+    rates = np.gradient(logs.signals, logs.time, axis=0)
+    return _Frame(logs, rates, second, value, middle, half, known, np.array([guess, 0.0, 0.0]))
+
+
+def _lever(middle: float, half: float) -> FloatArray:
+    """Offset at the second clock's zero, as a combination of the unknowns."""
+    return np.array([1.0, -middle / half, 0.0])
+
+
+def _noise(frame: _Frame, rest: FloatArray) -> float:
+    floor = (1e-9 * float(np.std(frame.value))) ** 2
+    return max(float(rest @ rest) / len(rest), floor, 1e-300)
+
+
+def _descend(frame: _Frame, unknown: FloatArray, noise: float) -> FloatArray:
+    """Gauss-Newton with halved steps."""
+    cost = frame.cost(unknown, noise)
+    for _ in range(_STEPS):
+        rest, jacobian, _ = frame.linear(unknown)
+        jacobian = jacobian[:, _TWICE]
+        pull = jacobian.T @ rest / noise - frame.known @ (unknown - frame.guess)
+        step = np.linalg.solve(jacobian.T @ jacobian / noise + frame.known, pull)
+        step *= min(1.0, _LONGEST / max(float(np.abs(step).max()), 1e-300))
+        while float(np.abs(step).max()) > _DONE:
+            tried = frame.cost(unknown + step, noise)
+            if tried < cost:
+                break
+            step = step / 2.0
+        else:
+            return unknown
+        unknown, cost = unknown + step, tried
+    return unknown
+
+
+def _estimate(frame: _Frame, unknown: FloatArray, inflation: float, few: float) -> Estimate:
+    """Deviations: of the scores as they are, `few` times for so few, and of what was known."""
+    rest, two, _ = frame.linear(unknown)
+    noise = _noise(frame, rest) * inflation
+    jacobian = two[:, _TWICE]
+    information = jacobian.T @ jacobian / noise + frame.known
+    inverse = np.asarray(np.linalg.inv(information), dtype=np.float64)
+    scores = few * long_run_covariance(two * rest[:, None])[np.ix_(_TWICE, _TWICE)] / noise**2
+    astray = (information - frame.known) @ np.diag([0.0, _APART, _APART])
+    covariance = inverse @ (scores + frame.known + astray @ astray.T) @ inverse
+    drift = _pair(_DRIFT / frame.half, unknown, covariance)
+    refused = None
+    if drift[1] > _DETERMINED * RESONATOR_STD:
+        refused = drift
+        unknown, covariance = _without_drift(frame, unknown, covariance, inverse)
+        drift = (0.0, RESONATOR_STD)
+    spread = frame.value - frame.value.mean()
+    return Estimate(
+        offset=_pair(_lever(frame.middle, frame.half), unknown, covariance),
+        drift=drift,
+        residual=_pair(_LATE, unknown, covariance),
+        explained=1.0 - float(rest @ rest) / float(spread @ spread),
+        refused=refused,
+    )
+
+
+def _without_drift(
+    frame: _Frame, unknown: FloatArray, covariance: FloatArray, inverse: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return what the others are with the drift held at zero, and what its true value may do."""
+    share = inverse[:, 1] / inverse[1, 1]
+    turn = np.eye(3) - np.outer(share, _DRIFT)
+    astray = np.outer(share, share) * (RESONATOR_STD * frame.half) ** 2
+    return turn @ unknown, turn @ covariance @ turn.T + astray
+
+
+def _pair(row: FloatArray, unknown: FloatArray, covariance: FloatArray) -> tuple[float, float]:
+    """Return a combination of the unknowns and its deviation."""
+    return float(row @ unknown), math.sqrt(max(float(row @ covariance @ row), 0.0))
+
+
+def _range(basis: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Orthonormal columns that span the basis, and weights of it that explain the value best."""
+    size = np.linalg.norm(basis, axis=0)
+    size = np.where(size > 0.0, size, 1.0)
+    left, singular, right = np.linalg.svd(basis / size, full_matrices=False)
+    kept = singular > _RANK * singular[0]
+    left = left[:, kept]
+    weights = right[kept].T @ ((left.T @ value) / singular[kept]) / size
+    return left, weights
+
+
+def _columns(time: FloatArray, signals: FloatArray, at: FloatArray, constant: float) -> FloatArray:
+    columns = [np.interp(at, time, signals[:, k]) for k in range(signals.shape[1])]
+    return np.column_stack((np.full_like(at, constant), *columns))

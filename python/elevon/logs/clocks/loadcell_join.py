@@ -1,0 +1,228 @@
+"""The load cell's file joined to a drive trace, on the drive's clock."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from elevon.errors import InputError
+from elevon.logs.clocks.clock_fit import RESONATOR_STD, RESONATOR_TOLERANCE
+from elevon.logs.clocks.quality import clock_quality
+from elevon.logs.clocks.sync import ClockFit, align_clocks, find_trigger
+from elevon.logs.command.note import CommandNote
+from elevon.logs.formats.limits import Limits
+from elevon.logs.formats.loadcell import LoadCellLog, read_loadcell
+from elevon.logs.formats.table import FloatArray
+from elevon.logs.report import ImportReport
+from elevon.recording import Recording
+
+__all__ = ["join_loadcell"]
+
+
+def join_loadcell(
+    recording: Recording,
+    path: str | Path,
+    note: CommandNote | None,
+    report: ImportReport,
+    limits: Limits,
+    *,
+    gear_ratio: float,
+) -> Recording:
+    """Add the load cell's channels on a clock of their own, moved to the drive's time.
+
+    Parameters
+    ----------
+    recording : Recording
+        The drive's trace on the clock ``drive``.
+    path : path
+        The load cell's file.
+    note : CommandNote or None
+        Gives the arm, and the chain's ratio.
+    report : ImportReport
+        Findings and the synchronisation are added to it.
+    limits : Limits
+        Bounds on size.
+    gear_ratio : float
+        Fast over slow.
+
+    Returns
+    -------
+    Recording
+        With ``load_cell_force`` and, where the arm is known, ``load_cell_torque``.
+    """
+    log = read_loadcell(path, limits=limits)
+    for text in log.notes:
+        report.note("load_cell", "format", text)
+    quality = clock_quality(str(path), log.time)
+    if quality.duplicates:
+        report.warn(
+            "load_cell", "duplicates", f"{quality.duplicates} repeated time stamps left out"
+        )
+    for start, end, missing in quality.gaps[:20]:
+        report.warn("load_cell", "gap", f"{missing} samples missing, {start:.3f} to {end:.3f} s")
+    time, value = log.time[quality.keep], log.value[quality.keep]
+    choices = _shared(recording, gear_ratio, note)
+    fit = _synchronise(recording, choices, time, value, report)
+    moved = time if fit is None else fit.to_first(time)
+    report.clocks["load_cell"] = {
+        "samples": quality.samples,
+        "duration_s": quality.duration,
+        "rate_hz": quality.rate,
+        "jitter_rms_s": quality.jitter_rms,
+        "gaps": [list(gap) for gap in quality.gaps],
+        "duplicates": quality.duplicates,
+    }
+    _check_overlap(recording, moved, report)
+    values, units = _channels(log, value, note, report)
+    cell = Recording.build(moved, values, units, clock="load_cell", rate=quality.rate)
+    return recording.joined(cell)
+
+
+def _synchronise(
+    recording: Recording,
+    choices: list[FloatArray],
+    time: FloatArray,
+    value: FloatArray,
+    report: ImportReport,
+) -> ClockFit | None:
+    drive = recording.clocks["drive"].time
+    edge = None
+    if "trigger" in recording:
+        edge = find_trigger(drive, recording["trigger"].values)
+        if edge is not None and edge.later:
+            report.note(
+                "trigger", "more-edges", f"{edge.later} changes after the first; the first is used"
+            )
+    try:
+        if not choices:
+            raise InputError("synchronisation: the log holds no current, no speed, no positions")
+        fit = align_clocks(drive, choices[0], time, value, edge=edge, alternatives=choices[1:])
+    except InputError as error:
+        if edge is None:
+            report.warn("load_cell", "not-synchronised", f"{error}; its clock stays its own")
+            report.synchronisation = {"method": "none"}
+            return None
+        report.note("load_cell", "trigger-alone", f"{error}")
+        fit = ClockFit(edge.time, edge.std, 0.0, math.inf, "trigger", math.nan)
+    _fit_findings(fit, report)
+    report.synchronisation = {
+        "method": fit.method,
+        "offset_s": fit.offset,
+        "offset_std_s": fit.offset_std,
+        "drift": fit.drift,
+        "drift_std": _finite(fit.drift_std),
+        "explained": _finite(fit.explained),
+        "residual_s": _finite(fit.residual) if edge is not None else None,
+        "residual_std_s": _finite(fit.residual_std) if edge is not None else None,
+    }
+    return fit
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _fit_findings(fit: ClockFit, report: ImportReport) -> None:
+    """Say what the two logs could not settle."""
+    if fit.refused is not None:
+        report.note(
+            "load_cell",
+            "drift-unknown",
+            f"clock drift {fit.refused[0]:.2e} is known only to {fit.refused[1]:.1e}, little "
+            f"better than a resonator keeps ({RESONATOR_STD:.1e}): not applied",
+        )
+    elif not math.isfinite(fit.drift_std):
+        report.note(
+            "load_cell",
+            "drift-unknown",
+            "nothing that both logs saw tells the clock's drift: the trigger gives the offset only",
+        )
+    if abs(fit.drift) - 2.0 * fit.drift_std > RESONATOR_TOLERANCE:
+        report.warn(
+            "load_cell",
+            "drift-large",
+            f"clock drift {fit.drift:.2e}, known to {fit.drift_std:.1e}: more than a ceramic "
+            f"resonator may be off ({RESONATOR_TOLERANCE:g})",
+        )
+    if fit.set_aside is not None:
+        report.warn(
+            "load_cell",
+            "offset-assumed",
+            f"no trigger: {fit.offset:.3f} s has the load cell begin within the drive's trace; "
+            f"{fit.set_aside:.3f} s, before it, cannot be told from it by what both saw",
+        )
+
+
+def _shared(recording: Recording, gear_ratio: float, note: CommandNote | None) -> list[FloatArray]:
+    """Return the sets of signals that may show what the load cell saw.
+
+    A brake acts on the fast shaft, weights and springs on the user: these show in what they wind up
+    between the two positions. Where the operator says whether the brake was on, only one of them is
+    meant.
+    """
+    brake = _braked(recording)
+    wound = []
+    if "resolver_position" in recording and "encoder_position" in recording:
+        motor, user = (recording[f"{name}_position"].values for name in ("resolver", "encoder"))
+        wound.append((motor / gear_ratio - user)[:, None])
+    if brake and wound and note is not None and note.brake is not None:
+        return brake if note.brake else wound
+    return [*brake, *wound]
+
+
+def _braked(recording: Recording) -> list[FloatArray]:
+    """Return the sets of signals that tell a brake's torque on the fast shaft.
+
+    What is left of the motor's torque when friction and inertia took their share: torque current,
+    direction of motion, speed and acceleration. Without the last two a brake that turns its sign
+    with the motion would seem early by the angle by which the accelerating current leads. A load
+    cell that shows a size alone follows the same four times the direction of motion; where the
+    shaft hardly moves, the current's size.
+    """
+    names = [name for name in ("current_q_meas", "current_ref") if name in recording]
+    current = [recording[name].values for name in names[:1]]
+    sets = [np.column_stack((i, np.abs(i))) for i in current]
+    speed = _speed(recording)
+    size = 0.0 if speed is None else float(np.nanstd(speed))
+    if speed is None or not size > 0.0:
+        return sets
+    direction = np.tanh(speed / (0.1 * size))
+    rate = np.gradient(speed, recording.clocks["drive"].time)
+    signed = np.column_stack((*current, direction, speed, rate))
+    return [signed, signed * direction[:, None], *sets]
+
+
+def _speed(recording: Recording) -> FloatArray | None:
+    if "motor_speed" in recording:
+        return recording["motor_speed"].values
+    if "resolver_position" not in recording:
+        return None
+    position = recording["resolver_position"].values
+    return np.asarray(np.gradient(position, recording.clocks["drive"].time), dtype=np.float64)
+
+
+def _check_overlap(recording: Recording, time: FloatArray, report: ImportReport) -> None:
+    drive = recording.clocks["drive"].time
+    outside = float(np.mean((time < drive[0]) | (time > drive[-1])))
+    if outside == 1.0:
+        report.warn("load_cell", "no-overlap", "no sample falls inside the drive's trace")
+    elif outside > 0.0:
+        report.note("load_cell", "overlap", f"{100 * outside:.1f} % lies outside the drive's trace")
+
+
+def _channels(
+    log: LoadCellLog, value: FloatArray, note: CommandNote | None, report: ImportReport
+) -> tuple[dict[str, FloatArray], dict[str, str]]:
+    if log.unit == "N m":
+        return {"load_cell_torque": value}, {"load_cell_torque": "N m"}
+    values, units = {"load_cell_force": value}, {"load_cell_force": "N"}
+    if note is None or note.load_cell_arm is None:
+        report.note("load_cell", "no-arm", "arm not stated: force only, no torque")
+        return values, units
+    factor = note.load_cell_arm / (note.chain_ratio or 1.0)
+    values["load_cell_torque"], units["load_cell_torque"] = value * factor, "N m"
+    shaft = "the fast shaft" if note.chain_ratio else "the shaft the arm belongs to"
+    report.note("load_cell_torque", "torque", f"force x {factor:.6g} m, on {shaft}")
+    return values, units

@@ -1,0 +1,1 @@
+"""The command of a log: rebuilt from its signals, or noted by the operator."""

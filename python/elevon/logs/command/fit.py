@@ -1,0 +1,331 @@
+"""A waveform fitted to a reconstructed command, with an honest uncertainty."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.errors import InputError, unknown
+from elevon.logs.command.guess import FREE, guesses
+from elevon.logs.command.reconstruct import CommandTrace
+from elevon.logs.covariance import robust_covariance
+from elevon.waveforms import evaluate, wave_records
+
+__all__ = ["FREE", "WaveformFit", "best_waveform", "fit_waveform"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_ANGLES = {"phase"}
+_OUTLIER = 6.0
+_FAR = 10.0  # of the robust spread: no noise reaches it
+_FEW = 0.01  # of the samples: more than that is no stray but a model that does not fit
+_LEAST = 20
+_ROUGH = 25  # evaluations from each guess
+_MOST = 200  # evaluations of the best one
+_SCORED = 2000  # samples enough to tell the kinds apart
+
+
+@dataclass(frozen=True, slots=True)
+class WaveformFit:
+    """A fitted command.
+
+    All standard deviations hold for coloured residuals, and include the unknown instant at which
+    the drive sampled the command (`fit_waveform`, `timing_std`).
+
+    Attributes
+    ----------
+    kind : str
+        Waveform.
+    values : dict of str to float
+        All its parameters (SI; phase at the log's time zero, within -pi to pi).
+    std : dict of str to float
+        Standard deviation of each fitted parameter, for coloured residuals.
+    covariance : ndarray, shape (p, p)
+        Of the fitted parameters, in the order of `std`.
+    rms : float
+        RMS of the residual [rad].
+    samples : int
+        Samples used.
+    outliers : int
+        Single samples left out because they stray far from all others, such as the first row of a
+        log, taken before the drive had computed its first set point.
+    window : (float, float)
+        First and last instant used [s]: before it the command had not begun, or was another.
+    converged : bool
+        Whether the optimiser met its tolerance.
+    """
+
+    kind: str
+    values: dict[str, float]
+    std: dict[str, float]
+    covariance: FloatArray
+    rms: float
+    samples: int
+    window: tuple[float, float]
+    converged: bool
+    outliers: int = 0
+
+    def at(self, time: npt.ArrayLike) -> FloatArray:
+        """Return the fitted command [rad] at instants [s]."""
+        return evaluate(self.kind, self.values, np.asarray(time, dtype=np.float64))
+
+    def as_term(self) -> dict[str, float | str]:
+        """Return the command as a scenario's term: SI numbers, infinite ends left out."""
+        kept = {name: v for name, v in self.values.items() if math.isfinite(v)}
+        return {"kind": self.kind, **kept}
+
+
+def fit_waveform(
+    trace: CommandTrace,
+    kind: str = "sine",
+    *,
+    fixed: Mapping[str, float] | None = None,
+    window: tuple[float, float] | None = None,
+    timing_std: float | None = None,
+) -> WaveformFit:
+    """Fit a waveform to the valid samples of a command trace.
+
+    Parameters
+    ----------
+    trace : CommandTrace
+        From `elevon.logs.command.reconstruct.reconstruct`.
+    kind : str
+        Waveform, one of `FREE`.
+    fixed : mapping of str to float, optional
+        Parameters that are known and not fitted (SI).
+    window : (float, float), optional
+        Seconds used. By default the command's beginning and end are found in the trace: a span at
+        rest at either end, and samples that no waveform of this kind explains.
+    timing_std : float, optional
+        Standard deviation [s] of the instant at which the drive sampled the command, against the
+        time stamp of the row. It is in no residual, so it is added to the phase and the instants.
+        Default: uniform within one period of the log.
+
+    Returns
+    -------
+    WaveformFit
+        With standard deviations that hold for coloured residuals.
+
+    Raises
+    ------
+    InputError
+        Unknown waveform or parameter, or too few valid samples.
+    """
+    known = dict(fixed or {})
+    if kind not in FREE:
+        raise unknown("waveform", kind, FREE)
+    names = wave_records()[kind].names
+    for name in known:
+        if name not in names:
+            raise unknown("parameter", name, names, f"waveform {kind}")
+    t, y = _selected(trace, window)
+    moving = window is None and kind not in {"constant", "step", "ramp", "trapezoid"}
+    if moving:
+        t, y = _without_rest(t, y)
+    free = [name for name in FREE[kind] if name not in known]
+    values, jacobian, residual, converged = _best(kind, t, y, known, free=free)
+    for _ in range(3 if moving else 0):
+        first = _first_explained(t, residual)
+        if first == 0 or len(t) - first < max(_LEAST, len(t) // 4):
+            break
+        t, y = t[first:], y[first:]
+        values, jacobian, residual, converged = _best(kind, t, y, known, free=free, start=values)
+    strays = _strays(y, residual)
+    if strays.any():
+        t, y = t[~strays], y[~strays]
+        values, jacobian, residual, converged = _best(kind, t, y, known, free=free, start=values)
+    solution = (jacobian, residual, converged)
+    fit = _result(kind, values, free, t, solution, timing_std=timing_std)
+    return replace(fit, outliers=int(strays.sum()))
+
+
+def best_waveform(
+    trace: CommandTrace,
+    kinds: Sequence[str] = ("sine", "triangle", "trapezoid", "chirp", "ramp", "step"),
+) -> WaveformFit:
+    """Fit several waveforms and return the one of least Bayesian information criterion.
+
+    All are scored on the same samples, with as many degrees of freedom as each has parameters.
+
+    Raises
+    ------
+    InputError
+        Too few valid samples for any of them.
+    """
+    t, y = _selected(trace, None)
+    step = max(1, len(t) // _SCORED)
+    t, y = t[::step], y[::step]
+    thin = CommandTrace(t, y, np.ones(len(t), dtype=bool))
+    scored = []
+    for kind in kinds:
+        fit = fit_waveform(thin, kind)
+        inside = (t >= fit.window[0]) & (t <= fit.window[1])
+        # Samples a kind leaves out are charged at the spread of the whole trace: a fit to a
+        # fragment must not win against one that explains everything.
+        rest = np.where(inside, y - fit.at(t), y - y.mean())
+        power = max(float(np.mean(rest**2)), 1e-300)
+        scored.append((len(t) * math.log(power) + len(fit.std) * math.log(len(t)), kind))
+    return fit_waveform(trace, min(scored)[1])
+
+
+def _selected(
+    trace: CommandTrace, window: tuple[float, float] | None
+) -> tuple[FloatArray, FloatArray]:
+    mask = trace.valid.copy()
+    if window is not None:
+        mask &= (trace.time >= window[0]) & (trace.time <= window[1])
+    if int(mask.sum()) < _LEAST:
+        raise InputError(
+            f"command: {int(mask.sum())} samples with the speed set point inside its limit; "
+            f"{_LEAST} are needed"
+        )
+    return trace.time[mask], trace.position[mask]
+
+
+def _without_rest(t: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Drop a span at rest before and after the motion: there the command holds one value."""
+    noise = 1.4826 * float(np.median(np.abs(np.diff(y)))) / math.sqrt(2.0)
+    band = max(_OUTLIER * noise, 0.005 * float(np.ptp(y)))
+    away = np.flatnonzero(np.abs(y - np.median(y[:_LEAST])) > band)
+    back = np.flatnonzero(np.abs(y - np.median(y[-_LEAST:])) > band)
+    first = int(away[0]) if away.size and away[0] > len(y) // 20 else 0
+    last = int(back[-1]) + 1 if back.size and back[-1] < len(y) - len(y) // 20 else len(y)
+    return (t[first:last], y[first:last]) if last - first >= _LEAST else (t, y)
+
+
+def _first_explained(t: FloatArray, residual: FloatArray) -> int:
+    """Index after the last sample of the first half beyond the second half's spread."""
+    half = len(t) // 2
+    spread = 1.4826 * float(np.median(np.abs(residual[half:] - np.median(residual[half:]))))
+    off = np.flatnonzero(np.abs(residual[:half]) > max(_OUTLIER * spread, 1e-12))
+    return int(off[-1]) + 1 if off.size > 3 else 0
+
+
+def _strays(y: FloatArray, residual: FloatArray) -> npt.NDArray[np.bool_]:
+    """Mark samples far outside the spread of the others; none when they are more than a few."""
+    middle = float(np.median(residual))
+    spread = 1.4826 * float(np.median(np.abs(residual - middle)))
+    far = np.abs(residual - middle) > max(_FAR * spread, 1e-6 * float(np.ptp(y)))
+    return far if far.mean() <= _FEW else np.zeros_like(far)
+
+
+def _best(
+    kind: str,
+    t: FloatArray,
+    y: FloatArray,
+    known: Mapping[str, float],
+    *,
+    free: Sequence[str],
+    start: Mapping[str, float] | None = None,
+) -> tuple[dict[str, float], FloatArray, FloatArray, bool]:
+    """Least squares from each guess, the best carried to its end.
+
+    Returns its values, Jacobian (n, p), residual, and whether it converged.
+    """
+    spread = float(np.ptp(t))
+    scale = np.array([_typical(name, y, spread) for name in free])
+
+    def solve(base: Mapping[str, float], x0: FloatArray, most: int) -> Any:
+        from scipy.optimize import least_squares
+
+        def residual(x: FloatArray) -> FloatArray:
+            return _model(kind, base, free, x, t) - y
+
+        return least_squares(
+            residual,
+            x0,
+            jac="3-point",
+            x_scale=scale,
+            xtol=1e-13,
+            ftol=1e-13,
+            gtol=1e-13,
+            max_nfev=most,
+        )
+
+    results = []
+    for guess in [start] if start is not None else guesses(kind, t, y, known):
+        base = {**guess, **known}
+        if not free:
+            return base, np.empty((len(t), 0)), y - evaluate(kind, base, t), True
+        rough = solve(base, np.array([base[name] for name in free]), _ROUGH)
+        results.append((float(rough.cost), base, rough))
+    _, base, rough = min(results, key=lambda item: item[0])
+    solution = rough if rough.status > 0 else solve(base, rough.x, _MOST)
+    values = {**base, **dict(zip(free, map(float, solution.x), strict=True))}
+    return values, np.asarray(solution.jac), -np.asarray(solution.fun), bool(solution.success)
+
+
+def _model(
+    kind: str, base: Mapping[str, float], free: Sequence[str], x: FloatArray, t: FloatArray
+) -> FloatArray:
+    values = {**base, **dict(zip(free, map(float, x), strict=True))}
+    for name in ("rise", "fall", "hold_high", "hold_low", "sweep_time"):
+        if name in values:
+            values[name] = max(values[name], 1e-6)
+    return evaluate(kind, values, t)
+
+
+def _typical(name: str, y: FloatArray, spread: float) -> float:
+    """Size of a meaningful change of a parameter, for the optimiser's scaling."""
+    if "frequency" in name:
+        return 0.05 / spread
+    if name in _ANGLES:
+        return 0.1
+    if name in {"time", "start", "end", "rise", "fall", "hold_high", "hold_low", "sweep_time"}:
+        return 0.01 * spread
+    if name == "slope":
+        return max(float(np.ptp(y)) / spread, 1e-12)
+    return max(float(np.ptp(y)), 1e-12)
+
+
+def _result(
+    kind: str,
+    values: dict[str, float],
+    free: Sequence[str],
+    t: FloatArray,
+    solution: tuple[FloatArray, FloatArray, bool],
+    *,
+    timing_std: float | None,
+) -> WaveformFit:
+    jacobian, residual, converged = solution
+    if values.get("amplitude", 1.0) < 0.0 and "phase" in free:
+        values["amplitude"], values["phase"] = -values["amplitude"], values["phase"] + math.pi
+        jacobian = jacobian * np.where(np.array(free) == "amplitude", -1.0, 1.0)
+    if "phase" in values:
+        values["phase"] = math.remainder(values["phase"], 2.0 * math.pi)
+    covariance = _covariance(kind, free, jacobian, residual)
+    if timing_std is None:
+        timing_std = float(np.median(np.diff(t))) / math.sqrt(12.0)
+    shift = _per_second(values, free)
+    covariance += timing_std**2 * np.outer(shift, shift)
+    std = {name: float(math.sqrt(covariance[k, k])) for k, name in enumerate(free)}
+    rms = float(np.sqrt(np.mean(residual**2)))
+    window = (float(t[0]), float(t[-1]))
+    return WaveformFit(kind, values, std, covariance, rms, len(t), window, converged)
+
+
+def _covariance(
+    kind: str, free: Sequence[str], jacobian: FloatArray, residual: FloatArray
+) -> FloatArray:
+    """Covariance of the fitted parameters, shape (p, p).
+
+    A step's instant has no derivative: the sampling alone bounds it, which the caller adds.
+    """
+    smooth = [k for k, name in enumerate(free) if (kind, name) != ("step", "time")]
+    covariance = np.zeros((len(free), len(free)))
+    if smooth:
+        part = robust_covariance(jacobian[:, smooth], residual)
+        covariance[np.ix_(smooth, smooth)] = part
+    return covariance
+
+
+def _per_second(values: Mapping[str, float], free: Sequence[str]) -> FloatArray:
+    """Change of each fitted parameter when the whole command comes one second later, shape (p,)."""
+    rate = 2.0 * math.pi * values.get("frequency", values.get("start_frequency", 0.0))
+    moves = {"phase": -rate, "start": 1.0, "end": 1.0, "time": 1.0}
+    return np.array([moves.get(name, 0.0) for name in free])

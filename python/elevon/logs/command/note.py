@@ -1,0 +1,213 @@
+"""What the operator knows, beside a log: the command, the brake, the load cell's arm.
+
+Values are in degrees, Hz and s at the user side, and m. Other software writes these files: the
+names of keys are taken in several spellings; keys that mean nothing here are reported, not refused.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from elevon.errors import FormatError, InputError, did_you_mean
+from elevon.logs.command.guess import FREE
+from elevon.logs.formats.limits import existing_file, quoted
+from elevon.units import parse_quantity
+from elevon.waveforms import wave_records
+
+__all__ = ["CommandNote", "read_command_note"]
+
+_MOST_BYTES = 1_000_000
+_KINDS: dict[str, str] = {
+    "amplitude": "deg", "bias": "deg", "phase": "deg", "initial": "deg", "final": "deg",
+    "low": "deg", "high": "deg", "value": "deg", "slope": "deg/s",
+    "frequency": "Hz", "start_frequency": "Hz", "end_frequency": "Hz",
+    "start": "s", "end": "s", "time": "s", "sweep_time": "s", "rise": "s", "fall": "s",
+    "hold_high": "s", "hold_low": "s",
+    "load_cell_arm": "m",
+}  # fmt: skip
+_SPELLINGS: dict[str, str] = {
+    "kind": "waveform", "shape": "waveform", "type": "waveform", "command": "waveform",
+    "amp": "amplitude", "offset": "bias", "mean": "bias", "freq": "frequency", "f": "frequency",
+    "sinamp": "amplitude", "sinbias": "bias", "sinfrq": "frequency", "chirptg": "sweep_time",
+    "stepini": "initial", "stepfin": "final", "steptime": "time", "rampic": "initial",
+    "rampslope": "slope", "ramptime": "start", "f0": "start_frequency", "f1": "end_frequency",
+    "f_start": "start_frequency", "f_end": "end_frequency", "initial_frequency": "start_frequency",
+    "final_frequency": "end_frequency", "target_time": "sweep_time", "duration": "sweep_time",
+    "start_time": "start", "t0": "start", "end_time": "end", "step_time": "time",
+    "arm": "load_cell_arm", "loadcell_arm": "load_cell_arm", "brake_arm": "load_cell_arm",
+    "lever_arm": "load_cell_arm", "arm_length": "load_cell_arm", "chain": "chain_ratio",
+    "brake_on": "brake", "current_convention": "current", "currents": "current",
+    "convention": "current",
+}  # fmt: skip
+_SUFFIX = re.compile(r"_(?:deg|degrees|hz|s|sec|seconds|m|deg_s|deg_per_s)$")
+_BRAKE = {"on": True, "true": True, "yes": True, "off": False, "false": False, "no": False}
+
+
+@dataclass(frozen=True, slots=True)
+class CommandNote:
+    """A command note in SI.
+
+    Attributes
+    ----------
+    source : str
+        The file.
+    waveform : str or None
+        Kind of waveform.
+    parameters : dict of str to float
+        Its parameters that are known (SI).
+    brake : bool or None
+        Whether the brake was on.
+    load_cell_arm : float or None
+        Arm of the load cell [m].
+    chain_ratio : float or None
+        Brake shaft's chain ratio.
+    current : str or None
+        ``rms`` or ``peak``.
+    ignored : tuple of str
+        Keys that mean nothing here.
+    """
+
+    source: str
+    waveform: str | None = None
+    parameters: dict[str, float] = field(default_factory=dict)
+    brake: bool | None = None
+    load_cell_arm: float | None = None
+    chain_ratio: float | None = None
+    current: str | None = None
+    ignored: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain types for a recording's metadata."""
+        return {
+            "waveform": self.waveform,
+            "parameters": dict(self.parameters),
+            "brake": self.brake,
+            "load_cell_arm": self.load_cell_arm,
+            "chain_ratio": self.chain_ratio,
+            "current": self.current,
+        }
+
+
+def read_command_note(path: str | Path) -> CommandNote:
+    """Read a command note from TOML or JSON, told apart by the ending or the first character.
+
+    Raises
+    ------
+    InputError
+        No such file, neither TOML nor JSON, a value of the wrong kind, an unknown waveform.
+    """
+    file = existing_file(path)
+    place = str(file)
+    flat = _flatten(_document(file), place)
+    values: dict[str, Any] = {}
+    ignored = []
+    for key, value in flat.items():
+        name = _canonical(key)
+        if name is None:
+            ignored.append(key[:60])
+        elif name in values:
+            raise InputError(f"{place}: {quoted(key)} gives {name} a second time")
+        else:
+            values[name] = value
+    return _note(place, values, tuple(ignored))
+
+
+def _document(file: Path) -> Mapping[str, Any]:
+    raw = file.read_bytes()[: _MOST_BYTES + 1]
+    if len(raw) > _MOST_BYTES:
+        raise FormatError(f"{file}: longer than {_MOST_BYTES} bytes; not a command note")
+    try:
+        text = raw.decode("utf-8-sig")
+        is_json = file.suffix.lower() == ".json" or text.lstrip().startswith("{")
+        document = json.loads(text) if is_json else tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise FormatError(f"{file}: neither JSON nor TOML: {quoted(str(error))}") from error
+    if not isinstance(document, dict):
+        raise FormatError(f"{file}: a table of keys and values is expected")
+    return document
+
+
+def _flatten(document: Mapping[str, Any], place: str) -> dict[str, Any]:
+    """Lift the keys of inner tables (``waveform = {kind = ...}``, ``[command]``) one level up."""
+    flat: dict[str, Any] = {}
+    for key, value in document.items():
+        if isinstance(value, list) and value and isinstance(value[0], dict):
+            if len(value) > 1:
+                raise InputError(f"{place}: {quoted(key)}: only one waveform can be noted")
+            value = value[0]  # noqa: PLW2901 - a list of one term is that term
+        inner = value if isinstance(value, dict) else {key: value}
+        for name, item in inner.items():
+            if name in flat:
+                raise InputError(f"{place}: {quoted(name)} stands twice")
+            flat[name] = item
+    return flat
+
+
+def _canonical(key: str) -> str | None:
+    text = re.sub(r"[\s\-.]+", "_", key.strip()).lower()
+    for name in (text, _SUFFIX.sub("", text)):
+        name = _SPELLINGS.get(name, name)  # noqa: PLW2901 - one spelling for each meaning
+        if name in _KINDS or name in {"waveform", "brake", "chain_ratio", "current"}:
+            return name
+    return None
+
+
+def _note(place: str, values: dict[str, Any], ignored: tuple[str, ...]) -> CommandNote:
+    waveform = values.pop("waveform", None)
+    if waveform is not None:
+        waveform = str(waveform).strip().lower()
+        if waveform not in FREE:
+            raise InputError(
+                f"{place}: unknown waveform {quoted(waveform)}{did_you_mean(waveform, FREE)}"
+            )
+    current = values.pop("current", None)
+    if current is not None and str(current).lower() not in {"rms", "peak"}:
+        raise InputError(f"{place}: current = {quoted(str(current))}; valid: 'rms', 'peak'")
+    brake = _switch(place, values.pop("brake", None))
+    ratio = values.pop("chain_ratio", None)
+    numbers = {name: _number(f"{place}: {name}", v, _KINDS[name]) for name, v in values.items()}
+    arm = numbers.pop("load_cell_arm", None)
+    chain = None if ratio is None else _number(f"{place}: chain_ratio", ratio, "1")
+    for name, value in (("load_cell_arm", arm), ("chain_ratio", chain)):
+        if value is not None and not value > 0.0:
+            raise InputError(f"{place}: {name} = {value:g} must be above 0")
+    _check_parameters(place, waveform, numbers)
+    return CommandNote(
+        place, waveform, numbers, brake, arm, chain,
+        None if current is None else str(current).lower(), ignored,
+    )  # fmt: skip
+
+
+def _check_parameters(place: str, waveform: str | None, numbers: Mapping[str, float]) -> None:
+    if waveform is None:
+        return
+    names = wave_records()[waveform].names
+    for name in numbers:
+        if name not in names:
+            raise InputError(
+                f"{place}: {name} is no parameter of the waveform {waveform}"
+                f"{did_you_mean(name, names)}"
+            )
+
+
+def _number(place: str, value: Any, kind: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise InputError(f"{place}: {quoted(str(value))} is not a number")
+    return parse_quantity(value, kind, place)
+
+
+def _switch(place: str, value: Any) -> bool | None:
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, int) and value in {0, 1}:
+        return bool(value)
+    state = _BRAKE.get(str(value).strip().lower())
+    if state is None:
+        raise InputError(f"{place}: brake = {quoted(str(value))}; valid: on, off")
+    return state

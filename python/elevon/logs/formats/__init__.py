@@ -1,0 +1,1 @@
+"""Files as tables of columns: every format a log may come in."""

@@ -1,0 +1,73 @@
+"""Which reader a file needs, told by its first bytes before its name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from elevon.errors import unknown
+from elevon.logs.formats.hdf import is_hdf5
+from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file
+from elevon.logs.formats.opening import head
+from elevon.logs.formats.table import RawTable
+
+__all__ = ["FORMATS", "file_kind", "read_table"]
+
+#: What `elevon import --format` takes.
+FORMATS = ("auto", "drive", "csv", "parquet", "netcdf", "mat", "recording", "cranfield")
+
+
+def file_kind(path: Path) -> str:
+    """Return ``parquet``, ``netcdf``, ``mat`` or ``csv`` from a file's first bytes."""
+    first = head(path, 128)
+    if first.startswith(b"PAR1"):
+        return "parquet"
+    if first.startswith((b"CDF\x01", b"CDF\x02")):
+        return "netcdf"
+    if first[126:128] in (b"IM", b"MI"):
+        return "mat"
+    if is_hdf5(path):
+        return "mat" if first.startswith(b"MATLAB 7.3") else "netcdf"
+    return "csv"
+
+
+def read_table(
+    path: str | Path, log_format: str = "auto", limits: Limits = DEFAULT_LIMITS
+) -> RawTable:
+    """Read a log's columns with the reader its format needs.
+
+    Parameters
+    ----------
+    path : path
+        The log.
+    log_format : str
+        One of `FORMATS`.
+    limits : Limits
+        Bounds on size.
+
+    Raises
+    ------
+    UnknownNameError
+        Unknown format.
+    InputError, FormatError
+        As the readers.
+    """
+    if log_format not in FORMATS:
+        raise unknown("format", log_format, FORMATS)
+    file = existing_file(path, limits)
+    kind = file_kind(file) if log_format in {"auto", "drive", "recording"} else log_format
+    if kind == "parquet":
+        from elevon.logs.formats.parquet import read_parquet
+
+        return read_parquet(file, limits=limits)
+    if kind == "netcdf":
+        from elevon.logs.formats.netcdf import read_netcdf
+
+        return read_netcdf(file, limits=limits)
+    if kind == "mat":
+        from elevon.logs.formats.matlab import read_matlab
+
+        return read_matlab(file, limits=limits)
+    from elevon.logs.formats.text import read_text_table
+
+    header = True if log_format == "drive" else None
+    return read_text_table(file, limits=limits, header=header)

@@ -1,0 +1,178 @@
+"""Load cells: their files, and the torque they stand for.
+
+The bench's load-cell file has two columns, time and value, on the load cell's own clock; its zero
+is the trigger edge of the drive's trace.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.errors import FormatError, InputError, RangeError
+from elevon.files import write_bytes
+from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, quoted
+from elevon.logs.formats.text import read_text_table
+from elevon.units import check_kind, to_si
+
+__all__ = [
+    "LoadCellLog",
+    "brake_torque",
+    "guide_torque",
+    "read_loadcell",
+    "write_loadcell",
+]
+
+FloatArray = npt.NDArray[np.float64]
+_UNITS = {"N": "N", "Nm": "N m", "N m": "N m", "kg": "kg", "g": "g"}
+_GRAVITY = 9.80665
+
+
+@dataclass(frozen=True, slots=True)
+class LoadCellLog:
+    """A load-cell file as read.
+
+    Attributes
+    ----------
+    time : ndarray, shape (samples,)
+        Seconds on the load cell's own clock.
+    value : ndarray, shape (samples,)
+        Force [N], or torque [N m] where the file says so.
+    unit : str
+        ``N`` or ``N m``.
+    notes : tuple of str
+        What was seen: units stated or assumed, text format.
+    """
+
+    time: FloatArray
+    value: FloatArray
+    unit: str
+    notes: tuple[str, ...]
+
+
+def brake_torque(force: npt.ArrayLike, arm: float, chain_ratio: float) -> FloatArray:
+    """Brake torque on the fast shaft [N m] from the force [N] at an arm [m] of the brake shaft.
+
+    The chain divides it: the brake shaft turns `chain_ratio` times slower than the motor.
+    """
+    _positive("arm", arm)
+    _positive("chain_ratio", chain_ratio)
+    return np.asarray(force, dtype=np.float64) * (arm / chain_ratio)
+
+
+def guide_torque(force_1: npt.ArrayLike, force_2: npt.ArrayLike, radius: float) -> FloatArray:
+    """Torque [N m] of two cables on the winding guide of `radius` [m]: (F1 + F2) r."""
+    _positive("radius", radius)
+    total = np.asarray(force_1, dtype=np.float64) + np.asarray(force_2, dtype=np.float64)
+    return np.asarray(total * radius, dtype=np.float64)
+
+
+def write_loadcell(
+    path: str | os.PathLike[str],
+    time: npt.ArrayLike,
+    value: npt.ArrayLike,
+    *,
+    unit: str = "N",
+    force: bool = False,
+) -> Path:
+    """Write a load-cell file: ``time [s],value [N]``.
+
+    Parameters
+    ----------
+    path : path
+        The CSV file.
+    time : array_like, shape (samples,)
+        Seconds from the trigger, on the load cell's clock.
+    value : array_like, shape (samples,)
+        Force or torque.
+    unit : str
+        ``N`` or ``N m``.
+    force : bool
+        Whether an existing file may be replaced.
+
+    Raises
+    ------
+    InputError
+        Lengths that differ, values that are not finite, or another unit.
+    """
+    times, values = (np.asarray(a, dtype=np.float64) for a in (time, value))
+    if unit not in {"N", "N m"}:
+        raise InputError(f"load cell: unit {unit!r}; valid: 'N', 'N m'")
+    if times.ndim != 1 or times.shape != values.shape:
+        raise InputError(f"load cell: time has shape {times.shape}, value {values.shape}")
+    if not (np.all(np.isfinite(times)) and np.all(np.isfinite(values))):
+        raise RangeError("load cell: a value is not finite")
+    text = io.StringIO()
+    text.write(f"time [s],value [{unit}]\n")
+    for t, v in zip(times.tolist(), values.tolist(), strict=True):
+        text.write(f"{t:.9g},{v:.9g}\n")
+    return write_bytes(path, text.getvalue().encode("utf-8"), force=force)
+
+
+def read_loadcell(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> LoadCellLog:
+    """Read a load-cell file: two columns, time and value, with or without a header.
+
+    Time is in s unless the header says ms, or the sample spacing shows it can only be ms; the value
+    is a force in N unless the header says otherwise.
+
+    Raises
+    ------
+    FormatError
+        Not two columns, missing cells, or time that runs backwards.
+    """
+    table = read_text_table(path, limits=limits, header=None)
+    if len(table.columns) != 2:
+        raise FormatError(
+            f"{table.source}: a load-cell file has two columns, time and value; "
+            f"this one has {len(table.columns)}"
+        )
+    (time_name, time), (value_name, value) = table.columns.items()
+    notes = list(table.notes)
+    for name, column in ((time_name, time), (value_name, value)):
+        if np.isnan(column).any():
+            row = int(np.argmax(np.isnan(column))) + 1
+            raise FormatError(f"{table.source}, row {row}: no number for {quoted(name)}")
+    scale = _time_scale(table.units.get(time_name, ""), time_name, time, notes)
+    factor, unit = _value_unit(table.source, table.units.get(value_name, ""), notes)
+    seconds = time * scale
+    back = np.flatnonzero(np.diff(seconds) < 0.0)
+    if back.size:
+        raise FormatError(f"{table.source}, row {back[0] + 2}: time runs backwards")
+    return LoadCellLog(seconds, value * factor, unit, tuple(notes))
+
+
+def _time_scale(unit: str, name: str, time: FloatArray, notes: list[str]) -> float:
+    text = unit or ("ms" if name.strip().lower() in {"xms", "time_ms", "timems", "t_ms"} else "")
+    if text:
+        check_kind(text, "s", "load cell, time")
+        return float(to_si(1.0, text))
+    # A load cell samples at 1 to 1000 Hz: a mean spacing of 1 or more can only be milliseconds,
+    # one of 0.5 s or less in ms would be above 2 kHz, which no such converter reaches.
+    spacing = float(time[-1] - time[0]) / max(len(time) - 1, 1)
+    if spacing >= 1.0:
+        notes.append(f"load-cell time taken as ms: spacing {spacing:.4g}")
+        return 1e-3
+    notes.append(f"load-cell time taken as s: spacing {spacing:.4g}")
+    return 1.0
+
+
+def _value_unit(source: str, unit: str, notes: list[str]) -> tuple[float, str]:
+    if not unit:
+        notes.append("load-cell value taken as a force in N: the file states no unit")
+        return 1.0, "N"
+    if unit not in _UNITS:
+        raise InputError(f"{source}: load-cell unit {quoted(unit)}; valid: {', '.join(_UNITS)}")
+    if unit in {"kg", "g"}:
+        notes.append(f"load-cell value in {unit}: converted with g = {_GRAVITY} m/s2")
+        return _GRAVITY * (1.0 if unit == "kg" else 1e-3), "N"
+    return 1.0, _UNITS[unit]
+
+
+def _positive(name: str, value: float) -> None:
+    if not value > 0.0:
+        raise RangeError(f"load cell: {name} = {value!r} must be above 0")

@@ -1,0 +1,95 @@
+"""MATLAB files of version 5 and 7.3."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from contextlib import closing
+from pathlib import Path
+
+from elevon.errors import FormatError
+from elevon.logs.formats.hdf import is_hdf5, numeric_vectors
+from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file, quoted
+from elevon.logs.formats.table import FloatArray, RawTable
+from elevon.logs.formats.vectors import table_of_vectors
+from elevon.recording.mat5 import Variable, variables
+
+__all__ = ["has_variable", "read_matlab"]
+
+
+def read_matlab(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> RawTable:
+    """Read the numeric vectors of a .mat file, at the top or inside one plain structure.
+
+    Cells, objects, function handles, sparse and complex values are named in the notes and never
+    loaded.
+
+    Raises
+    ------
+    FormatError
+        Not a .mat file of version 5 or 7.3, damaged, or larger than the limits after expansion.
+    """
+    file = existing_file(path, limits)
+    notes: list[str] = []
+    if is_hdf5(file):
+        vectors, _, notes = numeric_vectors(file, limits)
+        return table_of_vectors(str(file), vectors, {}, notes, file_format="mat 7.3", limits=limits)
+    vectors = _vectors(file, limits, notes)
+    return table_of_vectors(str(file), vectors, {}, notes, file_format="mat 5", limits=limits)
+
+
+def has_variable(path: Path, name: str, limits: Limits) -> bool:
+    """Whether a version 5 file holds a variable of a name at its top; False for any other file."""
+    try:
+        with closing(_bounded(path, limits)) as found:
+            return any(variable.name == name for variable in found)
+    except FormatError:
+        return False
+
+
+def _bounded(path: Path, limits: Limits) -> Generator[Variable, None, None]:
+    return variables(path, lambda size: limits.check_bytes(str(path), size))
+
+
+def _vectors(path: Path, limits: Limits, notes: list[str]) -> dict[str, FloatArray]:
+    """Return the numeric vectors of a version 5 file; those inside a structure as ``name/field``.
+
+    What is passed over is added to the notes: matrices, cells, objects, text, complex numbers.
+    """
+    found: dict[str, FloatArray] = {}
+    total = 0
+    for variable in _bounded(path, limits):
+        for label, item in _members(path, variable):
+            vector = _vector(label, item, notes)
+            if vector is None:
+                continue
+            if label in found:
+                raise FormatError(f"{path}: two variables are named {quoted(label)}")
+            total += len(vector)
+            limits.check_shape(str(path), total, 1)
+            found[label] = vector
+    return found
+
+
+def _members(path: Path, variable: Variable) -> Iterator[tuple[str, Variable]]:
+    """Yield the variable itself, or the fields of a structure."""
+    if variable.kind != "struct":
+        yield variable.name, variable
+        return
+    for field in variable.fields():
+        if field.kind == "struct":
+            raise FormatError(
+                f"{path}, {quoted(variable.name)}: a structure within a structure cannot be read"
+            )
+        yield f"{variable.name}/{field.name}", field
+
+
+def _vector(label: str, item: Variable, notes: list[str]) -> FloatArray | None:
+    """Decode a vector; None, with a note, for anything else."""
+    reason = "" if item.kind == "numbers" else item.kind
+    if not reason and item.is_complex:
+        reason = "complex numbers"
+    if not reason and sum(length != 1 for length in item.shape) > 1:
+        reason = f"not a vector, shape {item.shape}"
+    if reason:
+        notes.append(f"{quoted(label)} passed over: {reason}")
+        return None
+    return item.numbers()

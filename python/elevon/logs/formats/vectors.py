@@ -1,0 +1,68 @@
+"""From loose vectors (MATLAB, HDF5, NetCDF) to one table: those as long as the time vector."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from elevon.errors import FormatError
+from elevon.logs.formats.limits import Limits, quoted
+from elevon.logs.formats.table import FloatArray, RawTable
+
+__all__ = ["quiet", "table_of_vectors"]
+
+_TIMES = ("xms", "time", "t", "time_s", "time_ms", "timems", "x")
+
+
+def table_of_vectors(
+    source: str,
+    vectors: Mapping[str, FloatArray],
+    units: Mapping[str, str],
+    notes: list[str],
+    *,
+    file_format: str,
+    limits: Limits,
+) -> RawTable:
+    """Return the vectors that share the time vector's length; the others are named in the notes.
+
+    Group names are dropped where the last part of the path is unique.
+
+    Raises
+    ------
+    FormatError
+        No vector, or more than the limits allow.
+    """
+    if not vectors:
+        raise FormatError(f"{source}: no vector of numbers")
+    length = _length(vectors)
+    if length == 0:
+        raise FormatError(f"{source}: the vectors are empty")
+    kept = {name: quiet(values) for name, values in vectors.items() if len(values) == length}
+    for name in vectors.keys() - kept.keys():
+        notes.append(f"{quoted(name)} passed over: {len(vectors[name])} values, not {length}")
+    limits.check_shape(source, length, len(kept))
+    last = [name.rpartition("/")[2] for name in kept]
+    short = {
+        name: tail if last.count(tail) == 1 else name for name, tail in zip(kept, last, strict=True)
+    }
+    columns = {short[name]: values for name, values in kept.items()}
+    stated = {short[name]: unit for name, unit in units.items() if name in kept}
+    return RawTable(source, columns, stated, tuple(notes), file_format)
+
+
+def quiet(values: FloatArray) -> FloatArray:
+    """Return the values with every kind of NaN replaced by the plain one.
+
+    A file may hold signalling NaNs, which raise floating-point flags in the next operation.
+    """
+    missing = np.isnan(values)
+    return np.where(missing, np.nan, values) if missing.any() else values
+
+
+def _length(vectors: Mapping[str, FloatArray]) -> int:
+    for wanted in _TIMES:
+        for name, values in vectors.items():
+            if name.rpartition("/")[2].lower() == wanted:
+                return len(values)
+    return max(len(values) for values in vectors.values())

@@ -1,0 +1,310 @@
+"""A log made into a recording, with a report of everything seen on the way."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from elevon.errors import FormatError, InputError, RangeError
+from elevon.logs.channels import examine_channels
+from elevon.logs.clocks.loadcell_join import join_loadcell
+from elevon.logs.clocks.quality import ClockQuality, clock_quality
+from elevon.logs.command.note import CommandNote, read_command_note
+from elevon.logs.formats.detect import read_table
+from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits
+from elevon.logs.formats.matlab import has_variable
+from elevon.logs.formats.table import FloatArray, RawTable
+from elevon.logs.maps.assign import Assignment, assign_columns, rms_to_peak, settle_positions
+from elevon.logs.maps.column_map import ColumnMap, read_column_map
+from elevon.logs.report import ImportReport
+from elevon.recording import Recording
+
+__all__ = ["GEAR_RATIO", "ImportedLog", "find_sidecars", "import_log", "same_rate"]
+
+GEAR_RATIO = 124.0  # the Torino bench's gearbox
+_ROUNDING = 0.6  # ms: a clock written in whole ms jitters by half of one
+
+
+@dataclass(frozen=True, slots=True)
+class ImportedLog:
+    """A recording and the report of how it came about."""
+
+    recording: Recording
+    report: ImportReport
+    note: CommandNote | None
+
+
+def find_sidecars(path: str | Path) -> tuple[Path | None, Path | None]:
+    """Return ``NAME_loadcell.csv`` and ``NAME_command.json`` (or ``.toml``) beside ``NAME.csv``."""
+    file = Path(path).expanduser()
+    stem = file.name[: -len(file.suffix)] if file.suffix else file.name
+    cell = file.with_name(f"{stem}_loadcell.csv")
+    notes = [file.with_name(f"{stem}_command{ending}") for ending in (".json", ".toml")]
+    present = [note for note in notes if note.is_file()]
+    if len(present) > 1:
+        raise InputError(f"{present[0]} and {present[1].name} both exist; say which with --command")
+    return (cell if cell.is_file() else None), (present[0] if present else None)
+
+
+def import_log(
+    path: str | Path,
+    *,
+    log_format: str = "auto",
+    column_map: ColumnMap | str | Path | None = None,
+    loadcell: str | Path | None = None,
+    command: str | Path | None = None,
+    gear_ratio: float | None = None,
+    sidecars: bool = True,
+    limits: Limits = DEFAULT_LIMITS,
+) -> ImportedLog:
+    """Read a log into a recording.
+
+    Parameters
+    ----------
+    path : path
+        The log.
+    log_format : str
+        One of `elevon.logs.formats.detect.FORMATS` but ``cranfield``, which has a loader of
+        its own.
+    column_map : ColumnMap or path, optional
+        What the columns are, where the headers do not tell.
+    loadcell : path, optional
+        Load-cell file; by default the one beside the log.
+    command : path, optional
+        Command note; by default the one beside the log.
+    gear_ratio : float, optional
+        Fast over slow; 124 unless given here or in the map.
+    sidecars : bool
+        Whether files beside the log are looked for.
+    limits : Limits
+        Bounds on size.
+
+    Returns
+    -------
+    ImportedLog
+        Recording on the clock ``drive`` (and ``load_cell``), SI, currents as peak; the report is
+        also in its ``meta["import"]``.
+
+    Raises
+    ------
+    InputError, FormatError
+        Anything in the files that cannot be read as one consistent log.
+    """
+    if log_format in {"auto", "recording"}:
+        saved = _saved(path, log_format)
+        if saved is not None:
+            return saved
+    near_cell, near_note = find_sidecars(path) if sidecars else (None, None)
+    note_path = command or near_note
+    note = read_command_note(note_path) if note_path is not None else None
+    mapped = column_map
+    if mapped is not None and not isinstance(mapped, ColumnMap):
+        mapped = read_column_map(mapped)
+    table = read_table(path, log_format, limits)
+    report = ImportReport(str(path), table.file_format)
+    for text in table.notes:
+        report.note("file", "format", text)
+    ratio = _ratio(gear_ratio, mapped)
+    found = assign_columns(table, mapped, ratio, report, layout=log_format)
+    quality, time = _clock(table, found, report)
+    settle_positions(found, table, time, quality.keep, ratio, report=report)
+    convention = _currents(found, mapped, note, report)
+    recording = _build(table, found, quality, time, report=report)
+    values = {channel.name: channel.values for channel in recording.channels}
+    examine_channels(time, values, ratio, report)
+    cell = loadcell or near_cell
+    if cell is not None:
+        recording = join_loadcell(recording, cell, note, report, limits, gear_ratio=ratio)
+    _note_findings(note, report)
+    meta = _meta(path, report, note, ratio, convention)
+    return ImportedLog(recording.with_meta(**meta), report, note)
+
+
+def same_rate(logs: list[ImportedLog]) -> None:
+    """Check that logs imported together run at one rate.
+
+    Raises
+    ------
+    InputError
+        Two rates that differ by more than 1 %; both files are named.
+    """
+    rates = [(log.report.source, log.report.clocks["drive"]["rate_hz"]) for log in logs]
+    for source, rate in rates[1:]:
+        if abs(rate - rates[0][1]) > 0.01 * rates[0][1]:
+            raise InputError(
+                f"{rates[0][0]} runs at {rates[0][1]:.4g} Hz, {source} at {rate:.4g} Hz; "
+                "logs used together must have one rate"
+            )
+
+
+def _saved(path: str | Path, log_format: str) -> ImportedLog | None:
+    """Return a recording that this package saved, as it is; None for anything else."""
+    file = Path(path).expanduser()
+    if log_format == "auto" and not _is_saved(file):
+        return None
+    recording = Recording.load(file)
+    report = ImportReport(str(path), "recording")
+    for name, clock in recording.clocks.items():
+        quality = clock_quality(f"{path}, clock {name}", np.asarray(clock.time))
+        report.clocks[name] = _clock_facts(quality)
+    for channel in recording.channels:
+        report.channels.append(_channel_facts(channel.name, channel.name, channel.values, channel))
+    report.clocks.setdefault("drive", next(iter(report.clocks.values()), {}))
+    return ImportedLog(recording, report, None)
+
+
+def _is_saved(file: Path) -> bool:
+    try:
+        with file.open("rb") as stream:
+            if stream.read(9) == b"# elevon ":
+                return True
+        if file.suffix.lower() == ".mat" and not has_variable(file, "elevon", DEFAULT_LIMITS):
+            return False
+        if file.suffix.lower() in {".parquet", ".nc", ".mat"}:
+            Recording.load(file)
+            return True
+    except (InputError, OSError):
+        return False
+    return False
+
+
+def _ratio(given: float | None, mapped: ColumnMap | None) -> float:
+    ratio = given if given is not None else mapped.gear_ratio if mapped else None
+    ratio = GEAR_RATIO if ratio is None else ratio
+    if not (math.isfinite(ratio) and ratio > 0.0):
+        raise RangeError(f"gear ratio {ratio!r} must be above 0")
+    return ratio
+
+
+def _clock(
+    table: RawTable, found: dict[str, Assignment], report: ImportReport
+) -> tuple[ClockQuality, FloatArray]:
+    base = found["time"]
+    seconds = table.columns[base.column] * (base.factor or 1.0)
+    quality = clock_quality(table.source, seconds)
+    report.clocks["drive"] = _clock_facts(quality)
+    if quality.duplicates:
+        report.warn(
+            "drive",
+            "duplicates",
+            f"{quality.duplicates} rows repeat a time stamp: the first of each is kept, the "
+            "others are left out",
+        )
+    for start, end, missing in quality.gaps[:20]:
+        report.warn(
+            "drive", "gap", f"{missing} samples missing between {start:.4f} and {end:.4f} s"
+        )
+    if 1e3 * quality.jitter_max > _ROUNDING and quality.jitter_max > 0.25 * quality.period:
+        report.warn("drive", "jitter", f"time stamps stray up to {1e3 * quality.jitter_max:.3g} ms")
+    return quality, seconds[quality.keep]
+
+
+def _currents(
+    found: dict[str, Assignment],
+    mapped: ColumnMap | None,
+    note: CommandNote | None,
+    report: ImportReport,
+) -> str:
+    """Settle the convention of the drive's currents: what is said twice must agree."""
+    said = {c for c in (mapped.current if mapped else None, note.current if note else None) if c}
+    if len(said) > 1:
+        raise InputError(
+            f"{report.source}: the column map and the command note disagree on the currents "
+            "(rms, peak)"
+        )
+    convention = said.pop() if said else "rms"
+    changed = rms_to_peak(found) if convention == "rms" else []
+    if changed and not (mapped and mapped.current) and not (note and note.current):
+        report.warn(
+            "currents",
+            "convention-assumed",
+            f"{', '.join(changed)}: taken as rms and turned into peak; state it in the command "
+            "note or the map",
+        )
+    elif changed:
+        report.note("currents", "convention", f"{', '.join(changed)}: rms turned into peak")
+    return convention
+
+
+def _build(
+    table: RawTable,
+    found: dict[str, Assignment],
+    quality: ClockQuality,
+    time: FloatArray,
+    *,
+    report: ImportReport,
+) -> Recording:
+    values, units = {}, {}
+    for signal, item in found.items():
+        if signal == "time":
+            continue
+        column = table.columns[item.column][quality.keep]
+        values[signal] = column * (1.0 if item.factor is None else item.factor) + item.offset
+        units[signal] = item.unit
+    recording = Recording.build(time, values, units, clock="drive", rate=quality.rate)
+    for signal, item in found.items():
+        if signal != "time":
+            channel = recording[signal]
+            report.channels.append(_channel_facts(signal, item.column, channel.values, channel))
+    return recording
+
+
+def _channel_facts(name: str, column: str, values: Any, channel: Any) -> dict[str, Any]:
+    good = values[np.isfinite(values)]
+    return {
+        "name": name,
+        "column": column[:100],
+        "unit": channel.unit,
+        "minimum": float(good.min()) if good.size else None,
+        "maximum": float(good.max()) if good.size else None,
+        "missing": int(len(values) - good.size),
+    }
+
+
+def _clock_facts(quality: ClockQuality) -> dict[str, Any]:
+    return {
+        "samples": quality.samples,
+        "duration_s": quality.duration,
+        "rate_hz": quality.rate,
+        "period_s": quality.period,
+        "jitter_rms_s": quality.jitter_rms,
+        "jitter_max_s": quality.jitter_max,
+        "gaps": [list(gap) for gap in quality.gaps],
+        "duplicates": quality.duplicates,
+    }
+
+
+def _note_findings(note: CommandNote | None, report: ImportReport) -> None:
+    if note is None:
+        return
+    for key in note.ignored:
+        report.warn("command", "key-ignored", f"{note.source}: {key!a} means nothing here")
+
+
+def _meta(
+    path: str | Path,
+    report: ImportReport,
+    note: CommandNote | None,
+    ratio: float,
+    convention: str,
+) -> dict[str, Any]:
+    if not report.channels:
+        raise FormatError(f"{path}: no channel")
+    return {
+        "status": "measured",
+        "log": Path(path).name,
+        "gear_ratio": ratio,
+        "current_convention": convention,
+        "command_note": note.to_dict() if note else None,
+        "import": report.to_dict(),
+    }
+
+
+def with_source(log: ImportedLog, name: str) -> ImportedLog:
+    """Return the same log under another name in its metadata."""
+    return dataclasses.replace(log, recording=log.recording.with_meta(log=name))

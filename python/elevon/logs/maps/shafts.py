@@ -1,0 +1,254 @@
+"""Unit, shaft and sign of the two positions of a drive trace, settled by consistency."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from elevon.errors import InputError
+from elevon.logs.formats.table import FloatArray
+from elevon.logs.maps.consistency import (
+    Candidate,
+    Fit,
+    encoder_candidates,
+    match,
+    motor_candidates,
+    slope_with_play,
+)
+from elevon.logs.report import ImportReport
+
+__all__ = ["PositionStatement", "settle_encoder", "settle_motor", "travel_from_speed"]
+
+_LEAST_TRAVEL = 0.5  # rad of the motor: less than that says nothing about a unit
+
+
+@dataclass(frozen=True, slots=True)
+class PositionStatement:
+    """What is said about a position column: file units per rad of the signal's own shaft, signed.
+
+    None where nothing is said. The own shaft is the motor's for the motor's position and the user's
+    for the encoder's, whatever shaft the file refers it to.
+    """
+
+    column: str
+    per_rad: float | None = None
+
+
+def travel_from_speed(time: FloatArray, speed: FloatArray) -> FloatArray:
+    """Integrate a speed [rad/s] by the trapezoidal rule; missing samples are bridged."""
+    good = np.isfinite(speed)
+    filled = np.interp(time, time[good], speed[good]) if good.any() else np.zeros_like(time)
+    steps = 0.5 * (filled[1:] + filled[:-1]) * np.diff(time)
+    return np.concatenate(([0.0], np.cumsum(steps)))
+
+
+def settle_motor(
+    statement: PositionStatement,
+    time: FloatArray,
+    position: FloatArray,
+    speeds: Sequence[FloatArray],
+    report: ImportReport,
+) -> tuple[float, bool]:
+    """Return the factor from the file's motor position to rad, and whether the log confirms it.
+
+    Parameters
+    ----------
+    statement : PositionStatement
+        What the user said, if anything.
+    time : ndarray, shape (n,)
+        Seconds.
+    position : ndarray, shape (n,)
+        As in the file.
+    speeds : sequence of ndarray, shape (n,)
+        Actual speed and speed set point [rad/s], those that exist.
+    report : ImportReport
+        Findings are added to it.
+
+    Raises
+    ------
+    InputError
+        The motion contradicts every unit, or the one stated, or the sign.
+    """
+    fits = [_against(travel_from_speed(time, speed), position) for speed in speeds]
+    usable = [fit for fit in fits if fit.usable and fit.travel > _LEAST_TRAVEL]
+    if not usable:
+        return _unconfirmed(statement, "resolver_position", _why(fits), report), False
+    slope = usable[0].slope
+    if statement.per_rad is not None:
+        _check_stated(statement, slope, "the integral of the motor's speed")
+        return 1.0 / statement.per_rad, True
+    if slope < 0.0:
+        other = len(usable) > 1 and usable[1].slope > 0.0
+        what = "r63 (speed)" if other else f"{statement.column} (motor position)"
+        raise InputError(
+            f"{report.source}: {what} has the wrong sign: the motor's position falls while its "
+            "speed is positive; give sign = -1 in a column map"
+        )
+    found = match(slope, motor_candidates())
+    if found is None:
+        raise InputError(
+            f"{report.source}: {statement.column} moves {slope:.5g} per rad of the integrated "
+            f"motor speed, which is no known unit ({_listed(motor_candidates())}); give unit and "
+            "scale in a column map"
+        )
+    report.note(
+        "resolver_position",
+        "unit-confirmed",
+        f"{statement.column} is in {found.unit}: it moves {slope / found.scale:.4f} of the "
+        "integrated speed",
+    )
+    return 1.0 / found.scale, True
+
+
+def settle_encoder(
+    statement: PositionStatement,
+    reference: FloatArray,
+    position: FloatArray,
+    ratio: float,
+    report: ImportReport,
+    *,
+    trusted: bool = True,
+) -> tuple[float, bool]:
+    """Return the factor from the file's encoder position to rad at the user, and if confirmed.
+
+    Parameters
+    ----------
+    statement : PositionStatement
+        What the user said, if anything.
+    reference : ndarray, shape (n,)
+        The motor's position [rad].
+    position : ndarray, shape (n,)
+        As in the file.
+    ratio : float
+        Gear ratio, fast over slow.
+    report : ImportReport
+        Findings are added to it.
+    trusted : bool
+        Whether the reference itself is confirmed.
+
+    Raises
+    ------
+    InputError
+        Wrong sign, wrong shaft, or a scale that fits no unit.
+    """
+    good = np.isfinite(reference) & np.isfinite(position)
+    fit = slope_with_play(reference[good], position[good])
+    if not (trusted and fit.usable and fit.travel > _LEAST_TRAVEL):
+        why = "the motor's own unit is not confirmed" if not trusted else _why([fit])
+        return _unconfirmed(statement, "encoder_position", why, report, ratio), False
+    play = math.degrees(fit.play / ratio)
+    if statement.per_rad is not None:
+        against = "the motor's position over the gear ratio"
+        _check_stated(statement, fit.slope * ratio, against, ratio)
+        return 1.0 / statement.per_rad, True
+    if fit.slope < 0.0:
+        raise InputError(
+            f"{report.source}: {statement.column} (encoder) has the wrong sign: it falls while "
+            "the motor's position rises; give sign = -1 in a column map"
+        )
+    found = match(fit.slope, encoder_candidates(ratio))
+    _refuse_shaft(statement, fit, found, ratio, report)
+    assert found is not None
+    seen = ratio * found.scale / fit.slope
+    follows = f"gear ratio seen {seen:.3f}, expected {ratio:g}"
+    if found.shaft == "fast":  # the drive has multiplied by its own ratio: it cannot be seen
+        follows = f"it moves {fit.slope / found.scale:.4f} of the motor"
+    report.note(
+        "encoder_position",
+        "shaft-confirmed",
+        f"{statement.column} is on the {found.shaft} shaft in {found.unit}: {follows}; play about "
+        f"{play:.3f} deg at the user",
+    )
+    return 1.0 / (found.scale * ratio), True
+
+
+def _against(reference: FloatArray, position: FloatArray) -> Fit:
+    """Fit without play; a slow drift of the integrated speed is taken out where it can be told."""
+    good = np.isfinite(reference) & np.isfinite(position)
+    x, y = reference[good], position[good]
+    travel = float(np.ptp(x)) if x.size else 0.0
+    if travel == 0.0 or np.ptp(y) == 0.0:
+        return Fit(0.0, 0.0, math.inf, travel)
+    line = np.linspace(-1.0, 1.0, len(x))
+    dx, dy = x - x.mean(), y - y.mean()
+    if abs(float(np.corrcoef(dx, line)[0, 1])) < 0.9:
+        power = float(line @ line)
+        dx, dy = dx - line * (dx @ line) / power, dy - line * (dy @ line) / power
+    slope = float(dx @ dy) / float(dx @ dx)
+    rest = float(np.sqrt(np.mean((dy - slope * dx) ** 2)))
+    moved = abs(slope) * float(np.sqrt(np.mean(dx**2)))
+    return Fit(slope, 0.0, rest / moved if moved > 0.0 else math.inf, travel)
+
+
+def _refuse_shaft(
+    statement: PositionStatement,
+    fit: Fit,
+    found: Candidate | None,
+    ratio: float,
+    report: ImportReport,
+) -> None:
+    if found is None:
+        raise InputError(
+            f"{report.source}: {statement.column} (encoder) moves {fit.slope:.5g} per rad of the "
+            f"motor, which fits no unit on any shaft for a gear ratio of {ratio:g} "
+            f"({_listed(encoder_candidates(ratio))}); check the gear ratio, or give unit, scale "
+            "and shaft in a column map"
+        )
+    if found.shaft == "wheel":
+        raise InputError(
+            f"{report.source}: {statement.column} (encoder) is on the wrong shaft: it turns "
+            f"{fit.slope / found.scale:.3f} x 4 times the user shaft, as the encoder's own "
+            f"22-tooth wheel does; give shaft = 'slow', scale = 0.25, unit = '{found.unit}' in a "
+            "column map"
+        )
+
+
+def _check_stated(
+    statement: PositionStatement, slope: float, against: str, ratio: float = 1.0
+) -> None:
+    stated = statement.per_rad or 1.0
+    if slope * stated < 0.0:
+        raise InputError(
+            f"{statement.column}: the sign stated contradicts the log: against {against} it runs "
+            "the other way"
+        )
+    off = slope / stated
+    if abs(math.log(off)) > 0.15:
+        hint = ""
+        if ratio > 1.0 and min(abs(math.log(off / f)) for f in (ratio, 1.0 / ratio)) < 0.15:
+            hint = ": the other shaft"
+        raise InputError(
+            f"{statement.column}: unit, scale or shaft stated contradict the log: against "
+            f"{against} it moves {off:.4g} times what they say{hint}"
+        )
+
+
+def _unconfirmed(
+    statement: PositionStatement, name: str, why: str, report: ImportReport, ratio: float = 1.0
+) -> float:
+    if statement.per_rad is not None:
+        report.warn(name, "unit-unconfirmed", f"{statement.column}: unit as stated, {why}")
+        return 1.0 / statement.per_rad
+    shaft = ", on the fast shaft" if ratio > 1.0 else ""
+    report.warn(
+        name,
+        "unit-unconfirmed",
+        f"{statement.column}: taken as degrees{shaft}, {why}; state it in a column map",
+    )
+    return math.pi / 180.0 / ratio
+
+
+def _why(fits: Sequence[Fit]) -> str:
+    if not fits:
+        return "not confirmed: the log holds no speed"
+    travel = max(fit.travel for fit in fits)
+    if travel <= _LEAST_TRAVEL:
+        return f"not confirmed: the motor moves only {travel:.3g} rad"
+    return "not confirmed: the two do not move together"
+
+
+def _listed(candidates: Sequence[Candidate]) -> str:
+    return ", ".join(f"{c.unit} {c.shaft} {c.scale:.4g}" for c in candidates)
