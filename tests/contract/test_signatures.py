@@ -57,6 +57,7 @@ SIGNATURES = {
     ("stuck", "current"): "test_current_sensor_that_stands_still_frees_its_leg",
     ("dead", "current"): "test_current_sensor_that_stands_still_frees_its_leg",
     ("missing_counts", "encoder"): "test_missing_counts_make_the_encoder_read_short",
+    ("stator_rub", "motor"): "test_stator_rub_brakes_once_a_turn",
     ("bearing", "bearing"): "test_bearing_defect_shows_at_its_shaft_order",
     ("tooth_wear", "gear"): "test_tooth_wear_opens_the_play_over_each_mesh",
     ("chipped_tooth", "gear"): "test_chipped_tooth_opens_the_play_once_a_turn",

@@ -13,6 +13,8 @@ from tests.physics.rig import constant, run, term
 
 NAME = "nasa-ballscrew"
 LEAD = 0.010 / (2 * math.pi)
+#: Stops far away.
+AFAR = {"stop.upper": 10.0, "stop.lower": -10.0}
 #: The motor is turned by torques on its shaft; nothing rubs but what a test adds.
 FREE = {
     "drive.kind": "off", "friction.static": 0.0, "friction.dynamic": 0.0, "friction.viscous": 0.0,
@@ -158,6 +160,70 @@ def test_the_accelerometer_shows_the_passes_through_its_resonance(
     size = np.array([abs(np.mean(shown * window * np.exp(-1j * k * angle))) for k in lines])
     peak = lines[int(np.argmax(size))]
     assert abs(peak / passes - round(peak / passes)) < 0.03
+
+
+def shaken(values: dict[str, Any], speed: float, **options: Any) -> Any:
+    """An accelerometer on a shaft that turns freely 30 times."""
+    return run(
+        FREE | {"motor.inertia": 1e6, "vibration.model": "resonance"} | AFAR | values,
+        duration=30 * 2 * math.pi / speed, record="vibration,motor_position,motor_torque@20 kHz",
+        name=NAME, scenario={"initial": {"motor_speed": speed}}, **options,
+    )  # fmt: skip
+
+
+def lines(rec: Any, orders: list[float]) -> list[float]:
+    """Amplitude of the accelerometer at orders of the shaft, from the fifth turn on."""
+    late = rec["motor_position"].values > 5 * 2 * math.pi
+    angle, shown = rec["motor_position"].values[late], rec["vibration"].values[late]
+    window = np.hanning(angle.size)
+    return [
+        2.0 * abs(np.sum(window * shown * np.exp(-1j * k * angle))) / window.sum() for k in orders
+    ]
+
+
+def answered(force: float, frequency: float) -> float:
+    """Acceleration of the mode, 5 kg and 1200 Hz with 5 % damping, under a sine of the force."""
+    r = 2 * math.pi * frequency / (2 * math.pi * 1200.0)
+    return force / 5.0 * r**2 / math.hypot(1 - r**2, 0.1 * r)
+
+
+def test_the_accelerometer_shows_an_unbalance_once_a_turn() -> None:
+    """The centrifugal force J_x 22.94 1/m w^2 through the mode, and nothing between the orders."""
+    speed = 100.0
+    once, between = lines(shaken({"motor.unbalance_inertia": 7.27e-4}, speed), [1.0, 1.5])
+    force = 7.27e-4 * 22.94 * speed**2
+    assert once == pytest.approx(answered(force, speed / (2 * math.pi)), rel=0.01)
+    assert between < 0.01 * once
+
+
+def test_the_accelerometer_shows_the_mesh_of_a_gear() -> None:
+    """`gear_ripple` times the motor's torque at the order of the teeth."""
+    teeth, speed = 17.0, 60.0
+    values = {"vibration.gear_teeth": teeth, "vibration.gear_ripple": 30.0, "motor.inertia": 1e3}
+    driven = {"drive.kind": "hysteresis"}
+    rec = shaken(values | driven, speed, command=[constant(2.0)], mode="torque")
+    torque = float(np.mean(rec["motor_torque"].values))
+    mesh, between = lines(rec, [teeth, teeth + 0.5])
+    assert torque == pytest.approx(2.0, rel=0.05)
+    assert mesh == pytest.approx(answered(30.0 * torque, teeth * speed / (2 * math.pi)), rel=0.01)
+    assert between < 0.02 * mesh
+
+
+@pytest.mark.parametrize(
+    ("values", "once"),
+    [
+        ({"motor.eccentricity_dynamic": 0.97}, 200.0 * math.hypot(1.0, 0.2)),
+        ({"motor.eccentricity_static": 0.97}, 0.0),
+    ],
+)
+def test_the_accelerometer_shows_a_rub_that_turns_with_the_shaft(
+    values: dict[str, float], once: float
+) -> None:
+    """sqrt(1 + mu^2) N once a turn under a dynamic eccentricity; a static one presses one way."""
+    speed = 100.0
+    line = lines(shaken(values, speed), [1.0])[0]
+    full = answered(200.0 * math.hypot(1.0, 0.2), speed / (2 * math.pi))
+    assert line == pytest.approx(answered(once, speed / (2 * math.pi)), rel=0.01, abs=1e-3 * full)
 
 
 def test_starved_grease_drags_less_and_rubs_more() -> None:

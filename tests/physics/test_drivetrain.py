@@ -168,6 +168,51 @@ def test_magnetic_pull_rubs_in_the_bearing(fidelity: str) -> None:
 
 
 @BOTH
+@pytest.mark.parametrize(
+    ("settings", "depth"),
+    [
+        ({"motor.eccentricity_dynamic": 0.94}, 0.0),
+        ({"motor.eccentricity_dynamic": 0.97}, 0.02),
+        ({"motor.eccentricity_static": 0.6, "motor.rub_filled": 0.37}, 0.02),
+    ],
+)
+def test_a_closed_gap_brakes_the_shaft(
+    fidelity: str, settings: dict[str, float], depth: float
+) -> None:
+    """Mu K (e + f - c) R, at any angle: the same whether it stands still or turns."""
+    rec = coasting(settings, {}, fidelity, speed=20.0, duration=0.05, record="rub_force@1 kHz")
+    torque = 0.2 * 1e4 * depth * 0.016
+    assert values(rec, "rub_force")[0] == pytest.approx(1e4 * depth, abs=1e-9)
+    slowed = 20.0 - rec.final["motor_speed"]
+    assert slowed == pytest.approx(0.05 * torque / INERTIA, rel=1e-3, abs=1e-12)
+
+
+@BOTH
+def test_stator_rub_brakes_once_a_turn(fidelity: str) -> None:
+    """What fills the gap lets static and dynamic eccentricity meet: one contact a turn.
+
+    It lasts while |e| > c - f, for the share arccos((c'^2 - a^2 - b^2)/(2 a b))/pi of the turn.
+    """
+    a, b, filled = 0.2, 0.15, 0.65
+    rec = coasting(
+        {"motor.eccentricity_static": a, "motor.eccentricity_dynamic": b, "motor.inertia": 1e3},
+        fault("stator_rub", "motor", filled),
+        fidelity,
+        speed=2 * math.pi,
+        duration=4.0,
+        record="rub_force,motor_position@2 kHz",
+    )
+    force, angle = values(rec, "rub_force", "motor_position")
+    closed = 0.95 - filled
+    share = math.acos((closed**2 - a**2 - b**2) / (2 * a * b)) / math.pi
+    assert np.mean(force > 0.0) == pytest.approx(share, abs=2e-3)
+    assert np.count_nonzero((force[1:] > 0.0) & (force[:-1] == 0.0)) == 4
+    exact = np.hypot(a + b * np.cos(angle), b * np.sin(angle)) - closed
+    assert force == pytest.approx(1e4 * np.maximum(exact, 0.0), abs=1e-6)
+    assert [label["severity"] for label in rec.labels] == [filled]
+
+
+@BOTH
 def test_tooth_wear_opens_the_play_over_each_mesh(fidelity: str) -> None:
     """Pushed forwards, the user lags by half the play and the wear's sin^2 of the mesh."""
     play, wear = 1e-3, 4e-4

@@ -101,6 +101,22 @@ def test_current_noise_has_its_deviation() -> None:
     assert abs(np.corrcoef(noise[1:], noise[:-1])[0, 1]) < 0.06
 
 
+def test_resolver_noise_has_its_deviations() -> None:
+    """1 mrad and 0.2 rad/s, held over 10 us and independent of each other."""
+    rec = sensed(
+        {"sensor.resolver.noise_deviation": 1e-3, "sensor.resolver.speed_noise_deviation": 0.2,
+         "sensor.resolver.noise_sample_time": 1e-5},
+        "motor_position,resolver_position,motor_speed,resolver_speed@100 kHz",
+    )  # fmt: skip
+    angle, angle_shown, speed, speed_shown = values(
+        rec, "motor_position", "resolver_position", "motor_speed", "resolver_speed"
+    )
+    noise = np.array([angle_shown - angle, speed_shown - speed])[:, 10:]
+    assert np.std(noise, axis=1) == pytest.approx([1e-3, 0.2], rel=0.05)
+    assert abs(np.corrcoef(noise)[0, 1]) < 0.06
+    assert abs(np.corrcoef(noise[0, 1:], noise[0, :-1])[0, 1]) < 0.06
+
+
 def test_acquisition_filter_is_first_order() -> None:
     """The filtered q current is the true one through 1 / (1 + s / (2 pi f)), done again by hand."""
     cutoff = 100.0

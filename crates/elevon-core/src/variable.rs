@@ -150,6 +150,15 @@ impl<'a, P: Parameter> Own<'a, P> {
         self.raw[parameter.index()]
     }
 
+    /// The most a parameter may be in the run: its value, without bound where a fault moves it.
+    pub fn most(&self, parameter: P) -> f64 {
+        if self.touched[parameter.index()] {
+            f64::INFINITY
+        } else {
+            self.value(parameter)
+        }
+    }
+
     /// Is the parameter away from its neutral value, that of its record, now or later?
     pub fn away(&self, parameter: P) -> bool {
         self.apart(parameter.index())

@@ -18,13 +18,32 @@ variables! {
     }
 }
 
+/// Where the rotor stands in its bore, in fractions of the gap.
 #[derive(Clone, Copy, Debug)]
-pub struct MagneticPull<S> {
-    per_eccentricity: S,
+pub struct Eccentricity<S> {
     fixed: S,
     /// The dynamic eccentricity at the rotor's zero, along the static one and across it.
     along: S,
     across: S,
+}
+
+impl<S: Scalar> Eccentricity<S> {
+    /// `fixed` is the static eccentricity, `turning` the dynamic one times cosine and sine of its mechanical phase.
+    pub fn new(fixed: S, [along, across]: [S; 2]) -> Self {
+        Self { fixed, along, across }
+    }
+
+    /// Along the static eccentricity and across it, at a rotor angle.
+    #[inline(always)]
+    pub fn at(&self, angle: S) -> [S; 2] {
+        let (sin, cos) = angle.sin_cos();
+        [self.along.fma(cos, self.across.fma(sin, self.fixed)), self.along.fma(sin, -(self.across * cos))]
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct MagneticPull<S> {
+    per_eccentricity: S,
 }
 
 impl<S: Scalar> MagneticPull<S> {
@@ -33,17 +52,14 @@ impl<S: Scalar> MagneticPull<S> {
         own.away(MagneticPullParameter::MagneticPull)
     }
 
-    /// `fixed` is the static eccentricity, `turning` the dynamic one times cosine and sine of its mechanical phase.
-    pub fn derive(raw: &[S], fixed: S, [along, across]: [S; 2]) -> Self {
-        Self { per_eccentricity: raw[MagneticPullParameter::MagneticPull as usize], fixed, along, across }
+    pub fn derive(raw: &[S]) -> Self {
+        Self { per_eccentricity: raw[MagneticPullParameter::MagneticPull as usize] }
     }
 
     /// Radial force on the bearings at a rotor angle.
     #[inline(always)]
-    pub fn force(&self, angle: S) -> S {
-        let (sin, cos) = angle.sin_cos();
-        let x = self.along.fma(cos, self.across.fma(sin, self.fixed));
-        let y = self.along.fma(sin, -(self.across * cos));
+    pub fn force(&self, eccentricity: &Eccentricity<S>, angle: S) -> S {
+        let [x, y] = eccentricity.at(angle);
         self.per_eccentricity * x.fma(x, y * y).sqrt()
     }
 }
@@ -53,7 +69,8 @@ mod tests {
     use super::*;
 
     fn force(fixed: f64, turning: f64, angle: f64) -> f64 {
-        MagneticPull::derive(&[490.0], fixed, [turning * 0.2_f64.cos(), turning * 0.2_f64.sin()]).force(angle)
+        let eccentricity = Eccentricity::new(fixed, [turning * 0.2_f64.cos(), turning * 0.2_f64.sin()]);
+        MagneticPull::derive(&[490.0]).force(&eccentricity, angle)
     }
 
     #[test]

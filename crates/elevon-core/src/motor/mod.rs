@@ -4,6 +4,7 @@ pub mod cogging;
 pub mod equivalent;
 pub mod magnetic_pull;
 pub mod pole;
+pub mod rub;
 pub mod short;
 pub mod star;
 pub mod thermal;

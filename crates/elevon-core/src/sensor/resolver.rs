@@ -43,6 +43,13 @@ variables! {
                 Away("sensor.resolver.sine_short", 0.0), Away("sensor.resolver.cosine_short", 0.0),
             ])]);
         Stuck => "resolver.stuck", "-", "1", Flag, Sensor, Some(0.0), "1: the converter's reading stands still at its last value, angle and speed";
+        NoiseDeviation => "resolver.noise_deviation", "-", "rad", NonNegative, Sensor, Some(0.0), "standard deviation of the noise of the shown motor angle",
+            high_only("its step is longer than the noise's band");
+        SpeedNoiseDeviation => "resolver.speed_noise_deviation", "-", "rad/s", NonNegative, Sensor, Some(0.0), "standard deviation of the noise of the shown motor speed",
+            high_only("its step is longer than the noise's band");
+        NoiseSampleTime => "resolver.noise_sample_time", "-", "s", Positive, Sensor, Some(2.5e-4), "both noises are held over this time, which sets their band",
+            high_only("its step is longer than the noise's band")
+                .when(&[Either(&[Away("sensor.resolver.noise_deviation", 0.0), Away("sensor.resolver.speed_noise_deviation", 0.0)])]);
     }
 }
 
@@ -59,6 +66,8 @@ pub struct Resolver<S> {
     zero_when_off: S,
     stuck: S,
     tracking_limit: S,
+    noise_deviation: S,
+    speed_noise_deviation: S,
 }
 
 /// The last reading with power on.
@@ -97,6 +106,8 @@ impl<S: Scalar> Resolver<S> {
             off: S::indicator(off),
             stuck: g(P::Stuck),
             tracking_limit: g(P::TrackingLimit),
+            noise_deviation: g(P::NoiseDeviation),
+            speed_noise_deviation: g(P::SpeedNoiseDeviation),
             zero_when_off: S::indicator(S::mask(LossShows::read(g(P::LossShows)) == LossShows::Zero)),
         }
     }
@@ -107,6 +118,11 @@ impl<S: Scalar> Resolver<S> {
         own.any_away([P::Mismatch, P::Offset, P::Gain, P::PowerOff, P::Stuck]) || Self::signal_fails(own)
     }
 
+    /// Is there noise?
+    pub fn noisy(own: &Own<ResolverParameter>) -> bool {
+        own.any_away([ResolverParameter::NoiseDeviation, ResolverParameter::SpeedNoiseDeviation])
+    }
+
     /// Is a winding ever shorted or open?
     fn signal_fails(own: &Own<ResolverParameter>) -> bool {
         own.any_away_among(ResolverParameter::SineShort, ResolverParameter::CosineOpen)
@@ -115,6 +131,20 @@ impl<S: Scalar> Resolver<S> {
     /// Is it ever without power or signal?
     pub fn lost(own: &Own<ResolverParameter>) -> bool {
         own.away(ResolverParameter::PowerOff) || Self::signal_fails(own)
+    }
+
+    /// Adds noise of unit deviation to a reading, unless that is held.
+    #[inline(always)]
+    pub fn disturbed(&self, reading: Reading<S>, noise: [S; 2]) -> Reading<S> {
+        let half = S::splat(0.5);
+        let live = S::one() - S::indicator(half.le(self.off) | half.le(self.stuck));
+        let angle = live * self.noise_deviation * noise[0];
+        let speed = live * self.speed_noise_deviation * noise[1];
+        Reading {
+            angle: reading.angle + angle,
+            position: self.gain.fma(angle, reading.position),
+            speed: self.gain.fma(speed, reading.speed),
+        }
     }
 
     /// Reading at angle `theta`, speed `omega`; `held` is the last one with power on.
@@ -199,5 +229,18 @@ mod tests {
         assert_eq!((shown.angle, shown.speed), (1.0, 3.0));
         let again = free.read(6.0, 8.0, &mut held);
         assert_eq!((again.angle, again.speed), (6.0, 8.0));
+    }
+
+    #[test]
+    fn noise_is_added_to_a_live_reading() {
+        let noise = [(P::NoiseDeviation, 1e-3), (P::SpeedNoiseDeviation, 0.5)];
+        let shown = resolver(&noise).disturbed(Reading { angle: 0.3, position: 0.4, speed: 3.0 }, [2.0, -1.0]);
+        assert!((shown.angle - 0.302).abs() < 1e-15 && (shown.position - 0.402).abs() < 1e-15);
+        assert_eq!(shown.speed, 2.5);
+        for held in [P::PowerOff, P::Stuck] {
+            let shown =
+                resolver(&[noise[0], noise[1], (held, 1.0)]).disturbed(Reading { angle: 0.3, position: 0.4, speed: 0.0 }, [2.0, -1.0]);
+            assert_eq!((shown.angle, shown.position, shown.speed), (0.3, 0.4, 0.0));
+        }
     }
 }

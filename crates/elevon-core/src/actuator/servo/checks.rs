@@ -12,6 +12,7 @@ use crate::motor::star::{MotorParameter as Motor, ShortModel};
 use crate::motor::thermal::{ThermalModel, ThermalParameter as Thermal};
 use crate::motor::unbalance::UnbalanceParameter;
 use crate::sensor::current::CurrentSensorParameter;
+use crate::sensor::resolver::ResolverParameter as Resolver;
 use crate::transmission::friction::FrictionParameter;
 use crate::transmission::gear::{GearParameter, LoadParameter, StopParameter};
 use crate::transmission::play::{PlayModel, PlayParameter};
@@ -199,12 +200,16 @@ pub fn high<F: Form>(raw: &[f64]) -> Vec<Finding> {
         (Control::SampleTime.at(), "control.sample_time"),
         (Control::NoiseSampleTime.at(), "control.noise_sample_time"),
         (CurrentSensorParameter::NoiseSampleTime.at(), "sensor.current.noise_sample_time"),
+        (Resolver::NoiseSampleTime.at(), "sensor.resolver.noise_sample_time"),
         (PwmParameter::SampleTime.at(), "pwm.sample_time"),
         (Thermal::SampleTime.at(), "thermal.sample_time"),
     ] {
         let used = match path {
             "control.noise_sample_time" => raw[Control::NoiseDeviation.at()] > 0.0,
             "sensor.current.noise_sample_time" => raw[CurrentSensorParameter::NoiseDeviation.at()] > 0.0,
+            "sensor.resolver.noise_sample_time" => {
+                raw[Resolver::NoiseDeviation.at()] > 0.0 || raw[Resolver::SpeedNoiseDeviation.at()] > 0.0
+            }
             "thermal.sample_time" => ThermalModel::read(raw[Thermal::Model.at()]) != ThermalModel::Off,
             "pwm.sample_time" => drive(raw) == DriveKind::Pwm,
             _ => true,

@@ -396,6 +396,12 @@ pub fn mechanical(side: Side) -> Vec<FaultKind> {
             source: "T3 Table 1.1 (bearings); pulse law ASSUMED",
         },
         FaultKind {
+            kind: "stator_rub", unit: "1", range: Range::Unit, attributes: &[],
+            places: places!("motor": "motor.rub_filled" Add),
+            effect: "share of the air gap that something fills; where it and the eccentricities reach motor.rub_clearance the rotor presses on the stator: dry friction, once a turn where static and dynamic eccentricity meet",
+            source: "N 4.4 (rubbing named as a consequence of eccentricity); contact ASSUMED: linear spring, Coulomb",
+        },
+        FaultKind {
             kind: "bearing", unit: "N m", range: Range::Between(0.0, 1e3), attributes: &[],
             places: places!("bearing.cage": "bearing.cage_drag" Add),
             effect: "dry friction of a worn cage where it rubs most: friction modulated once a turn of the cage",

@@ -11,6 +11,7 @@ use crate::motor::cogging::{CoggingParameter, COGGING};
 use crate::motor::equivalent::{LowParameter, LOW};
 use crate::motor::magnetic_pull::{MagneticPullParameter, MAGNETIC_PULL};
 use crate::motor::pole::{PoleParameter, POLE};
+use crate::motor::rub::{RubParameter, RUB};
 use crate::motor::short::{ShortParameter, TapParameter, SHORT, TAP};
 use crate::motor::star::{MotorParameter, MOTOR};
 use crate::motor::thermal::{ThermalParameter, THERMAL};
@@ -45,6 +46,7 @@ variables! {
                 Away("sensor.resolver.mismatch", 0.0), Away("sensor.resolver.offset", 0.0), Away("sensor.resolver.power_off", 0.0),
                 Away("sensor.resolver.sine_short", 0.0), Away("sensor.resolver.cosine_short", 0.0), Away("sensor.resolver.excitation_short", 0.0),
                 Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0), Away("sensor.resolver.stuck", 0.0),
+                Away("sensor.resolver.noise_deviation", 0.0),
             ])]);
         FeedbackLoss => "feedback_loss", "-", "1", Choice(FeedbackLoss::NAMES), Controller, Some(0.0), "without resolver power the drive runs on with what it is shown, or opens its bridge until it returns",
             when(&[Either(&[
@@ -95,6 +97,7 @@ groups! {
     link: "inverter", LINK, LinkParameter;
     switching: "inverter", SWITCHING, SwitchingParameter;
     drive_heat: "thermal", DRIVE_HEAT, DriveHeatParameter;
+    rub: "motor", RUB, RubParameter;
 }
 
 pub const PORTS: &[Port] = &[

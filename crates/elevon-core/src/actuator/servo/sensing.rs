@@ -21,12 +21,13 @@ details! {
     full {
         resolver = Resolver::<f64>::needed(&parts.resolver());
         shown = feedback != Feedback::User;
+        noisy = Resolver::<f64>::noisy(&parts.resolver());
         /// The encoder loses counts, or stands still: it has a counter to follow.
         counting = Encoder::<f64>::loses(&parts.encoder());
     }
     extra {
         /// The commutation has a track of its own.
-        separate = resolver && !commutated;
+        separate = (resolver || noisy) && !commutated;
     }
 }
 
@@ -41,6 +42,8 @@ pub struct Sensing<S> {
 #[derive(Clone, Copy, Debug)]
 pub struct Sensed<S> {
     resolver: ResolverState<S>,
+    /// Of the resolver, angle and speed, of unit deviation.
+    pub noise: [S; 2],
     encoder: EncoderState<S>,
 }
 
@@ -52,7 +55,7 @@ impl<S: Scalar> Sensing<S> {
 
     pub(super) fn start(&self, s: &ShaftState<S>) -> Sensed<S> {
         let resolver = ResolverState { angle: s.motor_position, speed: s.motor_speed };
-        Sensed { resolver, encoder: self.encoder.start(s.user_position) }
+        Sensed { resolver, noise: [S::zero(); 2], encoder: self.encoder.start(s.user_position) }
     }
 
     /// The resolver has no power or no signal.
@@ -64,11 +67,14 @@ impl<S: Scalar> Sensing<S> {
     /// The resolver's reading.
     #[inline(always)]
     pub(super) fn shaft<const FULL: bool>(&self, d: &SensingDetails, s: &ShaftState<S>, sensed: &mut Sensed<S>) -> Reading<S> {
+        let mut reading = Reading { angle: s.motor_position, position: s.motor_position, speed: s.motor_speed };
         if FULL && d.resolver {
-            self.resolver.read(s.motor_position, s.motor_speed, &mut sensed.resolver)
-        } else {
-            Reading { angle: s.motor_position, position: s.motor_position, speed: s.motor_speed }
+            reading = self.resolver.read(s.motor_position, s.motor_speed, &mut sensed.resolver);
         }
+        if FULL && d.noisy {
+            reading = self.resolver.disturbed(reading, sensed.noise);
+        }
+        reading
     }
 
     /// Position of the encoder, which counts on to the present.

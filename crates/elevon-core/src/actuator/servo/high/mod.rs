@@ -21,6 +21,7 @@ use crate::fault::FaultKind;
 use crate::motor::thermal::ThermalParameter;
 use crate::scalar::{three_phase, Scalar};
 use crate::sensor::current::CurrentSensorParameter;
+use crate::sensor::resolver::ResolverParameter;
 use crate::three;
 use crate::time::Steps;
 use crate::variable::{Group, Signal};
@@ -36,6 +37,7 @@ const TICK_CURRENT_CONTROL: u8 = 3;
 const TICK_THERMAL: u8 = 4;
 const TICK_DEBRIS: u8 = 5;
 const TICK_DUTIES: u8 = 6;
+const TICK_RESOLVER_NOISE: u8 = 7;
 
 impl<F: Form> Wiring for High<F> {
     type Structure = Structure;
@@ -78,6 +80,7 @@ impl<F: Form> Wiring for High<F> {
         };
         add(raw[ControlParameter::NoiseDeviation.at()] != 0.0, ControlParameter::NoiseSampleTime.at(), TICK_COMMAND_NOISE);
         add(raw[CurrentSensorParameter::NoiseDeviation.at()] != 0.0, CurrentSensorParameter::NoiseSampleTime.at(), TICK_CURRENT_NOISE);
+        add(structure.sensing.noisy, ResolverParameter::NoiseSampleTime.at(), TICK_RESOLVER_NOISE);
         add(!structure.control_every_step, ControlParameter::SampleTime.at(), TICK_CONTROL);
         add(structure.drive == DriveKind::Pwm, PwmParameter::SampleTime.at(), TICK_CURRENT_CONTROL);
         add(structure.heat, ThermalParameter::SampleTime.at(), TICK_THERMAL);
@@ -126,6 +129,7 @@ impl<F: Form> Wiring for High<F> {
                 (s.star.resistance_factor, s.star.flux_factor) = m.extra.network.factors(&s.extra.network);
             }
             TICK_DEBRIS => s.shaft.scatter(&m.shaft.screw, noise(4)),
+            TICK_RESOLVER_NOISE => s.sensed.noise = [noise(5), noise(6)],
             TICK_DUTIES => s.current_control.update(),
             _ => {
                 let reading = shaft_reading::<S, true>(m, structure, s);

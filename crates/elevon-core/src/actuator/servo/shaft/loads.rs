@@ -147,7 +147,7 @@ impl<S: Scalar> Shaft<S> {
         if d.train.extra {
             let added = self.train.added(&d.train, s.motor_position, through, self.gear.per_ratio);
             torque = torque + added.torque();
-            friction = friction + added.bearing.friction;
+            friction = friction + added.friction();
         }
         (torque, friction, spalled)
     }

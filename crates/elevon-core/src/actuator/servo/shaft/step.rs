@@ -87,7 +87,7 @@ impl<S: Scalar> Shaft<S> {
             s.nut.collected = s.nut.collected + self.dt * self.nut.share * loads.nut * speed.abs();
         }
         if EXTRA && d.vibrates {
-            let force = self.shaking(s, loads.through, torque);
+            let force = self.shaking(d, s, loads.through, torque);
             self.vibration.step(&mut s.vibration, force, self.dt);
         }
         if FULL && d.elastic {
@@ -102,12 +102,13 @@ impl<S: Scalar> Shaft<S> {
         s.motor_speed = held_speed;
     }
 
-    /// Force on the screw's housing at the orders of its parts.
+    /// Force on the housing at the orders of its parts.
     #[inline(always)]
-    fn shaking(&self, s: &ShaftState<S>, through: S, torque: S) -> S {
+    fn shaking(&self, d: &ShaftDetails, s: &ShaftState<S>, through: S, torque: S) -> S {
         let angle = s.motor_position;
         let missing = self.screw.missing(angle, through, angle * self.gear.per_ratio, self.vibration.per_approach);
-        missing + self.unbalance.force(angle, s.motor_speed) + self.vibration.mesh(angle, torque)
+        let turning = self.unbalance.force(angle, s.motor_speed) + self.train.rub_force(&d.train, angle, s.motor_speed);
+        missing + turning + self.vibration.mesh(angle, torque)
     }
 
     /// The user as the play operator leaves it.

@@ -4,7 +4,8 @@
 use crate::actuator::servo::form::Form;
 use crate::actuator::servo::layout::*;
 use crate::motor::cogging::Cogging;
-use crate::motor::magnetic_pull::MagneticPull;
+use crate::motor::magnetic_pull::{Eccentricity, MagneticPull};
+use crate::motor::rub::Rub;
 use crate::motor::star::MotorParameter;
 use crate::motor::unbalance::Unbalance;
 use crate::scalar::Scalar;
@@ -29,6 +30,8 @@ details! {
         pull = MagneticPull::<f64>::needed(&parts.magnetic_pull())
             && (parts.motor().any_away([MotorParameter::EccentricityStatic, MotorParameter::EccentricityDynamic])
                 || Unbalance::<f64>::needed(&parts.unbalance()));
+        /// The gap can close.
+        rub = Rub::<f64>::needed(&parts.rub(), &parts.motor(), Unbalance::<f64>::needed(&parts.unbalance()));
         bearing = pull || Bearing::<f64>::needed(&parts.bearing());
         teeth = Teeth::<f64>::needed(&parts.tooth());
     }
@@ -39,7 +42,9 @@ pub struct Train<S> {
     pub law: Law<S>,
     cogging: Cogging<S>,
     bearing: Bearing<S>,
+    eccentricity: Eccentricity<S>,
     pull: MagneticPull<S>,
+    rub: Rub<S>,
     teeth: Teeth<S>,
 }
 
@@ -49,6 +54,7 @@ signals! {
     TrainSignal, TRAIN {
         CoggingTorque => "cogging_torque", "T_cog", "N m", "cogging torque of the motor, positive drives forwards";
         BearingTorque => "bearing_torque", "-", "N m", "torque of balls passing a defect of the bearing, positive drives forwards";
+        RubForce => "rub_force", "N", "N", "force between a rotor and a stator that touch";
         ToothTorque => "tooth_torque", "-", "N m", "torque of worn or chipped flanks under load, positive drives forwards";
     }
 }
@@ -58,6 +64,8 @@ signals! {
 pub(in crate::actuator::servo) struct Added<S> {
     pub cogging: S,
     pub bearing: BearingTorque<S>,
+    /// Force and friction torque of a rotor that rubs.
+    pub rub: [S; 2],
     pub teeth: S,
 }
 
@@ -67,10 +75,16 @@ impl<S: Scalar> Added<S> {
         self.cogging + self.bearing.torque + self.teeth
     }
 
+    /// Dry friction.
+    #[inline(always)]
+    pub fn friction(&self) -> S {
+        self.bearing.friction + self.rub[1]
+    }
+
     /// In the order of `TRAIN`.
     #[inline(always)]
     pub fn signals(&self) -> [S; TRAIN.len()] {
-        [self.cogging, self.bearing.torque, self.teeth]
+        [self.cogging, self.bearing.torque, self.rub[0], self.teeth]
     }
 }
 
@@ -87,7 +101,9 @@ impl<S: Scalar> Train<S> {
             law: Law::derive(view.friction_law(), raw[FrictionParameter::DryScale.at()]),
             cogging: Cogging::derive(view.cogging()),
             bearing: Bearing::derive(view.bearing()),
-            pull: MagneticPull::derive(view.magnetic_pull(), at(MotorParameter::EccentricityStatic), turning),
+            eccentricity: Eccentricity::new(at(MotorParameter::EccentricityStatic), turning),
+            pull: MagneticPull::derive(view.magnetic_pull()),
+            rub: Rub::derive(view.rub()),
             teeth: Teeth::derive(view.tooth()),
         }
     }
@@ -96,18 +112,31 @@ impl<S: Scalar> Train<S> {
     #[inline(always)]
     pub(super) fn added(&self, d: &TrainDetails, angle: S, through: S, per_ratio: S) -> Added<S> {
         let zero = S::zero();
-        let mut added = Added { cogging: zero, bearing: BearingTorque { torque: zero, friction: zero }, teeth: zero };
+        let mut added = Added { cogging: zero, bearing: BearingTorque { torque: zero, friction: zero }, rub: [zero; 2], teeth: zero };
         if d.cogging {
             added.cogging = self.cogging.torque(angle);
         }
         if d.bearing {
-            let pull = if d.pull { self.pull.force(angle) } else { zero };
+            let pull = if d.pull { self.pull.force(&self.eccentricity, angle) } else { zero };
             added.bearing = self.bearing.torque(angle, through * per_ratio, pull);
+        }
+        if d.rub {
+            added.rub = self.rub.contact(&self.eccentricity, angle);
         }
         if d.teeth {
             added.teeth = self.teeth.lag(angle).torque(through);
         }
         added
+    }
+
+    /// Force of a rub on the housing.
+    #[inline(always)]
+    pub(super) fn rub_force(&self, d: &TrainDetails, angle: S, speed: S) -> S {
+        if d.rub {
+            self.rub.force(&self.eccentricity, angle, speed)
+        } else {
+            S::zero()
+        }
     }
 
     /// What worn teeth add to half the play at a motor angle.
