@@ -1,6 +1,9 @@
-//! Position P and speed PID with limits and anti-windup (T2, T3; reference sheet 1.3).
+//! Position P and speed PID with limits and anti-windup (T2, T3; reference sheet 1.3), or one PID from the position error to
+//! the torque, T = K (e + 1/T_i int e dt + T_d de/dt), its derivative filtered at N / T_d (Astrom and Hagglund 1995, ch. 3).
+//! A cascade has the real zeros -G and -1/T_i; those of a PID may be complex.
 
 use crate::scalar::Scalar;
+use crate::variable::acts::When;
 use crate::variable::Switch;
 use crate::{choices, variables};
 
@@ -9,6 +12,8 @@ choices! {
     Mode { Position "position", Speed "speed", Torque "torque" }
     /// When the position error freezes the integrator.
     ErrorHold { Off "off", Below "below", Above "above" }
+    /// What makes a torque of a position command.
+    Structure { Cascade "cascade", Pid "pid" }
     /// What closes the position loop.
     Feedback { User "user", Encoder "encoder", Resolver "resolver" }
 }
@@ -19,35 +24,35 @@ variables! {
         Mode => "mode", "-", "1", Choice(Mode::NAMES), Controller, Some(0.0), "what the command is: a position, a speed (bypasses the position loop) or a torque (bypasses both loops)",
             nowhere("the command of the scenario says what it is");
         PositionGain => "position_gain", "G", "1/s", NonNegative, Controller, None, "user position error to fast-shaft speed reference",
-            when(&[Chosen("control.mode", &["position"])]);
+            when(&[Chosen("control.mode", &["position"]), Chosen("control.structure", &["cascade"])]);
         PositionGainScale => "position_gain_scale", "-", "1", NonNegative, Controller, Some(1.0), "healthy 1; drift of the position gain",
-            when(&[Chosen("control.mode", &["position"])]);
+            when(&[Chosen("control.mode", &["position"]), Chosen("control.structure", &["cascade"])]);
         SpeedFeedforward => "speed_feedforward", "g_ff", "1", Between(0.0, 1.5), Controller, Some(0.0), "share of the commanded speed (difference of the command over one tick) added to the speed reference",
-            when(&[Chosen("control.mode", &["position"])]);
+            when(&[Chosen("control.mode", &["position"]), Chosen("control.structure", &["cascade"])]);
         SpeedGain => "speed_gain", "K_p", "N m s/rad", NonNegative, Controller, None, "proportional gain of the speed PID, on all branches",
-            when(&[Chosen("control.mode", &["position", "speed"])]);
+            when(&[Chosen("control.mode", &["position", "speed"]), CASCADE]);
         SpeedGainScale => "speed_gain_scale", "-", "1", NonNegative, Controller, Some(1.0), "healthy 1; drift of the speed gain",
-            when(&[Chosen("control.mode", &["position", "speed"])]);
+            when(&[Chosen("control.mode", &["position", "speed"]), CASCADE]);
         IntegralTime => "integral_time", "T_i", "s", NonNegative, Controller, Some(0.0), "K_i = K_p / T_i; 0: no integral action",
-            when(&[Chosen("control.mode", &["position", "speed"])]);
+            when(&[Chosen("control.mode", &["position", "speed"]), CASCADE]);
         DerivativeTime => "derivative_time", "T_d", "s", NonNegative, Controller, Some(0.0), "derivative time; 0: no derivative action",
-            when(&[Chosen("control.mode", &["position", "speed"])]);
+            when(&[Chosen("control.mode", &["position", "speed"]), CASCADE]);
         DerivativeFilter => "derivative_filter", "N", "1", Positive, Controller, Some(1000.0), "the derivative's filter pole stands at N / T_d",
-            high_only("its derivative acts as inertia, without a filter").when(&[Chosen("control.mode", &["position", "speed"]), Away("control.derivative_time", 0.0)]);
+            high_only("its derivative acts as inertia, without a filter").when(&[Chosen("control.mode", &["position", "speed"]), CASCADE, Away("control.derivative_time", 0.0)]);
         SpeedLimit => "speed_limit", "omega_max", "rad/s", Positive, Controller, None, "limit of the speed reference",
-            when(&[Chosen("control.mode", &["position", "speed"])]);
+            when(&[Chosen("control.mode", &["position", "speed"]), CASCADE]);
         CurrentLimit => "current_limit", "I_max", "A", Positive, Controller, None, "limit of the quadrature current reference, peak";
         TorqueConstant => "torque_constant", "k_t", "N m/A", Positive, Controller, None, "torque per peak ampere that the controller believes, 1.5 k when it knows the motor";
         AntiWindupRest => "anti_windup_rest", "AW1", "1", Choice(Switch::NAMES), Controller, Some(0.0), "freeze the integrator while the speed is zero for more than one step",
-            high_only("its PID integrates without anti-windup").when(&[Chosen("control.mode", &["position", "speed"]), Away("control.integral_time", 0.0)]);
+            high_only("its PID integrates without anti-windup").when(&[Chosen("control.mode", &["position", "speed"]), CASCADE, Away("control.integral_time", 0.0)]);
         AntiWindupError => "anti_windup_error", "AW2", "1", Choice(ErrorHold::NAMES), Controller, Some(0.0), "freeze the integrator while the position error is below (T2) or above (T3) the threshold",
-            high_only("its PID integrates without anti-windup").when(&[Chosen("control.mode", &["position", "speed"]), Away("control.integral_time", 0.0)]);
+            high_only("its PID integrates without anti-windup").when(&[Chosen("control.mode", &["position", "speed"]), CASCADE, Away("control.integral_time", 0.0)]);
         AntiWindupThreshold => "anti_windup_threshold", "-", "rad", NonNegative, Controller, Some(0.0), "position error threshold of anti_windup_error, at the user",
-            high_only("its PID integrates without anti-windup").when(&[Chosen("control.mode", &["position", "speed"]), Away("control.integral_time", 0.0), Chosen("control.anti_windup_error", &["below", "above"])]);
+            high_only("its PID integrates without anti-windup").when(&[Chosen("control.mode", &["position", "speed"]), CASCADE, Away("control.integral_time", 0.0), Chosen("control.anti_windup_error", &["below", "above"])]);
         AntiWindupBackCalculation => "anti_windup_back_calculation", "AW3", "1/s", NonNegative, Controller, Some(0.0), "gain from (saturated - demanded) torque back to the integrator; 0: off",
-            high_only("its PID integrates without anti-windup").when(&[Chosen("control.mode", &["position", "speed"]), Away("control.integral_time", 0.0)]);
+            high_only("its PID integrates without anti-windup").when(&[Chosen("control.mode", &["position", "speed"]), CASCADE, Away("control.integral_time", 0.0)]);
         ConditionalIntegration => "conditional_integration", "-", "1", Choice(Switch::NAMES), Controller, Some(0.0), "integrate only while the torque reference is not limited",
-            high_only("its PID integrates without anti-windup").when(&[Chosen("control.mode", &["position", "speed"]), Away("control.integral_time", 0.0)]);
+            when(&[Chosen("control.mode", &["position", "speed"]), Either(&[Away("control.integral_time", 0.0), Away("control.pid_integral_time", 0.0)])]);
         SampleTime => "sample_time", "T_s", "s", NonNegative, Controller, Some(0.0), "sample time of the controller; 0: every solver step",
             when(&[In(Low, &[Away("screw.debris", 0.0)])]);
         NoiseDeviation => "noise_deviation", "-", "rad", NonNegative, Controller, Some(0.0), "standard deviation of the band-limited noise on the command line (unit of the user position)";
@@ -55,8 +60,21 @@ variables! {
             when(&[Away("control.noise_deviation", 0.0)]);
         PositionFeedback => "position_feedback", "-", "1", Choice(Feedback::NAMES), Controller, Some(0.0), "what closes the position loop: the user position itself (the papers' model), the user encoder's counts, or the motor resolver divided by the ratio",
             when(&[Chosen("control.mode", &["position"])]);
+        Structure => "structure", "-", "1", Choice(Structure::NAMES), Controller, Some(0.0), "a position error commands a speed and the speed error a torque (cascade), or one PID makes a torque of the position error (pid)",
+            when(&[Chosen("control.mode", &["position"])]);
+        PidGain => "pid_gain", "K", "N m/rad", NonNegative, Controller, Some(0.0), "user position error to torque on the fast shaft, on all branches of the position PID",
+            when(&[Chosen("control.mode", &["position"]), Chosen("control.structure", &["pid"])]);
+        PidIntegralTime => "pid_integral_time", "T_i", "s", NonNegative, Controller, Some(0.0), "integral time of the position PID; 0: no integral action",
+            when(&[Chosen("control.mode", &["position"]), Chosen("control.structure", &["pid"]), Away("control.pid_gain", 0.0)]);
+        PidDerivativeTime => "pid_derivative_time", "T_d", "s", NonNegative, Controller, Some(0.0), "derivative time of the position PID, on the error; 0: no derivative action",
+            when(&[Chosen("control.mode", &["position"]), Chosen("control.structure", &["pid"]), Away("control.pid_gain", 0.0)]);
+        PidDerivativeFilter => "pid_derivative_filter", "N", "1", Positive, Controller, Some(10.0), "the position PID's derivative filter stands at N / T_d",
+            when(&[Chosen("control.mode", &["position"]), Chosen("control.structure", &["pid"]), Away("control.pid_gain", 0.0), Away("control.pid_derivative_time", 0.0)]);
     }
 }
+
+/// The loops of the cascade are closed: always under a speed command.
+const CASCADE: When = When::Either(&[When::Chosen("control.mode", &["speed"]), When::Chosen("control.structure", &["cascade"])]);
 
 /// The switches that give a controller its structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -69,20 +87,30 @@ pub struct ControlStructure {
     pub feedforward: bool,
     pub conditional: bool,
     pub feedback: Feedback,
+    /// One PID makes a torque of the position error.
+    pub pid: bool,
 }
 
 impl ControlStructure {
+    /// Does one PID close the position loop?
+    pub fn single<S: Scalar>(raw: &[S]) -> bool {
+        let mode = Mode::read(raw[ControlParameter::Mode as usize]);
+        mode == Mode::Position && Structure::read(raw[ControlParameter::Structure as usize]) == Structure::Pid
+    }
+
     pub fn read(raw: &[f64]) -> Self {
         use ControlParameter as P;
         let on = |p: P| raw[p as usize] != 0.0;
         let switched = |p: P| Switch::read(raw[p as usize]) == Switch::On;
+        let pid = Self::single(raw);
         Self {
             mode: Mode::read(raw[P::Mode as usize]),
-            derivative: on(P::DerivativeTime),
-            hold_at_rest: switched(P::AntiWindupRest),
-            hold_on_error: ErrorHold::read(raw[P::AntiWindupError as usize]),
-            back_calculation: on(P::AntiWindupBackCalculation),
-            feedforward: on(P::SpeedFeedforward),
+            pid,
+            derivative: on(if pid { P::PidDerivativeTime } else { P::DerivativeTime }),
+            hold_at_rest: switched(P::AntiWindupRest) && !pid,
+            hold_on_error: if pid { ErrorHold::Off } else { ErrorHold::read(raw[P::AntiWindupError as usize]) },
+            back_calculation: on(P::AntiWindupBackCalculation) && !pid,
+            feedforward: on(P::SpeedFeedforward) && !pid,
             conditional: switched(P::ConditionalIntegration),
             feedback: Feedback::read(raw[P::PositionFeedback as usize]),
         }
@@ -123,10 +151,15 @@ impl<S: Scalar> PositionSpeed<S> {
     pub fn derive(raw: &[S], ts: f64, ratio: S) -> Self {
         use ControlParameter as P;
         let g = |p: P| raw[p as usize];
-        let gain = g(P::SpeedGain) * g(P::SpeedGainScale);
+        let pid = ControlStructure::single(raw);
+        let gain = if pid { g(P::PidGain) } else { g(P::SpeedGain) * g(P::SpeedGainScale) };
         let guarded = |x: S| S::select(x.equals(S::zero()), S::one(), x);
         let present = |x: S| S::indicator(S::zero().lt(x));
-        let (ti, td, filter) = (g(P::IntegralTime), g(P::DerivativeTime), g(P::DerivativeFilter));
+        let (ti, td, filter) = if pid {
+            (g(P::PidIntegralTime), g(P::PidDerivativeTime), g(P::PidDerivativeFilter))
+        } else {
+            (g(P::IntegralTime), g(P::DerivativeTime), g(P::DerivativeFilter))
+        };
         let dt = S::splat(ts);
         // The filter decays exactly over a tick, and a ramp gives K_p T_d times its slope at any tick: the gain N of the
         // continuous form is its limit for short ticks, the difference of two samples that for long ones.
@@ -150,6 +183,9 @@ impl<S: Scalar> PositionSpeed<S> {
     #[inline(always)]
     pub fn step(&self, structure: &ControlStructure, s: &mut PositionSpeedState<S>, command: S, position: S, speed: S) -> S {
         let position_error = command - position;
+        if structure.pid {
+            return self.single(structure, s, command, position_error, speed);
+        }
         let demanded = match structure.mode {
             Mode::Position if structure.feedforward => {
                 let moved = command - s.command;
@@ -174,6 +210,24 @@ impl<S: Scalar> PositionSpeed<S> {
         }
         s.torque_ref = torque.clamp_abs(self.torque_limit);
         self.integrate(structure, s, error, torque, position_error, speed);
+        s.torque_ref * self.per_torque_constant
+    }
+
+    /// One tick of the position PID.
+    #[inline(always)]
+    fn single(&self, structure: &ControlStructure, s: &mut PositionSpeedState<S>, command: S, error: S, speed: S) -> S {
+        let mut torque = self.speed_gain.fma(error, s.integral);
+        if structure.derivative {
+            // Not one kick before the first tick: the filter starts from the first error.
+            let known = s.command.equals(s.command);
+            s.command = command;
+            s.filtered_error = S::select(known, s.filtered_error, error);
+            let difference = error - s.filtered_error;
+            torque = self.derivative_gain.fma(difference, torque);
+            s.filtered_error = self.derivative_decay.fma(difference, s.filtered_error);
+        }
+        s.torque_ref = torque.clamp_abs(self.torque_limit);
+        self.integrate(structure, s, error, torque, error, speed);
         s.torque_ref * self.per_torque_constant
     }
 
@@ -210,5 +264,62 @@ impl<S: Scalar> PositionSpeedState<S> {
     pub fn rest() -> Self {
         let zero = S::zero();
         Self { integral: zero, filtered_error: zero, rested: zero, speed_ref: zero, torque_ref: zero, command: S::splat(f64::NAN) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TICK: f64 = 1e-3;
+    const GAIN: f64 = 3.0;
+
+    fn pid(integral_time: f64, derivative_time: f64) -> (PositionSpeed<f64>, ControlStructure) {
+        let mut raw = [0.0; CONTROL.len()];
+        for (at, value) in [
+            (ControlParameter::Structure, Structure::Pid.index()),
+            (ControlParameter::PidGain, GAIN),
+            (ControlParameter::PidIntegralTime, integral_time),
+            (ControlParameter::PidDerivativeTime, derivative_time),
+            (ControlParameter::PidDerivativeFilter, 10.0),
+            (ControlParameter::TorqueConstant, 1.0),
+            (ControlParameter::CurrentLimit, 100.0),
+            (ControlParameter::ConditionalIntegration, Switch::On.index()),
+        ] {
+            raw[at as usize] = value;
+        }
+        (PositionSpeed::derive(&raw, TICK, 1.0), ControlStructure::read(&raw))
+    }
+
+    /// Torque references for position errors of one tick after the other.
+    fn torques(controller: &(PositionSpeed<f64>, ControlStructure), errors: impl Iterator<Item = f64>) -> Vec<f64> {
+        let mut state = PositionSpeedState::rest();
+        errors.map(|e| controller.0.step(&controller.1, &mut state, e, 0.0, 7.0)).collect()
+    }
+
+    #[test]
+    fn a_position_pid_integrates_a_held_error() {
+        let seen = torques(&pid(0.5, 0.0), std::iter::repeat_n(2.0, 200));
+        for (k, torque) in seen.iter().enumerate() {
+            let expected = GAIN * 2.0 * (1.0 + k as f64 * TICK / 0.5);
+            assert!((torque - expected).abs() < 1e-12 * expected, "{k}: {torque} {expected}");
+        }
+    }
+
+    #[test]
+    fn a_position_pid_derives_a_ramp_and_does_not_kick_at_the_start() {
+        let slope = 4.0;
+        let seen = torques(&pid(0.0, 0.02), (0..100).map(|k| 1.0 + slope * k as f64 * TICK));
+        assert_eq!(seen[0], GAIN);
+        // The filter's lag T_d / N has passed 50 times.
+        let error = 1.0 + slope * 99.0 * TICK;
+        assert!((seen[99] - GAIN * (error + 0.02 * slope)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn at_its_limit_the_position_pid_integrates_no_further() {
+        let seen = torques(&pid(0.1, 0.0), std::iter::repeat_n(50.0, 300).chain(std::iter::repeat_n(1.0, 2)));
+        assert_eq!(seen[299], 100.0);
+        assert_eq!(seen[300], GAIN);
     }
 }

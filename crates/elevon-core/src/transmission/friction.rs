@@ -11,6 +11,8 @@ variables! {
         Dynamic => "dynamic", "FDJ", "N m", NonNegative, Plant, None, "dynamic dry friction";
         DryScale => "dry_scale", "-", "1", NonNegative, Plant, Some(1.0), "healthy 1; growth of the dry friction",
             when(&[Either(&[Away("friction.static", 0.0), Away("friction.dynamic", 0.0)])]);
+        ReverseScale => "reverse_scale", "-", "1", NonNegative, Plant, Some(1.0), "dry friction of negative motion over that of positive motion",
+            when(&[Either(&[Away("friction.static", 0.0), Away("friction.dynamic", 0.0)])]);
         Viscous => "viscous", "C", "N m s/rad", NonNegative, Plant, None, "viscous coefficient at rest";
         ViscousSlope => "viscous_slope", "-", "s/rad", Any, Plant, Some(0.0), "relative change of the viscous coefficient per rad/s: C(w) = C (1 + slope |w|), not below zero",
             when(&[Away("friction.viscous", 0.0)]);
@@ -30,6 +32,7 @@ pub struct Friction<S> {
     pub dynamic: S,
     pub viscous: S,
     viscous_slope: S,
+    reverse_scale: S,
     pub jam_torque: S,
     pub jam_position: S,
     pub jam_anywhere: S,
@@ -44,6 +47,7 @@ impl<S: Scalar> Friction<S> {
             dynamic: g(P::Dynamic) * g(P::DryScale),
             viscous: g(P::Viscous) * g(P::ViscousScale),
             viscous_slope: g(P::ViscousSlope),
+            reverse_scale: g(P::ReverseScale),
             jam_torque: g(P::JamTorque),
             jam_position: g(P::JamPosition),
             jam_anywhere: g(P::JamAnywhere),
@@ -53,6 +57,19 @@ impl<S: Scalar> Friction<S> {
     /// Does the viscous coefficient change with the speed?
     pub fn sloped(own: &Own<FrictionParameter>) -> bool {
         own.away(FrictionParameter::ViscousSlope)
+    }
+
+    /// Does the dry friction differ between the directions?
+    pub fn directed(own: &Own<FrictionParameter>) -> bool {
+        own.away(FrictionParameter::ReverseScale)
+    }
+
+    /// Dry friction, at rest and moving, in the direction of motion, or of the `active` torque that would start it.
+    #[inline(always)]
+    pub fn in_direction(&self, limits: [S; 2], speed: S, active: S) -> [S; 2] {
+        let direction = S::select(speed.equals(S::zero()), active, speed);
+        let scale = S::select(direction.lt(S::zero()), self.reverse_scale, S::one());
+        [limits[0] * scale, limits[1] * scale]
     }
 
     /// Does the mechanism ever seize?
@@ -157,5 +174,17 @@ mod tests {
         let gone = [(2.0, 1.5), (0.0, 1.5), (2.0, 1.4), (2.0, 0.9)];
         assert_eq!(history(0.0, &gone), [1.0, 0.0, 0.0, 1.0]);
         assert_eq!(history(1.0, &[(0.0, 0.2), (2.0, 0.2), (0.0, 0.2)]), [1.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn dry_friction_has_a_value_for_each_direction() {
+        let mut raw = [0.0; FRICTION.len()];
+        raw[FrictionParameter::ReverseScale as usize] = 1.5;
+        let friction = Friction::<f64>::derive(&raw);
+        assert_eq!(friction.in_direction([0.4, 0.2], 3.0, -9.0), [0.4, 0.2]);
+        assert_eq!(friction.in_direction([0.4, 0.2], -3.0, 9.0), [0.4 * 1.5, 0.2 * 1.5]);
+        // At rest what would start the motion decides.
+        assert_eq!(friction.in_direction([0.4, 0.2], 0.0, 9.0), [0.4, 0.2]);
+        assert_eq!(friction.in_direction([0.4, 0.2], 0.0, -9.0), [0.4 * 1.5, 0.2 * 1.5]);
     }
 }

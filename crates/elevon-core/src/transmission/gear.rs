@@ -32,6 +32,7 @@ variables! {
             when(&[Away("load.stiffness", 0.0)]);
         Damping => "damping", "c_L", "N m s/rad", NonNegative, Load, Some(0.0), "viscous damping on the user side";
         Friction => "friction", "F_L", "N m", NonNegative, Load, Some(0.0), "dry friction on the user side";
+        Constant => "constant", "T_0", "N m", Any, Load, Some(0.0), "constant load on the user side, such as a weight; positive opposes positive motion";
     }
 }
 
@@ -47,6 +48,7 @@ pub struct Gear<S> {
     pub user_stop: Stop<S>,
     pub stiffness: S,
     pub spring_zero: S,
+    pub constant: S,
 }
 
 impl<S: Scalar> Gear<S> {
@@ -62,6 +64,7 @@ impl<S: Scalar> Gear<S> {
             user_stop: Stop { upper, lower },
             stiffness: load[LoadParameter::Stiffness as usize],
             spring_zero: load[LoadParameter::SpringZero as usize],
+            constant: load[LoadParameter::Constant as usize],
         }
     }
 

@@ -41,11 +41,17 @@ const RAM_LOAD: [Variable; LOAD.len()] = relabelled(
         unit(D::SpringZero as usize, "m"),
         unit(D::Damping as usize, "N s/m"),
         unit(D::Friction as usize, "N"),
+        change(D::Constant as usize, "", "N", "constant load on the load side, such as a weight; positive opposes extension"),
     ],
 );
 const RAM_CONTROL: [Variable; CONTROL.len()] = relabelled(
     CONTROL,
-    &[unit(C::PositionGain as usize, "rad/(m s)"), unit(C::AntiWindupThreshold as usize, "m"), unit(C::NoiseDeviation as usize, "m")],
+    &[
+        unit(C::PositionGain as usize, "rad/(m s)"),
+        unit(C::AntiWindupThreshold as usize, "m"),
+        unit(C::NoiseDeviation as usize, "m"),
+        unit(C::PidGain as usize, "N"),
+    ],
 );
 const RAM_ENCODER: [Variable; ENCODER.len()] = relabelled(
     ENCODER,

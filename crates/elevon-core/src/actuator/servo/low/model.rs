@@ -31,7 +31,7 @@ details! {
         /// The references are blocks, not sines.
         six_step: bool = Commutation::read(parts.drive().value(DriveParameter::Commutation)) == Commutation::SixStep;
         control: ControlStructure = ControlStructure::read(parts.control().raw);
-        integral: bool = parts.control().value(ControlParameter::IntegralTime) > 0.0;
+        integral: bool = parts.control().value(if control.pid { ControlParameter::PidIntegralTime } else { ControlParameter::IntegralTime }) > 0.0;
         shaft: ShaftDetails = ShaftDetails::read::<F>(&ShaftNeeds::low(parts));
         sensing: SensingDetails = SensingDetails::read::<F>(parts);
         motor: MotorStructure = MotorStructure::read(&parts.motor()).with_unbalance(shaft.unbalance).with_weak_pole(WeakPole::<f64>::needed(&parts.pole()));
@@ -92,7 +92,7 @@ pub struct Model<S> {
     pub network: Network<S>,
 }
 
-/// What the controller believes: P, and PID whose derivative acts as inertia.
+/// What the controller believes: P, and PID whose derivative acts as inertia; or one PID on the position with a filter.
 #[derive(Clone, Copy, Debug)]
 pub struct Control<S> {
     pub per_dt: S,
@@ -101,6 +101,9 @@ pub struct Control<S> {
     pub speed_gain: S,
     pub integral_step: S,
     pub derivative_inertia: S,
+    /// Of the position PID: torque per difference of its filter, and the filter's share of a step.
+    pub derivative_gain: S,
+    pub derivative_decay: S,
     pub noise_deviation: S,
     pub speed_limit: S,
     pub torque_limit: S,
@@ -152,6 +155,8 @@ pub struct State<S> {
     pub command_noise: S,
     pub voltage: S,
     pub integral: S,
+    /// Position error as the PID's filter has it; NaN before the first step.
+    pub filtered_error: S,
     pub speed_ref: S,
     pub torque_ref: S,
     pub motor_torque: S,
@@ -165,18 +170,24 @@ impl<S: Scalar> Control<S> {
     fn derive(raw: &[S], structure: &Structure, ratio: S, dt: S) -> Self {
         let at = |p: ControlParameter| raw[p.at()];
         let (zero, one) = (S::zero(), S::one());
-        let gain = at(ControlParameter::SpeedGain) * at(ControlParameter::SpeedGainScale);
-        let ti = at(ControlParameter::IntegralTime);
+        let pid = structure.control.pid;
+        let gain = if pid { at(ControlParameter::PidGain) } else { at(ControlParameter::SpeedGain) * at(ControlParameter::SpeedGainScale) };
+        let ti = at(if pid { ControlParameter::PidIntegralTime } else { ControlParameter::IntegralTime });
         let integrates = zero.lt(ti);
         // A torque command passes the loops by, their derivative included.
-        let torque_mode = structure.control.mode == Mode::Torque;
+        let by_inertia = structure.control.mode != Mode::Torque && !pid;
+        let td = at(ControlParameter::PidDerivativeTime);
+        let derives = zero.lt(td);
+        let decay = one - (-(at(ControlParameter::PidDerivativeFilter) * dt / S::select(derives, td, one))).exp();
         Self {
             per_dt: one / dt,
             position_gain: at(ControlParameter::PositionGain) * at(ControlParameter::PositionGainScale),
             feedforward: at(ControlParameter::SpeedFeedforward) * ratio / dt,
             speed_gain: gain,
             integral_step: S::select(integrates, gain / S::select(integrates, ti, one) * dt, zero),
-            derivative_inertia: if torque_mode { zero } else { gain * at(ControlParameter::DerivativeTime) },
+            derivative_inertia: if by_inertia { gain * at(ControlParameter::DerivativeTime) } else { zero },
+            derivative_gain: gain * td / dt * decay,
+            derivative_decay: decay,
             noise_deviation: at(ControlParameter::NoiseDeviation),
             speed_limit: at(ControlParameter::SpeedLimit),
             torque_limit: at(ControlParameter::TorqueConstant) * at(ControlParameter::CurrentLimit),
@@ -286,6 +297,7 @@ impl<S: Scalar> Model<S> {
             command_noise: zero,
             voltage: zero,
             integral: zero,
+            filtered_error: nan,
             speed_ref: zero,
             torque_ref: zero,
             motor_torque: zero,

@@ -22,6 +22,9 @@ struct Demand<S> {
 #[inline(always)]
 fn demand<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, command: S, position: S, speed: S) -> Demand<S> {
     let c = &m.control;
+    if structure.control.pid {
+        return position_pid(m, structure, s, command - position);
+    }
     let demanded = match structure.control.mode {
         Mode::Position if structure.control.feedforward => {
             let moved = command - s.command;
@@ -40,6 +43,20 @@ fn demand<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, comm
         Mode::Position | Mode::Speed => c.speed_gain * error + s.integral + c.derivative_inertia * slope,
     };
     Demand { speed_ref, error, torque }
+}
+
+/// What one PID makes of the position error.
+#[inline(always)]
+fn position_pid<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, error: S) -> Demand<S> {
+    let c = &m.control;
+    let mut torque = c.speed_gain.fma(error, s.integral);
+    if structure.control.derivative {
+        let known = s.filtered_error.equals(s.filtered_error);
+        let difference = S::select(known, error - s.filtered_error, S::zero());
+        s.filtered_error = c.derivative_decay.fma(difference, error - difference);
+        torque = c.derivative_gain.fma(difference, torque);
+    }
+    Demand { speed_ref: S::zero(), error, torque }
 }
 
 /// Current and voltage of the phase after a step towards the torque reference.
@@ -160,10 +177,15 @@ fn step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &In
     let torque = p.efficacy * asked.torque;
     let mut loads = m.shaft.loads::<FULL, FULL>(&structure.shaft, x, &s.shaft, torque);
     let acceleration = m.shaft.acceleration::<FULL>(&structure.shaft, &s.shaft, &loads, torque, p.per_effective_inertia);
-    s.torque_ref = (asked.torque - m.control.derivative_inertia * acceleration).clamp_abs(m.control.torque_limit);
+    let unlimited = asked.torque - m.control.derivative_inertia * acceleration;
+    s.torque_ref = unlimited.clamp_abs(m.control.torque_limit);
     s.speed_ref = asked.speed_ref;
     if structure.integral {
-        s.integral = s.integral + m.control.integral_step * asked.error;
+        let mut change = m.control.integral_step * asked.error;
+        if structure.control.conditional {
+            change = S::select(s.torque_ref.equals(unlimited), change, S::zero());
+        }
+        s.integral = s.integral + change;
     }
 
     // Equivalent phase, motor and transmission dynamics.

@@ -33,7 +33,7 @@ impl<S: Scalar> Shaft<S> {
         s: &ShaftState<S>,
         torque: S,
     ) -> Loads<S> {
-        let user_torque = self.user_torque(x, s);
+        let user_torque = self.user_torque(d, x, s);
         let elastic = FULL && d.elastic;
         let through = if elastic { self.contact(d, s) } else { user_torque };
         let mut load = through.fma(self.gear.per_ratio, x.shaft);
@@ -73,6 +73,9 @@ impl<S: Scalar> Shaft<S> {
         let mut limits = [self.friction.static_limit, self.friction.dynamic];
         if EXTRA && d.train.lawful {
             limits = self.train.law.limits(d.train.law, limits, s.motor_speed, torque, load);
+        }
+        if EXTRA && d.directed {
+            limits = self.friction.in_direction(limits, s.motor_speed, torque - load);
         }
         let (mut static_limit, mut dynamic) = (limits[0] + added, limits[1] + added);
         if EXTRA {
@@ -118,8 +121,9 @@ impl<S: Scalar> Shaft<S> {
     }
 
     #[inline(always)]
-    pub(super) fn user_torque(&self, x: &Instant<S>, s: &ShaftState<S>) -> S {
-        self.gear.stiffness.fma(s.user_position - self.gear.spring_zero, x.user)
+    pub(super) fn user_torque(&self, d: &ShaftDetails, x: &Instant<S>, s: &ShaftState<S>) -> S {
+        let load = if d.weight { x.user + self.gear.constant } else { x.user };
+        self.gear.stiffness.fma(s.user_position - self.gear.spring_zero, load)
     }
 
     /// Dry friction of the load side, at the user.

@@ -40,6 +40,8 @@ details! {
         loaded = F::LINEAR || Gear::<f64>::loaded(&x.parts.gear());
         sloped = Friction::<f64>::sloped(&x.parts.friction());
         jams = Friction::<f64>::jams(&x.parts.friction());
+        /// A constant load that belongs to the actuator.
+        weight = x.parts.load().away(LoadParameter::Constant);
         /// The work of each load is summed.
         accounts = x.accounts;
     }
@@ -52,6 +54,7 @@ details! {
         debris = F::contaminated(x.parts.0);
         detailed_train = train.extra;
         /// The screw's friction warms a nut.
+        directed = Friction::<f64>::directed(&x.parts.friction());
         nut = F::LINEAR && Network::<f64>::needed(&x.parts.thermal());
         vibrates = !x.low && F::vibrates(x.parts.0);
     }
