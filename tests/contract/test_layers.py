@@ -139,3 +139,12 @@ def circles(edges):
 def test_circles_are_seen():
     assert circles({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == [["b", "c"]]
     assert circles({"a": {"b", "c"}, "b": {"c"}}) == []
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    modules = _module_names()
+    edges = {
+        name: set(_imported_modules(ast.parse(path.read_text(encoding="utf-8")), modules))
+        for name, path in modules.items()
+    }
+    assert circles(edges) == []

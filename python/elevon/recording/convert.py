@@ -1,14 +1,17 @@
 """Recordings as pandas tables, xarray datasets and Arrow tables."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 from elevon.recording.header import Header
-from elevon.recording.recording import Recording
 
 if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
     import xarray as xr
+
+    from elevon.recording.recording import Recording
 
 __all__ = ["time_name", "to_arrow", "to_pandas", "to_xarray"]
 
@@ -18,7 +21,7 @@ def time_name(recording: Recording, clock: str) -> str:
     return "time" if len(recording.clocks) == 1 else f"time_{clock}"
 
 
-def to_pandas(recording: Recording, clock: str | None) -> "pd.DataFrame":
+def to_pandas(recording: Recording, clock: str | None) -> pd.DataFrame:
     """See `Recording.to_pandas`."""
     import pandas as pd
 
@@ -30,7 +33,7 @@ def to_pandas(recording: Recording, clock: str | None) -> "pd.DataFrame":
     return table
 
 
-def to_xarray(recording: Recording) -> "xr.Dataset":
+def to_xarray(recording: Recording) -> xr.Dataset:
     """See `Recording.to_xarray`."""
     import xarray as xr
 
@@ -47,7 +50,7 @@ def to_xarray(recording: Recording) -> "xr.Dataset":
     return xr.Dataset(variables, coordinates, {"elevon": Header.of(recording).to_json()})
 
 
-def to_arrow(recording: Recording, clock: str | None) -> "pa.Table":
+def to_arrow(recording: Recording, clock: str | None) -> pa.Table:
     """See `Recording.to_arrow`."""
     import pyarrow as pa
 

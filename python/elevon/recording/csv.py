@@ -8,17 +8,23 @@ A file holds ONE clock; a recording of several is refused (Parquet, NetCDF and M
 A table without the first line is read as well, in any units, as a recording without meta.
 """
 
+from __future__ import annotations
+
 import re
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import FormatError, InputError
-from elevon.recording.assemble import check_size, header_bytes, rebuild
+from elevon.recording.channel import in_si
+from elevon.recording.clock import Clock
+from elevon.recording.contents import Contents, check_size, header_bytes, rebuild
 from elevon.recording.header import Header
-from elevon.recording.recording import Recording
+
+if TYPE_CHECKING:
+    from elevon.recording.recording import Recording
 from elevon.units import check_kind, to_si
 
 __all__ = ["check", "read", "write"]
@@ -54,7 +60,7 @@ def write(recording: Recording, path: Path) -> None:
         csv.write_csv(pa.Table.from_arrays(arrays, heads), stream, options)
 
 
-def read(path: Path, max_bytes: int) -> Recording:
+def read(path: Path, max_bytes: int) -> Contents:
     """Read the first lines, then the numbers."""
     check_size(str(path), path.stat().st_size, max_bytes)
     with path.open("rb") as stream:
@@ -124,7 +130,7 @@ def _numbers(path: Path, stream: Any, names: list[str]) -> dict[str, npt.NDArray
 
 def _without_header(
     path: Path, columns: dict[str, str], arrays: dict[str, npt.NDArray[np.float64]]
-) -> Recording:
+) -> Contents:
     try:
         values = {name: arrays[name] for name in columns if name != "time"}
         units = {name: unit for name, unit in columns.items() if name != "time"}
@@ -132,6 +138,7 @@ def _without_header(
         time = arrays["time"]
         if columns["time"] != "s":
             time = to_si(time, columns["time"])
-        return Recording.build(time, values, units)
+        base = Clock("main", time)
+        return Contents([in_si(name, units[name], values[name], base) for name in values], [base])
     except InputError as error:
         raise FormatError(f"{path}: {error}") from error

@@ -1,12 +1,17 @@
 """The file formats of recordings, chosen by the file's ending."""
 
+from __future__ import annotations
+
 import os
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from elevon.errors import FormatError, InputError, UnknownNameError, nearest, unknown
 from elevon.files import atomic_path, check_output
-from elevon.recording.recording import Recording
+from elevon.recording.contents import Contents
+
+if TYPE_CHECKING:
+    from elevon.recording.recording import Recording
 
 __all__ = ["ENDINGS", "check_ending", "load", "save"]
 
@@ -20,7 +25,7 @@ class _Format(Protocol):
     def write(self, recording: Recording, path: Path) -> None:
         """Write to a fresh temporary path."""
 
-    def read(self, path: Path, max_bytes: int) -> Recording:
+    def read(self, path: Path, max_bytes: int) -> Contents:
         """Read a file that nobody vouches for."""
 
 
@@ -35,8 +40,8 @@ def save(recording: Recording, path: str | os.PathLike[str], *, force: bool) -> 
     return target
 
 
-def load(path: str | os.PathLike[str], *, max_bytes: int) -> Recording:
-    """Read a recording; see `Recording.load`."""
+def load(path: str | os.PathLike[str], *, max_bytes: int) -> Contents:
+    """Read what a file holds; see `Recording.load`."""
     source = Path(path).expanduser()
     handler = _handler(source)
     if not source.is_file():

@@ -7,18 +7,22 @@ SciPy writes files that MATLAB cannot read when they pass 2 GB: this is checked 
 files are HDF5, another format.
 """
 
+from __future__ import annotations
+
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import FormatError, InputError
-from elevon.recording.assemble import check_size, header_bytes, rebuild
+from elevon.recording.contents import Contents, check_size, header_bytes, rebuild
 from elevon.recording.header import Header
 from elevon.recording.mat5 import Variable, variables
 from elevon.recording.names import check_name
-from elevon.recording.recording import Recording
+
+if TYPE_CHECKING:
+    from elevon.recording.recording import Recording
 
 __all__ = ["check", "read", "write"]
 
@@ -56,7 +60,7 @@ def write(recording: Recording, path: Path) -> None:
     savemat(path, content, appendmat=False, format="5", oned_as="column", do_compression=False)
 
 
-def read(path: Path, max_bytes: int) -> Recording:
+def read(path: Path, max_bytes: int) -> Contents:
     """Read the description, then the structs it names."""
     content = _content(path, max_bytes)
     text = content.get("elevon")

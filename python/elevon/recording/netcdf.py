@@ -8,18 +8,22 @@ A file is read through h5py with every link, layout and type checked first: HDF5
 other files on the disk, and those of strangers may.
 """
 
+from __future__ import annotations
+
 import io
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import FormatError
-from elevon.recording.assemble import check_size, header_bytes, rebuild
+from elevon.recording.contents import Contents, check_size, header_bytes, rebuild
 from elevon.recording.convert import time_name
 from elevon.recording.header import Header
-from elevon.recording.recording import Recording
+
+if TYPE_CHECKING:
+    from elevon.recording.recording import Recording
 
 __all__ = ["check", "read", "write"]
 
@@ -55,7 +59,7 @@ def write(recording: Recording, path: Path) -> None:
     path.write_bytes(memory.getbuffer())
 
 
-def read(path: Path, max_bytes: int) -> Recording:
+def read(path: Path, max_bytes: int) -> Contents:
     """Read the description, then what it names."""
     import h5py
 

@@ -9,17 +9,21 @@ each other, every clock starting a row group, and a channel is null in the rows 
 Snappy and plain or dictionary pages only, which every reader knows.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import FormatError
-from elevon.recording.assemble import check_size, header_bytes, rebuild
+from elevon.recording.contents import Contents, check_size, header_bytes, rebuild
 from elevon.recording.header import Header
-from elevon.recording.recording import Recording
+
+if TYPE_CHECKING:
+    from elevon.recording.recording import Recording
 
 __all__ = ["check", "read", "write"]
 
@@ -43,7 +47,7 @@ def write(recording: Recording, path: Path) -> None:
             writer.write_table(batch, row_group_size=_GROUP)
 
 
-def read(path: Path, max_bytes: int) -> Recording:
+def read(path: Path, max_bytes: int) -> Contents:
     """Read every clock from its rows."""
     import pyarrow as pa
     import pyarrow.parquet as pq

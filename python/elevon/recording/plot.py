@@ -1,5 +1,7 @@
 """Pictures and interactive pages of recordings."""
 
+from __future__ import annotations
+
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -13,11 +15,12 @@ from elevon.errors import InputError, unknown
 from elevon.files import atomic_path, check_output, write_text
 from elevon.recording.channel import Channel
 from elevon.recording.clock import Clock
-from elevon.recording.recording import Recording
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from elevon.recording.recording import Recording
 
 __all__ = ["plot"]
 
@@ -42,7 +45,7 @@ def plot(
     units: Mapping[str, str],
     title: str | None,
     force: bool,
-) -> "Figure | Path":
+) -> Figure | Path:
     """See `Recording.plot`."""
     chosen = recording.channels if names is None else [recording[name] for name in names]
     if not chosen:
@@ -98,7 +101,7 @@ def _page(panels: list[_Panel], heading: str) -> str:
     return page(heading, "\n".join(charts))
 
 
-def _figure(panels: list[_Panel], heading: str) -> "Figure":
+def _figure(panels: list[_Panel], heading: str) -> Figure:
     from matplotlib.figure import Figure
 
     height = 1.0 + 2.2 * len(panels)
@@ -115,7 +118,7 @@ def _figure(panels: list[_Panel], heading: str) -> "Figure":
     return figure
 
 
-def _draw(axis: "Axes", panel: _Panel, name_clock: bool) -> None:
+def _draw(axis: Axes, panel: _Panel, name_clock: bool) -> None:
     from elevon.report.uplot import COLOURS, thinned
 
     for k, (name, values) in enumerate(panel.lines.items()):

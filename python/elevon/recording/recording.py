@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.errors import InputError, unknown
+from elevon.errors import FormatError, InputError, unknown
 from elevon.recording.channel import Channel, in_si
 from elevon.recording.clock import Clock
 from elevon.recording.header import plain
@@ -394,4 +394,14 @@ class Recording:
         """
         from elevon.recording.formats import load
 
-        return load(path, max_bytes=max_bytes)
+        held = load(path, max_bytes=max_bytes)
+        try:
+            return cls(
+                held.channels,
+                clocks=held.clocks,
+                meta=held.meta,
+                labels=held.labels,
+                final=held.final,
+            )
+        except InputError as error:
+            raise FormatError(f"{path}: {error}") from error

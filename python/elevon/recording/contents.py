@@ -1,6 +1,10 @@
-"""From the description and columns of a file back to a recording, trusting neither."""
+"""What a file holds, its description and columns checked against each other; neither is trusted."""
+
+from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -9,9 +13,19 @@ from elevon.errors import FormatError, InputError
 from elevon.recording.channel import Channel
 from elevon.recording.clock import Clock
 from elevon.recording.header import Header
-from elevon.recording.recording import Recording
 
-__all__ = ["check_size", "header_bytes", "rebuild"]
+__all__ = ["Contents", "check_size", "header_bytes", "rebuild"]
+
+
+@dataclass(frozen=True)
+class Contents:
+    """Everything of which a recording is made; see `Recording`."""
+
+    channels: list[Channel]
+    clocks: list[Clock]
+    meta: dict[str, Any] = field(default_factory=dict)
+    labels: Any = None
+    final: dict[str, float] = field(default_factory=dict)
 
 
 def check_size(place: str, needed: int, max_bytes: int) -> None:
@@ -32,8 +46,8 @@ def rebuild(
     header: Header,
     columns: Callable[[str], Mapping[str, npt.NDArray[np.float64]]],
     place: str,
-) -> Recording:
-    """Build the recording that a header and its columns describe.
+) -> Contents:
+    """Return the contents that a header and its columns describe.
 
     Parameters
     ----------
@@ -66,9 +80,7 @@ def rebuild(
                 Channel(name, unit, arrays[name], clock, text)
                 for name, (unit, text) in entry.channels.items()
             ]
-        return Recording(
-            channels, clocks=clocks, meta=header.meta, labels=header.labels, final=header.final
-        )
+        return Contents(channels, clocks, header.meta, header.labels, header.final)
     except FormatError:
         raise
     except (InputError, TypeError, ValueError) as error:

@@ -1,0 +1,25 @@
+"""`elevon reproduce`: recompute a published table or figure, with checks."""
+
+from __future__ import annotations
+
+import typer
+
+from elevon.cli.reproduce.case import add_command
+from elevon.cli.reproduce.nasa import CASES as _NASA
+from elevon.cli.reproduce.pisa import CASES as _PISA
+from elevon.cli.reproduce.torino import CASES as _TORINO
+
+app = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="Recompute a published table or figure; exit code 1 when a check fails.",
+)
+
+
+@app.callback()
+def _group() -> None:
+    """Recompute a published table or figure; exit code 1 when a check fails."""
+
+
+for _case in (*_TORINO, *_NASA, *_PISA):
+    add_command(app, _case)
