@@ -5,6 +5,7 @@ pub mod actuator;
 pub mod command;
 pub mod control;
 pub mod fault;
+pub mod features;
 pub mod inverter;
 pub mod motor;
 pub mod noise;
