@@ -10,6 +10,9 @@ __all__ = [
     "check",
     "derivatives_per_pass",
     "faults",
+    "feature_records",
+    "feature_roles",
+    "features",
     "initial",
     "not_acting",
     "parameters",
@@ -49,6 +52,11 @@ def not_acting(
     paths: list[str] | None = None,
 ) -> list[dict[str, str]]: ...
 def widths() -> dict[str, Any]: ...
+def feature_records() -> list[dict[str, Any]]: ...
+def feature_roles() -> list[dict[str, str]]: ...
+def features(
+    plan: dict[str, Any], columns: list[npt.NDArray[np.float64]]
+) -> npt.NDArray[np.float64]: ...
 def simulate(
     wiring: str,
     fidelity: str,

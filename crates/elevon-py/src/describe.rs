@@ -14,7 +14,11 @@ use pyo3::types::{PyDict, PyList};
 type Dicts<'py> = PyResult<Bound<'py, PyList>>;
 
 /// A list of dictionaries, one per item.
-fn dicts<'py, T>(py: Python<'py>, items: impl IntoIterator<Item = T>, fill: impl Fn(&Bound<'py, PyDict>, T) -> PyResult<()>) -> Dicts<'py> {
+pub fn dicts<'py, T>(
+    py: Python<'py>,
+    items: impl IntoIterator<Item = T>,
+    fill: impl Fn(&Bound<'py, PyDict>, T) -> PyResult<()>,
+) -> Dicts<'py> {
     let list = PyList::empty(py);
     for item in items {
         let dict = PyDict::new(py);

@@ -1,6 +1,7 @@
 //! The Python seam: converts, releases the GIL, maps errors. No physics, no defaults.
 
 mod describe;
+mod features;
 mod run;
 mod spec;
 
@@ -23,6 +24,9 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(describe::check, m)?)?;
     m.add_function(wrap_pyfunction!(describe::not_acting, m)?)?;
     m.add_function(wrap_pyfunction!(describe::widths, m)?)?;
+    m.add_function(wrap_pyfunction!(features::feature_records, m)?)?;
+    m.add_function(wrap_pyfunction!(features::feature_roles, m)?)?;
+    m.add_function(wrap_pyfunction!(features::features, m)?)?;
     m.add_function(wrap_pyfunction!(run::simulate, m)?)?;
     m.add_function(wrap_pyfunction!(run::sensitivities, m)?)?;
     Ok(())

@@ -128,8 +128,13 @@ fn result<'py>(
         last.set_item(name, output.last[i * width])?;
     }
     d.set_item("final", last)?;
-    let kept = PyDict::new(py);
-    for (((clock, name), values), columns) in asked.clocks.iter().zip(&asked.names).zip(output.clocks).zip(output.columns) {
+    let (kept, summed) = (PyDict::new(py), PyDict::new(py));
+    let results = output.clocks.into_iter().zip(output.columns).zip(output.features);
+    for ((clock, name), ((values, columns), features)) in asked.clocks.iter().zip(&asked.names).zip(results) {
+        if clock.features.is_some() {
+            summed.set_item(name, PyArray1::from_vec(py, features))?;
+            continue;
+        }
         let rows = values.len().checked_div(columns).unwrap_or(0);
         let entry = PyDict::new(py);
         entry.set_item("time", times.get(py, dt, clock.period, rows))?;
@@ -137,6 +142,7 @@ fn result<'py>(
         kept.set_item(name, entry)?;
     }
     d.set_item("clocks", kept)?;
+    d.set_item("features", summed)?;
     Ok(d)
 }
 
@@ -194,6 +200,9 @@ pub fn sensitivities<'py>(
     let resolver = Resolver::new(wiring, fidelity)?;
     let spec = resolver.run(run)?;
     let (clocks, names) = resolver.clocks(record)?;
+    if clocks.iter().any(|clock| clock.features.is_some()) {
+        return Err(bad("features have no derivatives here"));
+    }
     let wanted = parameters.iter().map(|p| resolver.parameter(p)).collect::<PyResult<Vec<_>>>()?;
     if let Some(missing) = faults.iter().find(|&&f| f >= spec.faults.len()) {
         return Err(bad(format!("fault {missing} of {}", spec.faults.len())));

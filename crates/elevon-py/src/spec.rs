@@ -1,6 +1,7 @@
 //! Runs as the caller describes them, resolved to the core's indices. Everything is checked here, so that the
 //! core never sees a name or a length it does not expect.
 
+use crate::features;
 use elevon_core::actuator::Severity;
 use elevon_core::command::{catalogue, SourcePlan, Term, Wave};
 use elevon_core::fault::{whole, FaultKind, FaultSpec, Op, Profile, Write};
@@ -55,7 +56,7 @@ fn in_range(model: Model, raw: &[f64], start: &str) -> PyResult<()> {
 const MOST_STEPS: f64 = 9.0e15;
 
 /// A required entry of a dictionary.
-fn need<'py>(d: &Bound<'py, PyDict>, key: &str) -> PyResult<Bound<'py, PyAny>> {
+pub fn need<'py>(d: &Bound<'py, PyDict>, key: &str) -> PyResult<Bound<'py, PyAny>> {
     d.get_item(key)?.ok_or_else(|| bad(format!("missing {key:?}")))
 }
 
@@ -258,7 +259,8 @@ impl Resolver {
                 .iter()
                 .map(|n| self.signals.get(n.as_str()).copied().ok_or_else(|| bad(format!("no signal {n:?}"))))
                 .collect::<PyResult<Vec<_>>>()?;
-            clocks.push(Clock { period, signals });
+            let features = features::plan(&d)?.map(Arc::new);
+            clocks.push(Clock { period, signals, features });
             names.push(need(&d, "clock")?.extract()?);
         }
         Ok((clocks, names))

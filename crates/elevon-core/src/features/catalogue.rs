@@ -42,7 +42,7 @@ impl Family {
         match self {
             Level(_) => "level",
             Friction => "friction",
-            LostMotion => "lost_motion",
+            LostMotion => "transmission",
             Orders(_) => "orders",
             Phases => "phases",
             Bands(_) => "bands",

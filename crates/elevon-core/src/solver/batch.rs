@@ -114,6 +114,7 @@ fn broken<W: Wiring>(run: &RunSpec, clocks: &[Clock]) -> RunOutput {
         wall: 0.0,
         clocks: vec![Vec::new(); clocks.len()],
         columns: clocks.iter().map(|c| c.signals.len() + run.faults.len()).collect(),
+        features: clocks.iter().map(|c| vec![f64::NAN; c.features.as_ref().map_or(0, |plan| plan.len())]).collect(),
         last: vec![f64::NAN; W::signals().len()],
     }
 }

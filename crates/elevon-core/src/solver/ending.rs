@@ -86,13 +86,15 @@ impl<W: Wiring, S: Scalar, L: Lift<S>> Block<'_, W, S, L> {
             }
             let steps = self.stopped[lane].unwrap_or(k);
             let labels = self.faults.count(lane);
+            let (clocks, features) = self.rows[lane / S::LANES].take(lane % S::LANES, &self.lift);
             results.push(RunOutput {
                 status: self.status[lane].clone(),
                 steps,
                 time: steps as f64 * self.dt,
                 wall: self.wall / self.real as f64,
                 columns: self.clocks.iter().map(|c| (c.signals.len() + labels) * width).collect(),
-                clocks: self.rows[lane / S::LANES].take(lane % S::LANES, &self.lift),
+                clocks,
+                features,
                 last: std::mem::take(&mut self.last[lane]),
             });
         }

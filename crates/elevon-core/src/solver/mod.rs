@@ -6,6 +6,7 @@ mod ending;
 mod kernels;
 mod rows;
 mod spec;
+mod summing;
 mod width;
 
 pub use batch::{run_all, sensitivities, Monitor, DERIVATIVES};

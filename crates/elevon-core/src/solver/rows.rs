@@ -1,8 +1,10 @@
 //! What the clocks of one chunk of lanes recorded. Rows gather as whole vectors while the run goes on and are sorted into
-//! one table a lane some hundred rows at a time: a store a signal instead of one a signal and lane.
+//! one table a lane some hundred rows at a time: a store a signal instead of one a signal and lane. A clock with features
+//! sums them up from the sorted rows and keeps none.
 
 use super::kernels::Lift;
 use super::spec::Clock;
+use super::summing::Summing;
 use crate::fault::FaultLanes;
 use crate::scalar::Scalar;
 use crate::time::Steps;
@@ -14,9 +16,12 @@ const GATHERED: usize = 256;
 #[derive(Clone, Debug)]
 struct Table<S> {
     columns: usize,
+    /// Columns of fault labels among them.
+    labels: usize,
     gathered: Vec<S>,
     /// Row-major tables of the lanes that are recorded.
     lanes: Vec<Vec<f64>>,
+    summing: Option<Summing>,
 }
 
 /// The tables of one chunk, one a clock.
@@ -25,7 +30,6 @@ pub(super) struct Rows<S> {
     first: usize,
     /// Fault labels of each lane.
     labels: Vec<usize>,
-    most_labels: usize,
     /// Lanes that have stopped, and padding.
     ended: Vec<bool>,
     tables: Vec<Table<S>>,
@@ -39,28 +43,32 @@ impl<S: Scalar> Rows<S> {
         let most_labels = labels.iter().copied().max().unwrap_or(0);
         let ended: Vec<bool> = all.map(|lane| lane >= real).collect();
         let table = |clock: &Clock| {
-            let rows = (steps / clock.period + 1) as usize;
-            let room = |(labels, &ended): (&usize, &bool)| if ended { 0 } else { rows * (clock.signals.len() + labels) * lift.width() };
-            let columns = clock.signals.len() + most_labels;
+            let summing = clock.features.as_ref().map(|plan| Summing::new(plan, clock.signals.len(), S::LANES, GATHERED));
+            let kept = if summing.is_some() { 0 } else { (steps / clock.period + 1) as usize };
+            let labelled = if summing.is_some() { 0 } else { most_labels };
+            let room = |(labels, &ended): (&usize, &bool)| if ended { 0 } else { kept * (clock.signals.len() + labels) * lift.width() };
+            let columns = clock.signals.len() + labelled;
             Table {
                 columns,
-                gathered: Vec::with_capacity(rows.min(GATHERED) * columns),
+                labels: labelled,
+                gathered: Vec::with_capacity(GATHERED.min((steps / clock.period + 1) as usize) * columns),
                 lanes: labels.iter().zip(&ended).map(|lane| Vec::with_capacity(room(lane))).collect(),
+                summing,
             }
         };
         let tables = clocks.iter().map(table).collect();
-        Self { first, labels, most_labels, ended, tables }
+        Self { first, labels, ended, tables }
     }
 
     /// Appends a row to the table of clock `index`.
     #[inline(always)]
     pub fn append<L: Lift<S>>(&mut self, index: usize, clock: &Clock, observed: &[S], faults: &FaultLanes, lift: &L) {
-        let gathered = &mut self.tables[index].gathered;
+        let Table { columns, labels, gathered, .. } = &mut self.tables[index];
         gathered.extend(clock.signals.iter().map(|&signal| observed[signal]));
-        for label in 0..self.most_labels {
+        for label in 0..*labels {
             gathered.push(S::from_fn(|lane| faults.label(self.first + lane, label)));
         }
-        if gathered.len() >= GATHERED * self.tables[index].columns {
+        if gathered.len() >= GATHERED * *columns {
             self.sort(index, lift);
         }
     }
@@ -68,9 +76,13 @@ impl<S: Scalar> Rows<S> {
     /// The gathered rows of clock `index` go to the tables of the lanes that still record.
     #[inline(never)]
     fn sort<L: Lift<S>>(&mut self, index: usize, lift: &L) {
-        let Table { columns, gathered, lanes } = &mut self.tables[index];
+        let Table { columns, labels, gathered, lanes, summing } = &mut self.tables[index];
         for (lane, out) in lanes.iter_mut().enumerate().filter(|(lane, _)| !self.ended[*lane]) {
-            let used = *columns - self.most_labels + self.labels[lane];
+            if let Some(summing) = summing {
+                summing.push(lane, gathered);
+                continue;
+            }
+            let used = *columns - *labels + self.labels[lane];
             for row in gathered.chunks_exact((*columns).max(1)) {
                 for &value in &row[..used] {
                     lift.emit(value, lane, out);
@@ -100,11 +112,15 @@ impl<S: Scalar> Rows<S> {
         self.ended[lane] = true;
     }
 
-    /// The tables of one lane, row-major: its signals, then its fault labels.
-    pub fn take<L: Lift<S>>(&mut self, lane: usize, lift: &L) -> Vec<Vec<f64>> {
+    /// The tables of one lane, row-major: its signals, then its fault labels; and its features, where a clock has them.
+    pub fn take<L: Lift<S>>(&mut self, lane: usize, lift: &L) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
         for index in 0..self.tables.len() {
             self.sort(index, lift);
         }
-        self.tables.iter_mut().map(|table| std::mem::take(&mut table.lanes[lane])).collect()
+        let one = |table: &mut Table<S>| {
+            let features = table.summing.as_ref().map_or(Vec::new(), |summing| summing.finish(lane));
+            (std::mem::take(&mut table.lanes[lane]), features)
+        };
+        self.tables.iter_mut().map(one).unzip()
     }
 }

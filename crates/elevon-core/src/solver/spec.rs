@@ -2,7 +2,9 @@
 
 use crate::command::SourcePlan;
 use crate::fault::FaultSpec;
+use crate::features;
 use crate::time::Steps;
+use std::sync::Arc;
 
 /// One run, all in SI.
 #[derive(Clone, Debug)]
@@ -22,11 +24,12 @@ pub struct RunSpec {
     pub run: u64,
 }
 
-/// Signals kept every `period` steps, from the start on.
+/// Signals kept every `period` steps, from the start on; or features of them, and no rows.
 #[derive(Clone, Debug)]
 pub struct Clock {
     pub period: Steps,
     pub signals: Vec<usize>,
+    pub features: Option<Arc<features::Plan>>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -63,6 +66,8 @@ pub struct RunOutput {
     /// One per clock, row-major: the clock's signals, then the fault labels.
     pub clocks: Vec<Vec<f64>>,
     pub columns: Vec<usize>,
+    /// One per clock: its features, none where it keeps rows.
+    pub features: Vec<Vec<f64>>,
     /// All signals at the end.
     pub last: Vec<f64>,
 }
