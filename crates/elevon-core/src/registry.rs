@@ -76,6 +76,9 @@ macro_rules! dispatch {
 }
 
 impl Model {
+    /// How many there are.
+    pub const COUNT: usize = Self::LandingGearLow as usize + 1;
+
     pub fn find(kind: &str, fidelity: &str) -> Option<Self> {
         let kind = KINDS.iter().find(|k| k.name == kind)?;
         kind.fidelities.iter().find(|f| f.0 == fidelity).map(|f| f.1)

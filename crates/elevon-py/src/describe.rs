@@ -239,7 +239,7 @@ pub fn not_acting<'py>(
     faults: &Bound<'py, PyList>,
     paths: Option<Vec<String>>,
 ) -> Dicts<'py> {
-    let resolver = Resolver::new(wiring, fidelity)?;
+    let resolver = Resolver::of(wiring, fidelity)?;
     let raw = vector(resolver.model, &parameters)?;
     let faults = resolver.faults(faults)?;
     dicts(py, resolver.model.not_acting(&raw, &faults, paths.as_deref()), |d, (path, reason)| {

@@ -164,8 +164,8 @@ pub fn simulate<'py>(
     lanes: &str,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyList>> {
-    let resolver = Resolver::new(wiring, fidelity)?;
-    let specs = read_runs(&resolver, runs)?;
+    let resolver = Resolver::of(wiring, fidelity)?;
+    let specs = read_runs(resolver, runs)?;
     let (clocks, names) = resolver.clocks(record)?;
     let width =
         Width::by_name(lanes).ok_or_else(|| bad(format!("lanes {lanes:?} are not known here, or this processor cannot run them")))?;
@@ -197,7 +197,7 @@ pub fn sensitivities<'py>(
     faults: Vec<usize>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyList>> {
-    let resolver = Resolver::new(wiring, fidelity)?;
+    let resolver = Resolver::of(wiring, fidelity)?;
     let spec = resolver.run(run)?;
     let (clocks, names) = resolver.clocks(record)?;
     if clocks.iter().any(|clock| clock.features.is_some()) {

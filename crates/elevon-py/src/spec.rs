@@ -12,7 +12,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 pub fn bad(message: impl Into<String>) -> PyErr {
     PyValueError::new_err(message.into())
@@ -23,7 +23,7 @@ pub fn model(wiring: &str, fidelity: &str) -> PyResult<Model> {
 }
 
 /// Paths of all parameters of a model and their places.
-pub fn paths(model: Model) -> HashMap<String, usize> {
+fn paths(model: Model) -> HashMap<String, usize> {
     let groups = model.groups();
     let all = groups.iter().flat_map(|g| (0..g.variables.len()).map(|i| g.path(i)));
     all.enumerate().map(|(i, p)| (p, i)).collect()
@@ -137,7 +137,7 @@ fn names_of(faults: &Bound<'_, PyList>) -> PyResult<Vec<String>> {
     faults.iter().map(|f| name(&f.cast_into::<PyDict>()?)).collect()
 }
 
-/// What a caller's runs are resolved against; made once a call.
+/// What a caller's runs are resolved against.
 pub struct Resolver {
     pub model: Model,
     faults: Vec<FaultKind>,
@@ -146,10 +146,16 @@ pub struct Resolver {
 }
 
 impl Resolver {
-    pub fn new(wiring: &str, fidelity: &str) -> PyResult<Self> {
+    /// That of a model: made once, since writing out the paths of its catalogues takes as long as a short run.
+    pub fn of(wiring: &str, fidelity: &str) -> PyResult<&'static Self> {
+        static MADE: [OnceLock<Resolver>; Model::COUNT] = [const { OnceLock::new() }; Model::COUNT];
         let model = model(wiring, fidelity)?;
+        Ok(MADE[model as usize].get_or_init(|| Self::new(model)))
+    }
+
+    fn new(model: Model) -> Self {
         let signals = model.signals().iter().enumerate().map(|(i, s)| (s.name, i)).collect();
-        Ok(Self { model, faults: model.faults(), places: paths(model), signals })
+        Self { model, faults: model.faults(), places: paths(model), signals }
     }
 
     pub fn parameter(&self, path: &str) -> PyResult<usize> {

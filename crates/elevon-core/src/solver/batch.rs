@@ -5,7 +5,7 @@ use super::kernels::{Lift, Plain};
 use super::spec::{Clock, RunOutput, RunSpec, Status};
 use super::width::Width;
 use crate::actuator::{Tick, Wiring, MAX_CHUNKS};
-#[cfg(not(feature = "physics"))]
+#[cfg(not(any(feature = "physics", feature = "widest")))]
 use crate::scalar::Portable;
 use crate::scalar::{Dual, Scalar};
 use crate::time::Steps;
@@ -14,8 +14,10 @@ use std::collections::HashMap;
 use std::panic::{catch_unwind, AssertUnwindSafe};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
+#[cfg(all(target_arch = "x86_64", not(any(feature = "physics", feature = "widest"))))]
+use crate::scalar::Avx2x4;
 #[cfg(all(target_arch = "x86_64", not(feature = "physics")))]
-use crate::scalar::{Avx2x4, Avx512x8};
+use crate::scalar::Avx512x8;
 
 /// Progress out, interruption in; shared between threads.
 #[derive(Debug, Default)]
@@ -86,12 +88,15 @@ fn run_width<W: Wiring>(width: Width, runs: &[&RunSpec], clocks: &[Clock], recor
         _ => run_block::<W, f64>(runs, clocks, recorded, monitor),
         #[cfg(not(feature = "physics"))]
         Width::Single => run_block::<W, f64>(runs, clocks, recorded, monitor),
-        #[cfg(all(target_arch = "x86_64", not(feature = "physics")))]
+        #[cfg(all(target_arch = "x86_64", not(any(feature = "physics", feature = "widest"))))]
         Width::Avx2 => run_block::<W, Avx2x4>(runs, clocks, recorded, monitor),
         #[cfg(all(target_arch = "x86_64", not(feature = "physics")))]
         Width::Avx512 => run_block::<W, Avx512x8>(runs, clocks, recorded, monitor),
-        #[cfg(not(feature = "physics"))]
+        #[cfg(not(any(feature = "physics", feature = "widest")))]
         _ => run_block::<W, Portable<2>>(runs, clocks, recorded, monitor),
+        // A build for work on speed knows single runs and the widest lanes.
+        #[cfg(all(feature = "widest", not(feature = "physics")))]
+        _ => run_block::<W, f64>(runs, clocks, recorded, monitor),
     }
 }
 

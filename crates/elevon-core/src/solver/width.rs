@@ -22,11 +22,15 @@ impl Width {
             if wide && fused {
                 return Self::Avx512;
             }
-            if fused {
+            if fused && !cfg!(feature = "widest") {
                 return Self::Avx2;
             }
         }
-        Self::Portable
+        if cfg!(feature = "widest") {
+            Self::Single
+        } else {
+            Self::Portable
+        }
     }
 
     pub const NAMES: [&'static str; 4] = ["single", "portable", "avx2", "avx512"];
