@@ -1,8 +1,9 @@
 """Time this checkout against another one, both in one run: ``against.py OTHER [--json]``.
 
-OTHER is a checkout of the project whose extension is built (``make build`` there). Each of the two runs its own
-``run.py`` functions in a process of its own, one after the other within a round, so that a machine that slows down
-slows both; a C yardstick runs in each round as well. A figure is the best of the rounds, a ratio one of the bests.
+OTHER is a checkout of the project whose extension is built (``make build`` there). Each of the two
+runs its own ``run.py`` functions in a process of its own, one after the other within a round, so
+that a machine that slows down slows both; the C yardsticks run in each round as well. A figure is
+the best of the rounds, a ratio one of the bests.
 """
 
 from __future__ import annotations
@@ -51,7 +52,8 @@ class Checkout:
 
     def measure(self, call: str) -> float:
         """One figure."""
-        assert self.process.stdin is not None and self.process.stdout is not None
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
         print(call, file=self.process.stdin, flush=True)
         return float(json.loads(self.process.stdout.readline()))
 
@@ -108,9 +110,8 @@ def report(table: dict[str, dict[str, Any]]) -> None:
         ratios = [
             f"{row[key]:.2f}" if key in row else "" for key in ("ratio", "before_c", "after_c")
         ]
-        print(
-            f"| `{name}` | {row['unit']} | {row['before']:.4g} | {row['after']:.4g} | {' | '.join(ratios)} |"
-        )
+        figures = [f"{row[side]:.4g}" for side in ("before", "after")]
+        print(f"| `{name}` | {row['unit']} | {' | '.join(figures + ratios)} |")
 
 
 def main() -> int:
