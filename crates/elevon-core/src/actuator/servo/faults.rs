@@ -68,30 +68,23 @@ pub fn electrical() -> Vec<FaultKind> {
         "resistance of the short itself (loop model); without limit it is the healthy motor",
     )];
     const POLE: &[Attribute] = &[
-        Attribute { default: Some(0.0), ..attribute("phase", "rad", "motor.pole_loss_phase", "mechanical angle of the weak pole pair") },
-        Attribute {
-            default: Some(1.0),
-            ..attribute(
-                "concentration",
-                "1",
-                "motor.pole_concentration",
-                "1: a phase's coils stand under one pole pair, 0: evenly under all",
-            )
-        },
+        attribute("phase", "rad", "motor.pole_loss_phase", "mechanical angle of the weak pole pair"),
+        attribute("concentration", "1", "motor.pole_concentration", "1: a phase's coils stand under one pole pair, 0: evenly under all"),
     ];
-    const TOUCHING: &[Attribute] = &[Attribute {
-        default: Some(1.0),
-        ..attribute("turns", "1", "motor.phase_short_turns", "fraction of the turns between neutral and contact; 1: the terminals")
-    }];
+    const TOUCHING: &[Attribute] = &[attribute(
+        "turns",
+        "1",
+        "motor.phase_short_turns",
+        "fraction of the turns between neutral and contact, of all pairs; 1: the terminals",
+    )];
     const GROUNDED: &[Attribute] = &[
-        Attribute {
-            default: Some(1.0),
-            ..attribute("turns", "1", "motor.ground_short_turns", "fraction of the turns between neutral and contact; 1: the terminal")
-        },
-        Attribute {
-            default: Some(0.0),
-            ..attribute("potential", "1", "motor.ground_potential", "place of ground in the link: 0 lower rail, 1 upper rail")
-        },
+        attribute(
+            "turns",
+            "1",
+            "motor.ground_short_turns",
+            "fraction of the turns between neutral and contact, of all phases; 1: the terminal",
+        ),
+        attribute("potential", "1", "motor.ground_potential", "place of ground in the link: 0 lower rail, 1 upper rail"),
     ];
     vec![
         FaultKind {
