@@ -94,6 +94,36 @@ impl Finding {
     }
 }
 
+/// Some of the signals of a wiring.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Signals(u128);
+
+impl Signals {
+    pub const ALL: Self = Self(u128::MAX);
+
+    /// By their indices.
+    pub const fn of(indices: &[usize]) -> Self {
+        let (mut bits, mut i) = (0, 0);
+        while i < indices.len() {
+            assert!(indices[i] < 128);
+            bits |= 1 << indices[i];
+            i += 1;
+        }
+        Self(bits)
+    }
+
+    /// These, and all from the index `first` on.
+    pub const fn and_from(self, first: usize) -> Self {
+        Self(self.0 | u128::MAX << first)
+    }
+
+    /// Are any of the others among them?
+    #[inline(always)]
+    pub const fn any(self, others: Self) -> bool {
+        self.0 & others.0 != 0
+    }
+}
+
 /// A quantity watched for divergence.
 #[derive(Clone, Copy, Debug)]
 pub struct Watch<S> {
@@ -146,7 +176,7 @@ pub trait Wiring: Sized + Send + Sync + 'static {
     /// State at the start; `initial` holds the values given for `INITIAL`, NaN where none was.
     fn start<S: Scalar>(model: &Self::Model<S>, raw: &[S], initial: &[S]) -> Self::State<S>;
     /// After a fault changed parameters.
-    fn refresh<S: Scalar>(_raw: &[S], _state: &mut Self::State<S>) {}
+    fn refresh<S: Scalar>(_model: &Self::Model<S>, _structure: &Self::Structure, _raw: &[S], _state: &mut Self::State<S>) {}
     fn tick<S: Scalar>(
         kind: u8,
         structure: &Self::Structure,
@@ -165,13 +195,14 @@ pub trait Wiring: Sized + Send + Sync + 'static {
         from: Steps,
         count: Steps,
     );
-    /// All signals, in the order of `signals()`.
+    /// Signals in the order of `signals()`: those `asked` for, others where they cost nothing.
     fn observe<S: Scalar>(
         structure: &Self::Structure,
         model: &Self::Model<S>,
         inputs: &Inputs<S>,
         state: &Self::State<S>,
         t: S,
+        asked: Signals,
         out: &mut [S],
     );
     /// Quantities whose leaving of their limit means divergence.

@@ -49,6 +49,11 @@ pub trait Scalar:
     fn from_fn(f: impl FnMut(usize) -> f64) -> Self;
     /// Value of lane `i` (the real part of a dual number).
     fn lane(self, i: usize) -> f64;
+    /// The same, of a value in memory: read without the other lanes.
+    #[inline(always)]
+    fn lane_at(&self, i: usize) -> f64 {
+        self.lane(i)
+    }
 
     fn lt(self, other: Self) -> Self::Mask;
     fn le(self, other: Self) -> Self::Mask;

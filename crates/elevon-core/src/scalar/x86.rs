@@ -57,6 +57,7 @@ macro_rules! vector_type {
      $sqrt:ident, $fma:ident, $with:ident,
      $integers:ty, $to_bits:ident, $signs:ident, $xor:ident) => {
         #[derive(Clone, Copy, Debug)]
+        #[repr(transparent)]
         pub struct $name($register);
 
         impl Add for $name {
@@ -117,7 +118,13 @@ macro_rules! vector_type {
             }
             #[inline(always)]
             fn lane(self, i: usize) -> f64 {
-                self.array()[i]
+                Self::lane_at(&self, i)
+            }
+            #[inline(always)]
+            fn lane_at(&self, i: usize) -> f64 {
+                assert!(i < $lanes);
+                // SAFETY: a register in memory is its lanes one after another, and `i` is one of them.
+                unsafe { *std::ptr::from_ref(self).cast::<f64>().add(i) }
             }
             #[inline(always)]
             fn lt(self, o: Self) -> $mask {

@@ -4,7 +4,7 @@ use super::batch::Monitor;
 use super::kernels::{Advance, Lift, Observe, Record, Ticking};
 use super::rows::Rows;
 use super::spec::{Clock, RunOutput, RunSpec, Status};
-use crate::actuator::{Inputs, Setup, Tick, Wiring};
+use crate::actuator::{Inputs, Setup, Signals, Tick, Wiring};
 use crate::command::SourceLanes;
 use crate::fault::FaultLanes;
 use crate::noise::Key;
@@ -32,6 +32,8 @@ pub struct Block<'a, W: Wiring, S: Scalar, L: Lift<S>> {
     pub(super) lift: L,
     pub(super) clocks: &'a [Clock],
     structure: W::Structure,
+    /// The recorded signals.
+    asked: Signals,
     pub(super) dt: f64,
     steps: Steps,
     healthy: Vec<Vec<S>>,
@@ -88,6 +90,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             stopped: vec![None; runs.len()],
             last: vec![Vec::new(); runs.len()],
             structure,
+            asked: Signals::of(recorded),
             wall: 0.0,
         };
         block.begin();
@@ -181,7 +184,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             for chunk in 0..self.models.len() {
                 let raw = self.parameters_now(chunk);
                 self.models[chunk] = W::derive(&raw, &self.structure);
-                W::refresh(&raw, &mut self.states[chunk]);
+                W::refresh(&self.models[chunk], &self.structure, &raw, &mut self.states[chunk]);
             }
         }
     }
@@ -215,15 +218,9 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             return;
         }
         for chunk in 0..self.states.len() {
-            let lost = S::vectorize(Record::<W, S, L> {
-                observe: Observe {
-                    structure: &self.structure,
-                    model: &self.models[chunk],
-                    inputs: &self.inputs[chunk],
-                    state: &self.states[chunk],
-                    t: k as f64 * self.dt,
-                    out,
-                },
+            self.observe(chunk, k, self.asked, out);
+            let lost = S::vectorize(Record::<S, L> {
+                observed: out,
                 clocks: self.clocks,
                 due: &self.clock_due,
                 k,
@@ -231,6 +228,11 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
                 lift: &self.lift,
                 rows: &mut self.rows[chunk],
             });
+            if lost.is_empty() {
+                continue;
+            }
+            // An ended lane keeps every signal.
+            self.observe(chunk, k, Signals::ALL, out);
             for (i, signal) in lost {
                 self.status[chunk * S::LANES + i] = Status::Diverged { time: k as f64 * self.dt, signal: W::signals()[signal].name };
                 self.stop(chunk * S::LANES + i, k, out);
@@ -243,7 +245,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         }
     }
 
-    pub(super) fn observe(&self, chunk: usize, k: Steps, out: &mut [S]) {
+    pub(super) fn observe(&self, chunk: usize, k: Steps, asked: Signals, out: &mut [S]) {
         let t = k as f64 * self.dt;
         S::vectorize(Observe::<W, S> {
             structure: &self.structure,
@@ -251,6 +253,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             inputs: &self.inputs[chunk],
             state: &self.states[chunk],
             t,
+            asked,
             out,
         });
     }

@@ -3,7 +3,7 @@
 use super::block::Block;
 use super::kernels::Lift;
 use super::spec::{RunOutput, Status};
-use crate::actuator::Wiring;
+use crate::actuator::{Signals, Wiring};
 use crate::scalar::Scalar;
 use crate::time::Steps;
 
@@ -20,7 +20,7 @@ impl<W: Wiring, S: Scalar, L: Lift<S>> Block<'_, W, S, L> {
             for lane in chunk * S::LANES..((chunk + 1) * S::LANES).min(self.real) {
                 if self.stopped[lane].is_none() && mark(self, lane, time, &state) {
                     if !observed {
-                        self.observe(chunk, k, out);
+                        self.observe(chunk, k, Signals::ALL, out);
                         observed = true;
                     }
                     self.stop(lane, k, out);
@@ -77,7 +77,7 @@ impl<W: Wiring, S: Scalar, L: Lift<S>> Block<'_, W, S, L> {
         let mut results = Vec::with_capacity(self.real);
         for lane in 0..self.real {
             if lane % S::LANES == 0 {
-                self.observe(lane / S::LANES, k, &mut out);
+                self.observe(lane / S::LANES, k, Signals::ALL, &mut out);
             }
             if self.last[lane].is_empty() {
                 let reached = self.stopped[lane];

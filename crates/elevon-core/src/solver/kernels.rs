@@ -2,7 +2,7 @@
 
 use super::rows::Rows;
 use super::spec::{Clock, RunSpec};
-use crate::actuator::{Inputs, Wiring};
+use crate::actuator::{Inputs, Signals, Wiring};
 use crate::fault::FaultLanes;
 use crate::scalar::{Kernel, Scalar};
 use crate::time::Steps;
@@ -11,8 +11,18 @@ use crate::time::Steps;
 pub trait Lift<S> {
     fn parameter(&self, first: usize, index: usize) -> S;
     fn severity(&self, lane: usize, fault: usize) -> S;
-    /// Numbers written per value and lane.
     fn emit(&self, x: S, lane: usize, out: &mut Vec<f64>);
+    /// A row of values of one lane.
+    #[inline(always)]
+    fn emit_row(&self, row: &[S], lane: usize, out: &mut Vec<f64>)
+    where
+        S: Copy,
+    {
+        for &x in row {
+            self.emit(x, lane, out);
+        }
+    }
+    /// Numbers written per value and lane.
     fn width(&self) -> usize;
 }
 
@@ -29,6 +39,10 @@ impl<S: Scalar> Lift<S> for Plain<'_> {
     #[inline(always)]
     fn emit(&self, x: S, lane: usize, out: &mut Vec<f64>) {
         out.push(x.lane(lane));
+    }
+    #[inline(always)]
+    fn emit_row(&self, row: &[S], lane: usize, out: &mut Vec<f64>) {
+        out.extend(row.iter().map(|x| x.lane_at(lane)));
     }
     fn width(&self) -> usize {
         1
@@ -67,6 +81,7 @@ pub(super) struct Observe<'a, W: Wiring, S: Scalar> {
     pub inputs: &'a Inputs<S>,
     pub state: &'a W::State<S>,
     pub t: f64,
+    pub asked: Signals,
     pub out: &'a mut [S],
 }
 
@@ -74,13 +89,13 @@ impl<W: Wiring, S: Scalar> Kernel for Observe<'_, W, S> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        W::observe(self.structure, self.model, self.inputs, self.state, S::splat(self.t), self.out);
+        W::observe(self.structure, self.model, self.inputs, self.state, S::splat(self.t), self.asked, self.out);
     }
 }
 
-/// Observes one chunk and appends a row to every clock that is due. A lane whose row is not all numbers ends before it.
-pub(super) struct Record<'a, W: Wiring, S: Scalar, L: Lift<S>> {
-    pub observe: Observe<'a, W, S>,
+/// Appends what was observed of one chunk to every clock that is due. A lane whose row is not all numbers ends before it.
+pub(super) struct Record<'a, S: Scalar, L: Lift<S>> {
+    pub observed: &'a [S],
     pub clocks: &'a [Clock],
     pub due: &'a [Steps],
     pub k: Steps,
@@ -89,20 +104,18 @@ pub(super) struct Record<'a, W: Wiring, S: Scalar, L: Lift<S>> {
     pub rows: &'a mut Rows<S>,
 }
 
-impl<W: Wiring, S: Scalar, L: Lift<S>> Kernel for Record<'_, W, S, L> {
+impl<S: Scalar, L: Lift<S>> Kernel for Record<'_, S, L> {
     /// The lanes that ended, each with the signal in which it left the numbers.
     type Output = Vec<(usize, usize)>;
     #[inline(always)]
     fn run(self) -> Self::Output {
         let mut lost = Vec::new();
-        let Observe { structure, model, inputs, state, t, out } = self.observe;
-        W::observe(structure, model, inputs, state, S::splat(t), out);
         for (i, (clock, &due)) in self.clocks.iter().zip(self.due).enumerate() {
             if due <= self.k {
-                if !numbers(clock, out) {
-                    self.rows.lose(clock, out, self.lift, &mut lost);
+                if !numbers(clock, self.observed) {
+                    self.rows.lose(clock, self.observed, self.lift, &mut lost);
                 }
-                self.rows.append(i, clock, out, self.faults, self.lift);
+                self.rows.append(i, clock, self.observed, self.faults, self.lift);
             }
         }
         lost

@@ -84,9 +84,7 @@ impl<S: Scalar> Rows<S> {
             }
             let used = *columns - *labels + self.labels[lane];
             for row in gathered.chunks_exact((*columns).max(1)) {
-                for &value in &row[..used] {
-                    lift.emit(value, lane, out);
-                }
+                lift.emit_row(&row[..used], lane, out);
             }
         }
         gathered.clear();

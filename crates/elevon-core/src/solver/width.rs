@@ -50,7 +50,8 @@ impl Width {
             "avx512" => Self::Avx512,
             _ => return None,
         };
-        (width as usize <= widest as usize).then_some(width)
+        let built = width == Self::Single || width == widest || !cfg!(feature = "widest");
+        (built && width as usize <= widest as usize).then_some(width)
     }
 
     pub fn lanes(self) -> usize {

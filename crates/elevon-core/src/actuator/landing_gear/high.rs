@@ -3,7 +3,7 @@
 use super::body::{Body, Constants, Structure, E_COPPER, E_INVERTER};
 use super::layout::*;
 use super::signals::{Quantity as Q, ALL};
-use crate::actuator::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring, WATCHED};
+use crate::actuator::{Finding, Inputs, Port, Setup, Signals, Tick, Watch, Wiring, WATCHED};
 use crate::control::pi_rate::PiRateParameter;
 use crate::fault::FaultKind;
 use crate::inverter::bridge::{quench, Bridge, BridgeState, BridgeStructure, InverterParameter, Windings};
@@ -269,7 +269,7 @@ impl Wiring for High {
         }
     }
 
-    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
+    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, _asked: Signals, out: &mut [S]) {
         let (k, _) = m.c.coupling(structure, s.body.motion.motor_position);
         let torque = m.c.star.saturate(m.c.star.torque(k, s.current));
         m.c.observe(structure, inputs, &s.body, torque, t, out);

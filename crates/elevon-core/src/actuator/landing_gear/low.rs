@@ -4,7 +4,7 @@
 use super::body::{Body, Constants, Structure, E_COPPER, E_INVERTER};
 use super::layout::*;
 use super::signals::{Quantity as Q, ALL, PHASES};
-use crate::actuator::{Finding, Inputs, Port, Setup, Tick, Watch, Wiring, WATCHED};
+use crate::actuator::{Finding, Inputs, Port, Setup, Signals, Tick, Watch, Wiring, WATCHED};
 use crate::control::pi_rate::PiRateParameter;
 use crate::fault::FaultKind;
 use crate::inverter::bridge::InverterParameter;
@@ -277,7 +277,7 @@ impl Wiring for Low {
         }
     }
 
-    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
+    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, _asked: Signals, out: &mut [S]) {
         m.c.observe(structure, inputs, &s.body, s.torque, t, out);
         out[Q::CurrentLine as usize] = s.current;
         out[Q::EnergyMagnetic as usize] = S::splat(0.5) * pair(m, structure, s).inductance * s.current * s.current;

@@ -23,30 +23,31 @@ pub(super) struct Instant<S> {
 impl<S: Scalar> Instant<S> {
     #[inline(always)]
     pub(super) fn at(inputs: &Inputs<S>, t: S) -> Self {
-        let brake = inputs[BRAKE].at(t).maximum(S::zero());
-        Self {
-            t,
-            command: inputs[COMMAND].at(t),
-            brake,
-            shaft: inputs[SHAFT].at(t),
-            user: inputs[USER].at(t),
-            supply: inputs[SUPPLY].at(t),
-        }
+        let mut instant = Self { t, command: inputs[COMMAND].at(t), ..Self::none() };
+        instant.load(inputs, t);
+        instant
+    }
+
+    /// All but the command, which is evaluated ahead.
+    #[inline(always)]
+    fn load(&mut self, inputs: &Inputs<S>, t: S) {
+        self.brake = inputs[BRAKE].at(t).maximum(S::zero());
+        self.shaft = inputs[SHAFT].at(t);
+        self.user = inputs[USER].at(t);
+        self.supply = inputs[SUPPLY].at(t);
     }
 
     /// The instant of the next step: `steady` inputs but the command keep their values.
     #[inline(always)]
     fn move_to(&mut self, inputs: &Inputs<S>, steady: bool, t: S, command: S) {
         if !steady {
-            self.brake = inputs[BRAKE].at(t).maximum(S::zero());
-            self.shaft = inputs[SHAFT].at(t);
-            self.user = inputs[USER].at(t);
-            self.supply = inputs[SUPPLY].at(t);
+            self.load(inputs, t);
         }
         self.t = t;
         self.command = command;
     }
 
+    #[inline(always)]
     fn none() -> Self {
         let zero = S::zero();
         Self { t: zero, command: zero, brake: zero, shaft: zero, user: zero, supply: zero }
@@ -98,7 +99,7 @@ fn advance<T: Stepper<S>, S: Scalar>(x: Stretch<'_, T::Model, T::Structure, T::S
     let mut instants = [Instant::none(); MAX_CHUNKS];
     let mut steady = [false; MAX_CHUNKS];
     for ((model, inputs), (instant, steady)) in models.iter().zip(inputs).zip(instants.iter_mut().zip(&mut steady)) {
-        *instant = Instant::at(inputs, S::splat(from as f64) * T::dt(model));
+        instant.load(inputs, S::splat(from as f64) * T::dt(model));
         *steady = inputs[COMMAND + 1..].iter().all(|source| source.flat());
     }
     let mut k = from;

@@ -5,25 +5,41 @@ use crate::inverter::bridge::Circuit;
 use crate::scalar::Scalar;
 use crate::three;
 
-/// The step's end as a function of the potentials that stand during it:
-/// i_j = inject_j + sum_k own_jk v_k - across_j v_n, and for the neutral 0 = feed + sum_k across_k v_k - sum v_n.
+/// What a step makes of the network whatever its currents are: it changes with parameters and temperature alone, so it is
+/// made where they change and the step only multiplies.
+///
+/// The step's end as a function of the potentials that stand during it: i_j = inject_j + sum_k own_jk v_k - across_j v_n,
+/// and for the neutral 0 = feed + sum_k across_k v_k - v_n / per_sum.
+#[derive(Clone, Copy, Debug)]
+pub struct Discrete<S> {
+    /// Contact currents at the step's end and their means over it: a conductance, and what stays of the current.
+    end: [Contacts<S>; 2],
+    mean: [Contacts<S>; 2],
+    /// dt / L.
+    per: [S; 3],
+    own: [[S; 3]; 3],
+    across: [S; 3],
+    per_sum: S,
+    /// What the legs draw of a current fed to the neutral.
+    share: [S; 3],
+    /// Resistance of the switches, and terminal potentials per potential behind it with all legs held.
+    resistance: S,
+    held: [[S; 3]; 3],
+}
+
+/// The network of one step.
 #[derive(Clone, Copy, Debug)]
 pub struct Network<'a, S> {
     shorts: &'a Shorts<S>,
+    discrete: &'a Discrete<S>,
     structure: ShortStructure,
-    /// Contact currents at the step's end and their means over it: a conductance, and the current without a voltage.
-    end: [Contacts<S>; 2],
-    mean: [Contacts<S>; 2],
+    /// Currents of the contacts at the step's start.
+    contact: &'a Contacts<S>,
     /// Ampere-turns at the end with terminal and neutral at one potential.
     free: [S; 3],
-    /// dt / L.
-    per: [S; 3],
     ground: S,
-    own: [[S; 3]; 3],
-    across: [S; 3],
     inject: [S; 3],
     feed: S,
-    per_sum: S,
     /// Of the legs at the step's start.
     legs: [S; 3],
     open: [S; 3],
@@ -34,9 +50,6 @@ pub struct Network<'a, S> {
 pub struct Outcome<S> {
     pub turns: [S; 3],
     pub contact: Contacts<S>,
-    /// Means over the step.
-    through: Contacts<S>,
-    pub legs: [S; 3],
 }
 
 /// Mean currents and heats of a step.
@@ -57,102 +70,161 @@ const NO_CURRENT: f64 = 1e-9;
 /// A pivot below this share of its conductance is a potential that nothing determines.
 const FLOATING: f64 = 1e-12;
 
+impl<S: Scalar> Discrete<S> {
+    /// Over a step with `per` = dt / L of the phases; `factor` is what temperature makes of the copper's resistance,
+    /// `resistance` that of the switches.
+    pub fn new(shorts: &Shorts<S>, per: [S; 3], factor: S, resistance: S) -> Self {
+        let zero = S::zero();
+        let nothing = [[[zero; 3]; KINDS]; 2];
+        let diagonal = |x: [S; 3]| [[x[0], zero, zero], [zero, x[1], zero], [zero, zero, x[2]]];
+        let mut new = Self {
+            end: nothing,
+            mean: nothing,
+            per,
+            own: diagonal(per),
+            across: per,
+            per_sum: per[0] + per[1] + per[2],
+            share: per,
+            resistance,
+            held: diagonal([S::one(); 3]),
+        };
+        for kind in 0..KINDS {
+            for j in 0..3 {
+                new.join(shorts, kind, j, factor);
+            }
+        }
+        new.per_sum = S::one() / new.per_sum;
+        let y = new.across;
+        new.share = three!(|j| y[j] * new.per_sum);
+        let drawn = |j: usize, k: usize| resistance * (new.own[j][k] - y[j] * new.share[k]);
+        new.held = inverse(three!(|j| three!(|k| new.held[j][k] + drawn(j, k))));
+        new
+    }
+
+    /// Adds a contact. Lambda dc/dt + R c = w over the step by the Pade form (1, 2) of exp(-R dt/Lambda): third order where
+    /// the contact is slow, at once in its end state where it is fast.
+    fn join(&mut self, shorts: &Shorts<S>, kind: usize, j: usize, factor: S) {
+        let x = shorts.contact[kind][j];
+        let sixth = S::splat(1.0 / 6.0);
+        let (r, l) = (x.slope.fma(factor, x.base), x.leak);
+        let per = S::one() / (l * l + S::splat(2.0 / 3.0) * (r * l) + sixth * (r * r));
+        let g = x.weight * (sixth.fma(r, l) * per);
+        self.end[0][kind][j] = g;
+        self.end[1][kind][j] = l * S::splat(-1.0 / 3.0).fma(r, l) * per;
+        self.mean[0][kind][j] = x.weight * (sixth.fma(r, S::splat(0.5) * l) * per);
+        self.mean[1][kind][j] = l * sixth.fma(r, l) * per;
+        let squared = x.ratio * x.ratio * g;
+        self.own[j][j] = self.own[j][j] + squared;
+        if kind == PAIR {
+            let k = (j + 1) % 3;
+            self.own[k][k] = self.own[k][k] + squared;
+            self.own[j][k] = self.own[j][k] - squared;
+            self.own[k][j] = self.own[k][j] - squared;
+        } else {
+            let loose = loose(x.ratio, kind);
+            self.across[j] = self.across[j] + x.ratio * g * loose;
+            self.per_sum = self.per_sum + loose * loose * g;
+        }
+    }
+}
+
+/// How much of a contact's current is missing at the neutral.
+#[inline(always)]
+fn loose<S: Scalar>(ratio: S, kind: usize) -> S {
+    match kind {
+        PAIR => S::zero(),
+        GROUND => ratio - S::one(),
+        _ => ratio,
+    }
+}
+
+/// By its minors.
+fn inverse<S: Scalar>(z: [[S; 3]; 3]) -> [[S; 3]; 3] {
+    let minor = |j: usize, k: usize| {
+        let (a, b, c, d) = ((j + 1) % 3, (j + 2) % 3, (k + 1) % 3, (k + 2) % 3);
+        z[a][c] * z[b][d] - z[a][d] * z[b][c]
+    };
+    let determinant = z[0][0] * minor(0, 0) + z[0][1] * minor(0, 1) + z[0][2] * minor(0, 2);
+    three!(|j| three!(|k| minor(k, j) / determinant))
+}
+
 impl<'a, S: Scalar> Network<'a, S> {
-    /// `drop` is minus EMF and R m; `factor` is what temperature makes of the copper's resistance.
+    /// `drop` is minus EMF and R m.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
     pub fn new(
         shorts: &'a Shorts<S>,
+        discrete: &'a Discrete<S>,
         structure: ShortStructure,
-        per: [S; 3],
         turns: [S; 3],
-        contact: &Contacts<S>,
+        contact: &'a Contacts<S>,
         drop: [S; 3],
-        factor: S,
         ground: S,
         open: [S; 3],
     ) -> Self {
         let zero = S::zero();
         let legs = shorts.legs(&structure, turns, contact);
-        let free = three!(|j| per[j].fma(drop[j], turns[j]));
+        let free = three!(|j| discrete.per[j].fma(drop[j], turns[j]));
         let mut net = Self {
             shorts,
+            discrete,
             structure,
-            end: [[[zero; 3]; KINDS]; 2],
-            mean: [[[zero; 3]; KINDS]; 2],
+            contact,
             free,
-            per,
             ground,
-            own: [[per[0], zero, zero], [zero, per[1], zero], [zero, zero, per[2]]],
-            across: per,
             inject: free,
             feed: free[0] + free[1] + free[2],
-            per_sum: per[0] + per[1] + per[2],
             legs: three!(|j| S::select(legs[j].abs().lt(S::splat(NO_CURRENT)), zero, legs[j])),
             open,
         };
         for kind in 0..KINDS {
             if structure[kind] {
                 for j in 0..3 {
-                    net.join(kind, j, contact[kind][j], factor);
+                    net.inject(kind, j);
                 }
             }
         }
-        net.per_sum = S::one() / net.per_sum;
         net
     }
 
-    /// Adds a contact that carries `current`. Lambda dc/dt + R c = w over the step by the Pade form (1, 2) of exp(-R dt/Lambda):
-    /// third order where the contact is slow, at once in its end state where it is fast.
+    /// Adds what a contact carries without a voltage.
     #[inline(always)]
-    fn join(&mut self, kind: usize, j: usize, current: S, factor: S) {
-        let x = self.shorts.contact[kind][j];
-        let sixth = S::splat(1.0 / 6.0);
-        let (r, l) = (x.slope.fma(factor, x.base), x.leak);
-        let per = S::one() / (l * l + S::splat(2.0 / 3.0) * (r * l) + sixth * (r * r));
-        let g = x.weight * (sixth.fma(r, l) * per);
-        let held = l * S::splat(-1.0 / 3.0).fma(r, l) * per * current;
-        self.end[0][kind][j] = g;
-        self.end[1][kind][j] = held;
-        self.mean[0][kind][j] = x.weight * (sixth.fma(r, S::splat(0.5) * l) * per);
-        self.mean[1][kind][j] = l * sixth.fma(r, l) * per * current;
-        let mut zero_volt = held;
-        let loose = self.loose(kind, j);
+    fn inject(&mut self, kind: usize, j: usize) {
+        let ratio = self.shorts.contact[kind][j].ratio;
+        let mut current = self.discrete.end[1][kind][j] * self.contact[kind][j];
         if kind == GROUND {
-            zero_volt = zero_volt - g * self.ground;
+            current = current - self.discrete.end[0][kind][j] * self.ground;
         }
-        let (through, squared) = (x.ratio * g, x.ratio * x.ratio * g);
-        self.own[j][j] = self.own[j][j] + squared;
-        self.inject[j] = self.inject[j] + x.ratio * zero_volt;
+        self.inject[j] = ratio.fma(current, self.inject[j]);
         if kind == PAIR {
             let k = (j + 1) % 3;
-            self.own[k][k] = self.own[k][k] + squared;
-            self.own[j][k] = self.own[j][k] - squared;
-            self.own[k][j] = self.own[k][j] - squared;
-            self.inject[k] = self.inject[k] - x.ratio * zero_volt;
+            self.inject[k] = (-ratio).fma(current, self.inject[k]);
         } else {
-            self.across[j] = self.across[j] + through * loose;
-            self.feed = self.feed + loose * zero_volt;
-            self.per_sum = self.per_sum + loose * loose * g;
+            self.feed = loose(ratio, kind).fma(current, self.feed);
         }
     }
 
-    /// Neutral of legs that all hold their terminals.
+    /// Neutral between terminals of known potential.
     #[inline(always)]
     pub fn neutral(&self, v: [S; 3]) -> S {
-        let y = self.across;
-        self.per_sum * (self.feed + y[0] * v[0] + y[1] * v[1] + y[2] * v[2])
+        let y = self.discrete.share;
+        self.discrete.per_sum.fma(self.feed, y[0].fma(v[0], y[1].fma(v[1], y[2] * v[2])))
     }
 
-    /// How much of a contact's current is missing at the neutral.
+    /// Potentials of terminals whose legs are all held, behind the switches' resistance, and of the neutral.
     #[inline(always)]
-    fn loose(&self, kind: usize, j: usize) -> S {
-        let ratio = self.shorts.contact[kind][j].ratio;
-        match kind {
-            PAIR => S::zero(),
-            GROUND => ratio - S::one(),
-            _ => ratio,
-        }
+    pub fn behind(&self, source: [S; 3]) -> ([S; 3], S) {
+        let Discrete { held, share, resistance, .. } = self.discrete;
+        let e: [S; 3] = three!(|j| (-*resistance).fma((-share[j]).fma(self.feed, self.inject[j]), source[j]));
+        let v = three!(|j| held[j][0].fma(e[0], held[j][1].fma(e[1], held[j][2] * e[2])));
+        (v, self.neutral(v))
+    }
+
+    /// Currents of the legs at the step's end.
+    #[inline(always)]
+    pub fn ends(&self, v: [S; 3], neutral: S) -> [S; 3] {
+        let Discrete { own, across, .. } = self.discrete;
+        three!(|j| self.inject[j] + (own[j][0] * v[0] + own[j][1] * v[1] + own[j][2] * v[2]) - across[j] * neutral)
     }
 
     /// Voltage that drives a contact.
@@ -170,18 +242,23 @@ impl<'a, S: Scalar> Network<'a, S> {
     #[inline(always)]
     pub fn outcome(&self, v: [S; 3], neutral: S) -> Outcome<S> {
         let phase: [S; 3] = three!(|j| v[j] - neutral);
-        let turns = three!(|j| self.per[j].fma(phase[j], self.free[j]));
-        let (mut contact, mut through) = (self.end[1], self.mean[1]);
+        let turns = three!(|j| self.discrete.per[j].fma(phase[j], self.free[j]));
+        Outcome { turns, contact: self.contacts(&self.discrete.end, phase, neutral) }
+    }
+
+    /// Currents of the contacts, at the step's end or in their means.
+    #[inline(always)]
+    fn contacts(&self, [conductance, stays]: &[Contacts<S>; 2], phase: [S; 3], neutral: S) -> Contacts<S> {
+        let mut current = *self.contact;
         for kind in 0..KINDS {
             if self.structure[kind] {
                 for j in 0..3 {
-                    let w = self.drive(kind, j, phase, neutral);
-                    contact[kind][j] = self.end[0][kind][j].fma(w, contact[kind][j]);
-                    through[kind][j] = self.mean[0][kind][j].fma(w, through[kind][j]);
+                    let stays = stays[kind][j] * self.contact[kind][j];
+                    current[kind][j] = conductance[kind][j].fma(self.drive(kind, j, phase, neutral), stays);
                 }
             }
         }
-        Outcome { turns, contact, through, legs: self.shorts.legs(&self.structure, turns, &contact) }
+        current
     }
 
     /// Energies of the step: of contacts with their means over it, of windings with the middle of their ends. Only what
@@ -189,29 +266,22 @@ impl<'a, S: Scalar> Network<'a, S> {
     /// takes from the windings' inductances, of second order in the step, is heat of the contacts.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
-    pub fn account(
-        &self,
-        old: [S; 3],
-        before: &Contacts<S>,
-        new: &Outcome<S>,
-        v: [S; 3],
-        neutral: S,
-        resistance: [S; 3],
-        factor: S,
-    ) -> Account<S> {
+    pub fn account(&self, old: [S; 3], new: &Outcome<S>, v: [S; 3], neutral: S, resistance: [S; 3], factor: S) -> Account<S> {
         let half = S::splat(0.5);
         let dt = self.shorts.dt;
         let phase: [S; 3] = three!(|j| v[j] - neutral);
+        let through = self.contacts(&self.discrete.mean, phase, neutral);
+        let conducts = self.discrete.per;
         let change = (new.turns[0] - old[0]) + (new.turns[1] - old[1]) + (new.turns[2] - old[2]);
-        let per = S::one() / (self.per[0] + self.per[1] + self.per[2]);
+        let per = S::one() / (conducts[0] + conducts[1] + conducts[2]);
         let mut out = Account { legs: old, ground: S::zero(), copper: S::zero(), loops: S::zero(), contact: S::zero(), tap: S::zero() };
         let mut excess = S::zero();
         for kind in 0..KINDS {
             if self.structure[kind] {
                 for j in 0..3 {
-                    let (c, was, mean) = (new.contact[kind][j], before[kind][j], new.through[kind][j]);
+                    let (c, was, mean) = (new.contact[kind][j], self.contact[kind][j], through[kind][j]);
                     let x = self.shorts.contact[kind][j];
-                    let imposed = self.loose(kind, j) * (half * (was + c) - mean);
+                    let imposed = loose(x.ratio, kind) * (half * (was + c) - mean);
                     excess = excess + imposed;
                     let given = dt * (self.drive(kind, j, phase, neutral) * mean + imposed * per * change);
                     let heat = given - half * x.inductance * (c * c - was * was);
@@ -228,12 +298,12 @@ impl<'a, S: Scalar> Network<'a, S> {
                 }
             }
         }
-        let middle: [S; 3] = three!(|j| half * (old[j] + new.turns[j]) + self.per[j] * (per * excess));
-        out.legs = self.shorts.legs(&self.structure, middle, &new.through);
+        let middle: [S; 3] = three!(|j| half * (old[j] + new.turns[j]) + conducts[j] * (per * excess));
+        out.legs = self.shorts.legs(&self.structure, middle, &through);
         let copper = three!(|j| dt * resistance[j] * middle[j] * middle[j]);
         out.copper = out.copper + (copper[0] + copper[1] + copper[2]);
         if self.structure[LOOP] {
-            let inside = self.shorts.loops(&self.structure, middle, &new.through);
+            let inside = self.shorts.loops(&self.structure, middle, &through);
             for j in 0..3 {
                 let turns = self.shorts.contact[LOOP][j].ratio;
                 out.loops = out.loops + dt * turns * resistance[j] * inside[j] * inside[j];
@@ -266,17 +336,17 @@ impl<S: Scalar> Network<'_, S> {
     #[inline(always)]
     pub fn solve(&self, voltage: [S; 3], resistance: [S; 3], connected: [S::Mask; 3]) -> ([S; 3], S) {
         let (zero, one) = (S::zero(), S::one());
-        let y = self.across;
+        let Discrete { own, across: y, per_sum, share, .. } = self.discrete;
         let held: [S; 3] = three!(|j| S::indicator(connected[j]));
         let r: [S; 3] = three!(|j| S::select(connected[j], resistance[j], one));
-        let mut z = three!(|j| three!(|k| r[j] * (self.own[j][k] - y[j] * y[k] * self.per_sum)));
-        let mut b: [S; 3] = three!(|j| held[j] * voltage[j] - r[j] * (self.inject[j] - y[j] * self.feed * self.per_sum));
+        let mut z = three!(|j| three!(|k| r[j] * (own[j][k] - y[j] * y[k] * *per_sum)));
+        let mut b: [S; 3] = three!(|j| held[j] * voltage[j] - r[j] * (self.inject[j] - share[j] * self.feed));
         let mut lost = S::mask(false);
         let mut v = voltage;
         let mut per = [zero; 3];
         for j in 0..3 {
             z[j][j] = z[j][j] + held[j];
-            let fixed = (S::splat(FLOATING) * self.own[j][j]).lt(z[j][j]);
+            let fixed = (S::splat(FLOATING) * own[j][j]).lt(z[j][j]);
             lost = lost | !fixed;
             per[j] = S::select(fixed, one / S::select(fixed, z[j][j], one), zero);
             for l in j + 1..3 {

@@ -25,6 +25,7 @@ struct Case {
 struct Rig {
     star: Star<f64>,
     shorts: Shorts<f64>,
+    discrete: Discrete<f64>,
     structure: ShortStructure,
 }
 
@@ -74,12 +75,13 @@ impl Rig {
         let plain = MotorStructure { shorted_loop: true, ..MotorStructure::default() };
         let star = Star::derive(&motor, &plain, DT);
         let shorts = Shorts::derive(&motor, &tap, &short, &star, true, DT);
-        Self { star, shorts, structure }
+        let discrete = Discrete::new(&shorts, star.dt_per_inductance, 1.0, 0.0);
+        Self { star, shorts, discrete, structure }
     }
 
-    fn network(&self, turns: [f64; 3], contact: &Contacts<f64>, emf: [f64; 3], ground: f64) -> Network<'_, f64> {
+    fn network<'a>(&'a self, turns: [f64; 3], contact: &'a Contacts<f64>, emf: [f64; 3], ground: f64) -> Network<'a, f64> {
         let drop = three!(|j| -emf[j] - R * turns[j]);
-        Network::new(&self.shorts, self.structure, self.star.dt_per_inductance, turns, contact, drop, 1.0, ground, [0.0; 3])
+        Network::new(&self.shorts, &self.discrete, self.structure, turns, contact, drop, ground, [0.0; 3])
     }
 }
 
@@ -191,19 +193,19 @@ fn simulated(case: Case) -> (Vec<C>, Vec<C>) {
         let net = rig.network(m, &c, sines(K * SPEED, angle(0.5)), 0.0);
         let v = sines(VOLTS, angle(0.5));
         let neutral = net.neutral(v);
-        let out = net.outcome(v, neutral);
+        let (out, legs) = (net.outcome(v, neutral), net.ends(v, neutral));
         (m, c) = (out.turns, out.contact);
         if k >= begin {
             let share = 2.0 / period as f64;
             let (sin, cos) = (share * angle(1.0).sin(), share * angle(1.0).cos());
             for j in 0..3 {
-                let mut lower = out.legs[j];
+                let mut lower = legs[j];
                 match case.kind {
                     PAIR if j == (case.phase + 1) % 3 => lower += c[PAIR][case.phase],
                     kind if j == case.phase => lower -= c[kind][j],
                     _ => {}
                 }
-                above[j] = C(above[j].0 + sin * out.legs[j], above[j].1 + cos * out.legs[j]);
+                above[j] = C(above[j].0 + sin * legs[j], above[j].1 + cos * legs[j]);
                 below[j] = C(below[j].0 + sin * lower, below[j].1 + cos * lower);
             }
         }
@@ -303,7 +305,7 @@ fn flows_close_at_every_contact() {
                 let v = chopped(k);
                 let neutral = net.neutral(v);
                 let out = net.outcome(v, neutral);
-                let x = net.account(m, &c, &out, v, neutral, [R; 3], 1.0);
+                let x = net.account(m, &out, v, neutral, [R; 3], 1.0);
                 let power: f64 = (0..3).map(|j| v[j] * x.legs[j]).sum::<f64>() - ground * x.ground;
                 drawn += DT * power;
                 given += DT * power.abs();
@@ -338,11 +340,29 @@ fn at_its_onset_the_loop_carries_the_phase_current_and_cleared_it_carries_none()
 fn the_contact_does_not_follow_the_coppers_temperature() {
     let rig = Rig::new(Some(Case { kind: LOOP, phase: 0, turns: 0.2, resistance: 10.0 }), 1.0);
     for factor in [1.0, 1.4] {
-        let net = Network::new(&rig.shorts, rig.structure, [1e-12; 3], [0.0; 3], &REST, [0.0; 3], factor, 0.0, [0.0; 3]);
+        let discrete = Discrete::new(&rig.shorts, [1e-12; 3], factor, 0.0);
+        let net = Network::new(&rig.shorts, &discrete, rig.structure, [0.0; 3], &REST, [0.0; 3], 0.0, [0.0; 3]);
         let out = net.outcome([100.0, -50.0, -50.0], 0.0);
         // mu v over R_c and the warm mu N R.
         let expected = 0.2 * 100.0 / (10.0 + factor * 0.2 * 0.8 * R);
         assert!((out.contact[LOOP][0] - expected).abs() < 1e-12 * expected);
+    }
+}
+
+#[test]
+fn held_legs_have_the_potentials_of_the_elimination() {
+    for case in ALL {
+        let rig = Rig::new(Some(case), KAPPA);
+        let discrete = Discrete::new(&rig.shorts, rig.star.dt_per_inductance, 1.0, 0.3);
+        let (mut contact, drop) = (REST, sines(40.0, 0.3));
+        contact[case.kind][case.phase] = 0.7;
+        let net = Network::new(&rig.shorts, &discrete, rig.structure, [0.4, -0.3, -0.1], &contact, drop, -190.0, [0.0; 3]);
+        let (v, neutral) = net.behind([190.0, -190.0, 188.0]);
+        let (other, other_neutral) = net.solve([190.0, -190.0, 188.0], [0.3; 3], [true; 3]);
+        for j in 0..3 {
+            assert!((v[j] - other[j]).abs() < 1e-11, "kind {} leg {j}: {} {}", case.kind, v[j], other[j]);
+        }
+        assert!((neutral - other_neutral).abs() < 1e-10);
     }
 }
 
@@ -355,12 +375,12 @@ fn loose_legs_carry_nothing() {
         for connected in [[true, true, false], [false, true, false], [false, false, false]] {
             let net = rig.network([0.4, -0.3, -0.1], &contact, sines(40.0, 0.3), -190.0);
             let (v, neutral) = net.potentials([190.0, -190.0, 190.0], connected);
-            let out = net.outcome(v, neutral);
+            let legs = net.ends(v, neutral);
             for j in 0..3 {
                 if connected[j] {
                     assert_eq!(v[j], [190.0, -190.0, 190.0][j]);
                 } else {
-                    assert!(out.legs[j].abs() < 1e-10, "kind {} leg {j}: {}", case.kind, out.legs[j]);
+                    assert!(legs[j].abs() < 1e-10, "kind {} leg {j}: {}", case.kind, legs[j]);
                 }
             }
         }
@@ -373,17 +393,19 @@ fn stepped<S: Scalar>(raw: &[Vec<S>; 3]) -> Vec<S> {
     let star = Star::derive(&raw[0], &plain, S::splat(DT));
     let shorts = Shorts::derive(&raw[0], &raw[1], &raw[2], &star, true, S::splat(DT));
     let splat = |x: [f64; 3]| three!(|j| S::splat(x[j]));
+    let discrete = Discrete::new(&shorts, star.dt_per_inductance, S::splat(1.1), S::splat(0.2));
     let (mut m, mut c, mut out) = (splat([1.0, -0.4, -0.6]), [[S::splat(0.0); 3]; KINDS], Vec::new());
     for k in 0..20 {
         let drop = splat(sines(40.0, 0.1 * k as f64));
         let ground = S::splat(-190.0);
-        let net = Network::new(&shorts, [true; KINDS], star.dt_per_inductance, m, &c, drop, S::splat(1.1), ground, splat([0.0; 3]));
+        let net = Network::new(&shorts, &discrete, [true; KINDS], m, &c, drop, ground, splat([0.0; 3]));
         let connected = three!(|j| S::mask(!(k + j).is_multiple_of(4)));
         let (v, neutral) = net.solve(splat(chopped(40 * k)), splat([0.2; 3]), connected);
         let new = net.outcome(v, neutral);
-        let x = net.account(m, &c, &new, v, neutral, splat([R; 3]), S::splat(1.1));
+        let x = net.account(m, &new, v, neutral, splat([R; 3]), S::splat(1.1));
+        let held = net.behind(v).1;
         (m, c) = (new.turns, new.contact);
-        out.extend([m[0], m[1], m[2], neutral, x.copper, x.contact, x.tap, x.loops, x.ground]);
+        out.extend([m[0], m[1], m[2], neutral, held, x.copper, x.contact, x.tap, x.loops, x.ground]);
         out.extend(c.iter().flatten().chain(&x.legs).copied());
     }
     out

@@ -6,6 +6,7 @@
 
 use super::electric::{Coupling, Detailed};
 use super::model::{Model, State};
+use super::shorted::discrete;
 use super::step::{lose_switching, measured_current};
 use crate::actuator::servo::details::Structure;
 use crate::inverter::hysteresis::{count_transitions, crossing, six_step};
@@ -80,6 +81,13 @@ fn located_step<S: Scalar>(
 ) -> ([S; 3], [S; 3]) {
     let electric =
         |model: &Model<S>, state: &mut State<S>, old_legs| Detailed { model, structure, state, coupling: c, half_supply, old_legs }.step();
+    let part = |share: S, state: &mut State<S>, old_legs| {
+        let model = m.over(share);
+        if structure.shorted {
+            state.extra.contacts = discrete(&model, &state.star);
+        }
+        electric(&model, state, old_legs)
+    };
     let before = *s;
     let whole = electric(m, s, old_legs);
     let end = error_after(m, structure, s, whole.0, x);
@@ -90,7 +98,7 @@ fn located_step<S: Scalar>(
     let split = which[0] | which[1] | which[2];
     let kept = *s;
     *s = before;
-    let first = electric(&m.over(share), s, old_legs);
+    let first = part(share, s, old_legs);
     s.star.current = first.0;
     let turned = three!(|j| S::select(which[j], -s.legs[j], s.legs[j]));
     s.transitions = count_transitions(s.transitions, s.legs, turned);
@@ -100,9 +108,10 @@ fn located_step<S: Scalar>(
     let legs = s.legs;
     s.legs = turned;
     let rest = S::one() - share;
-    let second = electric(&m.over(rest), s, legs);
+    let second = part(rest, s, legs);
     s.star.current = before.star.current;
     s.extra.last_reference = kept.extra.last_reference;
+    s.extra.contacts = kept.extra.contacts;
     choose(s, split, &kept);
     let mean: [S; 3] = three!(|j| share * first.1[j] + rest * second.1[j]);
     (three!(|j| S::select(split, second.0[j], whole.0[j])), three!(|j| S::select(split, mean[j], whole.1[j])))

@@ -117,8 +117,8 @@ pub(crate) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
     (current, voltage)
 }
 
-/// `electric_step` with every detail, as a function of its own: contacts and bridge are the largest code of a step, and four
-/// places call them.
+/// `electric_step` with every detail, as a function of its own: contacts and bridge are the largest code of a step, and a
+/// step with located crossings calls them in three places.
 pub(crate) struct Detailed<'a, S: Scalar> {
     pub model: &'a Model<S>,
     pub structure: &'a Structure,

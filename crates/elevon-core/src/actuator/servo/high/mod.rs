@@ -9,12 +9,13 @@ mod start;
 mod step;
 
 use self::model::{Model, State, E_INVERTER};
+use self::shorted::discrete;
 use self::step::{control_step, link_voltage, park, seen_current, shaft_reading, HighStep};
 use crate::actuator::servo::advance::Stretch;
 use crate::actuator::servo::details::{sample_steps, Needs, Structure};
 use crate::actuator::servo::form::Form;
 use crate::actuator::servo::layout::*;
-use crate::actuator::{Finding, Inputs, Overheat, Port, Setup, Tick, Watch, Wiring, WATCHED};
+use crate::actuator::{Finding, Inputs, Overheat, Port, Setup, Signals, Tick, Watch, Wiring, WATCHED};
 use crate::control::current_dq::{CurrentSample, PwmParameter};
 use crate::control::position_speed::ControlParameter;
 use crate::fault::FaultKind;
@@ -102,8 +103,8 @@ impl<F: Form> Wiring for High<F> {
     fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
         start::start(model, raw, initial)
     }
-    fn refresh<S: Scalar>(raw: &[S], state: &mut State<S>) {
-        start::refresh(raw, state);
+    fn refresh<S: Scalar>(model: &Model<S>, structure: &Structure, raw: &[S], state: &mut State<S>) {
+        start::refresh(model, structure, raw, state);
     }
 
     fn tick<S: Scalar>(
@@ -127,6 +128,9 @@ impl<F: Form> Wiring for High<F> {
                 m.shaft.nut.tick(&mut s.shaft.nut);
                 m.extra.drive_heat.tick(&mut s.extra.drive_heat, s.energy[E_INVERTER]);
                 (s.star.resistance_factor, s.star.flux_factor) = m.extra.network.factors(&s.extra.network);
+                if structure.shorted {
+                    s.extra.contacts = discrete(m, &s.star);
+                }
             }
             TICK_DEBRIS => s.shaft.scatter(&m.shaft.screw, noise(4)),
             TICK_RESOLVER_NOISE => s.sensed.noise = [noise(5), noise(6)],
@@ -169,7 +173,8 @@ impl<F: Form> Wiring for High<F> {
     }
 
     #[inline(always)]
-    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, state: &State<S>, t: S, out: &mut [S]) {
+    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, state: &State<S>, t: S, _asked: Signals, out: &mut [S]) {
+        // A row costs what a step does, and there are hundreds of steps to a row.
         observe::high::<F, S>(structure, m, inputs, state, t, out);
     }
 

@@ -11,7 +11,7 @@ use crate::inverter::bridge::{Bridge, BridgeState, InverterParameter};
 use crate::inverter::link::{DcLink, DcLinkState};
 use crate::inverter::losses::{DriveHeat, DriveHeatState, SwitchingParameter};
 use crate::motor::pole::WeakPole;
-use crate::motor::short::Shorts;
+use crate::motor::short::{Discrete, Shorts};
 use crate::motor::star::{MotorParameter, Star, StarState};
 use crate::motor::thermal::{Network, NetworkState, ThermalParameter};
 use crate::scalar::Scalar;
@@ -83,6 +83,8 @@ pub(crate) struct ExtraState<S> {
     pub last_reference: S,
     pub link: DcLinkState<S>,
     pub drive_heat: DriveHeatState<S>,
+    /// The contacts' network at the present parameters and temperature.
+    pub contacts: Discrete<S>,
 }
 
 /// Accounts of the electrical part; those of the shaft are its own.

@@ -3,17 +3,23 @@
 use super::electric::{Coupling, Fed};
 use super::model::*;
 use crate::actuator::servo::details::Structure;
-use crate::inverter::bridge::{Circuit as _, Legs};
-use crate::motor::short::{Account, Network, Outcome};
+use crate::inverter::bridge::{BridgeState, Circuit as _, Legs};
+use crate::motor::short::{Account, Discrete, Network};
+use crate::motor::star::StarState;
 use crate::scalar::Scalar;
 use crate::three;
 
-/// Terminals, neutral and the step's end; the legs where a detailed bridge holds them.
-struct Solved<S: Scalar> {
+/// Terminals, neutral, and the rails the legs draw from.
+struct Solved<S> {
     terminal: [S; 3],
     neutral: S,
     rail: [S; 3],
-    outcome: Outcome<S>,
+}
+
+/// The network over the step of this model, for the present temperature.
+pub(crate) fn discrete<S: Scalar>(m: &Model<S>, star: &StarState<S>) -> Discrete<S> {
+    // Where no copper warms the factor is one.
+    Discrete::new(&m.extra.shorts, m.star.dt_per_inductance, star.resistance_factor, m.bridge.on_resistance)
 }
 
 /// Ampere-turns after the step and phase-to-neutral voltages.
@@ -25,50 +31,69 @@ pub(crate) fn shorted_step<S: Scalar>(
     c: &Coupling<S>,
     fed: &Fed<S>,
 ) -> ([S; 3], [S; 3]) {
-    let factor = if structure.thermal { s.star.resistance_factor } else { S::one() };
     let old = s.star.current;
-    let drop = three!(|j| -(c.k[j] * s.shaft.motor_speed) - fed.resistance[j] * old[j]);
+    let drop = three!(|j| (-fed.resistance[j]).fma(old[j], -(c.k[j] * s.shaft.motor_speed)));
     let ground = m.extra.shorts.ground(fed.half_supply);
-    let per = m.star.dt_per_inductance;
-    let before = s.star.contact;
-    let net = Network::new(&m.extra.shorts, structure.shorts, per, old, &before, drop, factor, ground, m.star.open);
-    let x = solve(m, structure, s, &net, fed);
+    let net = Network::new(&m.extra.shorts, &s.extra.contacts, structure.shorts, old, &s.star.contact, drop, ground, m.star.open);
+    let x = solve(m, structure, &mut s.bridge, s.legs, &net, fed);
+    let outcome = net.outcome(x.terminal, x.neutral);
     if structure.accounts || structure.heat {
-        let account = net.account(old, &before, &x.outcome, x.terminal, x.neutral, fed.resistance, factor);
+        let factor = if structure.thermal { s.star.resistance_factor } else { S::one() };
+        let account = net.account(old, &outcome, x.terminal, x.neutral, fed.resistance, factor);
         book(m, structure, s, &x, &account, ground);
     }
-    s.star.contact = x.outcome.contact;
+    s.star.contact = outcome.contact;
     s.voltage = three!(|j| x.terminal[j] - x.neutral);
-    (x.outcome.turns, s.voltage)
+    (outcome.turns, s.voltage)
 }
 
 #[inline(always)]
-fn solve<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, net: &Network<'_, S>, fed: &Fed<S>) -> Solved<S> {
+fn solve<S: Scalar>(
+    m: &Model<S>,
+    structure: &Structure,
+    bridge: &mut BridgeState<S>,
+    new_legs: [S; 3],
+    net: &Network<'_, S>,
+    fed: &Fed<S>,
+) -> Solved<S> {
     if !structure.bridge {
-        let terminal = three!(|j| s.legs[j] * fed.half_supply);
-        let neutral = net.neutral(terminal);
-        return Solved { terminal, neutral, rail: terminal, outcome: net.outcome(terminal, neutral) };
+        let terminal = three!(|j| new_legs[j] * fed.half_supply);
+        return Solved { terminal, neutral: net.neutral(terminal), rail: terminal };
     }
-    let legs = m.bridge.connect(&mut s.bridge, &structure.bridge_structure, fed.old_legs, s.legs, fed.half_supply, net, m.dt).legs;
+    let connection = m.bridge.connect(bridge, &structure.bridge_structure, fed.old_legs, new_legs, fed.half_supply, net, m.dt);
+    let legs = connection.legs;
     // A switch's resistance acts on the step's end: explicit, it would not stand a contact of less than its own.
     let old = net.currents();
     let resistance = three!(|j| S::select(legs.passive[j], S::zero(), m.bridge.on_resistance));
     let source = three!(|j| resistance[j].fma(old[j], legs.voltage[j]));
-    let connected = legs.connected;
-    let mut x = behind(net, &legs, source, resistance, connected);
-    // A passive leg's current stops at zero: where it would pass, the step is done again with that leg afloat.
-    let passed = three!(|j| legs.passive[j] & connected[j] & (old[j] * x.outcome.legs[j]).lt(S::zero()));
-    if S::any(passed[0] | passed[1] | passed[2]) {
-        x = behind(net, &legs, source, resistance, three!(|j| connected[j] & !passed[j]));
+    let (terminal, neutral) = net.behind(source);
+    let held = Solved { terminal, neutral, rail: legs.rail };
+    let passive = legs.passive[0] | legs.passive[1] | legs.passive[2];
+    if !S::any(passive) {
+        return held;
     }
-    x
+    let loose = released(net, &legs, source, resistance);
+    let pick = |x: S, y: S| S::select(passive, x, y);
+    Solved {
+        terminal: three!(|j| pick(loose.terminal[j], held.terminal[j])),
+        neutral: pick(loose.neutral, held.neutral),
+        rail: three!(|j| pick(loose.rail[j], held.rail[j])),
+    }
 }
 
+/// With legs that no switch holds.
 #[inline(always)]
-fn behind<S: Scalar>(net: &Network<'_, S>, legs: &Legs<S>, source: [S; 3], resistance: [S; 3], connected: [S::Mask; 3]) -> Solved<S> {
-    let (terminal, neutral) = net.solve(source, resistance, connected);
-    let rail = three!(|j| S::select(legs.connected[j], legs.rail[j], terminal[j]));
-    Solved { terminal, neutral, rail, outcome: net.outcome(terminal, neutral) }
+fn released<S: Scalar>(net: &Network<'_, S>, legs: &Legs<S>, source: [S; 3], resistance: [S; 3]) -> Solved<S> {
+    let (old, connected) = (net.currents(), legs.connected);
+    let mut x = net.solve(source, resistance, connected);
+    let ends = net.ends(x.0, x.1);
+    // A passive leg's current stops at zero: where it would pass, the step is done again with that leg afloat.
+    let passed = three!(|j| legs.passive[j] & connected[j] & (old[j] * ends[j]).lt(S::zero()));
+    if S::any(passed[0] | passed[1] | passed[2]) {
+        x = net.solve(source, resistance, three!(|j| connected[j] & !passed[j]));
+    }
+    let (terminal, neutral) = x;
+    Solved { terminal, neutral, rail: three!(|j| S::select(connected[j], legs.rail[j], terminal[j])) }
 }
 
 #[inline(always)]

@@ -1,6 +1,8 @@
 //! The state at the start of a run, and after a fault changed parameters.
 
 use super::model::{network, ExtraState, Model, State};
+use super::shorted::discrete;
+use crate::actuator::servo::details::Structure;
 use crate::actuator::servo::layout::*;
 use crate::control::current_dq::CurrentControlState;
 use crate::control::position_speed::PositionSpeedState;
@@ -54,12 +56,16 @@ pub(crate) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> St
             last_reference: S::splat(f64::NAN),
             link: DcLinkState::rest(),
             drive_heat: model.extra.drive_heat.start(),
+            contacts: discrete(model, &star),
         },
     }
 }
 
-pub(crate) fn refresh<S: Scalar>(raw: &[S], state: &mut State<S>) {
+pub(crate) fn refresh<S: Scalar>(model: &Model<S>, structure: &Structure, raw: &[S], state: &mut State<S>) {
     heat(raw, &mut state.star, &state.extra.network);
+    if structure.shorted {
+        state.extra.contacts = discrete(model, &state.star);
+    }
 }
 
 /// Temperature factors: of the network where there is one, else of the given winding temperature.

@@ -3,7 +3,7 @@
 //! that only some servos have; a detail at its healthy value changes no bit, so the forms agree exactly where both apply.
 
 use super::crossing::{Located, Seen};
-use super::electric::{coupling, electric_step, motor_torque, Detailed};
+use super::electric::{coupling, electric_step, motor_torque};
 use super::model::{Model, State, E_INVERTER, E_SUPPLY};
 use crate::actuator::servo::advance::{Instant, Stepper};
 use crate::actuator::servo::details::Structure;
@@ -160,10 +160,8 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
         let rate = if structure.sensing.resolver && structure.sensing.commutated { reading.speed } else { s.shaft.motor_speed };
         let seen = Seen { error, sines: sin_phases, cosines: cos_phases, rate };
         Located { model: m, structure, state: &mut *s, coupling: &c, half_supply, old_legs, seen }.step()
-    } else if EXTRA {
-        Detailed { model: m, structure, state: &mut *s, coupling: &c, half_supply, old_legs }.step()
     } else {
-        electric_step::<S, FULL, false>(m, structure, s, &c, half_supply, old_legs)
+        electric_step::<S, FULL, EXTRA>(m, structure, s, &c, half_supply, old_legs)
     };
     if EXTRA && structure.link {
         m.extra.link.step(&mut s.extra.link, source, s.energy[E_SUPPLY] - drawn_before);

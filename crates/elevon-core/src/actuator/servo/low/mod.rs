@@ -13,7 +13,7 @@ use self::step::LowStep;
 use super::advance::Stretch;
 use super::form::Form;
 use super::layout::*;
-use crate::actuator::{Finding, Inputs, Overheat, Port, Setup, Tick, Watch, Wiring, WATCHED};
+use crate::actuator::{Finding, Inputs, Overheat, Port, Setup, Signals, Tick, Watch, Wiring, WATCHED};
 use crate::control::position_speed::ControlParameter;
 use crate::fault::FaultKind;
 use crate::motor::equivalent::LowParameter;
@@ -87,7 +87,7 @@ impl<F: Form> Wiring for Low<F> {
     fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
         model.start(raw, initial)
     }
-    fn refresh<S: Scalar>(raw: &[S], state: &mut State<S>) {
+    fn refresh<S: Scalar>(_model: &Model<S>, _structure: &Structure, raw: &[S], state: &mut State<S>) {
         state.refresh(raw);
     }
 
@@ -129,8 +129,8 @@ impl<F: Form> Wiring for Low<F> {
     }
 
     #[inline(always)]
-    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, state: &State<S>, t: S, out: &mut [S]) {
-        observe::observe::<F, S>(structure, m, inputs, state, t, out);
+    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, state: &State<S>, t: S, asked: Signals, out: &mut [S]) {
+        observe::observe::<F, S>(structure, m, inputs, state, t, asked, out);
     }
 
     #[inline(always)]

@@ -3,21 +3,30 @@
 use super::model::{Model, State, Structure};
 use crate::actuator::servo::advance::Instant;
 use crate::actuator::servo::form::Form;
+use crate::actuator::servo::layout::COMMAND;
 use crate::actuator::servo::signals::{shared, LowSignal as Q, LOW, LOW_OWN};
-use crate::actuator::Inputs;
+use crate::actuator::{Inputs, Signals};
 use crate::scalar::Scalar;
 
+/// What the loads on the shaft decide; what stands behind the own signals is theirs, too.
+const OF_SHAFT: Signals = Signals::of(&[Q::UserSpeed as usize, Q::FrictionTorque as usize, Q::LoadTorque as usize, Q::StopTorque as usize])
+    .and_from(LOW_OWN.len());
+const OF_INPUTS: Signals = Signals::of(&[Q::BrakeTorque as usize, Q::SupplyVoltage as usize]);
+const OF_SENSORS: Signals = Signals::of(&[Q::EncoderPosition as usize, Q::ResolverPosition as usize, Q::ResolverSpeed as usize]);
+
 #[inline(always)]
-pub(super) fn observe<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
-    let x = Instant::at(inputs, t);
-    let shown = m.shaft.show(&structure.shaft, &x, &s.shaft, s.motor_torque);
-    let [encoder, resolver, resolver_speed] = m.sensing.show(&structure.sensing, &s.shaft, s.sensed);
+pub(super) fn observe<F: Form, S: Scalar>(
+    structure: &Structure,
+    m: &Model<S>,
+    inputs: &Inputs<S>,
+    s: &State<S>,
+    t: S,
+    asked: Signals,
+    out: &mut [S],
+) {
     let limited = m.control.speed_limit.le(s.speed_ref.abs()) | m.control.torque_limit.le(s.torque_ref.abs());
-    let source = x.supply * m.drive.supply_scale;
     for (q, value) in [
-        (Q::Command, x.command + s.command_noise),
         (Q::UserPosition, s.shaft.user_position),
-        (Q::UserSpeed, shown.user_speed),
         (Q::MotorPosition, s.shaft.motor_position),
         (Q::MotorSpeed, s.shaft.motor_speed),
         (Q::SpeedRef, s.speed_ref),
@@ -28,24 +37,45 @@ pub(super) fn observe<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, i
         (Q::VoltageQRef, s.voltage),
         (Q::VoltageQMeas, s.filtered[1]),
         (Q::MotorTorque, s.motor_torque),
-        (Q::FrictionTorque, shown.friction),
-        (Q::BrakeTorque, x.brake),
-        (Q::LoadTorque, shown.load),
-        (Q::StopTorque, shown.stop),
-        (Q::SupplyVoltage, if structure.link { m.drive.link.voltage(&s.link, source) } else { source }),
         (Q::WindingTemperature, if structure.heat { s.network.winding } else { m.temperature }),
         (Q::SurfaceTemperature, s.network.surface),
         (Q::HeatCopper, s.network.power[0]),
         (Q::HeatAir, s.network.power[3]),
         (Q::ThermalWarning, m.network.warns(&s.network)),
         (Q::Limited, S::indicator(limited)),
-        (Q::EncoderPosition, encoder),
-        (Q::ResolverPosition, resolver),
-        (Q::ResolverSpeed, resolver_speed),
         (Q::Tripped, s.tripped.maximum(s.network.over)),
         (Q::EnergyCopper, s.copper),
         (Q::EnergyHeatStored, m.network.stored(&s.network)),
         (Q::EnergyAir, s.network.heat_out),
+    ] {
+        out[q as usize] = value;
+    }
+    if asked.any(Signals::of(&[Q::Command as usize])) {
+        out[Q::Command as usize] = inputs[COMMAND].at(t) + s.command_noise;
+    }
+    if asked.any(OF_SENSORS) {
+        let shown = m.sensing.show(&structure.sensing, &s.shaft, s.sensed);
+        for (q, value) in [Q::EncoderPosition, Q::ResolverPosition, Q::ResolverSpeed].into_iter().zip(shown) {
+            out[q as usize] = value;
+        }
+    }
+    if asked.any(OF_INPUTS) || asked.any(OF_SHAFT) {
+        loaded::<F, S>(structure, m, &Instant::at(inputs, t), s, out);
+    }
+}
+
+/// What inputs and loads decide.
+#[inline(always)]
+fn loaded<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s: &State<S>, out: &mut [S]) {
+    let shown = m.shaft.show(&structure.shaft, x, &s.shaft, s.motor_torque);
+    let source = x.supply * m.drive.supply_scale;
+    for (q, value) in [
+        (Q::UserSpeed, shown.user_speed),
+        (Q::FrictionTorque, shown.friction),
+        (Q::BrakeTorque, x.brake),
+        (Q::LoadTorque, shown.load),
+        (Q::StopTorque, shown.stop),
+        (Q::SupplyVoltage, if structure.link { m.drive.link.voltage(&s.link, source) } else { source }),
     ] {
         out[q as usize] = value;
     }
