@@ -160,6 +160,55 @@ def test_loop_short_in_the_low_fidelity() -> None:
     assert found == pytest.approx(healthy, rel=5e-3)
 
 
+@pytest.mark.parametrize(
+    ("name", "load", "severity", "coupling"),
+    [
+        ("torino-rotary", "50 N m", 0.05, 0.9),
+        ("torino-rotary", "50 N m", 0.2, 0.9),
+        ("nasa-ballscrew", "2000 N", 0.05, 0.9),
+        ("nasa-ballscrew", "2000 N", 0.2, 0.5),
+        ("nasa-ballscrew", "2000 N", 0.5, 0.5),
+    ],
+)
+def test_loop_short_over_whole_turns(
+    name: str, load: str, severity: float, coupling: float
+) -> None:
+    """Mean current over four electrical turns, at any coupling: with i_f = i the shorted turns
+    link the whole winding's flux.
+    """
+    values = {"motor.short_model": "loop", "motor.short_coupling": coupling}
+    values |= {"thermal.model": "off"} if name == "nasa-ballscrew" else {}
+    scenario = make_scenario(
+        duration=0.4, mode="speed", command=[constant("40 rad/s")],
+        extra={"load": {"user": {"terms": [constant(load)]}},
+               "fault": [fault("short", "motor.phase_a", severity)]},
+    )  # fmt: skip
+    means = []
+    for fidelity, rate in (("high", 20), ("low", 2)):
+        record = f"current_q@{rate} kHz"
+        rec = elevon.simulate(actuator(values, name), scenario, fidelity=fidelity, record=record)
+        last = rec["current_q"].time > 0.4 - 4 * 2 * math.pi / (4 * 40.0)
+        means.append(float(rec["current_q"].values[last].mean()))
+    assert means[1] == pytest.approx(means[0], rel=0.025)
+
+
+@pytest.mark.parametrize("speed", [584.0, 900.0])
+def test_diodes_rectify_the_emf_of_a_drive_without_gates(speed: float) -> None:
+    """Above the link's voltage the diodes brake; a step is far more than an electrical radian."""
+    torques = []
+    for fidelity in FIDELITIES:
+        scenario = make_scenario(duration=0.1, mode="speed", command=[constant("0 rad/s")],
+                                 extra={"initial": {"motor_speed": speed}})  # fmt: skip
+        values = FLYWHEEL | {"drive.kind": "off", "motor.inertia": 100.0}
+        values["control.derivative_time"] = 0.0
+        rec = elevon.simulate(
+            actuator(values), scenario, fidelity=fidelity, record="motor_torque@2 kHz"
+        )
+        torques.append(late(rec, "motor_torque"))
+    assert torques[0] < -2.0
+    assert torques[1] == pytest.approx(torques[0], rel=0.07)
+
+
 def test_voltage_of_a_linear_carrier_drive() -> None:
     """In a sag the voltage vector ends at V / sqrt 3; the speed of both fidelities follows."""
     sag = {"fault": [fault("sag", "supply", 0.9)]}

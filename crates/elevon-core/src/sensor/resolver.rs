@@ -147,6 +147,13 @@ impl<S: Scalar> Resolver<S> {
         }
     }
 
+    /// Change of the speed shown over that of the shaft's: none without power or while it stands still.
+    #[inline(always)]
+    pub fn follows(&self) -> S {
+        let half = S::splat(0.5);
+        S::select(half.le(self.off) | half.le(self.stuck), S::zero(), self.gain)
+    }
+
     /// Reading at angle `theta`, speed `omega`; `held` is the last one with power on.
     #[inline(always)]
     pub fn read(&self, theta: S, omega: S, held: &mut ResolverState<S>) -> Reading<S> {

@@ -64,6 +64,12 @@ impl<S: Scalar> Sensing<S> {
         S::splat(0.5).lt(self.resolver.off)
     }
 
+    /// Change of the speed shown over that of the shaft's.
+    #[inline(always)]
+    pub(super) fn follows(&self) -> S {
+        self.resolver.follows()
+    }
+
     /// The resolver's reading.
     #[inline(always)]
     pub(super) fn shaft<const FULL: bool>(&self, d: &SensingDetails, s: &ShaftState<S>, sensed: &mut Sensed<S>) -> Reading<S> {

@@ -1,9 +1,10 @@
 //! Shorted turns as a loop of their own, at low fidelity. The phase current i_j is imposed; behind the contact resistance
 //! R_c the loop of mu turns carries i_f:
 //!
-//!     L_f di_f/dt = R_c (i_j - i_f) - mu R i_f - M di_j/dt - mu k_j omega,   L_f = mu^2 L, M = kappa mu (1 - mu) L
+//!     L_f di_f/dt = R_c (i_j - i_f) - mu R i_f - M di_j/dt - mu k_j omega,   L_f = mu L - M, M = kappa mu (1 - mu) L
 //!
-//! It is stepped exactly for held right-hand sides, so any R_c runs; R_c without limit is the healthy winding.
+//! With i_f = i_j all turns link the flux of the whole winding, L_f + M = mu L, whatever kappa: the split of the high
+//! fidelity (motor/short). Turns that are not shorted carry the phase's current. The loop is stepped exactly for held right-hand sides, so any R_c runs; R_c without limit is the healthy winding.
 
 use super::model::State;
 use super::phase::Phase;
@@ -23,6 +24,8 @@ pub struct Loops<S> {
     mutual_per_dt: [S; 3],
     /// dt / L_f.
     dt_per_inductance: [S; 3],
+    /// Inductance of the turns outside the short, N L - M.
+    pub(super) rest: [S; 3],
 }
 
 /// What the loops add to a step.
@@ -48,8 +51,10 @@ impl<S: Scalar> Loops<S> {
             mutual_per_dt: three!(|j| at(MotorParameter::ShortCoupling) * turns[j] * rest[j] * inductance / dt),
             dt_per_inductance: three!(|j| {
                 let there = zero.lt(turns[j]);
-                S::select(there, dt / S::select(there, turns[j] * turns[j] * inductance, one), zero)
+                let own = turns[j] * (one - at(MotorParameter::ShortCoupling) * rest[j]) * inductance;
+                S::select(there, dt / S::select(there, own, one), zero)
             }),
+            rest: three!(|j| rest[j] * (one - at(MotorParameter::ShortCoupling) * turns[j]) * inductance),
         }
     }
 
@@ -67,7 +72,7 @@ impl<S: Scalar> Loops<S> {
             let driven = self.contact * after[j] - self.mutual_per_dt[j] * (after[j] - before[j]) - k * speed;
             let settled = driven / total;
             let decay = (-(total * self.dt_per_inductance[j])).exp();
-            let new = S::select(there, (s.loops[j] - settled).fma(decay, settled), zero);
+            let new = S::select(there, (s.loops[j] - settled).fma(decay, settled), after[j]);
             let middle = half * (s.loops[j] + new);
             added.torque = added.torque + k * middle;
             let through = S::select(there, half * (before[j] + after[j]) - middle, zero);

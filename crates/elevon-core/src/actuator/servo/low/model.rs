@@ -121,8 +121,6 @@ pub struct Drive<S> {
     /// p L of the cross coupling.
     pub electrical_inductance: S,
     pub bridge: Bridge<S>,
-    /// (1 - exp(-R dt / L)) / R of each winding: exact for voltages held over a step.
-    pub per_winding: [S; 3],
     /// 1: a switch is shorted, the first gate of its partner trips the drive.
     pub shorted: S,
     pub trip_current: S,
@@ -219,7 +217,6 @@ impl<S: Scalar> Drive<S> {
             supply_scale: at(InverterParameter::SupplyScale.at()),
             electrical_inductance: at(MotorParameter::PolePairs.at()) * inductance,
             bridge: Bridge::derive(Raw(raw).inverter()),
-            per_winding: three!(|j| (one - (-(dt * star.resistance[j] * star.per_inductance[j])).exp()) / star.resistance[j]),
             shorted: S::indicator(half.le(shorted)),
             trip_current: at(InverterParameter::TripCurrent.at()),
             half_band: match structure.drive {
@@ -246,10 +243,11 @@ impl<S: Scalar> Model<S> {
         let one = S::one();
         let dt = raw[LowParameter::Step.at()];
         let shaft = Shaft::derive::<F>(raw, &structure.shaft, dt);
-        // The reduced short: missing turns only; loop currents do not show in one phase.
-        let reduced = MotorStructure { shorted_loop: false, ..structure.motor };
-        let mut star = Star::derive(Raw(raw).motor(), &reduced, dt);
+        // The turns outside the short; those inside are loops of their own.
+        let outside = MotorStructure { shorted_loop: false, ..structure.motor };
+        let mut star = Star::derive(Raw(raw).motor(), &outside, dt);
         star.lean(shaft.unbalance.eccentricity(shaft.inertia));
+        let circuits = Loops::derive(raw, dt);
         let control = Control::derive(raw, structure, shaft.gear.ratio, dt);
         let constant = S::splat(1.5) * at(MotorParameter::EmfConstant) * at(MotorParameter::FluxFraction);
         let cold = [constant, at(MotorParameter::WindingResistance), at(MotorParameter::WindingInductance)];
@@ -260,11 +258,11 @@ impl<S: Scalar> Model<S> {
         Self {
             dt,
             resistance: star.resistance,
-            inductance: three!(|j| one / star.per_inductance[j]),
+            inductance: if structure.loops { circuits.rest } else { three!(|j| one / star.per_inductance[j]) },
             healthy: Phase::new(constant * flux_factor, circuit, &control, shaft.inertia),
             cold,
             drive: Drive::derive(raw, structure, &star, dt),
-            circuits: Loops::derive(raw, dt),
+            circuits,
             star,
             pole: WeakPole::derive(Raw(raw).pole(), raw[MotorParameter::PolePairs.at()]),
             control,

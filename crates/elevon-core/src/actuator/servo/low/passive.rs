@@ -1,14 +1,41 @@
 //! The low fidelity without gates: a bridge that has tripped, lost its feedback or is off leaves diodes and shorted
 //! switches on the three windings, which carry what the EMFs drive. The current of one phase cannot stand for that: the
-//! windings are stepped one by one through the high fidelity's bridge, exactly for voltages held over the step.
+//! windings are stepped one by one through the high fidelity's bridge, exactly for voltages held over a part of the
+//! step. The diodes follow the EMFs as they turn, so that a step is cut into parts of a small electrical angle.
 
 use super::model::{Model, State, Structure};
-use super::phase::Phase;
+use super::phase::{coefficients, Phase};
 use crate::inverter::bridge::{quench, Windings};
-use crate::scalar::Scalar;
+use crate::motor::equivalent::quadrature;
+use crate::scalar::{three_phase, Scalar};
 use crate::three;
 
-/// Phase currents after a step behind the bridge without gates, and the rails that they come from.
+/// Electrical angle over which EMFs are held, rad, and most parts of a step: beyond, a step is more than four turns.
+const HELD: f64 = 0.1;
+const MOST: f64 = 256.0;
+
+/// A step behind the bridge without gates.
+pub(super) struct Passive<S> {
+    pub phases: [S; 3],
+    /// Means over the step: torque, copper loss, power drawn from the link.
+    pub torque: S,
+    pub copper: S,
+    pub drawn: S,
+    /// Quadrature component at the step's end, in the rotor's frame and in the drive's.
+    pub quadrature: S,
+    pub seen: S,
+}
+
+/// One part of a step: how long, and what does not change in it.
+struct Part<S> {
+    dt: S,
+    half_supply: S,
+    resistance: [S; 3],
+    /// (1 - exp(-R dt / L)) / R of each winding: exact for voltages held.
+    per_winding: [S; 3],
+}
+
+/// The windings over a step from the phase currents `i`.
 #[inline(always)]
 pub(super) fn passive_step<S: Scalar>(
     m: &Model<S>,
@@ -17,23 +44,63 @@ pub(super) fn passive_step<S: Scalar>(
     s: &mut State<S>,
     p: &Phase<S>,
     i: [S; 3],
-) -> ([S; 3], [S; 3]) {
+) -> Passive<S> {
+    let (zero, one, half) = (S::zero(), S::one(), S::splat(0.5));
     let speed = s.shaft.motor_speed;
-    let half_supply = S::splat(0.5) * supply;
-    let emf: [S; 3] = three!(|j| p.coefficients[j] * speed);
+    let turned = (m.star.pole_pairs * speed * m.dt).abs();
+    let parts = -((turned * S::splat(-1.0 / HELD)).floor()).clamp(S::splat(-MOST), S::splat(-1.0));
+    let share = one / parts;
     let resistance: [S; 3] = three!(|j| m.resistance[j] * s.resistance_factor);
-    let w = Windings { current: i, emf, per_inductance: m.drive.per_winding, resistance, open: m.star.open };
-    let open = [S::zero(); 3];
-    let connection = m.drive.bridge.connect(&mut s.bridge, &structure.bridge, open, open, half_supply, &w, m.dt);
+    let dt = share * m.dt;
+    let per_winding = three!(|j| (one - (-(dt * resistance[j] / m.inductance[j])).exp()) / resistance[j]);
+    let part = Part { dt, half_supply: half * supply, resistance, per_winding };
+    let mut x = Passive { phases: i, torque: zero, copper: zero, drawn: zero, quadrature: zero, seen: zero };
+    let mut k = zero;
+    // Lanes that have all their parts wait for the others.
+    while S::any(k.lt(parts)) {
+        let running = k.lt(parts);
+        let position = ((k + half) * dt).fma(speed, s.shaft.motor_position);
+        let along: [S; 3] = three!(|j| coefficients(m, structure, position)[j] * s.flux_factor);
+        let (after, rail) = part_step(m, structure, s, &part, along, x.phases);
+        let middle: [S; 3] = three!(|j| half * (x.phases[j] + after[j]));
+        for j in 0..3 {
+            let sum = |total: S, value: S| S::select(running, share.fma(value, total), total);
+            x.torque = sum(x.torque, along[j] * middle[j]);
+            x.copper = sum(x.copper, resistance[j] * middle[j] * middle[j]);
+            x.drawn = sum(x.drawn, rail[j] * middle[j]);
+        }
+        x.phases = three!(|j| S::select(running, after[j], x.phases[j]));
+        k = k + one;
+    }
+    let component = |angle: S| {
+        let (sin, cos) = angle.sin_cos();
+        quadrature(x.phases, three_phase(sin, cos).0)
+    };
+    x.quadrature = component(m.star.electrical_angle(speed.fma(m.dt, s.shaft.motor_position)));
+    x.seen = component(m.star.electrical_angle(p.believed[1].fma(m.dt, p.believed[0])));
+    x
+}
+
+/// Phase currents after a part of a step, and the rails that they come from.
+#[inline(always)]
+fn part_step<S: Scalar>(
+    m: &Model<S>,
+    structure: &Structure,
+    s: &mut State<S>,
+    part: &Part<S>,
+    along: [S; 3],
+    i: [S; 3],
+) -> ([S; 3], [S; 3]) {
+    let (g, open) = (part.per_winding, [S::zero(); 3]);
+    let emf: [S; 3] = three!(|j| along[j] * s.shaft.motor_speed);
+    let w = Windings { current: i, emf, per_inductance: g, resistance: part.resistance, open: m.star.open };
+    let connection = m.drive.bridge.connect(&mut s.bridge, &structure.bridge, open, open, part.half_supply, &w, part.dt);
     let legs = connection.legs;
-    let drop: [S; 3] = three!(|j| legs.voltage[j] - emf[j] - resistance[j] * i[j]);
+    let drop: [S; 3] = three!(|j| legs.voltage[j] - emf[j] - part.resistance[j] * i[j]);
     let neutral = match connection.loose {
         Some(neutral) => neutral,
-        None => {
-            let g = m.drive.per_winding;
-            (g[0] * drop[0] + g[1] * drop[1] + g[2] * drop[2]) / (g[0] + g[1] + g[2])
-        }
+        None => (g[0] * drop[0] + g[1] * drop[1] + g[2] * drop[2]) / (g[0] + g[1] + g[2]),
     };
-    let next = three!(|j| i[j] + m.drive.per_winding[j] * (drop[j] - neutral));
+    let next = three!(|j| i[j] + g[j] * (drop[j] - neutral));
     (quench(&legs, i, next), legs.rail)
 }

@@ -4,6 +4,7 @@ use super::model::{Control, Model, State, Structure};
 use crate::inverter::hysteresis::six_step;
 use crate::motor::equivalent::{equivalent, imposed_shape, quadrature, Circuit};
 use crate::scalar::{three_phase, Scalar};
+use crate::sensor::resolver::Reading;
 use crate::three;
 
 #[derive(Clone, Copy, Debug)]
@@ -17,10 +18,8 @@ pub struct Phase<S> {
     /// k_j of the phases, and the currents per ampere of the reference.
     pub coefficients: [S; 3],
     pub imposed: [S; 3],
-    /// Sines that the references follow.
-    pub reference: [S; 3],
-    /// Sines of the rotor's own angle.
-    pub rotor: [S; 3],
+    /// Angle and speed of the shaft by which the references are placed.
+    pub believed: [S; 2],
     /// Quadrature component of the imposed currents in the rotor's frame, and as the drive's sensors show it.
     pub quadrature: S,
     pub seen: S,
@@ -39,35 +38,44 @@ impl<S: Scalar> Phase<S> {
             per_effective_inertia,
             coefficients: zero,
             imposed: zero,
-            reference: zero,
-            rotor: zero,
+            believed: [S::zero(); 2],
             quadrature: one,
             seen: one,
         }
     }
 }
 
-/// The phase at the shaft's angle, its currents imposed at the angle `commutation` that the drive believes.
+/// k_j at a motor position and the reference temperature.
 #[inline(always)]
-pub(super) fn phase<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &State<S>, commutation: S) -> Phase<S> {
-    if !FULL || !structure.angle {
-        return if FULL && structure.heat { warm(m, s) } else { m.healthy };
-    }
-    let (sin, cos) = m.star.electrical_angle(s.shaft.motor_position).sin_cos();
-    let (rotor, _) = three_phase(sin, cos);
-    let shape = if structure.motor.trapezoidal { m.star.trapezoid(m.star.electrical_angle(s.shaft.motor_position)) } else { rotor };
+pub(super) fn coefficients<S: Scalar>(m: &Model<S>, structure: &Structure, position: S) -> [S; 3] {
+    let angle = m.star.electrical_angle(position);
+    let (sin, cos) = angle.sin_cos();
+    let shape = if structure.motor.trapezoidal { m.star.trapezoid(angle) } else { three_phase(sin, cos).0 };
     let mut gap = m.star.static_gap(sin, cos);
     if structure.motor.dynamic_eccentricity {
-        let turning = m.star.dynamic_gap(s.shaft.motor_position);
+        let turning = m.star.dynamic_gap(position);
         gap = three!(|j| gap[j] * turning[j]);
     }
     if structure.motor.weak_pole {
-        let passing = m.pole.gap(s.shaft.motor_position);
+        let passing = m.pole.gap(position);
         gap = three!(|j| gap[j] * passing[j]);
     }
-    let k = m.star.coefficients(shape, gap);
-    let sines = if structure.sensing.resolver && structure.sensing.commutated {
-        let (sin, cos) = m.star.electrical_angle(commutation).sin_cos();
+    m.star.coefficients(shape, gap)
+}
+
+/// The phase at the shaft's angle, its currents imposed at the angle that the drive reads.
+#[inline(always)]
+pub(super) fn phase<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &State<S>, reading: &Reading<S>) -> Phase<S> {
+    if !FULL || !structure.angle {
+        return if FULL && structure.heat { warm(m, s) } else { m.healthy };
+    }
+    let k = coefficients(m, structure, s.shaft.motor_position);
+    let (sin, cos) = m.star.electrical_angle(s.shaft.motor_position).sin_cos();
+    let (rotor, _) = three_phase(sin, cos);
+    let commutated = structure.sensing.resolver && structure.sensing.commutated;
+    let believed = if commutated { [reading.angle, reading.speed] } else { [s.shaft.motor_position, s.shaft.motor_speed] };
+    let sines = if commutated {
+        let (sin, cos) = m.star.electrical_angle(believed[0]).sin_cos();
         three_phase(sin, cos).0
     } else {
         rotor
@@ -84,8 +92,7 @@ pub(super) fn phase<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Struc
     Phase {
         coefficients: three!(|j| k[j] * s.flux_factor),
         imposed,
-        reference: sines,
-        rotor,
+        believed,
         quadrature: quadrature(imposed, rotor),
         seen: quadrature(shown, sines),
         ..Phase::new(e.torque_constant * s.flux_factor, circuit, &m.control, m.shaft.inertia)

@@ -7,7 +7,6 @@ use super::phase::{phase, Phase};
 use crate::actuator::servo::advance::{Instant, Stepper};
 use crate::actuator::servo::layout::DriveKind;
 use crate::control::position_speed::Mode;
-use crate::motor::equivalent::quadrature;
 use crate::scalar::Scalar;
 use crate::sensor::filter::low_pass;
 use crate::three;
@@ -149,17 +148,13 @@ fn without_gates<S: Scalar>(
     if !S::any(passive) {
         return (loss, power);
     }
-    let (after, rail) = passive_step(m, structure, supply, s, p, before);
-    s.phases = three!(|j| S::select(passive, after[j], imposed[j]));
-    s.current = S::select(passive, quadrature(s.phases, p.reference), s.current);
-    s.current_q = S::select(passive, quadrature(s.phases, p.rotor), s.current_q);
-    s.current_seen = S::select(passive, s.current, s.current_seen);
-    // The EMF is that of the step's begin: it lags by half a step, and so does the mean of the currents lead.
-    let middle: [S; 3] = three!(|j| half * (before[j] + after[j]));
-    s.motor_torque = S::select(passive, m.star.torque(p.coefficients, middle), s.motor_torque);
-    let squares = (0..3).fold(zero, |sum, j| sum + m.resistance[j] * s.resistance_factor * middle[j] * middle[j]);
-    let drawn = rail[0] * middle[0] + rail[1] * middle[1] + rail[2] * middle[2];
-    (S::select(passive, squares, loss), S::select(passive, drawn, power))
+    let x = passive_step(m, structure, supply, s, p, before);
+    s.phases = three!(|j| S::select(passive, x.phases[j], imposed[j]));
+    s.current = S::select(passive, x.seen, s.current);
+    s.current_q = S::select(passive, x.quadrature, s.current_q);
+    s.current_seen = S::select(passive, x.seen, s.current_seen);
+    s.motor_torque = S::select(passive, x.torque, s.motor_torque);
+    (S::select(passive, x.copper, loss), S::select(passive, x.drawn, power))
 }
 
 #[inline(always)]
@@ -173,11 +168,17 @@ fn step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &In
     let asked = demand(m, structure, s, x.command + s.command_noise, position, reading.speed);
 
     // Loads, and the acceleration that the derivative of the speed takes part in.
-    let p = phase::<S, FULL>(m, structure, s, reading.angle);
+    let mut p = phase::<S, FULL>(m, structure, s, &reading);
+    let mut derivative_inertia = m.control.derivative_inertia;
+    if FULL && structure.sensing.resolver {
+        // The derivative sees what the resolver shows of the acceleration.
+        derivative_inertia = derivative_inertia * m.sensing.follows();
+        p.per_effective_inertia = S::one() / p.efficacy.fma(derivative_inertia, m.shaft.inertia);
+    }
     let torque = p.efficacy * asked.torque;
     let mut loads = m.shaft.loads::<FULL, FULL>(&structure.shaft, x, &s.shaft, torque);
     let acceleration = m.shaft.acceleration::<FULL>(&structure.shaft, &s.shaft, &loads, torque, p.per_effective_inertia);
-    let unlimited = asked.torque - m.control.derivative_inertia * acceleration;
+    let unlimited = asked.torque - derivative_inertia * acceleration;
     s.torque_ref = unlimited.clamp_abs(m.control.torque_limit);
     s.speed_ref = asked.speed_ref;
     if structure.integral {
