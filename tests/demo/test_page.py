@@ -12,7 +12,7 @@ from elevon.calibrate.estimate import Estimate
 from elevon.calibrate.validation import SIGNALS, Trace
 from elevon.demo import page
 from elevon.demo.page_parameters import errors_figure, parameters_section
-from elevon.demo.pieces import Found, Step
+from elevon.demo.results import Recovered, Step
 from elevon.report import Report
 
 
@@ -44,7 +44,7 @@ def demo():
         for r in ROWS
     )  # fmt: skip
     base = Actuator.load("torino-rotary")
-    return SimpleNamespace(base=base, calibration=Found(base, estimates, ("a finding",)))
+    return SimpleNamespace(base=base, calibration=Recovered(base, estimates, ("a finding",)))
 
 
 def section(demo, rows):

@@ -20,7 +20,7 @@ from elevon.calibrate.validation import SignalError, Trace, Validation
 from elevon.cli import main
 from elevon.demo.hidden import RECOVERED, hidden_actuator
 from elevon.demo.kept import Kept, work_key
-from elevon.demo.pieces import Found, Plays, validation_from_json, validation_to_json
+from elevon.demo.results import Plays, Recovered, validation_from_json, validation_to_json
 from elevon.demo.run import run_demo
 from elevon.errors import OutputExistsError
 from elevon.report import Report
@@ -56,7 +56,7 @@ def found(base):
         )
         for path in paths
     )
-    return Found(fitted, estimates, ("what it says",))
+    return Recovered(fitted, estimates, ("what it says",))
 
 
 def validation(name, logs, factor):
@@ -86,7 +86,7 @@ def test_results_come_back_from_json_to_the_bit(base):
     assert again.rows == table.rows
     assert repr(again.checks) == repr(table.checks)
     result = found(base)
-    back = Found.from_json(json.loads(json.dumps(result.to_json(base))), base)
+    back = Recovered.from_json(json.loads(json.dumps(result.to_json(base))), base)
     assert (back.estimates, back.findings) == (result.estimates, result.findings)
     assert back.actuator.parameters == result.actuator.parameters
     assert back["derived.inertia"] == result["derived.inertia"]
@@ -107,7 +107,7 @@ def test_values_that_do_not_give_the_actuator_are_not_taken(base):
     data = found(base).to_json(base)
     data["values"]["friction.dynamic"] = 0.3001
     with pytest.raises(ValueError, match="damaged"):
-        Found.from_json(data, base)
+        Recovered.from_json(data, base)
 
 
 def test_the_work_is_told_by_version_seed_and_sets(base, monkeypatch):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.calibrate.acceptance import accept, missing, shortened, undetermined, with_values
 from elevon.calibrate.direct import saturated_speed
 from elevon.calibrate.dynamic import Dynamic, dynamic_stage
 from elevon.calibrate.estimate import Estimate
@@ -22,7 +23,6 @@ from elevon.calibrate.plant import (
 )
 from elevon.calibrate.regression import Regression
 from elevon.calibrate.signals import Signals, signal_stage
-from elevon.calibrate.taking import asked, missing, shortened, undetermined, with_values
 from elevon.errors import InputError, Interrupted
 from elevon.parameters.records import record_of
 from elevon.progress import Progress, part
@@ -191,7 +191,7 @@ def calibrate(
     _go(progress, 0.02)
     signals = signal_stage(logs, keeps, actuator, lambda f: _go(progress, 0.02 + 0.33 * f))
     plant, law, torque = signals.plant, signals.law, signals.torque
-    found = asked(signals.estimates, free, actuator)
+    found = accept(signals.estimates, free, actuator)
     direct = [p for p in free or () if p in KINEMATIC or p == "motor.emf_constant"]
     missing(direct, found, torque)
     dynamic = None

@@ -11,11 +11,12 @@ from elevon.calibrate.direct import DirectEstimate, direct_estimate
 from elevon.calibrate.log import BenchLog
 from elevon.errors import InputError
 from elevon.parameters.records import record_of
+from elevon.parameters.relations import emf_constant, motor_torque_constant, static_following
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["AUTO", "Candidate", "candidates", "start_values", "tamed"]
+__all__ = ["AUTO", "Candidate", "candidates", "start_values", "within_inertia"]
 
 #: What `auto` tries to free in the dynamic fit, in the model's own parameters.
 AUTO = (
@@ -175,16 +176,14 @@ def _parameter(path: str, actuator: Actuator) -> Candidate:
 def start_values(actuator: Actuator, logs: Sequence[BenchLog]) -> dict[str, float]:
     """Return first values in the model's parameters; those that make no sense are left out."""
     found = direct_estimate(logs)
-    kt = found.torque_constant or 1.5 * actuator.parameters.value("motor.emf_constant")
+    kt = found.torque_constant or motor_torque_constant(actuator.parameters)
     values: dict[str, float] = {}
     if found.torque_constant is not None:
-        values["motor.emf_constant"] = kt / 1.5
+        flux = actuator.parameters.value("motor.flux_fraction")
+        values["motor.emf_constant"] = emf_constant(kt, flux)
     if found.dry > 0.0:
-        ratio = actuator.parameters.value("friction.static") / max(
-            actuator.parameters.value("friction.dynamic"), 1e-12
-        )
         values["friction.dynamic"] = kt * found.dry
-        values["friction.static"] = kt * found.dry * max(ratio, 1.0)
+        values["friction.static"] = static_following(actuator.parameters, kt * found.dry)
     if found.viscous > 0.0:
         values["friction.viscous"] = kt * found.viscous
     rest = _other_inertia(actuator)
@@ -193,7 +192,7 @@ def start_values(actuator: Actuator, logs: Sequence[BenchLog]) -> dict[str, floa
     values |= _controller(actuator, found, kt)
     old = actuator.parameters.value
     near = {p: v for p, v in values.items() if 1.0 / _FAR < v / max(old(p), 1e-12) < _FAR}
-    return near | tamed(actuator, near)
+    return near | within_inertia(actuator, near)
 
 
 def _controller(actuator: Actuator, found: DirectEstimate, kt: float) -> dict[str, float]:
@@ -207,7 +206,7 @@ def _controller(actuator: Actuator, found: DirectEstimate, kt: float) -> dict[st
     return values
 
 
-def tamed(actuator: Actuator, values: Mapping[str, str | float]) -> dict[str, float]:
+def within_inertia(actuator: Actuator, values: Mapping[str, str | float]) -> dict[str, float]:
     """Return a shorter derivative time where gain times it would exceed the inertia, else nothing.
 
     Such a pair acts like an inertia larger than the real one; a drive with a tick does not bear it.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.calibrate.candidates import Candidate, candidates, start_values, tamed
+from elevon.calibrate.candidates import Candidate, candidates, start_values, within_inertia
 from elevon.calibrate.estimate import Estimate, quantile
 from elevon.calibrate.fit import (
     DynamicFit,
@@ -22,6 +22,7 @@ from elevon.calibrate.identify import Identifiability, choose
 from elevon.calibrate.log import BenchLog
 from elevon.calibrate.problem import Problem, values_of
 from elevon.errors import Interrupted
+from elevon.parameters.relations import constant_is_tied, static_following
 from elevon.progress import Progress
 
 if TYPE_CHECKING:
@@ -209,7 +210,7 @@ def _best_drive(
             logs,
             fidelity,
             check,
-            _tied(actuator),
+            constant_is_tied(actuator.parameters, 0.01),
             masks=[keep.copy() for keep in keeps],
         )
         values = values_of(free, _point(free, start, changed))
@@ -229,18 +230,11 @@ def _fixed(
         p: v for p, v in start.items() if p in actuator.parameters and p not in taken
     }
     if "friction.dynamic" in start:
-        ratio = actuator.parameters.value("friction.static") / max(
-            actuator.parameters.value("friction.dynamic"), 1e-300
-        )
-        values.setdefault("friction.static", max(ratio, 1.0) * start["friction.dynamic"])
+        static = static_following(actuator.parameters, start["friction.dynamic"])
+        values.setdefault("friction.static", static)
         values.setdefault("friction.dynamic", start["friction.dynamic"])
     kept = {p: v for p, v in values.items() if p not in {"play.total", "sensor.encoder.offset"}}
-    return kept | tamed(actuator, kept)
-
-
-def _tied(actuator: Actuator) -> bool:
-    value = actuator.parameters.value
-    return abs(value("control.torque_constant") / (1.5 * value("motor.emf_constant")) - 1.0) < 0.01
+    return kept | within_inertia(actuator, kept)
 
 
 def _absorbed(fit: DynamicFit, known: Sequence[Estimate]) -> tuple[tuple[str, float, float], ...]:

@@ -12,6 +12,7 @@ from elevon.calibrate.kinematics import CommandFit
 from elevon.calibrate.log import BenchLog
 from elevon.calibrate.plant import Torque
 from elevon.calibrate.regression import Regression
+from elevon.parameters.relations import motor_torque_constant
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -86,8 +87,7 @@ def _percent(a: float, b: float) -> str:
 
 
 def _convention(torque: Torque, actuator: Actuator) -> list[str]:
-    value = actuator.parameters.value
-    ratio = torque.constant / (1.5 * value("motor.emf_constant") * value("motor.flux_fraction"))
+    ratio = torque.constant / motor_torque_constant(actuator.parameters)
     for factor, name in ((math.sqrt(2.0), "peak"), (1.0 / math.sqrt(2.0), "rms")):
         if abs(ratio / factor - 1.0) < _CONVENTION:
             return [

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from elevon.calibrate.blocks import block_covariance, block_length
 from elevon.calibrate.candidates import Candidate
 from elevon.calibrate.problem import Problem, values_of
+from elevon.parameters.relations import TORQUE_PER_FLUX
 
 __all__ = ["DynamicFit", "blocks_of", "fit_dynamic", "refresh_scales", "step_sizes"]
 
@@ -262,7 +263,7 @@ def _exact(
         part = np.empty((len(log.time), 2, len(paths)))
         for j, path in enumerate(paths):
             column = by[path] + (
-                1.5 * by[tied] if path == "motor.emf_constant" and tied in by else 0
+                TORQUE_PER_FLUX * by[tied] if path == "motor.emf_constant" and tied in by else 0
             )
             inner = values[path] if free[chosen[j]].log_scale else 1.0
             part[:, :, j] = column * inner / np.array(scale)

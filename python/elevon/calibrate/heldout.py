@@ -15,6 +15,7 @@ from elevon.calibrate.log import BenchLog
 from elevon.calibrate.plant import controller_estimates, plant_estimates, torque_scale
 from elevon.calibrate.problem import Problem
 from elevon.errors import Interrupted
+from elevon.parameters.relations import static_following
 from elevon.progress import Progress
 
 if TYPE_CHECKING:
@@ -107,9 +108,8 @@ def _one(
     values = dict(followed) | {
         item.path: item.value for item in estimates if item.in_set and item.value > 0.0
     }
-    static = fitted.parameters.value("friction.static")
-    dynamic = max(fitted.parameters.value("friction.dynamic"), 1e-300)
-    values["friction.static"] = static / dynamic * values.get("friction.dynamic", dynamic)
+    dynamic = values.get("friction.dynamic", fitted.parameters.value("friction.dynamic"))
+    values["friction.static"] = static_following(fitted.parameters, dynamic)
     values["control.torque_constant"] = torque.believed
     offsets = {i.path: i.value for i in estimates if i.path == "sensor.current_offset"}
     shown = (fitted.validation or {}).get("offsets", {})

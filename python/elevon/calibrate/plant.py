@@ -12,6 +12,7 @@ import numpy.typing as npt
 from elevon.calibrate.estimate import Estimate, quantile
 from elevon.calibrate.regression import Regression
 from elevon.parameters.records import record_of
+from elevon.parameters.relations import constant_is_tied, emf_constant, motor_torque_constant
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -58,9 +59,9 @@ class Torque:
 def torque_scale(actuator: Actuator, plant: Regression | None) -> Torque:
     """Return the torque constant: from the load cell where there is one, else the set's."""
     value = actuator.parameters.value
-    old = 1.5 * value("motor.emf_constant") * value("motor.flux_fraction")
+    old = motor_torque_constant(actuator.parameters)
     own = value("control.torque_constant")
-    tied = abs(own / old - 1.0) < _TIED if old > 0.0 else False
+    tied = constant_is_tied(actuator.parameters, _TIED)
     if plant is not None and "brake" in plant.names and plant["brake"] > _SEEN * plant.std("brake"):
         constant = 1.0 / plant["brake"]
         relative = plant.std("brake") / plant["brake"]
@@ -110,7 +111,7 @@ def plant_estimates(
         add(
             "motor.emf_constant",
             "V s/rad",
-            lambda b: scale(b) / 1.5 / value("motor.flux_fraction"),
+            lambda b: emf_constant(scale(b), value("motor.flux_fraction")),
             "from the load cell: torque constant over 1.5",
             given=(),
         )

@@ -19,6 +19,7 @@ from elevon.calibrate.candidates import Candidate
 from elevon.calibrate.log import BenchLog
 from elevon.errors import InputError, Interrupted
 from elevon.parameters.records import positions
+from elevon.parameters.relations import torque_constant
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -119,7 +120,7 @@ class Problem:
                 vector[self._place[path]] = value
         at = self._place
         if self.tied and "motor.emf_constant" in values:
-            vector[at["control.torque_constant"]] = 1.5 * values["motor.emf_constant"]
+            vector[at["control.torque_constant"]] = torque_constant(values["motor.emf_constant"])
         static, dynamic = at["friction.static"], at["friction.dynamic"]
         vector[static] = max(vector[static], vector[dynamic])
         return vector

@@ -1,4 +1,4 @@
-"""``elevon demo``: a published table, then a bench with hidden values found again from its logs."""
+"""``elevon demo``: a published table, then a bench with hidden values recovered from its logs."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def _print(result: Demo) -> None:
         for row in result.rows()
     ]
     columns = ("parameter", "before", "hidden truth", "estimate", "90 % interval", "unit")
-    print_table(columns, rows, title="hidden values found again from three logs")
+    print_table(columns, rows, title="hidden values recovered from three logs")
     steps = [(step.name, f"{step.seconds:.1f}", step.kept) for step in result.steps]
     print_table(("step", "s", ""), [*steps, ("all", f"{result.seconds:.1f}", "")])
     checks = result.checks

@@ -1,4 +1,4 @@
-"""The demonstration: a published table, then a bench with hidden values found again from its logs.
+"""The demonstration: a published table, then a bench with hidden values recovered from its logs.
 
 Modules are imported by name; nothing is loaded here.
 """

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from elevon.actuator import Actuator
+from elevon.parameters.relations import torque_constant
 
 __all__ = ["RECOVERED", "hidden_actuator"]
 
@@ -51,7 +52,7 @@ def hidden_actuator(base: Actuator, seed: int) -> Actuator:
     values: dict[str, str | float] = {path: value(path) * float(f) for path, f in scale.items()}
     emf = float(values["motor.emf_constant"])
     values |= {
-        "control.torque_constant": 1.5 * emf,
+        "control.torque_constant": torque_constant(emf),
         "pwm.emf_constant": emf,
         "drive.kind": "pwm",
         "play.total": value("play.total") + math.radians(rng.uniform(0.2, 1.0)),

@@ -36,9 +36,9 @@ def demo_report(demo: Demo) -> Report:
     inside = sum(row["inside"] for row in rows)
     passed = [check.passed for check in demo.checks]
     report = Report(
-        "A bench with hidden values, found again from its logs",
+        "A bench with hidden values, recovered from its logs",
         "A published table is recomputed; then an actuator whose values nobody told the "
-        "calibration writes the logs a bench would write, and is found again from them.",
+        "calibration writes the logs a bench would write, and is recovered from them.",
     )
     report.fact("Checks passed", f"{sum(passed)} of {len(passed)}")
     report.fact("Truths inside", f"{inside} of {len(rows)}", f"{100 * LEVEL:.0f} % intervals")
@@ -205,8 +205,8 @@ def _clocks(report: Report, demo: Demo) -> None:
             ]
         )
     columns = [
-        "Log", "Found from", "True offset [s]", "Found [s]", "Deviation [ms]",
-        "True drift [ppm]", "Found [ppm]", "Deviation [ppm]",
+        "Log", "Recovered from", "True offset [s]", "Recovered [s]", "Deviation [ms]",
+        "True drift [ppm]", "Recovered [ppm]", "Deviation [ppm]",
     ]  # fmt: skip
     formats = ["", "", ".4f", ".4f", ".2f", "+.0f", "+.0f", ".0f"]
     section.table(

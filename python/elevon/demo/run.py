@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from elevon.demo.hidden import RECOVERED, hidden_actuator
 from elevon.demo.kept import Kept, inputs_of, work_key
-from elevon.demo.pieces import Found, Plays, Step, validation_from_json, validation_to_json
 from elevon.demo.procedure import HELD_OUT, LOADED, demo_procedure
+from elevon.demo.results import Plays, Recovered, Step, validation_from_json, validation_to_json
+from elevon.parameters.relations import motor_torque_constant
 from elevon.progress import Progress, part
 from elevon.report.checks import Check, all_passed
 
@@ -55,7 +56,7 @@ class Demo:
         What an interrupted run left, and this one leaves if it is interrupted.
     steps : list of Step
         What was done, the seconds it took, and what of it was kept from an interrupted run.
-    backlash, imported, calibration : Plays, list of ImportedLog, Found
+    backlash, imported, calibration : Plays, list of ImportedLog, Recovered
         Results.
     before, after : Validation
         Published and calibrated values against all logs, the held-out one among them.
@@ -72,7 +73,7 @@ class Demo:
     backlash: Plays = field(init=False)
     imported: list[ImportedLog] = field(init=False)
     logs: list[BenchLog] = field(init=False)
-    calibration: Found = field(init=False)
+    calibration: Recovered = field(init=False)
     before: Validation = field(init=False)
     after: Validation = field(init=False)
     truth: dict[str, float] = field(default_factory=dict)
@@ -298,10 +299,10 @@ def _calibrate(demo: Demo, progress: Progress | None, logs: Sequence[Path]) -> N
     used = [log for log in demo.logs if log.name != f"{HELD_OUT}.csv"]
     target = demo.folder / "calibrated.toml"
 
-    def work() -> Found:
+    def work() -> Recovered:
         result = calibrate(used, demo.base, progress=progress)
         write_calibration(target, result, force=True)
-        return Found.of(result)
+        return Recovered.of(result)
 
     demo.calibration = demo.resumed(
         "calibration on three logs",
@@ -309,7 +310,7 @@ def _calibrate(demo: Demo, progress: Progress | None, logs: Sequence[Path]) -> N
             "calibration",
             work,
             lambda found: found.to_json(demo.base),
-            lambda data: Found.from_json(data, demo.base),
+            lambda data: Recovered.from_json(data, demo.base),
             inputs_of(logs),
             [target],
         ),
@@ -325,7 +326,7 @@ def _truth(demo: Demo) -> dict[str, float]:
         for item in demo.calibration.estimates
         if item.path in demo.hidden.parameters
     }
-    constant, inertia = 1.5 * value("motor.emf_constant"), value("motor.inertia")
+    constant, inertia = motor_torque_constant(demo.hidden.parameters), value("motor.inertia")
     truth["derived.torque_constant"] = constant
     truth["derived.inertia"] = inertia + value("gear.inertia")
     truth["derived.integral_gain"] = value("control.speed_gain") / value("control.integral_time")

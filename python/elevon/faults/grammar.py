@@ -1,4 +1,4 @@
-"""Pieces of the fault grammar that faults and their profiles share."""
+"""Parts of the fault grammar that faults and their profiles share."""
 
 from __future__ import annotations
 

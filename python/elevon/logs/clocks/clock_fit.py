@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from elevon.logs.covariance import correlated, long_run_covariance
 
-__all__ = ["RESONATOR_STD", "RESONATOR_TOLERANCE", "Estimate", "SharedLogs", "fit_clock"]
+__all__ = ["RESONATOR_STD", "RESONATOR_TOLERANCE", "ClockEstimate", "SharedLogs", "fit_clock"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -119,7 +119,7 @@ class SharedLogs:
 
 
 @dataclass(frozen=True, slots=True)
-class Estimate:
+class ClockEstimate:
     """What the logs and what is known beforehand say together; deviations with each.
 
     Attributes
@@ -177,7 +177,9 @@ class _Frame:
         return float(rest @ rest) / noise + float(off @ self.known @ off)
 
 
-def fit_clock(logs: SharedLogs, guess: float, edge: tuple[float, float] | None) -> Estimate | None:
+def fit_clock(
+    logs: SharedLogs, guess: float, edge: tuple[float, float] | None
+) -> ClockEstimate | None:
     """Estimate offset and drift from a first guess of the offset.
 
     Parameters
@@ -191,7 +193,7 @@ def fit_clock(logs: SharedLogs, guess: float, edge: tuple[float, float] | None) 
 
     Returns
     -------
-    Estimate or None
+    ClockEstimate or None
         None where the logs hardly overlap, hold nothing that moves in time, or are worth hardly
         more independent samples than there are unknowns.
     """
@@ -271,7 +273,7 @@ def _descend(frame: _Frame, unknown: FloatArray, noise: float) -> FloatArray:
     return unknown
 
 
-def _estimate(frame: _Frame, unknown: FloatArray, inflation: float, few: float) -> Estimate:
+def _estimate(frame: _Frame, unknown: FloatArray, inflation: float, few: float) -> ClockEstimate:
     """Deviations: of the scores as they are, `few` times for so few, and of what was known."""
     rest, two, _ = frame.linear(unknown)
     noise = _noise(frame, rest) * inflation
@@ -279,8 +281,8 @@ def _estimate(frame: _Frame, unknown: FloatArray, inflation: float, few: float) 
     information = jacobian.T @ jacobian / noise + frame.known
     inverse = np.asarray(np.linalg.inv(information), dtype=np.float64)
     scores = few * long_run_covariance(two * rest[:, None])[np.ix_(_TWICE, _TWICE)] / noise**2
-    astray = (information - frame.known) @ np.diag([0.0, _APART, _APART])
-    covariance = inverse @ (scores + frame.known + astray @ astray.T) @ inverse
+    misplaced = (information - frame.known) @ np.diag([0.0, _APART, _APART])
+    covariance = inverse @ (scores + frame.known + misplaced @ misplaced.T) @ inverse
     drift = _pair(_DRIFT / frame.half, unknown, covariance)
     refused = None
     if drift[1] > _DETERMINED * RESONATOR_STD:
@@ -288,7 +290,7 @@ def _estimate(frame: _Frame, unknown: FloatArray, inflation: float, few: float) 
         unknown, covariance = _without_drift(frame, unknown, covariance, inverse)
         drift = (0.0, RESONATOR_STD)
     spread = frame.value - frame.value.mean()
-    return Estimate(
+    return ClockEstimate(
         offset=_pair(_lever(frame.middle, frame.half), unknown, covariance),
         drift=drift,
         residual=_pair(_LATE, unknown, covariance),
@@ -303,8 +305,8 @@ def _without_drift(
     """Return what the others are with the drift held at zero, and what its true value may do."""
     share = inverse[:, 1] / inverse[1, 1]
     turn = np.eye(3) - np.outer(share, _DRIFT)
-    astray = np.outer(share, share) * (RESONATOR_STD * frame.half) ** 2
-    return turn @ unknown, turn @ covariance @ turn.T + astray
+    misplaced = np.outer(share, share) * (RESONATOR_STD * frame.half) ** 2
+    return turn @ unknown, turn @ covariance @ turn.T + misplaced
 
 
 def _pair(row: FloatArray, unknown: FloatArray, covariance: FloatArray) -> tuple[float, float]:

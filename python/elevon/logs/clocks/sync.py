@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import InputError
-from elevon.logs.clocks.clock_fit import Estimate, SharedLogs, fit_clock
+from elevon.logs.clocks.clock_fit import ClockEstimate, SharedLogs, fit_clock
 from elevon.logs.clocks.offset_search import LEAST_R2, Guess, search_offset
 
 __all__ = ["ClockFit", "TriggerEdge", "align_clocks", "find_trigger"]
@@ -179,7 +179,7 @@ def align_clocks(
     )
 
 
-def _why_not(guess: Guess | None, fit: Estimate | None) -> str:
+def _why_not(guess: Guess | None, fit: ClockEstimate | None) -> str:
     """Say why there is no offset to be had from what both logs saw."""
     seen = 0.0
     if fit is not None:

@@ -53,20 +53,19 @@ def _read(source: str, parquet: Any, limits: Limits) -> RawTable:
     limits.check_shape(source, rows, len(names))
     groups = [parquet.metadata.row_group(k) for k in range(parquet.metadata.num_row_groups)]
     limits.check_bytes(source, sum(int(group.total_byte_size) for group in groups))
-    pieces: dict[str, list[FloatArray]] = {name: [] for name in names}
+    parts: dict[str, list[FloatArray]] = {name: [] for name in names}
     seen = 0
     for batch in parquet.iter_batches(columns=names, batch_size=65_536):
         seen += batch.num_rows
         limits.check_shape(source, seen, len(names))
         for name in names:
-            pieces[name].append(_floats(batch.column(name)))
+            parts[name].append(_floats(batch.column(name)))
     if seen == 0:
         raise FormatError(f"{source}: no row")
     units = {name: _unit(schema.field(name)) for name in names}
     labels = unique_names(source, [split_unit(name)[0] for name in names])
     columns = {
-        label: quiet(np.concatenate(pieces[name]))
-        for label, name in zip(labels, names, strict=True)
+        label: quiet(np.concatenate(parts[name])) for label, name in zip(labels, names, strict=True)
     }
     stated = {label: units[name] for label, name in zip(labels, names, strict=True) if units[name]}
     return RawTable(source, columns, stated, tuple(notes), "parquet")

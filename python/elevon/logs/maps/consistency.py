@@ -15,7 +15,14 @@ import numpy as np
 
 from elevon.logs.formats.table import FloatArray
 
-__all__ = ["Candidate", "Fit", "encoder_candidates", "match", "motor_candidates", "slope_with_play"]
+__all__ = [
+    "Fit",
+    "UnitCandidate",
+    "encoder_candidates",
+    "match",
+    "motor_candidates",
+    "slope_with_play",
+]
 
 MOTOR_COUNTS = 2.0**24  # absolute encoder of the motor, counts a turn (test-bench thesis)
 ENCODER_COUNTS = 20_000.0  # 5000 pulses, four edges each, a turn of the encoder's own wheel
@@ -25,7 +32,7 @@ _ENOUGH = 8.0  # travel over noise below which nothing is said
 
 
 @dataclass(frozen=True, slots=True)
-class Candidate:
+class UnitCandidate:
     """A way a position may be written: `scale` file units per rad of what it is compared to."""
 
     unit: str
@@ -60,26 +67,26 @@ class Fit:
         return self.travel > 0.0 and self.error * _ENOUGH < 1.0
 
 
-def motor_candidates() -> tuple[Candidate, ...]:
+def motor_candidates() -> tuple[UnitCandidate, ...]:
     """Ways the motor's position may be written, per rad of the motor."""
     return (
-        Candidate("rad", "fast", 1.0),
-        Candidate("deg", "fast", 180.0 / math.pi),
-        Candidate("rev", "fast", 0.5 / math.pi),
-        Candidate("counts", "fast", MOTOR_COUNTS / (2.0 * math.pi)),
+        UnitCandidate("rad", "fast", 1.0),
+        UnitCandidate("deg", "fast", 180.0 / math.pi),
+        UnitCandidate("rev", "fast", 0.5 / math.pi),
+        UnitCandidate("counts", "fast", MOTOR_COUNTS / (2.0 * math.pi)),
     )
 
 
-def encoder_candidates(ratio: float) -> tuple[Candidate, ...]:
+def encoder_candidates(ratio: float) -> tuple[UnitCandidate, ...]:
     """Ways the user encoder's position may be written, per rad of the motor."""
     shafts = (("fast", 1.0), ("slow", 1.0 / ratio), ("wheel", ENCODER_WHEEL / ratio))
     units = (("rad", 1.0), ("deg", 180.0 / math.pi), ("rev", 0.5 / math.pi))
-    angles = [Candidate(unit, shaft, u * s) for shaft, s in shafts for unit, u in units]
+    angles = [UnitCandidate(unit, shaft, u * s) for shaft, s in shafts for unit, u in units]
     counts = ENCODER_COUNTS * ENCODER_WHEEL / (2.0 * math.pi * ratio)
-    return (*angles, Candidate("counts", "slow", counts))
+    return (*angles, UnitCandidate("counts", "slow", counts))
 
 
-def match(slope: float, candidates: tuple[Candidate, ...]) -> Candidate | None:
+def match(slope: float, candidates: tuple[UnitCandidate, ...]) -> UnitCandidate | None:
     """Return the one candidate whose scale agrees with a slope (its sign aside), if any."""
     good = [c for c in candidates if abs(math.log(abs(slope) / c.scale)) < _TOLERANCE]
     return min(good, key=lambda c: abs(math.log(abs(slope) / c.scale))) if good else None

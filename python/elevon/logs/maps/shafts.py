@@ -11,8 +11,8 @@ import numpy as np
 from elevon.errors import InputError
 from elevon.logs.formats.table import FloatArray
 from elevon.logs.maps.consistency import (
-    Candidate,
     Fit,
+    UnitCandidate,
     encoder_candidates,
     match,
     motor_candidates,
@@ -186,7 +186,7 @@ def _against(reference: FloatArray, position: FloatArray) -> Fit:
 def _refuse_shaft(
     statement: PositionStatement,
     fit: Fit,
-    found: Candidate | None,
+    found: UnitCandidate | None,
     ratio: float,
     report: ImportReport,
 ) -> None:
@@ -250,5 +250,5 @@ def _why(fits: Sequence[Fit]) -> str:
     return "not confirmed: the two do not move together"
 
 
-def _listed(candidates: Sequence[Candidate]) -> str:
+def _listed(candidates: Sequence[UnitCandidate]) -> str:
     return ", ".join(f"{c.unit} {c.shaft} {c.scale:.4g}" for c in candidates)

@@ -1,4 +1,4 @@
-"""Which estimates are taken into the set, and which must be refused or explained."""
+"""Which estimates the set accepts, and which must be refused or explained."""
 
 from __future__ import annotations
 
@@ -8,17 +8,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elevon.calibrate.candidates import tamed
+from elevon.calibrate.candidates import within_inertia
 from elevon.calibrate.dynamic import Dynamic
 from elevon.calibrate.estimate import Estimate
 from elevon.calibrate.plant import Torque
 from elevon.errors import InputError
 from elevon.parameters.records import record_of
+from elevon.parameters.relations import static_following
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["asked", "missing", "shortened", "undetermined", "with_values"]
+__all__ = ["accept", "missing", "shortened", "undetermined", "with_values"]
 
 #: Offsets of sensors, which no parameter holds: they go with the set's promises on logs.
 _OFFSETS = {
@@ -28,11 +29,11 @@ _OFFSETS = {
 _LOOSEST = 0.25  # of the value, or of the one before: a larger deviation determines nothing
 
 
-def asked(
+def accept(
     found: Sequence[Estimate], free: Sequence[str] | None, actuator: Actuator
 ) -> list[Estimate]:
-    """Keep what was asked for, what no set holds, and only what a set can take."""
-    kept = []
+    """Keep what was asked for, what no set holds, and only what a set can hold."""
+    accepted = []
     for item in found:
         if item.in_set and free is not None and item.path not in free:
             continue
@@ -47,8 +48,8 @@ def asked(
             scale = max(abs(item.value), abs(item.old or 0.0))
             if record.minimum >= 0.0 and item.std > _LOOSEST * scale:
                 continue
-        kept.append(item)
-    return kept
+        accepted.append(item)
+    return accepted
 
 
 def missing(free: Sequence[str] | None, found: Sequence[Estimate], torque: Torque) -> None:
@@ -69,14 +70,14 @@ def missing(free: Sequence[str] | None, found: Sequence[Estimate], torque: Torqu
 
 
 def undetermined(
-    every: Sequence[Estimate], kept: Sequence[Estimate], free: Sequence[str] | None
+    every: Sequence[Estimate], accepted: Sequence[Estimate], free: Sequence[str] | None
 ) -> list[str]:
     """Say which direct estimates were too loose, or outside the model, to be taken."""
     return [
         f"{item.path} is not taken: {item.value:.4g} +- {item.std:.2g} {item.unit} is not "
         "determined by the signals, or not possible in the model"
         for item in every
-        if item.in_set and item not in kept and (free is None or item.path in free)
+        if item.in_set and item not in accepted and (free is None or item.path in free)
     ]
 
 
@@ -95,10 +96,9 @@ def with_values(
     if dynamic is not None and dynamic.drive != actuator.parameters["drive.kind"].value:
         values["drive.kind"] = dynamic.drive
     if "friction.dynamic" in values and "friction.static" not in values:
-        old = actuator.parameters.value
-        ratio = old("friction.static") / max(old("friction.dynamic"), 1e-300)
-        values["friction.static"] = max(ratio, 1.0) * float(values["friction.dynamic"])
-    values |= tamed(actuator, values)
+        friction = float(values["friction.dynamic"])
+        values["friction.static"] = static_following(actuator.parameters, friction)
+    values |= within_inertia(actuator, values)
     offsets = {
         signal: item.value
         for item in found
@@ -112,7 +112,7 @@ def with_values(
 def shortened(actuator: Actuator, found: Sequence[Estimate]) -> list[str]:
     """Say so where the set cannot hold the derivative time as estimated."""
     values: dict[str, str | float] = {item.path: item.value for item in found if item.in_set}
-    if "control.derivative_time" not in tamed(actuator, values):
+    if "control.derivative_time" not in within_inertia(actuator, values):
         return []
     return [
         "control.derivative_time is shortened in the set: as estimated, speed gain times it "

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from elevon.calibrate import Calibration
     from elevon.reproduce.backlash import BacklashResult
 
-__all__ = ["Found", "Plays", "Step", "validation_from_json", "validation_to_json"]
+__all__ = ["Plays", "Recovered", "Step", "validation_from_json", "validation_to_json"]
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Plays:
 
 
 @dataclass(frozen=True)
-class Found:
+class Recovered:
     """What the calibration found.
 
     Attributes
@@ -98,7 +98,7 @@ class Found:
     findings: tuple[str, ...]
 
     @classmethod
-    def of(cls, result: Calibration) -> Found:
+    def of(cls, result: Calibration) -> Recovered:
         """Take it from the whole result."""
         return cls(result.actuator, tuple(result.estimates), tuple(result.findings))
 
@@ -123,7 +123,7 @@ class Found:
         }
 
     @classmethod
-    def from_json(cls, data: Any, base: Actuator) -> Found:
+    def from_json(cls, data: Any, base: Actuator) -> Recovered:
         """Return it again.
 
         Raises
