@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator as Actuator
+    from elevon.campaign import load_campaign as load_campaign
     from elevon.errors import ElevonError as ElevonError
     from elevon.errors import ElevonWarning as ElevonWarning
     from elevon.errors import InputError as InputError
@@ -36,6 +37,7 @@ _PUBLIC = {
     "Recording": "elevon.recording",
     "Run": "elevon.simulate",
     "Scenario": "elevon.scenario",
+    "load_campaign": "elevon.campaign",
     "simulate": "elevon.simulate",
     "simulate_batch": "elevon.simulate",
 }

@@ -9,6 +9,7 @@ from difflib import get_close_matches
 from typing import ClassVar
 
 __all__ = [
+    "BusyError",
     "DivergedError",
     "ElevonError",
     "ElevonWarning",
@@ -87,6 +88,10 @@ class OutputError(InputError, OSError):
 
 class OutputExistsError(OutputError):
     """An output that exists already and may not be replaced."""
+
+
+class BusyError(InputError):
+    """Another process works in the folder."""
 
 
 class SimulationError(ElevonError):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import elevon
-from elevon.campaign import execute as execute_module
+from elevon.campaign import check as check_module
 from elevon.campaign import load_plan, load_run, read_manifest, resolve_plan
 from elevon.cli import main
 from elevon.errors import FormatError, InputError
@@ -60,48 +60,46 @@ def planned(path):
 
 
 def run(path, out, capsys=None):
-    code = main(["batch", str(path), "--out", str(out), "--json"])
+    code = main(["campaign", "run", str(path), "--out", str(out), "--json"])
     return code, capsys.readouterr() if capsys else None
 
 
 def test_runs_are_all_combinations(write):
     runs = planned(write(HEAD, "seeds = [1, 2]\n", SCENARIO, SHORTS, FRICTION, RANDOM))
     assert len(runs) == 2 * 3 * 3 * 8
-    assert [item.run.number for item in runs] == list(range(len(runs)))
-    assert {item.values["friction.dynamic"] for item in runs} == {
-        "0.2 N m", "0.30000000000000004 N m", "0.4 N m"
-    }  # fmt: skip
-    assert {item.values["short@motor.phase_a"] for item in runs} == {0, 0.1, "20 %"}
-    temperatures = {
-        item.run.actuator.parameters["motor.winding_temperature"].value for item in runs
-    }
+    rows = [runs.values(number) for number in range(len(runs))]
+    assert {row["friction.dynamic"] for row in rows} == {0.2, 0.30000000000000004, 0.4}
+    assert {row["short@motor.phase_a"] for row in rows} == {0.0, 0.1, 0.2}
+    temperatures = {row["motor.winding_temperature"] for row in rows}
     assert len(temperatures) == 8
     assert 293.15 <= min(temperatures) < max(temperatures) <= 353.15
+    item = runs.run(100)
+    assert item.actuator.parameters["friction.dynamic"].value == rows[100]["friction.dynamic"]
 
 
 def test_draws_fill_their_ranges_and_leave_some_faults_out(write):
-    text = RANDOM.replace("count = 8", "count = 64")
-    runs = planned(write(HEAD, SCENARIO, text))
-    plays = [item.values["play@transmission"] for item in runs]
-    present = [float(text.split()[0]) for text in plays if text is not None]
+    runs = planned(write(HEAD, SCENARIO, RANDOM.replace("count = 8", "count = 64")))
+    plays = np.array([runs.values(n)["play@transmission"] for n in range(64)])
+    present = np.degrees(plays[plays > 0.0])
     assert 25 <= len(present) <= 39
-    assert 0.01 <= min(present) < 0.03 < 0.5 < max(present) <= 1.0
+    assert 0.01 <= min(present) < 0.03 < 0.5 < max(present) <= 1.0 + 1e-12
     assert np.median(present) == pytest.approx(0.1, rel=0.6)
-    assert [len(item.run.scenario.fault) for item in runs] == [int(p is not None) for p in plays]
+    assert [len(runs.run(n).scenario.fault) for n in range(64)] == list((plays > 0.0).astype(int))
 
 
 @pytest.mark.parametrize("method", ["latin_hypercube", "sobol", "halton", "uniform"])
 def test_draws_repeat(write, method):
     path = write(HEAD, SCENARIO, RANDOM.replace("seed = 3", f'seed = 3\nmethod = "{method}"'))
-    assert [i.values for i in planned(path)] == [i.values for i in planned(path)]
+    first, second = planned(path), planned(path)
+    assert [first.values(n) for n in range(8)] == [second.values(n) for n in range(8)]
 
 
 def test_splits_keep_seeds_of_one_draw_together(write):
     split = "[split]\ntrain = 0.75\ntest = 0.25\n"
     runs = planned(write(HEAD, "seeds = [1, 2]\n", SCENARIO, RANDOM, split))
-    assert sum(item.split == "train" for item in runs) == 12
-    for first, second in zip(runs[::2], runs[1::2], strict=True):
-        assert first.split == second.split
+    split = list(runs.index.split)
+    assert split.count("train") == 12
+    assert split[::2] == split[1::2]
 
 
 def test_cases_change_several_things(write):
@@ -111,25 +109,29 @@ def test_cases_change_several_things(write):
         'parameters = { "motor.winding_temperature" = "60 degC" }\n'
         'scenario = { duration = "0.1 s" }\n'
     )
-    healthy, worn = planned(write(HEAD, SCENARIO, cases))
-    assert not healthy.run.scenario.fault
-    assert [str(fault) for fault in worn.run.scenario.fault][1] == "friction@transmission=0.2"
-    assert worn.run.scenario.seconds == 0.1
+    runs = planned(write(HEAD, SCENARIO, cases))
+    assert not runs.run(0).scenario.fault
+    assert [str(f) for f in runs.run(1).scenario.fault][1] == "friction@transmission=0.2"
+    assert runs.run(1).scenario.seconds == 0.1
+    assert runs.run(1).actuator.parameters["motor.winding_temperature"].value == 333.15
 
 
 def test_a_batch_is_its_single_runs(write, tmp_path):
     path = write(HEAD, "seeds = [1, 2]\n", SCENARIO, SHORTS)
     assert run(path, tmp_path / "out")[0] == 0
-    for item in planned(path):
+    runs = planned(path)
+    for number in range(len(runs)):
+        item = runs.run(number)
         alone = elevon.simulate(
-            item.run.actuator,
-            item.run.scenario,
+            item.actuator,
+            item.scenario,
             fidelity="low",
             record="user_position,motor_speed@400 Hz",
-            seed=item.run.seed,
-            number=item.run.number,
+            seed=item.seed,
+            number=number,
         )
-        kept = load_run(tmp_path / "out", item.run.number)
+        kept = load_run(tmp_path / "out", number)
+        assert kept.labels == alone.labels
         assert kept.names == alone.names
         for name in alone.names:
             assert kept[name].values.tobytes() == alone[name].values.tobytes()
@@ -147,19 +149,21 @@ def test_the_folder_tells_everything(write, tmp_path, capsys):
     assert (summary["runs"], summary["status"], summary["counts"]) == (3, "ok", {"ok": 3})
     assert "3 runs in 1 block(s)" in captured.err
     assert (out / "plan.toml").read_text() == path.read_text()
-    resolved = json.loads((out / "resolved.json").read_text())
-    assert len(resolved["runs"]) == 3
     manifest = read_manifest(out)
     for block in manifest.blocks:
-        for file in block["files"]:
-            data = (out / file["file"]).read_bytes()
-            assert hashlib.sha256(data).hexdigest() == file["sha256"]
-    assert "| user_position | rad | at_400_hz | user position |" in (out / "README.md").read_text()
+        for name, about in block["files"].items():
+            data = (out / name).read_bytes()
+            assert hashlib.sha256(data).hexdigest() == about["sha256"]
+    assert {"user_position", "short@motor.phase_a"} <= {
+        column["name"] for column in manifest.clocks[0]["columns"]
+    }
+    assert (summary["failed"], summary["bytes_per_run"] > 0.0) == (0, True)
+    assert summary["runs_per_hour"] == pytest.approx(3 * 3600 / summary["wall_s"])
 
 
-def test_blocks_hold_at_most_fifty_runs(write, tmp_path):
+def test_blocks_hold_as_many_runs_as_the_plan_says(write, tmp_path):
     many = '[[vary]]\nparameter = "friction.dynamic"\nfrom = 0.1\nto = 0.3\ncount = 60\n'
-    path = write(HEAD, SCENARIO.replace("0.2 s", "10 ms"), many)
+    path = write(HEAD, "runs_per_file = 50\n", SCENARIO.replace("0.2 s", "10 ms"), many)
     assert run(path, tmp_path / "out")[0] == 0
     blocks = read_manifest(tmp_path / "out").blocks
     assert [(block["first"], block["last"]) for block in blocks] == [(0, 49), (50, 59)]
@@ -185,34 +189,37 @@ def test_going_on_does_only_what_is_missing(write, tmp_path, capsys):
     path = write(HEAD, "runs_per_file = 1\n", SCENARIO, SHORTS)
     out = tmp_path / "out"
     run(path, out, capsys)
-    whole = {file.name: file.read_bytes() for file in (out / "runs").iterdir()}
-    (out / "runs" / "block_00001.at_400_hz.parquet").unlink()
+    whole = {file.name: file.read_bytes() for file in (out / "runs").rglob("*.parquet")}
+    (out / "runs" / "at_400_hz" / "block_00001.parquet").unlink()
     _, captured = run(path, out, capsys)
     assert json.loads(captured.out)["skipped"] == 2
-    assert {file.name: file.read_bytes() for file in (out / "runs").iterdir()} == whole
+    assert {f.name: f.read_bytes() for f in (out / "runs").rglob("*.parquet")} == whole
 
 
 def test_a_killed_batch_goes_on(write, tmp_path):
     scenario = SCENARIO.replace("0.2 s", "300 s")
     path = write(HEAD, "runs_per_file = 1\n", "seeds = [1, 2, 3, 4]\n", scenario, SHORTS)
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "elevon.cli", "batch", str(path), "--out", str(out)]
+    command = [sys.executable, "-m", "elevon.cli", "campaign", "run", str(path)]
+    command += ["--out", str(out)]
     for number, code in ((signal.SIGKILL, -9), (signal.SIGINT, 130)):
-        before = len(list(out.glob("runs/*.parquet")))
+        before = len(list(out.rglob("block_*.parquet")))
         process = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=os.environ
         )
         for _ in range(400):
-            if len(list(out.glob("runs/*.parquet"))) > before or process.poll() is not None:
+            if len(list(out.rglob("block_*.parquet"))) > before or process.poll() is not None:
                 break
             time.sleep(0.02)
         process.send_signal(number)
         process.communicate(timeout=20)
         assert process.returncode in (code, 0)
-        manifest = read_manifest(out)
-        assert all((out / file["file"]).is_file() for b in manifest.blocks for file in b["files"])
+        assert all(item.intact(out) for item in elevon.load_campaign(out).items)
     assert run(path, out)[0] == 0
-    assert [item["run"] for item in read_manifest(out).runs] == list(range(12))
+    frame = elevon.load_campaign(out).runs.to_pandas()
+    assert list(frame.run) == list(range(12))
+    assert set(frame.status) == {"ok"}
+    assert sorted(set(elevon.load_campaign(out).signals.to_pandas(["run"]).run)) == list(range(12))
 
 
 def test_another_plan_is_refused(write, tmp_path, capsys):
@@ -244,7 +251,7 @@ def test_damaged_manifest(tmp_path):
 
 
 def test_a_plan_that_does_not_fit_says_how_much(write, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(execute_module, "available_bytes", lambda: 30_000)
+    monkeypatch.setattr(check_module, "available_bytes", lambda: 30_000)
     path = write(HEAD, SCENARIO.replace("0.2 s", "10 s"), SHORTS)
     code, captured = run(path, tmp_path / "out", capsys)
     assert code == 2
@@ -310,7 +317,7 @@ REFUSED = {
     ),
     "signal": (HEAD.replace("user_position", "user_positon") + SCENARIO, "did you mean 'user_pos"),
     "rate": (HEAD.replace("400 Hz", "300 Hz") + SCENARIO, "nearest"),
-    "block": (HEAD + "runs_per_file = 51\n" + SCENARIO, "less than or equal to 50"),
+    "block": (HEAD + "runs_per_file = 0\n" + SCENARIO, "greater than or equal to 1"),
     "no scenario file": (HEAD + 'scenario = "absent.toml"\n', "cannot be read"),
 }
 

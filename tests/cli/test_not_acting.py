@@ -70,12 +70,12 @@ def test_a_plan_refuses_it_unless_it_allows_it(elevon_cli, tmp_path):
     )
     plan = tmp_path / "plan.toml"
     plan.write_text(text)
-    refused = elevon_cli("batch", plan, "--out", "refused")
+    refused = elevon_cli("campaign", "run", plan, "--out", "refused")
     assert refused.code == 2
     assert "run 1: solver.step = 2 us does not act" in refused.err
     assert not (tmp_path / "refused").exists()
     plan.write_text("allow_not_acting = true\n" + text)
-    allowed = elevon_cli("batch", plan, "--out", "allowed", "--json")
+    allowed = elevon_cli("campaign", "run", plan, "--out", "allowed", "--json")
     assert allowed.code == 0
     assert json.loads(allowed.out)["runs"] == 2
     assert allowed.err.count("elevon: warning: solver.step = 2 us does not act") == 1

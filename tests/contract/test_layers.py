@@ -13,7 +13,7 @@ ROWS = [
     ["errors", "_core"],
     ["_unit_table"],
     ["units", "files", "progress", "memory", "data"],
-    ["documents", "series", "report"],
+    ["documents", "series", "report", "worklog"],
     ["recording"],
     ["parameters", "loads"],
     ["actuator", "faults", "waveforms"],

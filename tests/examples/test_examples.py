@@ -40,5 +40,8 @@ def test_own_actuator_and_scenario(capsys):
     assert '"actuator": "torino-large-rotor"' in capsys.readouterr().out
 
 
-def test_batch_plan(tmp_path):
-    assert main(["batch", str(EXAMPLES / "batch.toml"), "--out", str(tmp_path / "runs")]) == 0
+def test_campaign_plan(tmp_path):
+    assert (
+        main(["campaign", "run", str(EXAMPLES / "campaign.toml"), "--out", str(tmp_path / "runs")])
+        == 0
+    )

@@ -1,18 +1,26 @@
-"""Campaigns: a plan file becomes many runs in a folder that survives being killed."""
+"""Campaigns: a plan file becomes many labelled runs in a folder that survives being killed."""
 
-from elevon.campaign.execute import CampaignResult, run_campaign
-from elevon.campaign.folder import Manifest, load_run, read_manifest
+from elevon.campaign.dataset import Dataset, Table, load_campaign
+from elevon.campaign.execute import CampaignResult, resume_campaign, run_campaign
+from elevon.campaign.load import load_run
 from elevon.campaign.plan import Plan, load_plan
-from elevon.campaign.resolve import PlannedRun, resolve_plan
+from elevon.campaign.resolve import resolve_plan
+from elevon.campaign.resolved import Resolved
+from elevon.campaign.store import Manifest, read_manifest, read_resolved
 
 __all__ = [
     "CampaignResult",
+    "Dataset",
     "Manifest",
     "Plan",
-    "PlannedRun",
+    "Resolved",
+    "Table",
+    "load_campaign",
     "load_plan",
     "load_run",
     "read_manifest",
+    "read_resolved",
     "resolve_plan",
+    "resume_campaign",
     "run_campaign",
 ]

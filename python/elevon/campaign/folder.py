@@ -1,209 +1,290 @@
-"""The campaign folder: plan, resolved plan, manifest, Parquet blocks, data card."""
+"""A campaign's folder: begun, found again, gone on with, finished."""
 
 from __future__ import annotations
 
-import hashlib
-import json
-import os
-import re
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+from elevon.campaign.block import block_name
+from elevon.campaign.card import write_cards
+from elevon.campaign.estimate import Estimate, check_disk
+from elevon.campaign.resolved import Resolved
+from elevon.campaign.store import (
+    MANIFEST,
+    PLAN,
+    RESOLVED,
+    RUNS,
+    Manifest,
+    core_hash,
+    plan_hash,
+    planned,
+    read_manifest,
+    read_outcome,
+    resolved_text,
+    write_runs,
+)
+from elevon.errors import InputError, OutputError
+from elevon.files import write_text
+from elevon.record_plan import ClockPlan
+from elevon.worklog import LOCK, Item, WorkLog, digest
 
-from elevon.errors import FormatError, InputError
-from elevon.files import atomic_path, write_text
-from elevon.recording import Channel, Clock, Recording
+__all__ = ["LOG", "Work", "begin", "finish", "finished", "open_folder", "work_log"]
 
-__all__ = ["SCHEMA", "Manifest", "load_run", "read_manifest", "write_block"]
-
-#: Version of the folder's form, apart from the package's.
-SCHEMA = 1
-MANIFEST = "manifest.json"
-
-_SEVERITY = re.compile(r"fault_\d+")
+LOG = "progress.log"
+"""The log of finished blocks, while the campaign runs."""
 
 
 @dataclass
-class Manifest:
-    """What a campaign folder holds; written whole after every block.
+class Work:
+    """A campaign that is carried out: its folder, its plan, what is done and what is missing."""
 
-    Attributes
-    ----------
-    plan_hash : str
-        Of everything that decides the results: resuming another plan is refused.
-    blocks : list of dict
-        First and last run, files with size and SHA-256.
-    runs : list of dict
-        One a finished run: number, block, status, split, varied values, faults, seed, hash.
-    status : str
-        ``running``, ``ok`` or ``failed`` (some run diverged).
-    """
+    folder: Path
+    resolved: Resolved
+    manifest: Manifest
+    log: WorkLog
+    missing: list[int]
 
-    name: str
-    plan_hash: str
-    total: int
-    version: str
-    status: str = "running"
-    blocks: list[dict[str, Any]] = field(default_factory=list)
-    runs: list[dict[str, Any]] = field(default_factory=list)
-    schema: int = SCHEMA
+    @property
+    def edges(self) -> list[int]:
+        """Where the blocks begin, and the end."""
+        return self.manifest.edges
 
-    def write(self, folder: Path) -> None:
-        """Write the manifest, whole or not at all."""
-        write_text(folder / MANIFEST, json.dumps(asdict(self), indent=1) + "\n", force=True)
+    @property
+    def done_runs(self) -> int:
+        """Number of runs whose data are there."""
+        return len(self.resolved) - sum(len(self.numbers(block)) for block in self.missing)
 
-    def done(self, folder: Path) -> set[int]:
-        """Return the indices of the blocks whose files are there in full."""
-        return {
-            block["block"]
-            for block in self.blocks
-            if all(
-                (folder / file["file"]).is_file()
-                and (folder / file["file"]).stat().st_size == file["bytes"]
-                for file in block["files"]
-            )
-        }
+    def numbers(self, block: int) -> range:
+        """Return the runs of a block."""
+        return range(self.edges[block], self.edges[block + 1])
+
+    def check_disk(self) -> None:
+        """Raise `InputError` when the disk has no room for what is missing."""
+        check_disk(self.folder, Estimate.of(self).disk)
 
 
-def read_manifest(folder: str | os.PathLike[str]) -> Manifest:
-    """Read a campaign folder's manifest.
+def open_folder(folder: Path, resolved: Resolved, text: str) -> bool:
+    """Tell whether a folder holds this very campaign, begun before; nothing is written.
 
     Raises
     ------
     InputError
-        No campaign folder.
-    FormatError
-        Damaged, or of a form this version does not know.
+        It holds another campaign, or something else.
     """
-    path = Path(folder) / MANIFEST
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{folder}: is not a campaign folder (no {MANIFEST})") from error
-    except ValueError as error:
-        raise FormatError(f"{path}: damaged: {error}") from error
-    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
-        raise FormatError(f"{path}: its form is not number {SCHEMA}, the one this version reads")
-    try:
-        return Manifest(**data)
-    except TypeError as error:
-        raise FormatError(f"{path}: damaged: {error}") from error
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder}: is a file, not a folder")
+    if not folder.is_dir():
+        return False
+    if (folder / MANIFEST).is_file():
+        _check_same(folder, read_manifest(folder), resolved)
+        return True
+    names = {path.name for path in folder.iterdir()}
+    if not names <= {LOCK, PLAN, RESOLVED, RUNS, LOG} | {n for n in names if ".part" in n}:
+        raise InputError(f"{folder}: is not a campaign folder (no {MANIFEST}), and not empty")
+    if names and LOCK not in names and not _is_plan(folder / PLAN, text):
+        raise InputError(f"{folder}: is not a campaign folder (no {MANIFEST}), and not empty")
+    return False
 
 
-def write_block(
-    folder: Path, index: int, numbers: Sequence[int], recordings: Sequence[Recording]
-) -> list[dict[str, Any]]:
-    """Write one block: a Parquet file a clock, with the columns run, time and the channels.
-
-    A channel that a run does not have (the severity of a fault it is spared) is NaN there.
-
-    Returns
-    -------
-    list of dict
-        File, bytes, sha256 and clock of each.
-    """
-    files = []
-    clocks = dict.fromkeys(name for recording in recordings for name in recording.clocks)
-    for clock in clocks:
-        name = f"runs/block_{index:05d}.{clock}.parquet"
-        with atomic_path(folder / name, force=True) as temporary:
-            _write_parquet(temporary, clock, numbers, recordings)
-        data = (folder / name).read_bytes()
-        digest = hashlib.sha256(data).hexdigest()
-        files.append({"file": name, "clock": clock, "bytes": len(data), "sha256": digest})
-    return files
-
-
-def _write_parquet(
-    path: Path, clock: str, numbers: Sequence[int], recordings: Sequence[Recording]
-) -> None:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    parts = [(n, r) for n, r in zip(numbers, recordings, strict=True) if clock in r.clocks]
-    known: dict[str, Channel] = {}
-    for _, recording in parts:
-        known.update({c.name: c for c in recording.on_clock(clock) if c.name not in known})
-    runs = [np.full(len(r.clocks[clock]), n, dtype=np.int64) for n, r in parts]
-    fields = [pa.field("run", pa.int64()), pa.field("time", pa.float64(), metadata={"unit": "s"})]
-    columns = [np.concatenate(runs), np.concatenate([r.clocks[clock].time for _, r in parts])]
-    for name, channel in known.items():
-        unit, text = _described(channel)
-        values = [
-            r[name].values if name in r else np.full(len(r.clocks[clock]), np.nan) for _, r in parts
-        ]
-        columns.append(np.concatenate(values))
-        metadata = {"unit": unit, "text": text}
-        fields.append(pa.field(name, pa.float64(), metadata=metadata))
-    rates = {str(n): r.clocks[clock].rate for n, r in parts}
-    schema = pa.schema(fields, metadata={"elevon": json.dumps({"schema": SCHEMA, "rates": rates})})
-    table = pa.Table.from_arrays([pa.array(column) for column in columns], schema=schema)
-    pq.write_table(table, path, compression="snappy")
-
-
-def _described(channel: Channel) -> tuple[str, str]:
-    """Unit and text of a column; a fault's number means another fault in another run."""
-    if _SEVERITY.fullmatch(channel.name):
-        number = channel.name.removeprefix("fault_")
-        return "", f"severity of the run's fault {number}, in the SI unit of its label"
-    return channel.unit, channel.text
-
-
-def load_run(folder: str | os.PathLike[str], number: int) -> Recording:
-    """Read one run of a campaign back as a recording.
+def begin(folder: Path, resolved: Resolved, text: str | None, need: Estimate | None) -> Work:
+    """Make a folder a campaign's own, or find what is done in it; call with the lock held.
 
     Parameters
     ----------
-    folder : path
-        The campaign folder.
-    number : int
-        Its number in the plan.
+    text : str or None
+        The plan as given; None to go on with what is there.
+    need : Estimate or None
+        What the campaign takes; None where it was begun before.
 
     Raises
     ------
     InputError
-        No such run, or it is not done yet.
+        The folder holds another campaign.
+    OutputError
+        It cannot be written.
     """
-    root = Path(folder)
-    manifest = read_manifest(root)
-    entry = next((run for run in manifest.runs if run["run"] == number), None)
-    if entry is None:
-        raise InputError(f"{root}: run {number} is not there; {len(manifest.runs)} runs are done")
-    block = next(item for item in manifest.blocks if item["block"] == entry["block"])
-    channels: list[Channel] = []
-    clocks: list[Clock] = []
-    labels = {label["channel"]: label for label in entry["labels"]}
-    for file in block["files"]:
-        found = _read_clock(root / file["file"], file["clock"], number, labels)
-        clocks.append(found[0])
-        channels.extend(found[1])
-    meta = {key: value for key, value in entry.items() if key not in ("labels", "final")}
-    return Recording(
-        channels, clocks=clocks, meta=meta, labels=entry["labels"], final=entry["final"]
+    if (folder / MANIFEST).is_file():
+        manifest = read_manifest(folder)
+        _check_same(folder, manifest, resolved)
+        return _found(folder, resolved, manifest)
+    if need is None or text is None:
+        raise OutputError(f"{folder}: its {MANIFEST} has gone meanwhile")
+    write_text(folder / PLAN, text, force=True)
+    write_text(folder / RESOLVED, resolved_text(resolved), force=True)
+    write_runs(folder, resolved, planned(len(resolved)))
+    manifest = _manifest(resolved, need)
+    manifest.write(folder)
+    log = WorkLog.begin(folder / LOG, manifest.plan_hash)
+    return Work(folder, resolved, manifest, log, list(range(len(need.edges) - 1)))
+
+
+def finished(work: Work) -> dict[str, list[Any]] | None:
+    """Return how every run ended where the campaign is finished and nothing is to be done."""
+    files = Item("tables", work.manifest.files, {})
+    if work.manifest.status == "running" or work.missing or not files.intact(work.folder):
+        return None
+    return read_outcome(work.folder)
+
+
+def finish(work: Work) -> dict[str, list[Any]]:
+    """Write the table of the runs, the cards and the manifest; return how every run ended.
+
+    Raises
+    ------
+    OutputError
+        Blocks are missing: the rows are not 0 to total - 1.
+    """
+    items = [work.log.items.get(block_name(block)) for block in range(len(work.edges) - 1)]
+    outcome = _outcome(work, items)
+    runs = write_runs(work.folder, work.resolved, outcome)
+    manifest = work.manifest
+    manifest.blocks = [{"name": i.name, **i.data, "files": i.files} for i in items if i is not None]
+    for block in manifest.blocks:
+        for key in outcome:
+            block.pop(key, None)
+    failed = {"diverged", "refused"} & set(outcome["status"])
+    manifest.status = "failed" if failed else "ok"
+    paths = (runs, work.folder / RESOLVED, work.folder / PLAN)
+    manifest.files = {path.name: digest(path) for path in paths}
+    write_cards(work.folder, manifest)
+    manifest.write(work.folder)
+    (work.folder / LOG).unlink(missing_ok=True)
+    return outcome
+
+
+def work_log(folder: Path, manifest: Manifest) -> WorkLog | None:
+    """Return the log of a campaign that runs or was interrupted; None where it is finished."""
+    log = WorkLog.read(folder / LOG)
+    return log if log is not None and log.key == manifest.plan_hash else None
+
+
+def _found(folder: Path, resolved: Resolved, manifest: Manifest) -> Work:
+    """Find which blocks of a campaign are there, each file as it was written."""
+    log = work_log(folder, manifest)
+    before = {} if log is None else dict(log.items)
+    earlier = _finished(folder, manifest)
+    wanted = [block_name(block) for block in range(len(manifest.edges) - 1)]
+    kept = {}
+    for name in wanted:
+        item = before.get(name) or earlier.get(name)
+        if item is not None and item.intact(folder):
+            kept[name] = item
+    missing = [block for block, name in enumerate(wanted) if name not in kept]
+    if kept and missing:
+        _check_build(folder, manifest)
+    log = WorkLog(folder / LOG, manifest.plan_hash, kept)
+    if missing or manifest.status == "running":
+        log.rewrite()
+    return Work(folder, resolved, manifest, log, missing)
+
+
+def _finished(folder: Path, manifest: Manifest) -> dict[str, Item]:
+    """Return the items of a finished manifest, with how their runs ended."""
+    if not manifest.blocks:
+        return {}
+    outcome = read_outcome(folder)
+    items = {}
+    for block in manifest.blocks:
+        first, last = block["first"], block["last"]
+        ended = {key: values[first : last + 1] for key, values in outcome.items()}
+        data = {"first": first, "last": last, **ended}
+        items[block["name"]] = Item(block["name"], block["files"], data)
+    return items
+
+
+def _outcome(work: Work, items: list[Item | None]) -> dict[str, list[Any]]:
+    outcome: dict[str, list[Any]] = {"status": [], "reason": [], "sim_s": [], "steps": []}
+    for block, item in enumerate(items):
+        numbers = work.numbers(block)
+        whole = item is not None and (item.data["first"], item.data["last"] + 1) == (
+            numbers.start,
+            numbers.stop,
+        )
+        if item is None or not whole or len(item.data["status"]) != len(numbers):
+            raise OutputError(
+                f"{work.folder}: runs {numbers.start} to {numbers.stop - 1} are not there in full"
+            )
+        for key, values in outcome.items():
+            values.extend(item.data[key])
+    return outcome
+
+
+def _is_plan(path: Path, text: str) -> bool:
+    try:
+        return path.read_text("utf-8") == text
+    except (OSError, ValueError):
+        return False
+
+
+def _check_same(folder: Path, manifest: Manifest, resolved: Resolved) -> None:
+    """Refuse another plan than the one a campaign was begun with."""
+    from elevon.campaign.difference import difference
+
+    if manifest.plan_hash != plan_hash(resolved):
+        raise InputError(
+            f"{folder}: holds another campaign ({manifest.name}, {manifest.total} runs): "
+            f"{difference(folder, resolved)}; give a new folder, or go on with the plan as it was: "
+            f"elevon campaign resume {folder}"
+        )
+
+
+def _check_build(folder: Path, manifest: Manifest) -> None:
+    """Refuse to mix runs of two builds in one folder."""
+    from elevon import _core
+
+    if (manifest.version, manifest.core) != (_core.version(), core_hash()):
+        raise InputError(
+            f"{folder}: was begun by another build of elevon ({manifest.version}, core "
+            f"{manifest.core[:12]}; this is {_core.version()}, {core_hash()[:12]}): its runs and "
+            "new ones might differ; give a new folder"
+        )
+
+
+def _manifest(resolved: Resolved, need: Estimate) -> Manifest:
+    from elevon import _core
+
+    clocks = {} if need.checked is None else need.checked.clocks
+    return Manifest(
+        name=resolved.name,
+        plan_hash=plan_hash(resolved),
+        total=len(resolved),
+        edges=need.edges,
+        version=_core.version(),
+        core=core_hash(),
+        text=resolved.text,
+        actuator=resolved.actuator.name,
+        wiring=resolved.wiring,
+        fidelity=resolved.fidelity,
+        clocks=[_clock(resolved, clock) for clock in clocks.values()],
+        faults=[{"name": n, "unit": u} for n, u in resolved.fault_names().items()],
+        columns=[
+            {"name": c.name, "kind": c.kind, "unit": c.unit, "role": c.role}
+            for c in resolved.columns
+        ],
+        responses=resolved.responses,
+        not_acting=[] if need.checked is None else need.checked.idle,
+        estimate=need.to_dict(),
+        design=resolved.design,
+        sources=resolved.sources,
     )
 
 
-def _read_clock(
-    path: Path, name: str, number: int, labels: Mapping[str, Mapping[str, Any]]
-) -> tuple[Clock, list[Channel]]:
-    import pyarrow.parquet as pq
+def _clock(resolved: Resolved, clock: ClockPlan) -> dict[str, Any]:
+    from elevon.campaign.block import signal_schema
 
-    table = pq.read_table(path, filters=[("run", "==", number)])
-    about = json.loads(table.schema.metadata[b"elevon"])
-    clock = Clock(name, table["time"].to_numpy(), about["rates"].get(str(number)))
-    channels = []
-    for item in table.schema:
-        if item.name in ("run", "time"):
-            continue
-        values = table[item.name].to_numpy()
-        unit, text = item.metadata[b"unit"].decode(), item.metadata[b"text"].decode()
-        if item.name in labels:
-            label = labels[item.name]
-            unit, text = label["unit"], f"severity of {label['kind']}@{label['place']}"
-        elif _SEVERITY.fullmatch(item.name):
-            continue
-        channels.append(Channel(item.name, unit, values, clock, text))
-    return clock, channels
+    unit = resolved.prepared(0).command_unit
+    columns = [
+        {
+            "name": item.name,
+            "unit": item.metadata[b"unit"].decode(),
+            "text": item.metadata[b"text"].decode(),
+        }
+        for item in signal_schema(resolved, clock, unit)
+    ]
+    return {
+        "name": clock.name,
+        "rate": clock.rate,
+        "folder": f"runs/{clock.name}",
+        "columns": columns,
+    }

@@ -1,166 +1,84 @@
-"""The plan file: what varies, how, and how the runs are split (grammar: ``docs/batch.md``)."""
+"""The plan file: what varies, how, and how the runs are split (grammar: ``docs/campaigns.md``)."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Self
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    StrictBool,
-    StrictFloat,
-    StrictInt,
-    StrictStr,
-    model_validator,
-)
+from pydantic import Field, StrictBool, StrictInt, StrictStr, model_validator
 
+from elevon.campaign.grammar import Axis, Case, Design, Number, Population, Random, Strict
 from elevon.documents import Document, read_toml, validated
 
-__all__ = ["Axis", "Case", "Draw", "Plan", "Random", "load_plan"]
-
-Quantity = StrictInt | StrictFloat | StrictStr
-Number = StrictInt | StrictFloat
+__all__ = ["Plan", "load_plan"]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+class Plan(Strict):
+    """A campaign plan.
 
-
-class Target(_Strict):
-    """What one axis or draw changes: exactly one of `parameter`, `fault` and `scenario`.
+    The runs are all combinations of units, ages, cases, axes, draws (or the points of the design)
+    and seeds. What a run sets where it cannot act is an error, unless `allow_not_acting`.
 
     Attributes
     ----------
-    parameter : str
-        Path of a parameter.
-    fault : str
-        ``KIND@PLACE``; the values are severities. `attributes` and `profile` go with it.
-    scenario : str
-        Place in the scenario, such as ``command.terms[0].amplitude`` or ``duration``.
+    responses : tuple of str
+        What the campaign is about: signals or features, named for the reader and for `effects`.
+    split_by : str
+        ``unit`` (the default where there is a population) or ``draw``.
+    runs_per_file : int
+        Runs in one file; default: as many as make some 16 MB, at most 256.
     """
 
-    parameter: StrictStr | None = None
-    fault: StrictStr | None = None
-    scenario: StrictStr | None = None
-    attributes: dict[str, Quantity] = Field(default_factory=dict)
-    profile: StrictStr | dict[str, Any] | None = None
-
-    @model_validator(mode="after")
-    def _one(self) -> Self:
-        given = [name for name in ("parameter", "fault", "scenario") if getattr(self, name)]
-        if len(given) != 1:
-            raise ValueError("give exactly one of 'parameter', 'fault' and 'scenario'")
-        if self.fault is None and (self.attributes or self.profile is not None):
-            raise ValueError("'attributes' and 'profile' belong to a fault")
-        if self.fault is not None and (self.fault.count("@") != 1 or "=" in self.fault):
-            raise ValueError(f"fault = {self.fault!r} is not of the form KIND@PLACE")
-        return self
-
-    @property
-    def name(self) -> str:
-        """The name of the varied quantity in tables."""
-        return self.parameter or self.fault or self.scenario or ""
-
-
-class Axis(Target):
-    """One axis of the grid: a list of values, or `count` of them from one to another."""
-
-    values: tuple[Any, ...] | None = None
-    start: Quantity | None = Field(None, alias="from")
-    stop: Quantity | None = Field(None, alias="to")
-    count: StrictInt | None = Field(None, ge=1)
-    spacing: Literal["linear", "log"] = "linear"
-
-    @model_validator(mode="after")
-    def _values_or_range(self) -> Self:
-        ranged = [value is not None for value in (self.start, self.stop, self.count)]
-        if (self.values is not None) == any(ranged) or (any(ranged) and not all(ranged)):
-            raise ValueError("give either 'values', or 'from', 'to' and 'count'")
-        return self
-
-
-class Draw(Target):
-    """One random quantity: from a range, or one of `values`.
-
-    Attributes
-    ----------
-    probability : float
-        Of a fault being there at all.
-    """
-
-    values: tuple[Any, ...] | None = None
-    start: Quantity | None = Field(None, alias="from")
-    stop: Quantity | None = Field(None, alias="to")
-    spacing: Literal["linear", "log"] = "linear"
-    probability: Number = Field(1.0, ge=0.0, le=1.0)
-
-    @model_validator(mode="after")
-    def _values_or_range(self) -> Self:
-        ranged = [value is not None for value in (self.start, self.stop)]
-        if (self.values is not None) == any(ranged) or (any(ranged) and not all(ranged)):
-            raise ValueError("give either 'values', or 'from' and 'to'")
-        if self.values is not None and not self.values:
-            raise ValueError("'values' is empty")
-        if self.probability < 1.0 and self.fault is None:
-            raise ValueError("'probability' belongs to a fault")
-        return self
-
-
-class Random(_Strict):
-    """Random draws, all quantities together."""
-
-    count: StrictInt = Field(ge=0)
-    method: Literal["latin_hypercube", "sobol", "halton", "uniform"] = "latin_hypercube"
-    seed: StrictInt = Field(0, ge=0)
-    draw: tuple[Draw, ...] = Field(min_length=1)
-
-
-class Case(_Strict):
-    """A named variant that changes several things at once; the cases are one axis."""
-
-    name: StrictStr = Field(min_length=1)
-    faults: tuple[StrictStr | dict[str, Any], ...] = ()
-    parameters: dict[str, Any] = Field(default_factory=dict)
-    scenario: dict[str, Any] = Field(default_factory=dict)
-
-
-class Plan(_Strict):
-    """A batch plan.
-
-    The runs are all combinations of the cases, the axes, the random draws and the seeds. What a
-    run sets where it cannot act is an error, unless `allow_not_acting` makes it a warning.
-    """
-
-    name: StrictStr = "batch"
+    name: StrictStr = "campaign"
     text: StrictStr = ""
     actuator: StrictStr
     fidelity: StrictStr = "high"
     scenario: StrictStr | dict[str, Any] | None = None
     parameters: dict[str, Any] = Field(default_factory=dict)
     record: StrictStr | tuple[StrictStr, ...] | None = None
+    responses: tuple[StrictStr, ...] = ()
     seeds: tuple[StrictInt, ...] = (0,)
+    population: Population | None = None
     case: tuple[Case, ...] | None = None
     vary: tuple[Axis, ...] = ()
     random: Random | None = None
+    design: Design | None = None
     split: dict[str, Number] = Field(default_factory=dict)
     split_seed: StrictInt = Field(0, ge=0)
+    split_by: StrictStr | None = None
     allow_not_acting: StrictBool = False
-    runs_per_file: StrictInt = Field(50, ge=1, le=50)
+    runs_per_file: StrictInt | None = Field(None, ge=1, le=4096)
 
     @model_validator(mode="after")
     def _split_adds_up(self) -> Self:
         shares = self.split.values()
         if self.split and (min(shares) < 0.0 or abs(sum(shares) - 1.0) > 1e-9):
             raise ValueError(f"split: the shares are {list(shares)}; they must add up to 1")
+        self._split_keeps_together()
+        if self.random is not None and self.design is not None:
+            raise ValueError("give either 'random' or 'design'")
         names = [case.name for case in self.case or ()]
         for index, name in enumerate(names):
             if name in names[:index]:
                 raise ValueError(f"case {name!r} is given twice")
         return self
+
+    def _split_keeps_together(self) -> None:
+        if self.split_by is None:
+            return
+        if not self.split:
+            raise ValueError("split_by: there is no 'split'")
+        if self.split_by == "unit" and self.population is None:
+            raise ValueError("split_by = 'unit': the plan has no 'population'")
+        if self.split_by == "draw" and self.population is not None:
+            raise ValueError("split_by = 'draw' would leak: runs of one unit stand in two parts")
+        if self.split_by not in {"unit", "draw"}:
+            raise ValueError(
+                f"split_by = {self.split_by!r} would leak: runs alike stand in two parts; "
+                "valid: 'unit', 'draw'"
+            )
 
 
 def load_plan(path: str | os.PathLike[str]) -> tuple[Plan, Document]:

@@ -1,59 +1,40 @@
-"""A plan becomes a list of runs, each complete in itself."""
+"""A plan becomes a table of runs, one row each, complete in itself: no file is needed again."""
 
 from __future__ import annotations
 
-import copy
-import itertools
-import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from elevon.actuator import Actuator
-from elevon.campaign.draw import ABSENT, axis_values, random_values
-from elevon.campaign.plan import Case, Plan, Target
-from elevon.documents import Document
-from elevon.errors import InputError, unknown
+from elevon.campaign.draw import axis_values, column_of, random_values
+from elevon.campaign.embed import Embedder
+from elevon.campaign.grammar import Target
+from elevon.campaign.plan import Plan
+from elevon.campaign.resolved import Index, Resolved, Variant
+from elevon.campaign.split import dealt
+from elevon.documents import Document, read_toml, validated
+from elevon.errors import InputError
+from elevon.faults import Fault
 from elevon.scenario import Scenario
-from elevon.simulate import Run
 
-__all__ = ["PlannedRun", "resolve_plan"]
+__all__ = ["resolve_plan"]
 
 
 @dataclass(frozen=True)
-class PlannedRun:
-    """One run of a plan.
+class _Axis:
+    """One axis of the product of all combinations: its length, and values of its targets."""
 
-    Attributes
-    ----------
-    run : Run
-        What is simulated; ``run.number`` is its place in the plan.
-    values : mapping
-        Name of each varied quantity to its value in this run, as written.
-    split : str
-        Which part of the data it belongs to; empty without a split.
-    """
-
-    run: Run
-    values: Mapping[str, Any]
-    split: str = ""
+    length: int
+    targets: Sequence[Target]
+    columns: Sequence[tuple[str, Any]]
 
 
-@dataclass
-class _Variant:
-    """What one combination changes."""
-
-    values: dict[str, Any] = field(default_factory=dict)
-    parameters: dict[str, Any] = field(default_factory=dict)
-    faults: list[Any] = field(default_factory=list)
-    scenario: list[tuple[str, Any]] = field(default_factory=list)
-    top: dict[str, Any] = field(default_factory=dict)
-
-
-def resolve_plan(plan: Plan, document: Document) -> list[PlannedRun]:
-    """Return every run of a plan: cases x axes x random draws x seeds, the last fastest.
+def resolve_plan(plan: Plan, document: Document) -> Resolved:
+    """Return every run of a plan: units x ages x cases x axes x draws x seeds, the last fastest.
 
     Parameters
     ----------
@@ -64,28 +45,50 @@ def resolve_plan(plan: Plan, document: Document) -> list[PlannedRun]:
 
     Returns
     -------
-    list of PlannedRun
-        Numbered from 0.
+    Resolved
+        Runs numbered from 0. Whatever the plan's files said is in it.
 
     Raises
     ------
     InputError
-        The plan is empty, or anything in it cannot be; the run and the place are named.
+        The plan is empty, or anything in it cannot be; the place is named.
     """
+    files = Embedder(document.folder)
     actuator = _actuator(plan, document)
-    base = _base_scenario(plan, actuator, document)
-    variants = list(_variants(plan, document))
-    if not variants or not plan.seeds:
+    base = _base_scenario(plan, actuator, document, files)
+    variants = _variants(plan, document, files)
+    axes = [_axis(axis, actuator.wiring, document, k) for k, axis in enumerate(plan.vary)]
+    draws = _draws(plan, actuator.wiring, document)
+    lengths = [len(variants), *(axis.length for axis in axes), draws.length, len(plan.seeds)]
+    if 0 in lengths:
         raise InputError(f"{document.place()}: the plan is empty: it holds no run")
-    splits = _splits(plan, len(variants))
-    planned: list[PlannedRun] = []
-    for index, variant in enumerate(variants):
-        scenario, changed = _apply(variant, base, actuator, f"{document.place()}: run {index}")
-        for seed in plan.seeds:
-            number = len(planned)
-            run = Run(changed, scenario, seed, f"{plan.name}-{number:06d}", number)
-            planned.append(PlannedRun(run, {**variant.values, "seed": seed}, splits[index]))
-    return planned
+    _no_twins([t for axis in (*axes, draws) for t in axis.targets], base, document)
+    index = _index(lengths)
+    columns = [
+        files.column(column_of(target, unit, values[index[1 + position]]), document.place())
+        for position, axis in enumerate([*axes, draws])
+        for target, (unit, values) in zip(axis.targets, axis.columns, strict=True)
+    ]
+    return Resolved(
+        name=plan.name,
+        text=plan.text,
+        actuator=actuator,
+        fidelity=plan.fidelity,
+        record=plan.record if plan.record is None else _texts(plan.record),
+        scenario=base,
+        variants=variants,
+        columns=columns,
+        index=_labels(plan, index, document),
+        responses=list(plan.responses),
+        allow_not_acting=plan.allow_not_acting,
+        runs_per_file=plan.runs_per_file,
+        files=files.points,
+        sources=files.sources,
+    )
+
+
+def _texts(record: str | Sequence[str]) -> list[str]:
+    return [record] if isinstance(record, str) else list(record)
 
 
 def _actuator(plan: Plan, document: Document) -> Actuator:
@@ -99,114 +102,99 @@ def _actuator(plan: Plan, document: Document) -> Actuator:
     )
 
 
-def _base_scenario(plan: Plan, actuator: Actuator, document: Document) -> dict[str, Any]:
+def _base_scenario(
+    plan: Plan, actuator: Actuator, document: Document, files: Embedder
+) -> dict[str, Any]:
     if isinstance(plan.scenario, str):
-        path = plan.scenario
-        if document.folder is not None and (document.folder / path).is_file():
-            path = str(document.folder / path)
-        return Scenario.load(path).to_dict()
+        path = files.located(plan.scenario)
+        own = read_toml(path)
+        inner = Embedder(own.folder)
+        scenario = validated(Scenario, inner.scenario(own.data, own.place()), own)
+        files.sources[str(path)] = hashlib.sha256(own.text.encode()).hexdigest()
+        files.sources.update(inner.sources)
+        return scenario.to_dict()
     data = plan.scenario if plan.scenario is not None else actuator.default_scenario
     if data is None:
         raise InputError(f"{document.place()}: 'scenario' is missing")
-    return Scenario.from_dict(data, document.place(("scenario",))).to_dict()
+    place = document.place(("scenario",))
+    return Scenario.from_dict(files.scenario(data, place), place).to_dict()
 
 
-def _variants(plan: Plan, document: Document) -> Iterator[_Variant]:
-    """Yield one variant for each combination of cases, axes and draws."""
-    cases: list[Case | None] = list(plan.case) if plan.case is not None else [None]
-    grids = [
-        axis_values(axis, document.place(("vary", index))) for index, axis in enumerate(plan.vary)
-    ]
-    draws: list[list[Any]] = [[]]
-    quantities: tuple[Target, ...] = ()
-    if plan.random is not None:
-        draws = random_values(plan.random, document.place(("random",)))
-        quantities = plan.random.draw
-    targets = [*plan.vary, *quantities]
-    _no_twins(targets, document)
-    for case, grid, draw in itertools.product(cases, itertools.product(*grids), draws):
-        variant = _Variant()
-        if case is not None:
-            variant.values["case"] = case.name
-            variant.parameters.update(case.parameters)
-            variant.faults.extend(case.faults)
-            variant.top.update(case.scenario)
-        for target, value in zip(targets, [*grid, *draw], strict=True):
-            _change(variant, target, value)
-        yield variant
-
-
-def _no_twins(targets: list[Any], document: Document) -> None:
-    names = [target.name for target in targets]
-    for index, name in enumerate(names):
-        if name in names[:index]:
-            raise InputError(f"{document.place()}: {name!r} is varied twice")
-
-
-def _change(variant: _Variant, target: Target, value: Any) -> None:
-    variant.values[target.name] = value
-    if target.parameter is not None:
-        variant.parameters[target.parameter] = value
-    elif target.scenario is not None:
-        variant.scenario.append((target.scenario, value))
-    elif value is not ABSENT:
-        kind, place = str(target.fault).split("@")
-        fault = {"kind": kind, "place": place, "severity": value, **target.attributes}
-        variant.faults.append(
-            fault if target.profile is None else fault | {"profile": target.profile}
+def _variants(plan: Plan, document: Document, files: Embedder) -> list[Variant]:
+    if plan.case is None:
+        return [Variant()]
+    variants = []
+    for index, case in enumerate(plan.case):
+        place = document.place(("case", index))
+        faults = [files.fault(item, place) for item in case.faults]
+        read = [Fault.from_dict(item, place).to_dict() for item in faults]
+        variants.append(
+            Variant(case.name, read, case.parameters, files.scenario(case.scenario, place))
         )
+    return variants
 
 
-def _apply(
-    variant: _Variant, base: Mapping[str, Any], actuator: Actuator, place: str
-) -> tuple[Scenario, Actuator]:
-    data = {**copy.deepcopy(dict(base)), **copy.deepcopy(variant.top)}
-    for path, value in variant.scenario:
-        _set(data, path, value, place)
-    if variant.faults:
-        data["fault"] = [*data.get("fault", []), *variant.faults]
-    scenario = Scenario.from_dict(data, place)
-    return scenario, actuator.with_values(variant.parameters, source="plan", place=place)
+def _axis(axis: Any, wiring: str, document: Document, index: int) -> _Axis:
+    unit, values = axis_values(axis, wiring, document.place(("vary", index)))
+    return _Axis(len(values), [axis], [(unit, values)])
 
 
-_STEP = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)|\[(\d+)\]")
+def _draws(plan: Plan, wiring: str, document: Document) -> _Axis:
+    if plan.random is None:
+        return _Axis(1, [], [])
+    place = document.place(("random",))
+    columns = random_values(plan.random, 1, wiring, place)
+    return _Axis(plan.random.count, plan.random.draw, columns)
 
 
-def _set(data: Any, path: str, value: Any, place: str) -> None:
-    """Set one place of nested mappings and lists; the place must be one the scenario has."""
-    steps: list[Any] = [m[1] if m[1] else int(m[2]) for m in _STEP.finditer(path)]
-    written = "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in steps).lstrip(".")
-    if not steps or written != path:
-        raise InputError(
-            f"{place}: scenario = {path!r} is not a place such as command.terms[0].phase"
-        )
-    for step, following in itertools.pairwise(steps):
-        if isinstance(step, int):
-            if not isinstance(data, list) or step >= len(data):
-                raise InputError(f"{place}: the scenario has no {path!r} (no entry {step})")
-            data = data[step]
-        elif not isinstance(data, dict):
-            raise InputError(f"{place}: the scenario has no {path!r}")
-        elif step in data:
-            data = data[step]
-        elif isinstance(following, int):
-            raise unknown("place of the scenario", path, data, place)
-        else:
-            data = data.setdefault(step, {})
-    last = steps[-1]
-    if isinstance(last, int) and (not isinstance(data, list) or last >= len(data)):
-        raise InputError(f"{place}: the scenario has no {path!r} (no entry {last})")
-    data[last] = value
+def _no_twins(targets: Sequence[Target], base: dict[str, Any], document: Document) -> None:
+    seen: set[str] = set()
+    for target in targets:
+        if target.name in seen:
+            raise InputError(f"{document.place()}: {target.name!r} is varied twice")
+        if target.parameter is not None and target.parameter in base.get("parameters", {}):
+            raise InputError(
+                f"{document.place()}: {target.name!r} is varied, and set by the scenario's "
+                "'parameters' too"
+            )
+        seen.add(target.name)
 
 
-def _splits(plan: Plan, count: int) -> list[str]:
-    """Deal the variants (never parts of a run, nor seeds of one variant) to the parts."""
-    if not plan.split:
-        return [""] * count
-    order = np.random.default_rng(plan.split_seed).permutation(count)
-    names, shares = list(plan.split), np.cumsum(list(plan.split.values()))
-    dealt = [""] * count
-    for rank, index in enumerate(order):
-        part = int(np.searchsorted(shares, (rank + 0.5) / count, side="right"))
-        dealt[int(index)] = names[min(part, len(names) - 1)]
-    return dealt
+def _index(lengths: Sequence[int]) -> list[Any]:
+    """Return for each axis of the product which of its values each run has."""
+    grid = np.indices(lengths, dtype=np.int64)
+    return [axis.reshape(-1) for axis in grid]
+
+
+def _labels(plan: Plan, index: list[Any], document: Document) -> Index:
+    count = len(index[0])
+    draw = index[-2] if plan.random is not None else _distinct(index[:-1])
+    none = np.full(count, -1, dtype=np.int64)
+    labels = Index(
+        unit=none,
+        age=np.full(count, np.nan),
+        variant=index[0],
+        draw=draw,
+        block=np.zeros(count, dtype=np.int64),
+        replicate=np.zeros(count, dtype=np.int64),
+        seed=np.array(plan.seeds, dtype=np.int64)[index[-1]],
+        split=np.full(count, "", dtype=object),
+    )
+    return _split(labels, plan, document) if plan.split else labels
+
+
+def _split(labels: Index, plan: Plan, document: Document) -> Index:
+    noun = "draw" if plan.population is None else "unit"
+    groups = labels.draw if plan.population is None else labels.unit
+    shares = {name: float(share) for name, share in plan.split.items()}
+    return replace(
+        labels, split=dealt(groups, shares, plan.split_seed, document.place(("split",)), noun)
+    )
+
+
+def _distinct(axes: Sequence[Any]) -> Any:
+    """Number the combinations of several axes."""
+    number = np.zeros(len(axes[0]), dtype=np.int64)
+    for axis in axes:
+        number = number * (int(axis.max()) + 1) + axis
+    return number

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -14,7 +15,14 @@ from elevon.simulate.acting import report
 from elevon.simulate.prepare import Prepared, Record, Run, prepare, prepare_named
 from elevon.simulate.result import build_recording
 
-__all__ = ["Progress", "batch_bytes", "simulate", "simulate_batch"]
+__all__ = [
+    "Progress",
+    "batch_bytes",
+    "checked_threads",
+    "simulate",
+    "simulate_batch",
+    "simulate_prepared",
+]
 
 Progress = Callable[[float], Any]
 
@@ -112,7 +120,7 @@ def simulate_batch(
     fidelity, record, lanes, strict, progress
         As for `simulate`; what does not act is said once, however many runs set it.
     threads : int, optional
-        Default: one a core.
+        Default, and most: one a core.
 
     Returns
     -------
@@ -129,6 +137,7 @@ def simulate_batch(
     """
     if not runs:
         raise InputError("a batch needs at least one run")
+    checked_threads(threads)
     prepared = [prepare_named(run, fidelity, record, len(runs) > 1) for run in runs]
     report([item.doubts for item in prepared], strict=strict)
     return _simulated(
@@ -158,6 +167,54 @@ def _simulated(
             results[index] = build_recording(runs[index], prepared[index], fidelity, result, clocks)
         done += len(group)
     return [item for item in results if item is not None]
+
+
+def simulate_prepared(
+    prepared: Sequence[Prepared],
+    *,
+    fidelity: str,
+    threads: int | None = None,
+    lanes: str = "auto",
+    progress: Progress | None = None,
+) -> list[dict[str, Any]]:
+    """Simulate runs that are ready for the core; return what it says of each, in their order.
+
+    Errors as `simulate_batch`. Each result has ``status``, ``message``, ``time``, ``steps`` and
+    ``clocks``: name to ``time``, shape (n,), and ``values``, shape (n, signals + faults).
+    """
+    results: list[dict[str, Any]] = [{}] * len(prepared)
+    done = 0
+    for group in _groups(prepared):
+        share = _share(progress, done, len(group), len(prepared))
+        part = [prepared[index] for index in group]
+        for index, result in zip(
+            group, _run_core(part, fidelity, threads, lanes, share), strict=True
+        ):
+            results[index] = result
+        done += len(group)
+    return results
+
+
+#: More threads than this are no wish but a slip.
+_MOST_THREADS = 1024
+
+
+def checked_threads(threads: int | None) -> int:
+    """Return how many threads are started: as many as asked for, at most one a core.
+
+    Raises
+    ------
+    InputError
+        Not a whole number, or outside 1 to 1024.
+    """
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    if threads is None:
+        return cores or 1
+    if isinstance(threads, bool) or not isinstance(threads, int):
+        raise InputError(f"threads = {threads!r} is not a whole number")
+    if not 1 <= threads <= _MOST_THREADS:
+        raise InputError(f"threads = {threads} is outside 1 to {_MOST_THREADS}")
+    return min(threads, cores or 1)
 
 
 def batch_bytes(
@@ -209,7 +266,7 @@ def _run_core(
             fidelity,
             [item.core for item in part],
             [clock.to_core() for clock in first.plan],
-            threads or 0,
+            checked_threads(threads),
             lanes,
             progress,
         )

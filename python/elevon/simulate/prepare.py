@@ -84,8 +84,10 @@ def prepare_named(run: Run, fidelity: str, record: Record, named: bool) -> Prepa
         raise InputError(f"{place}: {error}") from error
 
 
-def prepare(run: Run, fidelity: str, record: Record) -> Prepared:
+def prepare(run: Run, fidelity: str, record: Record, *, doubts: bool = True) -> Prepared:
     """Check a run and bring it into the form the core takes.
+
+    Without `doubts` nobody asks what does not act: whoever prepares many runs alike asks once.
 
     Raises
     ------
@@ -97,7 +99,7 @@ def prepare(run: Run, fidelity: str, record: Record) -> Prepared:
     actuator = actuator.with_values(
         run.scenario.parameters, source="scenario", place="scenario parameters"
     )
-    doubts = check_values(actuator, fidelity)
+    said = check_values(actuator, fidelity)
     step = solver_step(actuator, fidelity)
     compiled = compile_scenario(run.scenario, actuator.wiring, fidelity)
     check_stroke(compiled, actuator)
@@ -129,7 +131,7 @@ def prepare(run: Run, fidelity: str, record: Record) -> Prepared:
         step,
         8 * sum(n * m for n, m in rows) + _RUN_BYTES,
         compiled.command_unit,
-        (*doubts, *not_acting(actuator, compiled, fidelity)),
+        (*said, *(not_acting(actuator, compiled, fidelity) if doubts else ())),
     )
 
 

@@ -14,7 +14,7 @@ from elevon.recording import Channel, Clock, Recording
 from elevon.scenario.compile import signal_records
 from elevon.simulate.prepare import Prepared, Run
 
-__all__ = ["build_recording"]
+__all__ = ["build_recording", "fault_labels"]
 
 
 def build_recording(
@@ -43,7 +43,7 @@ def build_recording(
         channels,
         clocks=clocks,
         meta=_meta(run, prepared, fidelity, result),
-        labels=_labels(prepared),
+        labels=fault_labels(prepared),
         final=_final(prepared, result["final"]),
     )
 
@@ -66,7 +66,7 @@ def _severities(
     prepared: Prepared, clock: Clock, values: npt.NDArray[np.float64]
 ) -> Iterator[Channel]:
     """The severity of each fault as it was applied, on the first clock."""
-    for column, label in enumerate(_labels(prepared)):
+    for column, label in enumerate(fault_labels(prepared)):
         text = f"severity of {label['kind']}@{label['place']}"
         yield Channel(label["channel"], label["unit"], values[:, column], clock, text)
 
@@ -81,7 +81,8 @@ def _final(prepared: Prepared, values: Mapping[str, float]) -> dict[str, float]:
     }
 
 
-def _labels(prepared: Prepared) -> list[dict[str, Any]]:
+def fault_labels(prepared: Prepared) -> list[dict[str, Any]]:
+    """Return the label of each fault of a run: channel, kind, place, severity, unit, profile."""
     wiring = prepared.actuator.wiring
     return [
         {

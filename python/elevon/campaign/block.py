@@ -1,0 +1,235 @@
+"""One block of runs: simulated together, its tables written whole, one file a clock."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elevon.campaign.resolved import Resolved
+from elevon.errors import InputError, OutputError
+from elevon.files import atomic_path
+from elevon.record_plan import ClockPlan
+from elevon.scenario.compile import signal_records
+from elevon.simulate.batch import simulate_prepared
+from elevon.simulate.prepare import Prepared
+from elevon.worklog import LOCK, Item, digest
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+__all__ = ["block_name", "finish_block", "run_block", "simulate_block", "write_table"]
+
+Result = Mapping[str, Any]
+
+#: Rows of a row group: reading one run reads no more than some of these.
+_GROUP = 32_768
+
+
+def block_name(index: int) -> str:
+    """Return the name of a block, that of its files."""
+    return f"block_{index:05d}"
+
+
+def run_block(
+    resolved: Resolved,
+    folder: Path,
+    index: int,
+    numbers: Sequence[int],
+    *,
+    threads: int | None = None,
+    progress: Callable[[float], Any] | None = None,
+) -> Item:
+    """Simulate a block and write its tables; what is returned goes into the work's log.
+
+    Parameters
+    ----------
+    resolved : Resolved
+        The plan.
+    folder : path
+        The campaign's.
+    index : int
+        The block's number.
+    numbers : sequence of int
+        Its runs.
+
+    Raises
+    ------
+    Interrupted
+        `progress` returned False.
+    OutputError
+        A file cannot be written.
+    """
+    prepared = [resolved.prepared(number) for number in numbers]
+    results = simulate_block(resolved, prepared, threads, progress)
+    return finish_block(resolved, folder, index, numbers, prepared=prepared, results=results)
+
+
+def finish_block(
+    resolved: Resolved,
+    folder: Path,
+    index: int,
+    numbers: Sequence[int],
+    *,
+    prepared: Sequence[Prepared],
+    results: Sequence[Result],
+) -> Item:
+    """Write what a block's runs gave; arguments and errors as `run_block`."""
+    tables = block_tables(resolved, numbers, prepared, results)
+    return write_block(folder, index, numbers, tables, block_outcome(results))
+
+
+def block_tables(
+    resolved: Resolved,
+    numbers: Sequence[int],
+    prepared: Sequence[Prepared],
+    results: Sequence[Result],
+) -> dict[str, pa.Table]:
+    """Return a block's tables by the folder they go to: ``runs/CLOCK`` for each clock."""
+    clocks = {clock.name: clock for item in prepared for clock in item.plan}
+    return {
+        f"runs/{name}": _signals(resolved, clock, numbers, prepared, results)
+        for name, clock in clocks.items()
+    }
+
+
+def block_outcome(results: Sequence[Result]) -> dict[str, Any]:
+    """Return how each run of a block ended, in JSON's types."""
+    return {
+        "status": [str(result["status"]) for result in results],
+        "reason": [str(result["message"]) for result in results],
+        "sim_s": [float(result["time"]) for result in results],
+        "steps": [int(result["steps"]) for result in results],
+    }
+
+
+def write_block(
+    folder: Path,
+    index: int,
+    numbers: Sequence[int],
+    tables: Mapping[str, pa.Table],
+    outcome: Mapping[str, Any],
+) -> Item:
+    """Write a block's tables, each whole or not at all, and return its item for the log."""
+    check_there(folder)
+    files = {}
+    for place, table in tables.items():
+        path = folder / place / f"{block_name(index)}.parquet"
+        write_table(table, path)
+        files[path.relative_to(folder).as_posix()] = digest(path)
+    about = {"first": int(numbers[0]), "last": int(numbers[-1]), **outcome}
+    return Item(block_name(index), files, about)
+
+
+def check_there(folder: Path) -> None:
+    """Raise `OutputError` when a campaign's folder has gone: writing would make half a new one."""
+    if not (folder / LOCK).is_file():
+        raise OutputError(
+            f"{folder}: the folder has gone since the campaign began; nothing more is written"
+        )
+
+
+def write_table(table: pa.Table, path: Path) -> None:
+    """Write a Parquet file whose pages carry checksums."""
+    import pyarrow.parquet as pq
+
+    with atomic_path(path, force=True) as temporary:
+        pq.write_table(
+            table,
+            temporary,
+            compression="snappy",
+            use_dictionary=False,
+            use_byte_stream_split=False,
+            write_page_checksum=True,
+            row_group_size=_GROUP,
+        )
+
+
+def simulate_block(
+    resolved: Resolved,
+    prepared: Sequence[Prepared],
+    threads: int | None,
+    progress: Callable[[float], Any] | None,
+) -> list[dict[str, Any]]:
+    """Simulate a block; a run that the core refuses after all is set apart, with its reason."""
+    own = {"fidelity": resolved.fidelity, "threads": threads}
+    try:
+        return simulate_prepared(prepared, progress=progress, **own)  # type: ignore[arg-type]
+    except InputError:
+        results = []
+        for item in prepared:
+            try:
+                results += simulate_prepared([item], progress=progress, **own)  # type: ignore[arg-type]
+            except InputError as error:
+                results.append(_refused(item, str(error)))
+        return results
+
+
+def _refused(prepared: Prepared, reason: str) -> dict[str, Any]:
+    columns = len(prepared.core["faults"])
+    clocks = {
+        clock.name: {"time": np.empty(0), "values": np.empty((0, len(clock.signals) + columns))}
+        for clock in prepared.plan
+    }
+    return {"status": "refused", "message": reason, "time": 0.0, "steps": 0, "clocks": clocks}
+
+
+def _signals(
+    resolved: Resolved,
+    clock: ClockPlan,
+    numbers: Sequence[int],
+    prepared: Sequence[Prepared],
+    results: Sequence[Result],
+) -> pa.Table:
+    """Return one clock's samples: run, time, the channels, and the severity of every fault."""
+    import pyarrow as pa
+
+    parts = [
+        (number, item, result["clocks"][clock.name])
+        for number, item, result in zip(numbers, prepared, results, strict=True)
+        if clock.name in result["clocks"]
+    ]
+    lengths = np.array([len(kept["time"]) for _, _, kept in parts])
+    runs = np.repeat(np.array([number for number, _, _ in parts], dtype=np.int64), lengths)
+    columns = {"run": runs, "time": np.concatenate([kept["time"] for _, _, kept in parts])}
+    values = np.concatenate([kept["values"][:, : len(clock.signals)] for _, _, kept in parts])
+    columns.update({name: values[:, k].copy() for k, name in enumerate(clock.signals)})
+    columns.update(_severities(resolved, clock, parts, lengths))
+    schema = signal_schema(resolved, clock, parts[0][1].command_unit)
+    return pa.Table.from_arrays([pa.array(columns[name]) for name in schema.names], schema=schema)
+
+
+def _severities(
+    resolved: Resolved, clock: ClockPlan, parts: Sequence[Any], lengths: Any
+) -> dict[str, Any]:
+    """Return each fault's severity as it was applied at each sample; 0 in a run without it."""
+    ends = np.cumsum(lengths)
+    severities = {name: np.zeros(int(ends[-1])) for name in resolved.fault_names()}
+    for (_, item, kept), start, end in zip(parts, ends - lengths, ends, strict=True):
+        for place, fault in enumerate(item.core["faults"], start=len(clock.signals)):
+            name = f"{fault['kind']}@{fault['place']}"
+            severities[name][start:end] = kept["values"][:, place]
+    return severities
+
+
+def signal_schema(resolved: Resolved, clock: ClockPlan, command_unit: str) -> pa.Schema:
+    """Return the columns of a clock's files, each with ``unit`` and ``text`` in its metadata."""
+    import pyarrow as pa
+
+    known = signal_records(resolved.wiring, resolved.fidelity)
+    fields = [
+        pa.field("run", pa.int64(), metadata={"unit": "1", "text": "number of the run"}),
+        pa.field("time", pa.float64(), metadata={"unit": "s", "text": "time from the start"}),
+    ]
+    for name in clock.signals:
+        unit = command_unit if name == "command" else known[name]["unit"] or "1"
+        about = {"unit": unit, "text": known[name]["text"]}
+        fields.append(pa.field(name, pa.float64(), metadata=about))
+    for name, unit in resolved.fault_names().items():
+        about = {"unit": unit, "text": f"severity of {name} as applied; 0: absent"}
+        fields.append(pa.field(name, pa.float64(), metadata=about))
+    head = {"schema": 2, "name": resolved.name, "clock": clock.name, "rate": clock.rate}
+    return pa.schema(fields, metadata={"elevon": json.dumps(head)})

@@ -1,0 +1,193 @@
+"""Check every run of a plan before the first one starts: by column and by kind of run."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.campaign.draw import Column
+from elevon.campaign.resolved import Resolved, record_of_fault
+from elevon.errors import (
+    FindingWarning,
+    InputError,
+    Interrupted,
+    NotActingError,
+    NotActingWarning,
+)
+from elevon.memory import available_bytes, format_bytes
+from elevon.parameters.records import record_of
+from elevon.scenario import compile_scenario
+from elevon.simulate.acting import Doubt, not_acting, report
+
+__all__ = ["Checked", "borders", "check", "check_memory"]
+
+#: A file of signals is about this large, and holds at most so many runs (whole lanes of any width).
+_FILE_BYTES, _FILE_RUNS = 16_000_000, 256
+
+
+@dataclass
+class Checked:
+    """What is known of the runs before they start.
+
+    Attributes
+    ----------
+    sizes, steps : ndarray, shape (runs,)
+        Bytes in memory and solver steps of each run.
+    clocks : dict
+        Name of each clock to its plan.
+    idle : list of str
+        What is set where it cannot act, with the reasons.
+    """
+
+    sizes: npt.NDArray[np.int64]
+    steps: npt.NDArray[np.int64]
+    clocks: dict[str, Any] = field(default_factory=dict)
+    idle: list[str] = field(default_factory=list)
+
+
+def check(resolved: Resolved, progress: Callable[[float], Any] | None = None) -> Checked:
+    """Check all runs: every value against its range, every run's values together.
+
+    What decides how a run is prepared (which faults, which scenario) is worked out once for all
+    runs alike; numbers are compared with their limits column by column.
+
+    Raises
+    ------
+    InputError
+        A run that cannot be; it is named, with place, value and limit.
+    NotActingError
+        Something set that cannot act, unless the plan allows it.
+    """
+    for column in resolved.columns:
+        _check_range(resolved, column)
+    count = len(resolved)
+    checked = Checked(np.zeros(count, np.int64), np.zeros(count, np.int64))
+    findings: dict[str, tuple[int, Doubt]] = {}
+    idle: dict[Doubt, int] = {}
+    seen: set[Any] = set()
+    for number in range(count):
+        prepared = resolved.prepared(number)
+        checked.sizes[number] = prepared.bytes
+        checked.steps[number] = round(prepared.core["duration"] / prepared.step)
+        checked.clocks.update({clock.name: clock for clock in prepared.plan})
+        for path, doubt in _together(resolved, number, prepared.core["parameters"]):
+            findings.setdefault(path, (number, doubt))
+        if (sign := (resolved.structure(number), _signature(resolved, number))) not in seen:
+            seen.add(sign)
+            for doubt in _idle(resolved, number):
+                idle.setdefault(doubt, number)
+        if progress is not None and number % 256 == 0 and progress(number / count) is False:
+            raise Interrupted(f"interrupted while run {number} of {count} was checked")
+    report(
+        [[Doubt(FindingWarning, f"run {n}: {d.text}") for n, d in findings.values()]], strict=False
+    )
+    return replace(checked, idle=_reported(resolved, idle))
+
+
+def borders(sizes: npt.NDArray[np.int64], most: int | None) -> list[int]:
+    """Return where blocks begin, and the end: they follow from the runs alone.
+
+    Parameters
+    ----------
+    sizes : ndarray, shape (runs,)
+        Bytes of each run.
+    most : int or None
+        Runs in a block; default: some 16 MB, at most 256 runs.
+    """
+    edges, total = [0], 0
+    for index, size in enumerate(int(s) for s in sizes):
+        held = index - edges[-1]
+        full = held >= most if most else held >= _FILE_RUNS or total + size > _FILE_BYTES
+        if held and full:
+            edges.append(index)
+            total = 0
+        total += size
+    return [*edges, len(sizes)]
+
+
+def check_memory(checked: Checked, edges: list[int]) -> int:
+    """Return the memory in bytes that the largest block takes.
+
+    Raises
+    ------
+    InputError
+        More than there is; both amounts are named.
+    """
+    blocks = [int(checked.sizes[a:b].sum()) for a, b in itertools.pairwise(edges)]
+    free, need = available_bytes(), max(blocks)
+    if free is not None and need > 0.8 * free:
+        first = edges[int(np.argmax(blocks))]
+        raise InputError(
+            f"the block from run {first} on would take {format_bytes(need)} of memory, of the "
+            f"{format_bytes(free)} available (all {len(checked.sizes)} runs: "
+            f"{format_bytes(int(checked.sizes.sum()))}); record fewer signals, at a lower rate, "
+            "for less time, or write fewer 'runs_per_file'"
+        )
+    return need
+
+
+def _check_range(resolved: Resolved, column: Column) -> None:
+    """Compare the smallest and the largest value of a column with its limits."""
+    if not column.numeric or column.kind == "scenario":
+        return
+    values = column.values
+    for index in dict.fromkeys((int(np.argmin(values)), int(np.argmax(values)))):
+        value, place = float(values[index]), f"run {index}: {column.name}"
+        if column.kind == "parameter":
+            record_of(resolved.wiring, column.name).check(value, place)
+        elif value != 0.0:
+            record_of_fault(column.name, resolved.wiring).read_severity(value, place)
+
+
+def _together(
+    resolved: Resolved, number: int, vector: npt.NDArray[np.float64]
+) -> Iterator[tuple[str, Doubt]]:
+    """Yield the core's doubts about a run's values together; what it refuses is an error."""
+    from elevon import _core
+
+    for finding in _core.check(resolved.wiring, resolved.fidelity, vector):
+        if finding.get("severity", "error") == "error":
+            raise InputError(f"run {number}: {finding['message']}")
+        yield str(finding["path"]), Doubt(FindingWarning, str(finding["message"]))
+
+
+def _signature(resolved: Resolved, number: int) -> tuple[int, ...]:
+    """Return which parameters are at rest: whether something acts depends on no more of them."""
+    known = resolved.actuator.parameters
+    signs = []
+    for column in resolved.columns:
+        if column.kind == "parameter" and column.numeric:
+            value = column.values[number]
+            signs.append(int(value == 0.0) + 2 * int(value == known.value(column.name)))
+    return tuple(signs)
+
+
+def _idle(resolved: Resolved, number: int) -> Iterator[Doubt]:
+    """Yield what is set in a run where it cannot act."""
+    run = resolved.run(number)
+    actuator = run.actuator.with_values(run.scenario.parameters, source="scenario")
+    compiled = compile_scenario(run.scenario, resolved.wiring, resolved.fidelity)
+    yield from not_acting(actuator, compiled, resolved.fidelity)
+
+
+def _reported(resolved: Resolved, idle: dict[Doubt, int]) -> list[str]:
+    """Refuse what does not act, or say it where the plan allows it; return the list."""
+    if idle and not resolved.allow_not_acting:
+        doubt, number = next(iter(idle.items()))
+        raise NotActingError(f"run {number}: {doubt.text} (allow_not_acting = true allows it)")
+    declined = [
+        Doubt(NotActingWarning, _declined(name, resolved.fidelity, reason))
+        for name, reason in resolved.not_carried().items()
+    ]
+    report([[*declined, *idle]], strict=False)
+    return [doubt.text for doubt in (*declined, *idle)]
+
+
+def _declined(name: str, fidelity: str, reason: str) -> str:
+    why = f": {reason}" if reason else ""
+    return f"fault {name} is not simulated, fidelity {fidelity} does not carry it{why}"

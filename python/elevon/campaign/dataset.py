@@ -1,0 +1,264 @@
+"""A campaign's folder as a data set: tables that are read when they are asked for."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from elevon.campaign.folder import work_log
+from elevon.campaign.store import RUNS, Manifest, read_manifest, read_resolved
+from elevon.errors import FormatError, InputError, unknown
+from elevon.worklog import Item
+
+if TYPE_CHECKING:
+    import duckdb
+    import pandas as pd
+    import polars as pl
+    import pyarrow as pa
+    import pyarrow.dataset
+    import xarray as xr
+
+    from elevon.campaign.resolved import Resolved
+    from elevon.recording import Recording
+
+__all__ = ["Dataset", "Table", "load_campaign"]
+
+
+@dataclass(frozen=True)
+class Table:
+    """One table of a data set, in one or several Parquet files; nothing is read before it is asked.
+
+    Attributes
+    ----------
+    path : str
+        A file, or a pattern that names all files: for ``pandas.read_parquet``, ``polars`` or a
+        query of DuckDB.
+    files : list of Path
+        The files.
+    clock : str
+        Whose samples these are; empty for tables without time.
+    """
+
+    path: str
+    files: Sequence[Path]
+    clock: str = ""
+
+    def dataset(self) -> pyarrow.dataset.Dataset:
+        """Return the files as an Arrow data set; damaged pages are errors when they are read."""
+        import pyarrow.dataset as ds
+
+        options = ds.ParquetFragmentScanOptions(page_checksum_verification=True)
+        kind = ds.ParquetFileFormat(default_fragment_scan_options=options)
+        return ds.dataset([str(path) for path in self.files], format=kind)
+
+    @property
+    def schema(self) -> pa.Schema:
+        """Columns, with ``unit`` and ``text`` in each field's metadata."""
+        return self.dataset().schema
+
+    @property
+    def columns(self) -> list[str]:
+        """Names of the columns."""
+        return list(self.schema.names)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of each column."""
+        return {f.name: (f.metadata or {}).get(b"unit", b"").decode() for f in self.schema}
+
+    def to_arrow(
+        self, columns: Sequence[str] | None = None, runs: Iterable[int] | None = None
+    ) -> pa.Table:
+        """Return rows as an Arrow table.
+
+        Parameters
+        ----------
+        columns : sequence of str, optional
+            Which; default all.
+        runs : iterable of int, optional
+            Only the rows of these runs.
+
+        Raises
+        ------
+        UnknownNameError
+            No such column.
+        FormatError
+            A page is not as it was written.
+        """
+        import pyarrow as pa
+        import pyarrow.dataset as ds
+
+        data = self.dataset()
+        for name in columns or ():
+            if name not in data.schema.names:
+                raise unknown("column", name, data.schema.names, self.path)
+        wanted = None if runs is None else ds.field("run").isin([int(n) for n in runs])
+        try:
+            kept: pa.Table = data.to_table(
+                columns=None if columns is None else list(columns), filter=wanted
+            )
+        except (OSError, pa.ArrowException) as error:
+            raise FormatError(f"{self.path}: cannot be read: {error}") from error
+        return kept
+
+    def to_pandas(
+        self, columns: Sequence[str] | None = None, runs: Iterable[int] | None = None
+    ) -> pd.DataFrame:
+        """Return rows as a pandas table; units in ``attrs["units"]``. Errors as `to_arrow`."""
+        frame: pd.DataFrame = self.to_arrow(columns, runs).to_pandas()
+        frame.attrs["units"] = {name: self.units[name] for name in frame.columns}
+        return frame
+
+    def to_polars(self) -> pl.LazyFrame:
+        """Return a lazy polars table over all files."""
+        import polars
+
+        return polars.scan_parquet([str(path) for path in self.files])
+
+    def to_duckdb(self) -> duckdb.DuckDBPyRelation:
+        """Return a lazy DuckDB relation over all files."""
+        import duckdb
+
+        return duckdb.read_parquet([str(path) for path in self.files])
+
+    def to_xarray(
+        self, columns: Sequence[str] | None = None, runs: Iterable[int] | None = None
+    ) -> xr.Dataset:
+        """Return an xarray data set: dimensions run and time, or run alone.
+
+        Runs of several lengths are filled up with NaN. Errors as `to_arrow`.
+        """
+        import xarray
+
+        index = ["run", "time"] if "time" in self.columns else ["run"]
+        wanted = None if columns is None else list(dict.fromkeys([*index, *columns]))
+        frame = self.to_pandas(wanted, runs).set_index(index)
+        whole: xr.Dataset = xarray.Dataset.from_dataframe(frame)
+        for name, unit in self.units.items():
+            if name in whole.variables:
+                whole[name].attrs["units"] = unit
+        return whole
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """A campaign's folder.
+
+    Attributes
+    ----------
+    folder : Path
+        Where it is.
+    manifest : Manifest
+        What it says of itself.
+    """
+
+    folder: Path
+    manifest: Manifest
+
+    def __len__(self) -> int:
+        return self.manifest.total
+
+    def __repr__(self) -> str:
+        return f"<Dataset {self.manifest.name}: {len(self)} runs, {self.manifest.status}>"
+
+    @property
+    def runs(self) -> Table:
+        """One row a run: unit, split, seed, status, reason, faults and other drawn values."""
+        return Table(str(self.folder / RUNS), [self.folder / RUNS])
+
+    @property
+    def signals(self) -> Table:
+        """The samples of the first clock: run, time, the channels, the faults' severities."""
+        return self.clock(self.clocks[0])
+
+    @property
+    def features(self) -> Table:
+        """One row a run: what was computed of its signals.
+
+        Raises
+        ------
+        InputError
+            The campaign computed none.
+        """
+        return self._table("features", "")
+
+    @property
+    def clocks(self) -> list[str]:
+        """Names of the clocks."""
+        return [clock["name"] for clock in self.manifest.clocks]
+
+    @property
+    def items(self) -> list[Item]:
+        """The finished blocks, in order."""
+        if self.manifest.blocks:
+            return [
+                Item(block["name"], block["files"], {k: block[k] for k in ("first", "last")})
+                for block in self.manifest.blocks
+            ]
+        log = work_log(self.folder, self.manifest)
+        return [] if log is None else [log.items[name] for name in sorted(log.items)]
+
+    def clock(self, name: str) -> Table:
+        """Return the samples of one clock.
+
+        Raises
+        ------
+        UnknownNameError
+            No such clock.
+        InputError
+            No run is finished yet.
+        """
+        if name not in self.clocks:
+            raise unknown("clock", name, self.clocks, str(self.folder))
+        return self._table(f"runs/{name}", name)
+
+    def resolved(self) -> Resolved:
+        """Return the plan with everything decided; errors as `read_resolved`."""
+        return read_resolved(self.folder)
+
+    def recording(self, number: int) -> Recording:
+        """Return one run as a recording; errors as `elevon.campaign.load_run`."""
+        from elevon.campaign.load import load_run
+
+        return load_run(self.folder, number)
+
+    def _table(self, place: str, clock: str) -> Table:
+        names = [name for item in self.items for name in item.files if name.startswith(place + "/")]
+        if not names:
+            raise InputError(f"{self.folder}: holds no {place}")
+        return Table(
+            str(self.folder / place / "*.parquet"), [self.folder / name for name in names], clock
+        )
+
+
+def load_campaign(folder: str | os.PathLike[str]) -> Dataset:
+    """Open a campaign's folder; nothing but its manifest is read.
+
+    Parameters
+    ----------
+    folder : path
+        As ``elevon campaign run`` wrote it; it may still run.
+
+    Returns
+    -------
+    Dataset
+        ``runs``, ``signals`` and ``features``, each with ``to_pandas()``, ``to_polars()``,
+        ``to_duckdb()``, ``to_xarray()`` and ``to_arrow()``.
+
+    Raises
+    ------
+    InputError
+        No campaign folder.
+    FormatError
+        Its manifest is damaged.
+
+    Examples
+    --------
+    >>> ds = elevon.load_campaign("DIR")  # doctest: +SKIP
+    >>> ds.runs.to_pandas().groupby("split").size()  # doctest: +SKIP
+    """
+    path = Path(folder).expanduser()
+    return Dataset(path, read_manifest(path))

@@ -1,0 +1,101 @@
+"""Read one run of a campaign back as a recording."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from elevon.campaign.dataset import Dataset, load_campaign
+from elevon.campaign.resolved import Resolved
+from elevon.errors import FormatError, InputError
+from elevon.recording import Channel, Clock, Recording
+from elevon.simulate.result import fault_labels
+from elevon.worklog import Item
+
+__all__ = ["load_run"]
+
+
+def load_run(folder: str | os.PathLike[str], number: int) -> Recording:
+    """Read one run of a campaign back as a recording.
+
+    Parameters
+    ----------
+    folder : path
+        The campaign folder.
+    number : int
+        Its number in the plan.
+
+    Returns
+    -------
+    Recording
+        Channels, clocks and labels as `elevon.simulate` gives them for this run.
+
+    Raises
+    ------
+    InputError
+        No such run, or it is not done yet.
+    FormatError
+        A file is not as it was written.
+    """
+    ds = load_campaign(folder)
+    item = _block(ds, number)
+    if damaged := item.damaged(ds.folder):
+        raise FormatError(f"{ds.folder / damaged[0]}: is not as it was written (SHA-256)")
+    resolved = ds.resolved()
+    prepared = resolved.prepared(number)
+    labels = fault_labels(prepared)
+    channels: list[Channel] = []
+    clocks: list[Clock] = []
+    for place, plan in enumerate(prepared.plan):
+        frame = ds.clock(plan.name).to_arrow(runs=[number])
+        clock = Clock(plan.name, frame["time"].to_numpy(), plan.rate)
+        about = {f.name: f.metadata for f in frame.schema}
+        clocks.append(clock)
+        for name in plan.signals:
+            unit, text = (about[name][key].decode() for key in (b"unit", b"text"))
+            channels.append(Channel(name, unit, frame[name].to_numpy(), clock, text))
+        if place == 0:
+            channels.extend(_severities(labels, frame, clock))
+    meta = _meta(ds, resolved, number)
+    return Recording(channels, clocks=clocks, meta=meta, labels=labels)
+
+
+def _severities(labels: list[dict[str, Any]], frame: Any, clock: Clock) -> list[Channel]:
+    channels = []
+    for label in labels:
+        name = f"{label['kind']}@{label['place']}"
+        values, text = frame[name].to_numpy(), f"severity of {name}"
+        channels.append(Channel(label["channel"], label["unit"], values, clock, text))
+    return channels
+
+
+def _block(ds: Dataset, number: int) -> Item:
+    for item in ds.items:
+        if item.data["first"] <= number <= item.data["last"]:
+            return item
+    done = sum(item.data["last"] - item.data["first"] + 1 for item in ds.items)
+    raise InputError(f"{ds.folder}: run {number} is not there; {done} of {len(ds)} runs are done")
+
+
+def _meta(ds: Dataset, resolved: Resolved, number: int) -> dict[str, Any]:
+    run = resolved.run(number)
+    row = ds.runs.to_arrow(runs=[number]).to_pylist()[0]
+    return {
+        "status": row["status"],
+        "message": row["reason"],
+        "run": number,
+        "label": run.label,
+        "split": row["split"],
+        "values": resolved.values(number),
+        "actuator": run.actuator.name,
+        "wiring": resolved.wiring,
+        "fidelity": resolved.fidelity,
+        "seed": run.seed,
+        "number": number,
+        "parameter_hash": run.actuator.hash,
+        "version": ds.manifest.version,
+        "sim_s": row["sim_s"],
+        "steps": row["steps"],
+        "faults": [str(fault) for fault in run.scenario.fault],
+        "scenario": run.scenario.to_dict(),
+    }

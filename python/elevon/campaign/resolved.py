@@ -1,0 +1,275 @@
+"""A resolved plan: the table of its runs, and each run as the core takes it."""
+
+from __future__ import annotations
+
+import copy
+import itertools
+import re
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.actuator import Actuator
+from elevon.campaign.draw import Column
+from elevon.campaign.embed import filled
+from elevon.errors import InputError, unknown
+from elevon.faults import FaultRecord, find_record
+from elevon.parameters.records import positions
+from elevon.scenario import Scenario
+from elevon.simulate import Run
+from elevon.simulate.prepare import Prepared, prepare
+
+__all__ = ["Index", "Resolved", "Variant", "record_of_fault", "set_place"]
+
+Ints = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """What a case of the plan changes."""
+
+    name: str = ""
+    faults: list[dict[str, Any]] = field(default_factory=list)
+    parameters: dict[str, Any] = field(default_factory=dict)
+    scenario: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Index:
+    """What each run is, beside the varied quantities; every array has shape (runs,).
+
+    Attributes
+    ----------
+    unit, draw, block, replicate, seed, variant : ndarray of int
+        Numbers; a unit of -1 means that the plan has no population.
+    age : ndarray of float
+        Of the unit, 0 to 1; NaN without a population.
+    split : ndarray of str
+        Part of the data; empty without a split.
+    """
+
+    unit: Ints
+    age: npt.NDArray[np.float64]
+    variant: Ints
+    draw: Ints
+    block: Ints
+    replicate: Ints
+    seed: Ints
+    split: npt.NDArray[Any]
+
+
+@dataclass
+class Resolved:
+    """Every run of a plan; nothing outside it is needed to simulate one.
+
+    Attributes
+    ----------
+    actuator : Actuator
+        With the plan's own parameters.
+    scenario : dict
+        Of all runs, before what a case or a column changes.
+    variants : list of Variant
+        The plan's cases; one nameless one without.
+    columns : list of Column
+        The varied quantities.
+    index : Index
+        What each run is.
+    files, sources : dict
+        Points of the files among the values; path and SHA-256 of every file read.
+    """
+
+    name: str
+    text: str
+    actuator: Actuator
+    fidelity: str
+    record: list[str] | None
+    scenario: dict[str, Any]
+    variants: list[Variant]
+    columns: list[Column]
+    index: Index
+    responses: list[str] = field(default_factory=list)
+    allow_not_acting: bool = False
+    runs_per_file: int | None = None
+    files: dict[str, Any] = field(default_factory=dict)
+    sources: dict[str, str] = field(default_factory=dict)
+    design: dict[str, Any] = field(default_factory=dict)
+    _known: OrderedDict[Any, Prepared] = field(default_factory=OrderedDict, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.index.seed)
+
+    @property
+    def wiring(self) -> str:
+        """Of the actuator."""
+        return self.actuator.wiring
+
+    def values(self, number: int) -> dict[str, Any]:
+        """Return the varied quantities of one run: SI numbers, 0 for a fault it is spared."""
+        return {c.name: _plain(c.values[number]) for c in self.columns}
+
+    def run(self, number: int) -> Run:
+        """Return one run, as `elevon.simulate` takes it.
+
+        Raises
+        ------
+        InputError
+            Its values cannot be; the run is named.
+        """
+        place = f"run {number}"
+        variant = self.variants[self.index.variant[number]]
+        parameters = dict(variant.parameters)
+        parameters.update(
+            (c.name, _plain(c.values[number])) for c in self.columns if c.kind == "parameter"
+        )
+        return Run(
+            self.actuator.with_values(parameters, source="plan", place=place),
+            Scenario.from_dict(self._scenario(number, variant, place), place),
+            int(self.index.seed[number]),
+            f"{self.name}-{number:06d}",
+            number,
+        )
+
+    def prepared(self, number: int) -> Prepared:
+        """Return one run ready for the core; what runs share is worked out once.
+
+        Raises
+        ------
+        InputError
+            Its values cannot be; the run is named.
+        """
+        template = self._template(number)
+        vector = template.core["parameters"].copy()
+        place = positions(self.wiring)
+        for column in self.columns:
+            if column.kind == "parameter" and column.numeric:
+                vector[place[column.name]] = column.values[number]
+        drawn = self._severities(number)
+        faults = [
+            {**fault, "severity": drawn.get(f"{fault['kind']}@{fault['place']}", fault["severity"])}
+            for fault in template.core["faults"]
+        ]
+        changed = {
+            "parameters": vector,
+            "faults": faults,
+            "seed": int(self.index.seed[number]),
+            "run": number,
+        }
+        return replace(template, core={**template.core, **changed})
+
+    def structure(self, number: int) -> tuple[Any, ...]:
+        """Return what decides how a run is prepared, apart from numbers that are only put in."""
+        key: list[Any] = [int(self.index.variant[number])]
+        for column in self.columns:
+            value = _plain(column.values[number])
+            if column.kind == "fault":
+                key.append(value != 0.0)
+            elif column.kind == "scenario" or not column.numeric or _prepares(column.name):
+                key.append(value if isinstance(value, (float, str)) else repr(value))
+        return tuple(key)
+
+    def fault_names(self) -> dict[str, str]:
+        """Return ``KIND@PLACE`` of every fault in any run, and the unit of its severity."""
+        fixed = [*self.scenario.get("fault", []), *(f for v in self.variants for f in v.faults)]
+        names = [f"{f['kind']}@{f['place']}" for f in fixed]
+        names += [c.name for c in self.columns if c.kind == "fault"]
+        return {
+            name: record_of_fault(name, self.wiring).unit or "1" for name in dict.fromkeys(names)
+        }
+
+    def not_carried(self) -> dict[str, str]:
+        """Return the faults that the fidelity does not carry, each with the core's reason."""
+        records = {n: record_of_fault(n, self.wiring) for n in self.fault_names()}
+        return {
+            name: record.declined.get(self.fidelity, "")
+            for name, record in records.items()
+            if self.fidelity not in record.fidelities
+        }
+
+    def _severities(self, number: int) -> dict[str, float]:
+        return {c.name: float(c.values[number]) for c in self.columns if c.kind == "fault"}
+
+    def _template(self, number: int) -> Prepared:
+        key = self.structure(number)
+        if key not in self._known:
+            try:
+                prepared = prepare(self.run(number), self.fidelity, self.record, doubts=False)
+            except InputError as error:
+                start = "" if str(error).startswith("run ") else f"run {number}: "
+                raise type(error)(f"{start}{error}") from error
+            self._known[key] = prepared
+            if len(self._known) > _MOST_TEMPLATES:
+                self._known.popitem(last=False)
+        return self._known[key]
+
+    def _scenario(self, number: int, variant: Variant, place: str) -> dict[str, Any]:
+        data = copy.deepcopy({**self.scenario, **variant.scenario})
+        for column in self.columns:
+            if column.kind == "scenario":
+                set_place(data, column.name, copy.deepcopy(_plain(column.values[number])), place)
+        faults = [*data.get("fault", []), *variant.faults, *self._drawn(number)]
+        dropped = self.not_carried() if self.allow_not_acting else {}
+        data["fault"] = [f for f in faults if f"{f['kind']}@{f['place']}" not in dropped]
+        whole: dict[str, Any] = filled(data, self.files)
+        return whole if whole["fault"] else {k: v for k, v in whole.items() if k != "fault"}
+
+    def _drawn(self, number: int) -> Iterator[dict[str, Any]]:
+        for column in self.columns:
+            if column.kind == "fault" and column.values[number] != 0.0:
+                kind, at = column.name.split("@")
+                fault = {"kind": kind, "place": at, "severity": float(column.values[number])}
+                profile = {} if column.profile is None else {"profile": column.profile}
+                yield {**fault, **column.attributes, **profile}
+
+
+#: Templates kept; of runs that each have a scenario of their own, only the last are of use.
+_MOST_TEMPLATES = 512
+
+
+def _prepares(path: str) -> bool:
+    """Whether a number decides more of a run's preparation than its own place in the vector."""
+    return path.endswith(".step") or path.startswith("stop.")
+
+
+def record_of_fault(name: str, wiring: str) -> FaultRecord:
+    """Return the catalogue's record of ``KIND@PLACE``."""
+    kind, _, place = name.partition("@")
+    return find_record(kind, place, wiring)
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if hasattr(value, "item") else value
+
+
+_STEP = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)|\[(\d+)\]")
+
+
+def set_place(data: Any, path: str, value: Any, place: str) -> None:
+    """Set one place of nested mappings and lists; the place must be one the scenario has."""
+    steps: list[Any] = [m[1] if m[1] else int(m[2]) for m in _STEP.finditer(path)]
+    written = "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in steps).lstrip(".")
+    if not steps or written != path:
+        raise InputError(
+            f"{place}: scenario = {path!r} is not a place such as command.terms[0].phase"
+        )
+    for step, following in itertools.pairwise(steps):
+        data = _stepped(data, step, following, path, place)
+    last = steps[-1]
+    if isinstance(last, int) and (not isinstance(data, list) or last >= len(data)):
+        raise InputError(f"{place}: the scenario has no {path!r} (no entry {last})")
+    data[last] = value
+
+
+def _stepped(data: Any, step: Any, following: Any, path: str, place: str) -> Any:
+    if isinstance(step, int):
+        if not isinstance(data, list) or step >= len(data):
+            raise InputError(f"{place}: the scenario has no {path!r} (no entry {step})")
+        return data[step]
+    if not isinstance(data, Mapping):
+        raise InputError(f"{place}: the scenario has no {path!r}")
+    if step not in data and isinstance(following, int):
+        raise unknown("place of the scenario", path, data, place)
+    return data[step] if step in data else data.setdefault(step, {})  # type: ignore[attr-defined]

@@ -1,0 +1,235 @@
+"""``elevon campaign``: many labelled runs from a plan file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from elevon.cli import interrupt
+from elevon.cli.common import JsonOption, StrictOption
+from elevon.cli.output import print_json, print_table, progress_bar, say
+
+app = typer.Typer(rich_markup_mode=None, no_args_is_help=True)
+
+PlanArgument = Annotated[Path, typer.Argument(metavar="PLAN", help="The plan file (TOML).")]
+FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="The campaign's folder.")]
+ThreadsOption = Annotated[int | None, typer.Option(min=1, help="Threads; default one a core.")]
+SchedulerOption = Annotated[
+    str | None, typer.Option("--scheduler", metavar="ADDRESS", help="Of a Dask scheduler.")
+]
+ClusterOption = Annotated[
+    str | None, typer.Option("--cluster", metavar="local:N", help="N Dask workers started here.")
+]
+
+
+@app.command()
+def plan(
+    plan: PlanArgument,
+    *,
+    threads: ThreadsOption = None,
+    json: JsonOption = False,
+) -> int:
+    """Check a plan and say what it will take; nothing is written."""
+    from elevon.campaign import load_plan, resolve_plan
+    from elevon.campaign.check import check
+    from elevon.campaign.estimate import estimate
+    from elevon.simulate.batch import checked_threads
+
+    read, document = load_plan(plan)
+    resolved = resolve_plan(read, document)
+    checked = check(resolved)
+    need = estimate(resolved, checked, Path(), checked_threads(threads))
+    if json:
+        print_json(
+            {
+                "status": "ok",
+                "name": resolved.name,
+                "runs": len(resolved),
+                "blocks": need.blocks,
+                "estimate": need.to_dict(),
+                "columns": [
+                    {"name": c.name, "kind": c.kind, "unit": c.unit, "role": c.role}
+                    for c in resolved.columns
+                ],
+                "splits": _counted(resolved.index.split),
+                "responses": resolved.responses,
+                "design": resolved.design,
+                "not_acting": checked.idle,
+            }
+        )
+        return 0
+    typer.echo(f"{resolved.name}: {need}")
+    rows = [[c.name, c.kind, c.role, c.unit, _range(c)] for c in resolved.columns]
+    print_table(["varied", "kind", "role", "unit", "values"], rows)
+    return 0
+
+
+@app.command()
+def run(
+    plan: PlanArgument,
+    *,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder of the results; resumed if begun.")
+    ],
+    threads: ThreadsOption = None,
+    scheduler: SchedulerOption = None,
+    cluster: ClusterOption = None,
+    strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
+    json: JsonOption = False,
+) -> int:
+    """Run a plan into a folder; an interrupted one goes on where it was."""
+    from elevon.campaign import load_plan, resolve_plan, run_campaign
+
+    read, document = load_plan(plan)
+    resolved = resolve_plan(read, document)
+    with interrupt.telling(lambda: _kept(out)), progress_bar(f"running {read.name}") as advance:
+        result = run_campaign(
+            resolved,
+            document.text,
+            out,
+            threads=threads,
+            cluster=_cluster(scheduler, cluster),
+            progress=advance,
+            announce=say,
+        )
+    return _told(result, out, json=json)
+
+
+@app.command()
+def resume(
+    folder: FolderArgument,
+    *,
+    threads: ThreadsOption = None,
+    scheduler: SchedulerOption = None,
+    cluster: ClusterOption = None,
+    json: JsonOption = False,
+) -> int:
+    """Go on with a campaign from its folder; the plan file is not needed."""
+    from elevon.campaign import resume_campaign
+
+    with interrupt.telling(lambda: _kept(folder)), progress_bar("going on") as advance:
+        result = resume_campaign(
+            folder,
+            threads=threads,
+            cluster=_cluster(scheduler, cluster),
+            progress=advance,
+            announce=say,
+        )
+    return _told(result, folder, json=json)
+
+
+@app.command()
+def status(folder: FolderArgument, *, json: JsonOption = False) -> int:
+    """Say how far a campaign is."""
+    found = _status(folder)
+    if json:
+        print_json(found)
+    else:
+        typer.echo(
+            f"{found['name']}: {found['status']}, {found['done']} of {found['runs']} runs done, "
+            f"{found['failed']} failed{', a process works on it' if found['active'] else ''}"
+        )
+    return 0
+
+
+def _status(folder: Path) -> dict[str, Any]:
+    from elevon.campaign import load_campaign
+    from elevon.campaign.folder import work_log
+    from elevon.worklog import is_locked
+
+    ds = load_campaign(folder)
+    counts: dict[str, int] = {}
+    log = work_log(folder, ds.manifest)
+    if ds.manifest.status == "running":
+        ended = [] if log is None else [s for i in log.items.values() for s in i.data["status"]]
+    else:
+        ended = ds.runs.to_arrow(["status"])["status"].to_pylist()
+    counts = _counted(ended)
+    return {
+        "status": ds.manifest.status,
+        "name": ds.manifest.name,
+        "runs": len(ds),
+        "done": len(ended),
+        "failed": counts.get("diverged", 0) + counts.get("refused", 0),
+        "counts": counts,
+        "active": is_locked(folder),
+        "out": folder,
+    }
+
+
+def _cluster(scheduler: str | None, cluster: str | None) -> str | None:
+    from elevon.errors import InputError
+
+    if scheduler is not None and cluster is not None:
+        raise InputError("give either --scheduler or --cluster")
+    return scheduler or cluster
+
+
+def _kept(out: Path) -> str:
+    from elevon.errors import InputError
+
+    try:
+        found = _status(out)
+    except InputError:
+        return "nothing is kept; give the same command again to start over"
+    return (
+        f"{found['done']} of {found['runs']} runs are kept in {out}; give the same command "
+        "again to go on"
+    )
+
+
+def _told(result: Any, out: Path, *, json: bool) -> int:
+    if json:
+        print_json(_summary(result, out))
+    else:
+        _print(result, out)
+    return 1 if result.failed else 0
+
+
+def _summary(result: Any, out: Path) -> dict[str, Any]:
+    manifest = result.manifest
+    fresh = manifest.total - result.skipped
+    return {
+        "status": manifest.status,
+        "name": manifest.name,
+        "runs": manifest.total,
+        "failed": len(result.failed),
+        "failed_runs": result.failed,
+        "counts": result.counts,
+        "skipped": result.skipped,
+        "wall_s": result.wall_s,
+        "runs_per_hour": 3600.0 * fresh / result.wall_s,
+        "bytes": result.bytes,
+        "bytes_per_run": result.bytes / manifest.total,
+        "sim_s": sum(result.outcome["sim_s"]),
+        "blocks": len(manifest.blocks),
+        "not_acting": manifest.not_acting,
+        "out": out,
+    }
+
+
+def _print(result: Any, out: Path) -> None:
+    counts = ", ".join(f"{count} {status}" for status, count in result.counts.items())
+    earlier = f" ({result.skipped} done before)" if result.skipped else ""
+    typer.echo(f"{result.manifest.total} runs{earlier}: {counts}")
+    for number in result.failed[:20]:
+        typer.echo(f"run {number}: {result.outcome['reason'][number]}")
+    if len(result.failed) > 20:
+        typer.echo(f"and {len(result.failed) - 20} more; see runs.parquet")
+    typer.echo(f"{result.wall_s:.3g} s, in {out}")
+
+
+def _counted(items: Any) -> dict[str, int]:
+    counts: dict[str, int] = {}
+    for item in items:
+        if item:
+            counts[str(item)] = counts.get(str(item), 0) + 1
+    return counts
+
+
+def _range(column: Any) -> str:
+    if not column.numeric:
+        return ", ".join(dict.fromkeys(str(value) for value in column.values))[:60]
+    return f"{column.values.min():.6g} to {column.values.max():.6g}"
