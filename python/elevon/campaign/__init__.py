@@ -1,8 +1,7 @@
 """Campaigns: a plan file becomes many labelled runs in a folder that survives being killed."""
 
-from elevon.campaign.dataset import Dataset, Table, load_campaign
+from elevon.campaign.dataset import Dataset, Table, load_campaign, load_run
 from elevon.campaign.execute import CampaignResult, resume_campaign, run_campaign
-from elevon.campaign.load import load_run
 from elevon.campaign.plan import Plan, load_plan
 from elevon.campaign.resolve import resolve_plan
 from elevon.campaign.resolved import Resolved

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from elevon.campaign.resolved import Resolved
     from elevon.recording import Recording
 
-__all__ = ["Dataset", "Table", "load_campaign"]
+__all__ = ["Dataset", "Table", "load_campaign", "load_run"]
 
 
 @dataclass(frozen=True)
@@ -221,9 +221,9 @@ class Dataset:
 
     def recording(self, number: int) -> Recording:
         """Return one run as a recording; errors as `elevon.campaign.load_run`."""
-        from elevon.campaign.load import load_run
+        from elevon.campaign.load import recorded
 
-        return load_run(self.folder, number)
+        return recorded(self, number)
 
     def _table(self, place: str, clock: str) -> Table:
         names = [name for item in self.items for name in item.files if name.startswith(place + "/")]
@@ -262,3 +262,28 @@ def load_campaign(folder: str | os.PathLike[str]) -> Dataset:
     """
     path = Path(folder).expanduser()
     return Dataset(path, read_manifest(path))
+
+
+def load_run(folder: str | os.PathLike[str], number: int) -> Recording:
+    """Read one run of a campaign back as a recording.
+
+    Parameters
+    ----------
+    folder : path
+        The campaign folder.
+    number : int
+        Its number in the plan.
+
+    Returns
+    -------
+    Recording
+        Channels, clocks and labels as `elevon.simulate` gives them for this run.
+
+    Raises
+    ------
+    InputError
+        No such run, or it is not done yet.
+    FormatError
+        A file is not as it was written.
+    """
+    return load_campaign(folder).recording(number)

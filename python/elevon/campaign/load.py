@@ -2,42 +2,22 @@
 
 from __future__ import annotations
 
-import os
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from elevon.campaign.dataset import Dataset, load_campaign
 from elevon.campaign.resolved import Resolved
 from elevon.errors import FormatError, InputError
 from elevon.recording import Channel, Clock, Recording
 from elevon.simulate.result import fault_labels
 from elevon.worklog import Item
 
-__all__ = ["load_run"]
+if TYPE_CHECKING:
+    from elevon.campaign.dataset import Dataset
+
+__all__ = ["recorded"]
 
 
-def load_run(folder: str | os.PathLike[str], number: int) -> Recording:
-    """Read one run of a campaign back as a recording.
-
-    Parameters
-    ----------
-    folder : path
-        The campaign folder.
-    number : int
-        Its number in the plan.
-
-    Returns
-    -------
-    Recording
-        Channels, clocks and labels as `elevon.simulate` gives them for this run.
-
-    Raises
-    ------
-    InputError
-        No such run, or it is not done yet.
-    FormatError
-        A file is not as it was written.
-    """
-    ds = load_campaign(folder)
+def recorded(ds: Dataset, number: int) -> Recording:
+    """Return one run of a data set; see `elevon.campaign.load_run`."""
     item = _block(ds, number)
     if damaged := item.damaged(ds.folder):
         raise FormatError(f"{ds.folder / damaged[0]}: is not as it was written (SHA-256)")
