@@ -128,6 +128,11 @@ impl<S: Scalar> Resolver<S> {
         own.any_away_among(ResolverParameter::SineShort, ResolverParameter::CosineOpen)
     }
 
+    /// Does it ever show what it showed before?
+    pub fn remembers(own: &Own<ResolverParameter>) -> bool {
+        own.away(ResolverParameter::Stuck) || Self::lost(own)
+    }
+
     /// Is it ever without power or signal?
     pub fn lost(own: &Own<ResolverParameter>) -> bool {
         own.away(ResolverParameter::PowerOff) || Self::signal_fails(own)

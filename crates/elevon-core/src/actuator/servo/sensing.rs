@@ -28,6 +28,16 @@ details! {
     extra {
         /// The commutation has a track of its own.
         separate = (resolver || noisy) && !commutated;
+        /// The controller alone reads the resolver, and that forgets what it showed.
+        unread = separate && !Resolver::<f64>::remembers(&parts.resolver());
+    }
+}
+
+impl SensingDetails {
+    /// Does the resolver ever show another angle than the shaft's?
+    #[inline(always)]
+    pub(super) fn shows(&self) -> bool {
+        self.resolver || self.noisy
     }
 }
 

@@ -105,7 +105,12 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     s: &mut State<S>,
 ) {
     // Sensors and control electronics.
-    let reading = shaft_reading::<S, FULL>(m, structure, s);
+    let reading = if EXTRA && structure.sensing.unread && !structure.control_every_step {
+        // Nobody looks between the ticks of the controller.
+        Reading { angle: s.shaft.motor_position, position: s.shaft.motor_position, speed: s.shaft.motor_speed }
+    } else {
+        shaft_reading::<S, FULL>(m, structure, s)
+    };
     if FULL && structure.sensing.counting {
         m.sensing.count::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed);
     }
@@ -121,7 +126,7 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
         s.extra.sensed = three!(|j| low_pass(m.extra.closing, s.extra.sensed[j], measured[j]));
         measured = s.extra.sensed;
     }
-    let (sin_c, cos_c) = if FULL && structure.sensing.resolver && (!EXTRA || structure.sensing.commutated) {
+    let (sin_c, cos_c) = if FULL && structure.sensing.shows() && (!EXTRA || structure.sensing.commutated) {
         m.star.electrical_angle(reading.angle).sin_cos()
     } else {
         (sin, cos)
@@ -157,7 +162,7 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     let c = coupling::<S, FULL>(m, structure, s, sin, cos);
     let torque = motor_torque(m, s, &c);
     let (current, voltage) = if EXTRA && structure.located {
-        let rate = if structure.sensing.resolver && structure.sensing.commutated { reading.speed } else { s.shaft.motor_speed };
+        let rate = if structure.sensing.shows() && structure.sensing.commutated { reading.speed } else { s.shaft.motor_speed };
         let seen = Seen { error, sines: sin_phases, cosines: cos_phases, rate };
         Located { model: m, structure, state: &mut *s, coupling: &c, half_supply, old_legs, seen }.step()
     } else {
