@@ -14,12 +14,14 @@ import elevon
 from elevon import _core
 
 
-def shipped() -> dict[str, str]:
-    """Wiring of every shipped parameter set by its name, from the package's own folder."""
+def shipped() -> dict[str, str | None]:
+    """Wiring of every shipped set by its name, from the package's own folder; None: its base's."""
     folder = resources.files("elevon.parameters") / "sets"
     files = [entry for entry in folder.iterdir() if entry.name.endswith(".toml")]
     return {
-        entry.name.removesuffix(".toml"): tomllib.loads(entry.read_text(encoding="utf-8"))["wiring"]
+        entry.name.removesuffix(".toml"): tomllib.loads(entry.read_text(encoding="utf-8")).get(
+            "wiring"
+        )
         for entry in sorted(files, key=lambda entry: entry.name)
     }
 
@@ -31,7 +33,11 @@ def actuator(name: str) -> Any:
 
 
 def names() -> list[str]:
-    """Shipped sets whose wiring the core has; `test_every_shipped_set_loads` reports the others."""
+    """Shipped sets whose wiring the core has; `test_every_shipped_set_loads` reports the others.
+
+    A set on a base has other numbers in the same wiring: what the suite asks of it, it asks of
+    the base.
+    """
     known = {wiring["name"] for wiring in _core.wirings()}
     return [name for name, wiring in shipped().items() if wiring in known]
 

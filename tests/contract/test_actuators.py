@@ -24,7 +24,7 @@ def test_every_shipped_set_loads(name: str) -> None:
     assert elevon.Actuator.load(name).name == name
 
 
-@pytest.mark.parametrize("name", ACTUATORS)
+@pytest.mark.parametrize("name", sets.shipped())
 def test_every_value_has_a_unit_a_source_and_lies_in_range(name: str) -> None:
     """ASSUMED is a legal source, silence is not, and an assumption gives its reason."""
     actuator = elevon.Actuator.load(name)

@@ -16,8 +16,15 @@ from elevon.reproduce.nasa.design import (
     model_matrix,
     shuffled_blocks,
 )
-from elevon.reproduce.nasa.effect import Effect, EffectScale, compare_profiles, welch_p
+from elevon.reproduce.nasa.effect import (
+    POWER,
+    Effect,
+    EffectScale,
+    compare_profiles,
+    welch_p,
+)
 from elevon.reproduce.nasa.features import FEATURES, compared
+from elevon.reproduce.nasa.impact import GAP
 from elevon.reproduce.nasa.population import SPREADS, draw_units
 from elevon.reproduce.nasa.separation import FAULTS, reproduce_separation
 from elevon.reproduce.nasa.store import CellStore
@@ -58,19 +65,32 @@ def test_a_winner_needs_an_interval_above_all_others() -> None:
     assert clear.power > 0.5
     near = compare_profiles([Effect(10, 8, 12), Effect(11, 9, 13)], 0.95)
     assert near.winner is None
-    # Halves of 2 and 2 against a gap of 1: sixteen times the draws halve them twice.
-    assert near.factor == pytest.approx(16.0)
     assert near.power < 0.5
+    # Halves of 2 and 2 and the 95 % quantile of their spread, against a gap of 1.
+    spread = np.hypot(2.0, 2.0) / 1.95996
+    assert near.factor == pytest.approx((4.0 + 1.64485 * spread) ** 2, rel=1e-4)
     assert compare_profiles([Effect(0.5, -1, 2), Effect(0.1, -0.1, 0.3)], 0.95).winner is None
+
+
+def test_a_winner_is_one_that_another_experiment_would_name() -> None:
+    """Intervals that part by less than the spread of their ends name none: a new draw may differ.
+
+    Halves of 2 and 2 at 95 %, spread 1.443: a gap of 4.1 parts them, one of 6.4 has 95.2 % power.
+    """
+    for gap, winner in ((4.1, None), (6.3, None), (6.4, 1)):
+        best = compare_profiles([Effect(10, 8, 12), Effect(10 + gap, 8 + gap, 12 + gap)], 0.95)
+        assert best.winner == winner
+        assert (best.power >= POWER) == (winner is not None)
+        assert (best.factor <= 1.0) == (winner is not None)
 
 
 def test_healthy_against_healthy_passes_the_threshold_as_rarely_as_said() -> None:
     """Rayleigh amplitudes in their root's scale, groups as of the command: 1 % below 0.01."""
     rng = np.random.default_rng(2)
-    raw = np.zeros((2000, 184, len(FEATURES)))
-    raw[..., 1] = rng.rayleigh(size=(2000, 184))
+    raw = np.zeros((2000, 240, len(FEATURES)))
+    raw[..., 1] = rng.rayleigh(size=(2000, 240))
     scaled = np.moveaxis(compared(raw)[..., 1], 0, 1)
-    above = np.mean(welch_p(scaled[24:], scaled[:24]) < 0.01)
+    above = np.mean(welch_p(scaled[16:], scaled[:16]) < 0.01)
     assert above < 0.01 + binomial(0.01, 2000)
 
 
@@ -124,6 +144,19 @@ def test_finished_cells_are_found_again_by_the_same_work_only(tmp_path: Path) ->
     (tmp_path / "runs.json").write_text("{")
     with pytest.raises(OutputExistsError, match=r"runs\.json"):
         CellStore(tmp_path, "a")
+
+
+@pytest.mark.long
+def test_winners_agree_over_five_seeds() -> None:
+    """The gap at two loads, every profile: other units, other noise, the same best profile."""
+    winners = [
+        reproduce_separation(
+            faults=FAULTS[-1:], loads=(0.0, 4500.0), healthy=80, reassemblies=8, seed=seed
+        ).winners()
+        for seed in range(5)
+    ]
+    assert winners == winners[:1] * 5
+    assert winners[0][GAP, 4500.0] == "trapezoidal"
 
 
 @pytest.mark.long

@@ -133,7 +133,7 @@ CASES = (
         _separation,
         _show_separation,
         _page,
-        options={"reassemblies": (_REASSEMBLIES, 24), "healthy": (_HEALTHY, 160)},
+        options={"reassemblies": (_REASSEMBLIES, 16), "healthy": (_HEALTHY, 240)},
         prepare=_check_counts,
     ),
 )

@@ -13,6 +13,9 @@ __all__ = ["Comparison", "Effect", "EffectScale", "compare_profiles", "welch_p"]
 
 Array = npt.NDArray[np.float64]
 
+POWER = 0.95
+"""A best profile is named where another experiment would name it again this often: intervals that
+just part in one draw of the units overlap in every other."""
 PIVOTS = 200_000
 """Draws of the pivots; tails of 1e-4 then hold 20 of them."""
 
@@ -100,13 +103,14 @@ class Comparison:
     Attributes
     ----------
     winner : int or None
-        Index of the effect whose interval lies above all others.
+        Index of the effect whose interval lies above all others, if another such experiment
+        would find that again with the probability `POWER`.
     power : float
-        Probability that another such experiment names the larger of the two largest effects,
-        were they as estimated.
+        Probability that in another such experiment the intervals of the two largest effects
+        part, were they as estimated.
     factor : float
-        Times as many draws would be needed for the two intervals to part; infinite where the
-        effects are equal.
+        Times as many draws would give that probability `POWER`; infinite where the effects are
+        equal.
     """
 
     winner: int | None
@@ -124,9 +128,10 @@ def compare_profiles(effects: Sequence[Effect], level: float) -> Comparison:
     rival = max(rest, key=lambda effect: effect.bounds[1])
     gap = abs(best.size) - abs(rival.size)
     halves = abs(best.size) - best.bounds[0], rival.bounds[1] - abs(rival.size)
-    named = best.shown and best.bounds[0] > rival.bounds[1]
     z = float(norm.ppf(0.5 + 0.5 * level))
     spread = math.hypot(halves[0] / z, halves[1] / z)
     power = float(norm.cdf((gap - sum(halves)) / spread))
-    factor = (sum(halves) / gap) ** 2 if gap > 0.0 else math.inf
+    named = best.shown and best.bounds[0] > rival.bounds[1] and power >= POWER
+    apart = sum(halves) + float(norm.ppf(POWER)) * spread
+    factor = (apart / gap) ** 2 if gap > 0.0 else math.inf
     return Comparison(order[0] if named else None, power, factor)

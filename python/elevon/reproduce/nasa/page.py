@@ -34,8 +34,13 @@ def nasa_report(result: Result, *, date: str | None = None) -> Report:
         command = f"nasa-separation --reassemblies {result.reassemblies} --healthy {result.healthy}"
     report.section("Checks").checks(result.checks)
     values = result.to_dict()
-    known = {"Parameter hash": "parameter_hash", "Seed": "seed", "Core": "version"}
-    facts = {name: values[key] for name, key in known.items() if key in values}
+    known = {
+        "Parameter hash": "parameter_hash",
+        "Parameter hash of nasa-dema": "fit_parameter_hash",
+        "Seed": "seed",
+        "Core": "version",
+    }
+    facts = {name: values[key] for name, key in known.items() if values.get(key) is not None}
     options = f"--seed {values.get('seed', 0)} --out DIR"
     report.provenance(provenance(f"elevon reproduce {command} {options}", **facts))
     return report

@@ -8,14 +8,18 @@ import numpy as np
 
 from elevon.report import Report, Table
 from elevon.report.figures import COLOURS, new_figure
+from elevon.reproduce.nasa.corners import ACCELERATION
+from elevon.reproduce.nasa.effect import POWER
 from elevon.reproduce.nasa.population import spread_rows
 from elevon.reproduce.nasa.separation_rows import SeparationResult, SeparationRow
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["separation_page"]
 
+_ROUNDED = ", rounded"
 SHAPE_COLOURS = {
     "trapezoidal": COLOURS["blue"],
     "sinusoidal": COLOURS["orange"],
@@ -30,7 +34,9 @@ def separation_page(result: SeparationResult, date: str | None) -> Report:
         "Which profile shows which fault",
         f"{result.healthy} healthy units and {result.reassemblies} of each fault, every one in "
         "every profile under every load. One feature a fault, named beforehand. A profile is "
-        "called the best only where its interval lies above all others.",
+        "called the best only where its interval lies above all others and another such "
+        f"experiment would find that again with a probability of {100 * POWER:.0f} %. "
+        f"Rounded corners have {ACCELERATION:g} m/s2, all others are sharp as in the paper.",
         date=date,
     )
     winners = result.winners()
@@ -77,8 +83,9 @@ def _winners_table(result: SeparationResult) -> Table:
                "Draws that would name one"]  # fmt: skip
     return Table(
         columns, rows,
-        "Power: probability that another such experiment names the best of these profiles, were "
-        "the effects as estimated. Draws: of each fault, with as many times more healthy units.",
+        "Power: probability that the intervals of the two largest effects part in another such "
+        f"experiment, were they as estimated; named from {100 * POWER:.0f} % on. Draws: of each "
+        "fault, with as many times more healthy units.",
     )  # fmt: skip
 
 
@@ -87,27 +94,37 @@ def _effects_figure(result: SeparationResult) -> Figure:
     loads = sorted({row.load for row in result.rows})
     shapes = list(dict.fromkeys(row.profile for row in result.rows))
     lines = (len(faults) + 1) // 2
-    with new_figure(lines, 2, width=8.0, height=1.9 * lines, sharex=True, squeeze=False) as (
+    height = 1.9 * lines + 0.5
+    with new_figure(lines, 2, width=8.0, height=height, sharex=True, squeeze=False) as (
         figure,
         grid,
     ):
         for axes, fault in zip(grid.flat, faults, strict=False):
             for place, shape in enumerate(shapes):
                 rows = [r for r in result.rows if r.fault == fault and r.profile == shape]
-                x = np.array([loads.index(r.load) for r in rows]) + 0.16 * (place - 1.5)
-                size = np.array([r.effect.size for r in rows])
-                ends = np.array([[r.effect.low, r.effect.high] for r in rows]).T
-                axes.errorbar(
-                    x, size, np.abs(ends - size), fmt="o", ms=3, lw=1,
-                    color=SHAPE_COLOURS.get(shape, COLOURS["grey"]), label=shape,
-                )  # fmt: skip
+                x = np.array([loads.index(r.load) for r in rows])
+                _bars(axes, x + (place - 0.5 * (len(shapes) - 1)) * 0.7 / len(shapes), rows)
             axes.axhline(0.0, color=COLOURS["grey"], lw=0.8)
             axes.set_title(fault, fontsize=9)
             axes.set_xticks(range(len(loads)), [f"{load:.0f} N" for load in loads])
-        grid.flat[0].legend(fontsize=7)
         for axes in grid[:, 0]:
             axes.set_ylabel("Effect size")
+        handles, labels = grid.flat[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8)
     return figure
+
+
+def _bars(axes: Axes, x: np.ndarray, rows: list[SeparationRow]) -> None:
+    """Draw the effects of one profile with their intervals; rounded corners have open marks."""
+    shape = rows[0].profile
+    name, rounded, _ = shape.partition(_ROUNDED)
+    size = np.array([row.effect.size for row in rows])
+    ends = np.array([[row.effect.low, row.effect.high] for row in rows]).T
+    axes.errorbar(
+        x, size, np.abs(ends - size), fmt="o", ms=3.5, lw=1, mew=1,
+        color=SHAPE_COLOURS.get(name, COLOURS["grey"]), label=shape,
+        mfc="none" if rounded else None,
+    )  # fmt: skip
 
 
 def _impact_sections(report: Report, result: SeparationResult) -> None:

@@ -97,8 +97,19 @@ SPREADS = (
 )  # fmt: skip
 """What differs between healthy units, all ASSUMED."""
 
-NOISE = {"sensor.current.noise_deviation": 0.02, "sensor.current.noise_sample_time": 2.5e-4}
-"""Noise of the current sensors: 0.1 % of 20 A, held for a tick of the controller (ASSUMED)."""
+NOISE = {
+    "sensor.current.noise_deviation": 0.02,
+    "sensor.current.noise_sample_time": 2.5e-4,
+    "sensor.resolver.noise_deviation": 1e-4,
+    "sensor.resolver.speed_noise_deviation": 0.05,
+    "sensor.resolver.noise_sample_time": 2.5e-4,
+}
+"""Noise of every unit, held for a tick of the controller; ASSUMED."""
+_NOISE_ROWS = (
+    ("noise of the current sensors", "0.02", "A; 0.1 % of a 20 A sensor"),
+    ("noise of the resolver's angle", "0.0001", "rad; a step of a converter of 16 bits"),
+    ("noise of the resolver's speed", "0.05", "rad/s; 0.05 A behind the speed loop"),
+)
 
 
 def draw_units(actuator: Actuator, group: str, count: int, seed: int) -> list[Actuator]:
@@ -163,4 +174,7 @@ def spread_rows() -> list[dict[str, Any]]:
             size = f"{100 * spread.size:g} %" if spread.kind == "factor" else f"{spread.size:g}"
         row = {"property": spread.name, "deviation": size, "reason": spread.reason}
         shown.setdefault(spread.name, row)
-    return list(shown.values())
+    noise = [
+        dict(zip(("property", "deviation", "reason"), row, strict=True)) for row in _NOISE_ROWS
+    ]
+    return [*shown.values(), *noise]

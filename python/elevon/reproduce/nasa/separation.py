@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from elevon.progress import part
 from elevon.report.checks import Check
+from elevon.reproduce.nasa.corners import ACCELERATION
 from elevon.reproduce.nasa.effect import Comparison, Effect, EffectScale, compare_profiles, welch_p
 from elevon.reproduce.nasa.features import FEATURES, PEAK, RECORD, RMS, UNITS, compared, features
 from elevon.reproduce.nasa.impact import GAP, gap_impacts, gap_traces, impact_checks
@@ -37,14 +38,19 @@ __all__ = ["FAULTS", "Seeded", "SeparationResult", "SeparationRow", "reproduce_s
 Array = npt.NDArray[np.float64]
 
 ACTUATOR = "nasa-ballscrew"
-SHAPES = ("trapezoidal", "sinusoidal", "triangular", "sweep")
+ROUNDED = ", rounded"
+SHAPES = (
+    "trapezoidal", "trapezoidal" + ROUNDED, "sinusoidal",
+    "triangular", "triangular" + ROUNDED, "sweep",
+)  # fmt: skip
+"""The paper's profiles, which have sharp corners, and the two with corners at `ACCELERATION`."""
 LOADS = (0.0, 500.0, 4500.0, 8500.0)
 """N of the stand (N 2.4), as forces that oppose motion of either direction."""
 HALF_LOAD = 4500.0
 """Load at which half the severity is run, too."""
-DURATION = 6.0
+DURATION = 5.0
 """Time of every run [s]: every profile has the same time to show a fault."""
-SOLVER = {"solver.step": 5e-6}
+SOLVER = {"solver.step": 6.25e-6}
 FAMILY = 0.05
 """Probability that any interval of a whole table misses."""
 SPLITS = 400
@@ -71,8 +77,8 @@ def reproduce_separation(
     faults: Sequence[Seeded] = FAULTS,
     shapes: Sequence[str] = SHAPES,
     loads: Sequence[float] = LOADS,
-    reassemblies: int = 24,
-    healthy: int = 160,
+    reassemblies: int = 16,
+    healthy: int = 240,
     seed: int = 0,
     folder: Path | None = None,
     progress: Progress | None = None,
@@ -133,6 +139,11 @@ def reproduce_separation(
                             traces, meta)  # fmt: skip
 
 
+def _profile(shape: str) -> Profile:
+    name, rounded, _ = shape.partition(ROUNDED)
+    return Profile(name, 0.05, 0.06, DURATION, ACCELERATION if rounded else 0.0)
+
+
 def _provenance(actuator: Actuator) -> dict[str, Any]:
     import elevon
 
@@ -164,8 +175,7 @@ def _cell(
     from elevon.simulate import Run
 
     shape, load = case
-    profile = Profile(shape, 0.05, 0.06, DURATION)
-    plain = Scenario.from_dict(profile_scenario(profile, opposing=load))
+    plain = Scenario.from_dict(profile_scenario(_profile(shape), opposing=load))
     conditions = _conditions(faults, load)
     runs = [
         Run(unit, plain.with_faults(texts) if texts else plain, seed + index,

@@ -72,6 +72,7 @@ class ThermalResult:
             "status": "pass" if all_passed(self.checks) else "fail",
             "rows": rows,
             "fit": [row.to_dict() for row in self.fit.rows] if self.fit else [],
+            "fit_parameter_hash": self.fit.parameter_hash if self.fit else None,
             "checks": [check.to_dict() for check in self.checks],
             "note": "parameters ASSUMED within insulation classes; no published temperature to "
             "compare with",
@@ -106,7 +107,7 @@ def reproduce_thermal(*, seed: int = 0, progress: Progress | None = None) -> The
     for index, model in enumerate(("dynamic", "quasi_static")):
         span = (0.25 + 0.05 * index, 0.3 + 0.05 * index)
         checks.append(_closed_form_check(actuator, model, seed, part(progress, *span)))
-    fit = fit_dema(actuator, seed, part(progress, 0.35, 1.0))
+    fit = fit_dema(seed, part(progress, 0.35, 1.0))
     checks += [_energy_check(hour), *_trend_checks(hour), *fit.checks]
     time = hour["winding_temperature"].time
     rows = np.searchsorted(time, np.arange(0.0, HOUR + 1e-6, ROW_TIME))
