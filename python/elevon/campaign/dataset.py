@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from elevon.campaign.folder import work_log
 from elevon.campaign.store import RUNS, Manifest, read_manifest, read_resolved
 from elevon.errors import FormatError, InputError, unknown
-from elevon.worklog import Item
+from elevon.worklog import Item, digest
 
 if TYPE_CHECKING:
     import duckdb
@@ -28,31 +30,74 @@ __all__ = ["Dataset", "Table", "load_campaign", "load_run"]
 
 
 @dataclass(frozen=True)
+class Part:
+    """One file of a table: the runs it holds, and what it must be (size, SHA-256) if known."""
+
+    path: Path
+    first: int
+    last: int
+    about: Mapping[str, Any] | None
+
+    def check(self) -> None:
+        """Raise `FormatError` unless the file is as it was written."""
+        try:
+            stat = self.path.stat()
+        except OSError as error:
+            raise FormatError(f"{self.path}: cannot be read: {error.strerror}") from error
+        if self.about is not None and _mark(self.path, stat.st_mtime_ns) != self.about["sha256"]:
+            raise FormatError(f"{self.path}: is not as it was written (SHA-256)")
+
+
+@lru_cache(maxsize=4096)
+def _mark(path: Path, stamp: int) -> str:  # noqa: ARG001 - a changed file is read anew
+    return str(digest(path)["sha256"])
+
+
+@dataclass(frozen=True)
 class Table:
     """One table of a data set, in one or several Parquet files; nothing is read before it is asked.
+
+    What this class reads into memory is compared with the SHA-256 of its files first. The lazy
+    tables of polars and DuckDB read the files themselves; ``elevon dataset verify`` checks them.
 
     Attributes
     ----------
     path : str
         A file, or a pattern that names all files: for ``pandas.read_parquet``, ``polars`` or a
         query of DuckDB.
-    files : list of Path
-        The files.
+    parts : list of Part
+        Its files.
     clock : str
         Whose samples these are; empty for tables without time.
     """
 
     path: str
-    files: Sequence[Path]
+    parts: Sequence[Part]
     clock: str = ""
 
-    def dataset(self) -> pyarrow.dataset.Dataset:
-        """Return the files as an Arrow data set; damaged pages are errors when they are read."""
+    @property
+    def files(self) -> list[Path]:
+        """The files, in the order of their runs."""
+        return [part.path for part in self.parts]
+
+    def dataset(self, parts: Sequence[Part] | None = None) -> pyarrow.dataset.Dataset:
+        """Return the files (or some of them) as an Arrow data set.
+
+        Raises
+        ------
+        FormatError
+            A file cannot be read. Damaged pages are errors when they are read.
+        """
+        import pyarrow as pa
         import pyarrow.dataset as ds
 
         options = ds.ParquetFragmentScanOptions(page_checksum_verification=True)
         kind = ds.ParquetFileFormat(default_fragment_scan_options=options)
-        return ds.dataset([str(path) for path in self.files], format=kind)
+        names = [str(part.path) for part in (self.parts if parts is None else parts)]
+        try:
+            return ds.dataset(names, format=kind)
+        except (OSError, pa.ArrowException) as error:
+            raise FormatError(f"{self.path}: cannot be read: {error}") from error
 
     @property
     def schema(self) -> pa.Schema:
@@ -86,16 +131,20 @@ class Table:
         UnknownNameError
             No such column.
         FormatError
-            A page is not as it was written.
+            A file is not as it was written.
         """
         import pyarrow as pa
         import pyarrow.dataset as ds
 
-        data = self.dataset()
+        numbers = None if runs is None else [int(number) for number in runs]
+        parts = self._of(numbers)
+        for part in parts:
+            part.check()
+        data = self.dataset(parts or self.parts[:1])
         for name in columns or ():
             if name not in data.schema.names:
                 raise unknown("column", name, data.schema.names, self.path)
-        wanted = None if runs is None else ds.field("run").isin([int(n) for n in runs])
+        wanted = None if numbers is None else ds.field("run").isin(numbers)
         try:
             kept: pa.Table = data.to_table(
                 columns=None if columns is None else list(columns), filter=wanted
@@ -142,6 +191,17 @@ class Table:
                 whole[name].attrs["units"] = unit
         return whole
 
+    def _of(self, runs: Sequence[int] | None) -> Sequence[Part]:
+        """Return the files that hold some runs."""
+        if runs is None:
+            return self.parts
+        wanted = sorted(runs)
+        return [
+            part
+            for part in self.parts
+            if bisect_left(wanted, part.first) < bisect_right(wanted, part.last)
+        ]
+
 
 @dataclass(frozen=True)
 class Dataset:
@@ -167,7 +227,9 @@ class Dataset:
     @property
     def runs(self) -> Table:
         """One row a run: unit, split, seed, status, reason, faults and other drawn values."""
-        return Table(str(self.folder / RUNS), [self.folder / RUNS])
+        path = self.folder / RUNS
+        about = None if self.manifest.status == "running" else self.manifest.files.get(RUNS)
+        return Table(str(path), [Part(path, 0, len(self) - 1, about)])
 
     @property
     def signals(self) -> Table:
@@ -226,12 +288,15 @@ class Dataset:
         return recorded(self, number)
 
     def _table(self, place: str, clock: str) -> Table:
-        names = [name for item in self.items for name in item.files if name.startswith(place + "/")]
-        if not names:
+        parts = [
+            Part(self.folder / name, item.data["first"], item.data["last"], about)
+            for item in self.items
+            for name, about in item.files.items()
+            if name.startswith(f"{place}/")
+        ]
+        if not parts:
             raise InputError(f"{self.folder}: holds no {place}")
-        return Table(
-            str(self.folder / place / "*.parquet"), [self.folder / name for name in names], clock
-        )
+        return Table(str(self.folder / place / "*.parquet"), parts, clock)
 
 
 def load_campaign(folder: str | os.PathLike[str]) -> Dataset:

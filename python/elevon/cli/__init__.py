@@ -23,7 +23,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 success, 1 a run or a check failed, 2 bad usage or input, 130 interrupted.
+        0 success, 1 a run or a check failed, 2 bad usage or input, 130 interrupted, 143 terminated.
     """
     from elevon.cli import interrupt
 
@@ -39,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stderr.write(
                 "elevon: interrupted; nothing was written; give the command again to start over\n"
             )
-            code = interrupt.INTERRUPTED
-        if argv is None and code == interrupt.INTERRUPTED:
-            interrupt.leave()
+            code = interrupt.code()
+        if argv is None and code in (interrupt.INTERRUPTED, interrupt.TERMINATED):
+            interrupt.leave(code)
         return code

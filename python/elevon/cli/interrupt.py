@@ -1,4 +1,4 @@
-"""Ctrl-C: noticed wherever it falls, told once.
+"""Ctrl-C, and SIGTERM alike: noticed wherever it falls, told once.
 
 Python raises `KeyboardInterrupt` between any two instructions, also where an exception is lost: in
 a finaliser, in a weak reference's callback, in a library's start-up. So the signal is noted;
@@ -20,7 +20,9 @@ from typing import Any, NoReturn
 
 __all__ = [
     "INTERRUPTED",
+    "TERMINATED",
     "check",
+    "code",
     "drop_output",
     "ignore",
     "leave",
@@ -30,8 +32,8 @@ __all__ = [
     "watched",
 ]
 
-INTERRUPTED = 130
-"""Exit code."""
+INTERRUPTED, TERMINATED = 130, 143
+"""Exit codes after Ctrl-C and after SIGTERM, with which schedulers and shutdowns end a process."""
 _LATER = 0.02  # s after which a lost exception is raised again: out of the place that lost it
 
 
@@ -40,8 +42,10 @@ class _Watch:
     """What is known of the command that runs."""
 
     installed: bool = False
+    terminable: bool = False
     owner: bool = False
     noticed: bool = False
+    code: int = INTERRUPTED
     closed: bool = False
     story: str = ""
     hook: Callable[[Any], Any] = sys.unraisablehook
@@ -49,6 +53,8 @@ class _Watch:
     def note(self, number: int, frame: FrameType | None) -> None:  # noqa: ARG002 - signal's form
         """Remember, and stop the work."""
         self.noticed = True
+        if number == signal.SIGTERM:
+            self.code = TERMINATED
         raise KeyboardInterrupt
 
     def lost(self, report: Any) -> None:
@@ -64,9 +70,12 @@ class _Watch:
             signal.raise_signal(signal.SIGINT)
 
     def close(self, action: Any) -> None:
-        """Let Ctrl-C do something else from now on."""
+        """Let Ctrl-C do something else from now on, and SIGTERM with it."""
         self.closed = True
         signal.signal(signal.SIGINT, action)
+        if self.terminable:
+            usual = signal.SIG_IGN if action is signal.SIG_IGN else signal.SIG_DFL
+            signal.signal(signal.SIGTERM, usual)
 
 
 _watch = _Watch()
@@ -89,6 +98,9 @@ def watched(*, owner: bool) -> Iterator[None]:
         with suppress(ValueError):  # not the main thread: signals do not come here
             signal.signal(signal.SIGINT, _watch.note)
             _watch.installed = True
+            if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
+                signal.signal(signal.SIGTERM, _watch.note)
+                _watch.terminable = True
             _watch.hook, sys.unraisablehook = sys.unraisablehook, _watch.lost
     try:
         yield
@@ -102,6 +114,11 @@ def watched(*, owner: bool) -> Iterator[None]:
 def noticed() -> bool:
     """Whether Ctrl-C was pressed since the command began."""
     return _watch.noticed
+
+
+def code() -> int:
+    """Return the exit code of a command that was interrupted: 130, after SIGTERM 143."""
+    return _watch.code
 
 
 def check() -> None:
@@ -149,8 +166,8 @@ def drop_output() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def leave() -> NoReturn:
-    """End an interrupted process with its exit code.
+def leave(status: int) -> NoReturn:
+    """End an interrupted process with an exit code.
 
     Where the exception has passed through `exec` (so dataclasses are made), Python started with
     ``-m`` would end the process by the signal instead, although the exception was caught.
@@ -162,4 +179,4 @@ def leave() -> NoReturn:
         with suppress(OSError, ValueError):
             stream.flush()
     atexit._run_exitfuncs()
-    os._exit(INTERRUPTED)
+    os._exit(status)

@@ -153,7 +153,7 @@ def _warnings_in_words() -> Iterator[None]:
 def _interrupted(written: Sequence[Path]) -> int:
     interrupt.ignore()
     interrupt.drop_output()
-    return _fail(f"interrupted; {interrupt.story() or _kept(written)}", interrupt.INTERRUPTED)
+    return _fail(f"interrupted; {interrupt.story() or _kept(written)}", interrupt.code())
 
 
 def _kept(written: Sequence[Path], most: int = 4) -> str:
