@@ -90,19 +90,19 @@ pub fn electrical() -> Vec<FaultKind> {
         FaultKind {
             kind: "short", unit: "1", range: Range::Between(0.0, 0.95), attributes: CONTACT,
             places: places!("motor.phase_a": "motor.turns_a" Lose, "motor.phase_b": "motor.turns_b" Lose, "motor.phase_c": "motor.turns_c" Lose),
-            effect: "fraction of the turns of a phase shorted: R ~ N, L ~ N^2, k ~ N; ripple at twice the electrical frequency. With motor.short_model = loop the turns are there, carry a current of their own, brake and heat",
+            effect: "fraction of the turns of a phase shorted: R ~ N, L ~ N^2, k ~ N; ripple at twice the electrical frequency; with motor.short_model = loop the turns are there, carry a current of their own, brake and heat",
             source: "T2 (fault coefficients N_j), N 5.2",
         },
         FaultKind {
             kind: "eccentricity_static", unit: "1", range: Range::Between(0.0, 0.9), attributes: PHASE,
             places: places!("motor": "motor.eccentricity_static" Add),
-            effect: "k_j (1 + zeta cos(theta_e - phi + 2 pi (j-1)/3)); torque ripple at the electrical frequency",
+            effect: "fraction of the air gap by which the rotor stands out of centre, at rest: k_j (1 + zeta cos(theta_e - phi + 2 pi (j-1)/3)), torque ripple at the electrical frequency",
             source: "T2 (eccentricity coefficient zeta, phi)",
         },
         FaultKind {
             kind: "eccentricity_dynamic", unit: "1", range: Range::Between(0.0, 0.9), attributes: PHASE_DYNAMIC,
             places: places!("motor": "motor.eccentricity_dynamic" Add),
-            effect: "fraction of the air gap; the modulation turns with the shaft (law ASSUMED: the paper names the fault only)",
+            effect: "fraction of the air gap by which the rotor stands out of centre, turning with the shaft: the modulation of k_j turns, too (law ASSUMED: the paper names the fault only)",
             source: "N 4.4 and 5.1",
         },
         FaultKind {
