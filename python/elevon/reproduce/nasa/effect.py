@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Comparison", "Effect", "EffectScale", "compare_profiles", "welch_p"]
+__all__ = ["POWER", "Comparison", "Effect", "EffectScale", "compare_profiles", "null_p"]
 
 Array = npt.NDArray[np.float64]
 
@@ -50,8 +50,9 @@ class EffectScale:
     """Glass's effect size: the mean's change over the healthy standard deviation.
 
     The interval is that of the generalised pivots (Weerahandi 1993): both means and the healthy
-    deviation vary as normal samples of these sizes make them, with unequal deviations. The
-    point estimate has Hedges' correction for the small sample of the deviation.
+    deviation vary as normal samples of these sizes make them, with unequal deviations. A small
+    group may miss the tail of its population: its deviation counts as no less than the healthy
+    one. The point estimate has Hedges' correction for the small sample of the deviation.
 
     Parameters
     ----------
@@ -83,17 +84,27 @@ class EffectScale:
         moved = float(np.mean(faulty) - np.mean(healthy))
         if deviation == 0.0:
             return Effect(float("nan"), float("nan"), float("nan"))
-        change = (moved - own * self._faulty) / (deviation * self._deviation)
+        change = (moved - max(own, deviation) * self._faulty) / (deviation * self._deviation)
         ends = 0.5 * (1.0 - self._level), 0.5 * (1.0 + self._level)
         low, high = np.quantile(change - self._healthy, ends)
         return Effect(self._correction * moved / deviation, float(low), float(high))
 
 
-def welch_p(healthy: Array, faulty: Array) -> Array:
-    """Return the probability that equal means differ so much, along the first axis (Welch's t)."""
-    from scipy.stats import ttest_ind
+def null_p(healthy: Array, faulty: Array) -> Array:
+    """Return the probability that equal means differ so much, along the first axis.
 
-    return np.asarray(ttest_ind(healthy, faulty, axis=0, equal_var=False).pvalue)
+    Welch's t, with the deviation of the second, small group no less than that of the first, as
+    in `EffectScale`.
+    """
+    from scipy.stats import t
+
+    large, small = len(healthy), len(faulty)
+    variance = np.var(healthy, axis=0, ddof=1)
+    own = np.maximum(np.var(faulty, axis=0, ddof=1), variance) / small
+    other = variance / large
+    freedom = (own + other) ** 2 / (own**2 / (small - 1) + other**2 / (large - 1))
+    moved = np.abs(np.mean(healthy, axis=0) - np.mean(faulty, axis=0))
+    return np.asarray(2.0 * t.sf(moved / np.sqrt(own + other), freedom))
 
 
 @dataclass(frozen=True, slots=True)

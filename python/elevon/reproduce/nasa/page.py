@@ -64,7 +64,8 @@ def _thermal(result: ThermalResult, date: str | None) -> Report:
             "The fit's procedure on a bench with hidden values",
             "The paper fits its network to an hour on a smaller stand (surface within 0.84 K, "
             "0.42 K rms) and prints neither temperatures nor parameters. Here a bench with hidden "
-            "values is measured in the same way (surface and nut, averaged over 1 s) and fitted.",
+            "values about the set nasa-dema is measured in the same way (surface and nut, averaged "
+            "over 1 s) and fitted; the load changes every quarter of an hour.",
         )
         section.figure(_fit_figure(result.fit), "Surface and nut as measured and as fitted.")
         section.table(Table(["Parameter, SI", "Put in", "Recovered", "from", "to"], rows, digits=4))

@@ -75,18 +75,25 @@ def _winners_table(result: SeparationResult) -> Table:
         else:
             verdict = winner or "none named"
         rows.append(
-            [fault, f"{load:.0f}", largest.feature, verdict, f"{abs(largest.effect.size):.3g}",
-             f"{100 * largest.power:.0f} %",
-             "" if largest.draws is None else f"{largest.draws:d}"]
+            [fault, f"{load:.0f}", largest.feature.replace("current reference", "current"),
+             verdict, f"{abs(largest.effect.size):.3g}", f"{100 * largest.power:.0f} %",
+             _draws(largest, verdict)]
         )  # fmt: skip
     columns = ["Fault", "Load [N]", "Feature", "Best profile", "Largest effect", "Power",
                "Draws that would name one"]  # fmt: skip
     return Table(
         columns, rows,
+        "Features: lines and rms of the current reference, peak of the load cell. "
         "Power: probability that the intervals of the two largest effects part in another such "
         f"experiment, were they as estimated; named from {100 * POWER:.0f} % on. Draws: of each "
         "fault, with as many times more healthy units.",
     )  # fmt: skip
+
+
+def _draws(row: SeparationRow, verdict: str) -> str:
+    if row.draws is not None:
+        return f"{row.draws:d}"
+    return "over 1e9" if verdict == "none named" else ""
 
 
 def _effects_figure(result: SeparationResult) -> Figure:

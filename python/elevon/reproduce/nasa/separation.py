@@ -20,7 +20,7 @@ import numpy.typing as npt
 from elevon.progress import part
 from elevon.report.checks import Check
 from elevon.reproduce.nasa.corners import ACCELERATION
-from elevon.reproduce.nasa.effect import Comparison, Effect, EffectScale, compare_profiles, welch_p
+from elevon.reproduce.nasa.effect import Comparison, Effect, EffectScale, compare_profiles, null_p
 from elevon.reproduce.nasa.features import FEATURES, PEAK, RECORD, RMS, UNITS, compared, features
 from elevon.reproduce.nasa.impact import GAP, gap_impacts, gap_traces, impact_checks
 from elevon.reproduce.nasa.population import draw_units
@@ -274,7 +274,7 @@ def _null(
     above = []
     for _ in range(SPLITS):
         order = rng.permutation(pool.shape[0])
-        p = welch_p(pool[order[group:]], pool[order[:group]])
+        p = null_p(pool[order[group:]], pool[order[:group]])
         above.append(p < 1.0 - level)
     exceeded = np.array(above)
     return float(exceeded.mean()), float(exceeded.any(axis=1).mean())
