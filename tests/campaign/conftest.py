@@ -18,22 +18,27 @@ kind = "sine"
 amplitude = "7 deg"
 frequency = "2 Hz"
 {terms}
+{vary}
+{tail}
+"""
+
+VARY = """
 [[vary]]
 parameter = "friction.dynamic"
 from = "0.2 N m"
 to = "0.4 N m"
 count = {count}
-{tail}
 """
 
 
 @pytest.fixture
 def plan(tmp_path):
-    """Write a plan of `count` runs of 10 ms; `head` and `tail` are further lines."""
+    """Write a plan of `count` frictions (0: none), 10 ms each, with further lines."""
 
     def write(count=12, head="runs_per_file = 4", tail="", terms="", name="plan.toml"):
         path = tmp_path / name
-        path.write_text(PLAN.format(count=count, head=head, tail=tail, terms=terms))
+        vary = VARY.format(count=count) if count else ""
+        path.write_text(PLAN.format(vary=vary, head=head, tail=tail, terms=terms))
         return path
 
     return write
@@ -47,6 +52,7 @@ def cli(capsys):
         extra = ["--json"] if json_output else []
         code = main([str(item) for item in arguments] + extra)
         captured = capsys.readouterr()
-        return code, json.loads(captured.out) if captured.out else None, captured.err
+        told = json.loads(captured.out) if captured.out and json_output else captured.out
+        return code, told or None, captured.err
 
     return run

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.campaign.grammar import Axis, Draw, Random, Target
+from elevon.campaign.grammar import Axis, Draw, Growth, Random, Spread, Target
 from elevon.errors import InputError
 from elevon.faults import find_record
 from elevon.parameters.records import record_of
@@ -22,6 +22,7 @@ _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\
 
 Floats = npt.NDArray[np.float64]
 Values = npt.NDArray[Any]
+Ranged = Axis | Draw | Spread | Growth
 
 
 @dataclass(frozen=True)
@@ -146,7 +147,7 @@ def sample(method: str, shape: tuple[int, int], seed: int, repeats: int, place: 
 
 
 def ranged(
-    target: Axis | Draw, fractions: Sequence[float] | Floats, wiring: str, place: str
+    target: Ranged, fractions: Sequence[float] | Floats, wiring: str, place: str
 ) -> tuple[str, Values]:
     """Return unit and SI values at fractions (0 to 1) of a target's range, shape (n,)."""
     low, written = _split(target.start, place)
@@ -156,10 +157,11 @@ def ranged(
             f"{place}: 'from' is in {written or 'no unit'!r} and 'to' in {other or 'no unit'!r}; "
             "write both in one unit"
         )
-    if target.spacing == "log" and (low <= 0.0 or high <= 0.0):
+    spacing = getattr(target, "spacing", "linear")
+    if spacing == "log" and (low <= 0.0 or high <= 0.0):
         raise InputError(f"{place}: a logarithmic range must stay above zero ({low:g} to {high:g})")
     u = np.asarray(fractions, dtype=np.float64)
-    if target.spacing == "log":
+    if spacing == "log":
         numbers = np.exp(np.log(low) + u * (np.log(high) - np.log(low)))
     else:
         numbers = low + u * (high - low)

@@ -63,7 +63,7 @@ class Embedder:
         if isinstance(item, Fault):
             return item.to_dict()
         if isinstance(item, str):
-            found = _FILE.sub(lambda m: m[1] + str(self._noted(m[2].strip())), item)
+            found = _FILE.sub(lambda m: m[1] + str(self.note(m[2].strip())), item)
             try:
                 return Fault.parse(found).to_dict()
             except InputError as error:
@@ -77,7 +77,7 @@ class Embedder:
         if isinstance(item, str) and _FILE.search(item):
             from elevon.faults import Profile
 
-            text = _FILE.sub(lambda m: m[1] + str(self._noted(m[2].strip())), item)
+            text = _FILE.sub(lambda m: m[1] + str(self.note(m[2].strip())), item)
             return Profile.parse(text).to_dict()
         return self._within(item, place)
 
@@ -90,7 +90,8 @@ class Embedder:
             return column
         return replace(column, profile=self.profile(column.profile, place))
 
-    def _noted(self, name: str) -> Path:
+    def note(self, name: str) -> Path:
+        """Note a file as a source, and return its path."""
         path = self.located(name)
         if path.is_file():
             self.sources[str(path)] = hashlib.sha256(path.read_bytes()).hexdigest()

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from elevon.actuator import Actuator
+from elevon.campaign.design import Points, design_points
 from elevon.campaign.draw import axis_values, column_of, random_values
 from elevon.campaign.embed import Embedder
-from elevon.campaign.grammar import Target
+from elevon.campaign.grammar import Axis, Target
 from elevon.campaign.plan import Plan
+from elevon.campaign.population import Units, units_of
 from elevon.campaign.resolved import Index, Resolved, Variant
 from elevon.campaign.split import dealt
 from elevon.documents import Document, read_toml, validated
@@ -24,13 +26,26 @@ from elevon.scenario import Scenario
 __all__ = ["resolve_plan"]
 
 
-@dataclass(frozen=True)
-class _Axis:
-    """One axis of the product of all combinations: its length, and values of its targets."""
+Quantity = tuple[Target, str, Any]
 
-    length: int
-    targets: Sequence[Target]
-    columns: Sequence[tuple[str, Any]]
+
+@dataclass(frozen=True)
+class _Parts:
+    """What a plan combines: units at their ages, cases, axes, draws or points, and seeds."""
+
+    units: Units | None
+    variants: list[Variant]
+    axes: list[tuple[Axis, str, Any]]
+    draws: list[tuple[str, Any]]
+    points: Points | None
+
+    def lengths(self, plan: Plan) -> list[int]:
+        """Return the length of each axis of the product."""
+        ages = 1 if self.units is None else len(self.units.unit)
+        drawn = 1 if plan.random is None else plan.random.count
+        drawn = drawn if self.points is None else len(self.points.draw)
+        grid = [len(values) for _, _, values in self.axes]
+        return [ages, len(self.variants), *grid, drawn, len(plan.seeds)]
 
 
 def resolve_plan(plan: Plan, document: Document) -> Resolved:
@@ -56,19 +71,13 @@ def resolve_plan(plan: Plan, document: Document) -> Resolved:
     files = Embedder(document.folder)
     actuator = _actuator(plan, document)
     base = _base_scenario(plan, actuator, document, files)
-    variants = _variants(plan, document, files)
-    axes = [_axis(axis, actuator.wiring, document, k) for k, axis in enumerate(plan.vary)]
-    draws = _draws(plan, actuator.wiring, document)
-    lengths = [len(variants), *(axis.length for axis in axes), draws.length, len(plan.seeds)]
+    parts = _parts(plan, actuator, document, files)
+    lengths = parts.lengths(plan)
     if 0 in lengths:
         raise InputError(f"{document.place()}: the plan is empty: it holds no run")
-    _no_twins([t for axis in (*axes, draws) for t in axis.targets], base, document)
-    index = _index(lengths)
-    columns = [
-        files.column(column_of(target, unit, values[index[1 + position]]), document.place())
-        for position, axis in enumerate([*axes, draws])
-        for target, (unit, values) in zip(axis.targets, axis.columns, strict=True)
-    ]
+    places = [axis.reshape(-1) for axis in np.indices(lengths, dtype=np.int64)]
+    quantities = list(_quantities(plan, parts, places, lengths))
+    _no_twins([target for target, _, _ in quantities], base, document)
     return Resolved(
         name=plan.name,
         text=plan.text,
@@ -76,15 +85,87 @@ def resolve_plan(plan: Plan, document: Document) -> Resolved:
         fidelity=plan.fidelity,
         record=plan.record if plan.record is None else _texts(plan.record),
         scenario=base,
-        variants=variants,
-        columns=columns,
-        index=_labels(plan, index, document),
+        variants=parts.variants,
+        columns=[files.column(column_of(*item), document.place()) for item in quantities],
+        index=_index(plan, parts, places, lengths, document),
         responses=list(plan.responses),
         allow_not_acting=plan.allow_not_acting,
         runs_per_file=plan.runs_per_file,
         files=files.points,
         sources=files.sources,
+        design={} if parts.points is None else parts.points.about,
     )
+
+
+def _parts(plan: Plan, actuator: Actuator, document: Document, files: Embedder) -> _Parts:
+    wiring = actuator.wiring
+    units = None
+    if plan.population is not None:
+        units = units_of(plan.population, actuator, document.place(("population",)))
+    axes = [
+        (axis, *axis_values(axis, wiring, document.place(("vary", k))))
+        for k, axis in enumerate(plan.vary)
+    ]
+    draws: list[tuple[str, Any]] = []
+    if plan.random is not None:
+        # With a population every unit has draws of its own at every age.
+        repeats = 1 if units is None else len(units.unit)
+        draws = random_values(plan.random, repeats, wiring, document.place(("random",)))
+    points = None
+    if plan.design is not None:
+        place = document.place(("design",))
+        points = design_points(plan.design, wiring, document.folder, place)
+        if plan.design.file is not None:
+            files.note(plan.design.file)
+    return _Parts(units, _variants(plan, document, files), axes, draws, points)
+
+
+def _quantities(
+    plan: Plan, parts: _Parts, places: Sequence[Any], lengths: Sequence[int]
+) -> Iterator[Quantity]:
+    """Yield every varied quantity with its unit and its value in each run."""
+    ages, drawn = places[0], places[-2]
+    if parts.units is not None:
+        for target, (unit, values) in zip(parts.units.targets, parts.units.columns, strict=True):
+            yield target, unit, values[ages]
+    for position, (axis, unit, values) in enumerate(parts.axes):
+        yield axis, unit, values[places[2 + position]]
+    if plan.random is not None:
+        for draw, (unit, values) in zip(plan.random.draw, parts.draws, strict=True):
+            yield draw, unit, values[ages * lengths[-2] + drawn]
+    if parts.points is not None:
+        for target, (unit, values) in zip(parts.points.targets, parts.points.columns, strict=True):
+            yield target, unit, values[drawn]
+
+
+def _index(
+    plan: Plan,
+    parts: _Parts,
+    places: Sequence[Any],
+    lengths: Sequence[int],
+    document: Document,
+) -> Index:
+    """Return what each run is: unit, age, case, draw, block, replicate, seed, part of the data."""
+    ages, drawn, count = places[0], places[-2], len(places[0])
+    units, points = parts.units, parts.points
+    none = np.zeros(count, dtype=np.int64)
+    if points is not None:
+        draw = ages * (int(points.draw.max()) + 1) + points.draw[drawn]
+    elif plan.random is not None:
+        draw = ages * lengths[-2] + drawn
+    else:
+        draw = _distinct(places[:-1])
+    index = Index(
+        unit=none - 1 if units is None else units.unit[ages],
+        age=np.full(count, np.nan) if units is None else units.age[ages],
+        variant=places[1],
+        draw=draw,
+        block=none if points is None else points.block[drawn],
+        replicate=none if points is None else points.replicate[drawn],
+        seed=np.array(plan.seeds, dtype=np.int64)[places[-1]],
+        split=np.full(count, "", dtype=object),
+    )
+    return _split(index, plan, document) if plan.split else index
 
 
 def _texts(record: str | Sequence[str]) -> list[str]:
@@ -134,19 +215,6 @@ def _variants(plan: Plan, document: Document, files: Embedder) -> list[Variant]:
     return variants
 
 
-def _axis(axis: Any, wiring: str, document: Document, index: int) -> _Axis:
-    unit, values = axis_values(axis, wiring, document.place(("vary", index)))
-    return _Axis(len(values), [axis], [(unit, values)])
-
-
-def _draws(plan: Plan, wiring: str, document: Document) -> _Axis:
-    if plan.random is None:
-        return _Axis(1, [], [])
-    place = document.place(("random",))
-    columns = random_values(plan.random, 1, wiring, place)
-    return _Axis(plan.random.count, plan.random.draw, columns)
-
-
 def _no_twins(targets: Sequence[Target], base: dict[str, Any], document: Document) -> None:
     seen: set[str] = set()
     for target in targets:
@@ -158,29 +226,6 @@ def _no_twins(targets: Sequence[Target], base: dict[str, Any], document: Documen
                 "'parameters' too"
             )
         seen.add(target.name)
-
-
-def _index(lengths: Sequence[int]) -> list[Any]:
-    """Return for each axis of the product which of its values each run has."""
-    grid = np.indices(lengths, dtype=np.int64)
-    return [axis.reshape(-1) for axis in grid]
-
-
-def _labels(plan: Plan, index: list[Any], document: Document) -> Index:
-    count = len(index[0])
-    draw = index[-2] if plan.random is not None else _distinct(index[:-1])
-    none = np.full(count, -1, dtype=np.int64)
-    labels = Index(
-        unit=none,
-        age=np.full(count, np.nan),
-        variant=index[0],
-        draw=draw,
-        block=np.zeros(count, dtype=np.int64),
-        replicate=np.zeros(count, dtype=np.int64),
-        seed=np.array(plan.seeds, dtype=np.int64)[index[-1]],
-        split=np.full(count, "", dtype=object),
-    )
-    return _split(labels, plan, document) if plan.split else labels
 
 
 def _split(labels: Index, plan: Plan, document: Document) -> Index:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -63,7 +64,31 @@ def plan(
     typer.echo(f"{resolved.name}: {need}")
     rows = [[c.name, c.kind, c.role, c.unit, _range(c)] for c in resolved.columns]
     print_table(["varied", "kind", "role", "unit", "values"], rows)
+    for line in _design_lines(resolved.design):
+        typer.echo(line)
+    for part, count in _counted(resolved.index.split).items():
+        typer.echo(f"split {part}: {count} runs")
+    for text in checked.idle:
+        typer.echo(f"does not act: {text}")
     return 0
+
+
+def _design_lines(design: dict[str, Any]) -> Iterator[str]:
+    """Yield what a design cannot tell apart, and its power."""
+    if "resolution" in design:
+        generators = ", ".join(design.get("generators", []))
+        yield f"resolution {design['resolution']}" + (
+            f"; generators {generators}; I = {' = '.join(design['defining_words'])}"
+            if generators
+            else ""
+        )
+    for effect, others in design.get("aliases", {}).items():
+        yield f"{effect} is aliased with {', '.join(others)}"
+    if words := design.get("block_words"):
+        yield f"blocks are confounded with {', '.join(words)}"
+    for row in design.get("power", []):
+        power = row["note"] if row["power"] is None else f"{row['power']:.3f} ({row['df']} df)"
+        yield f"power of {row['term']}: {power}"
 
 
 @app.command()
