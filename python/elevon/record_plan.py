@@ -9,7 +9,15 @@ from dataclasses import dataclass
 from elevon.errors import InputError, unknown
 from elevon.units import parse_quantity
 
-__all__ = ["DEFAULT_RECORD", "GROUPS", "MOST_STEPS", "ClockPlan", "clock_name", "record_plan"]
+__all__ = [
+    "DEFAULT_RECORD",
+    "GROUPS",
+    "MOST_STEPS",
+    "ClockPlan",
+    "clock_name",
+    "period_of",
+    "record_plan",
+]
 
 #: Solver steps are counted in whole numbers that a double holds exactly.
 MOST_STEPS = 9.0e15
@@ -170,7 +178,7 @@ def _read(text: str, units: Mapping[str, str], step: float) -> tuple[list[str], 
     chosen: list[str] = []
     for name in (part.strip() for part in wanted.split(",")):
         chosen.extend(item for item in _expand(name, units) if item not in chosen)
-    return chosen, _period(rate.strip(), step)
+    return chosen, period_of(rate.strip(), step)
 
 
 def _expand(name: str, units: Mapping[str, str]) -> list[str]:
@@ -183,15 +191,22 @@ def _expand(name: str, units: Mapping[str, str]) -> list[str]:
     raise unknown("signal", name, [*units, *GROUPS, _ALL], "record")
 
 
-def _period(rate: str, step: float) -> int:
+def period_of(rate: str, step: float, place: str = "record") -> int:
+    """Return the solver steps (of `step` s) between two samples of a rate such as ``400 Hz``.
+
+    Raises
+    ------
+    InputError
+        The rate is no whole number of steps; the nearest possible rates are named.
+    """
     if rate == _EVERY:
         return 1
-    hertz = parse_quantity(rate, "Hz", "record")
+    hertz = parse_quantity(rate, "Hz", place)
     if hertz <= 0.0:
-        raise InputError(f"record: the rate {rate} must be positive")
+        raise InputError(f"{place}: the rate {rate} must be positive")
     slowest = 1.0 / (MOST_STEPS * step)
     if hertz < slowest:
-        raise InputError(f"record: the rate {rate} is too low; at least {slowest:.3g} Hz")
+        raise InputError(f"{place}: the rate {rate} is too low; at least {slowest:.3g} Hz")
     exact = 1.0 / (hertz * step)
     period = max(round(exact), 1)
     if abs(exact - period) <= 1e-9 * exact:
@@ -199,6 +214,6 @@ def _period(rate: str, step: float) -> int:
     low, high = max(math.floor(exact), 1), max(math.ceil(exact), 1)
     near = " or ".join(f"{1.0 / (n * step):.9g} Hz" for n in dict.fromkeys((high, low)))
     raise InputError(
-        f"record: {rate} is no whole number of solver steps of {step:g} s "
+        f"{place}: {rate} is no whole number of solver steps of {step:g} s "
         f"({exact:.6g} of them); nearest: {near}"
     )

@@ -19,6 +19,7 @@ ROWS = [
     ["actuator", "faults", "waveforms"],
     ["scenario", "diagram"],
     ["record_plan"],
+    ["features"],
     ["logs"],
     ["simulate"],
     ["bench", "campaign", "calibrate", "compare"],

@@ -135,6 +135,65 @@ def waveforms(*, json: JsonOption = False) -> None:
     print_table(("kind", "parameters", "text"), table)
 
 
+@app.command()
+def features(
+    actuator: Annotated[
+        str | None,
+        typer.Argument(metavar="[ACTUATOR]", help="Only what this actuator's signals allow."),
+    ] = None,
+    *,
+    fidelity: FidelityOption = "high",
+    json: JsonOption = False,
+) -> None:
+    """List the features of a motion: unit, roles they need, definition.
+
+    With an actuator: only those it has, with their units and the signals that serve.
+    """
+    from elevon.features import feature_records
+
+    if actuator is not None:
+        rows = _own_features(actuator, fidelity)
+    else:
+        rows = [
+            {
+                "name": record.name,
+                "unit": record.unit,
+                "family": record.family,
+                "roles": list(record.roles),
+                "minimum_rate": record.minimum_rate,
+                "text": record.text,
+            }
+            for record in feature_records().values()
+        ]
+    last = "roles" if actuator is None else "signals"
+    _print("features", rows, json, ("name", "unit", "family", last, "text"))
+
+
+def _own_features(reference: str, fidelity: str) -> list[dict[str, Any]]:
+    from elevon.actuator import Actuator
+    from elevon.features import assign_roles, comparable, feature_records
+    from elevon.scenario.compile import signal_units
+    from elevon.simulate import check_fidelity
+
+    wiring = Actuator.load(reference).wiring
+    check_fidelity(wiring, fidelity)
+    units = {name: unit or "1" for name, unit in signal_units(wiring, fidelity).items()}
+    roles = comparable(assign_roles(units), units)
+    by_role = {role: units[name] for role, name in roles.items()}
+    return [
+        {
+            "name": record.name,
+            "unit": record.unit_of(by_role),
+            "family": record.family,
+            "signals": [roles[role] for role in record.roles],
+            "minimum_rate": record.minimum_rate,
+            "text": record.text,
+        }
+        for record in feature_records().values()
+        if roles.keys() >= set(record.roles)
+    ]
+
+
 def _needed(parameter: dict[str, Any]) -> str:
     return f"{parameter['name']}*" if parameter["default"] is None else str(parameter["name"])
 

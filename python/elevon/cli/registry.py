@@ -20,7 +20,9 @@ class Command:
 
 
 COMMANDS: dict[str, Command] = {
-    "list": Command("elevon.cli.list", "List actuators, signals, parameters, faults, waveforms."),
+    "list": Command(
+        "elevon.cli.list", "List actuators, signals, parameters, faults, waveforms, features."
+    ),
     "show": Command("elevon.cli.show", "Show an actuator: parameters, sources, block diagram."),
     "simulate": Command("elevon.cli.simulate", "Simulate one actuator and keep what it did."),
     "campaign": Command("elevon.cli.campaign", "Run plans of many labelled simulations."),
@@ -31,6 +33,7 @@ COMMANDS: dict[str, Command] = {
     "design": Command("elevon.cli.design", "Design experiments and parts."),
     "loads": Command("elevon.cli.loads", "Turn a recorded flight into an actuator's load."),
     "import": Command("elevon.cli.import_log", "Read bench and drive logs into recordings."),
+    "features": Command("elevon.cli.features", "Compute features of a recording or a log."),
     "calibrate": Command("elevon.cli.calibrate", "Fit an actuator's parameters to logs."),
     "validate": Command(
         "elevon.cli.validate", "Check an actuator against logs it was not fitted to."

@@ -12,7 +12,7 @@ from elevon.memory import check_memory
 from elevon.recording import Clock, Recording
 from elevon.scenario import Scenario
 from elevon.simulate.acting import report
-from elevon.simulate.prepare import Prepared, Record, Run, prepare, prepare_named
+from elevon.simulate.prepare import Features, Prepared, Record, Run, prepare, prepare_named
 from elevon.simulate.result import build_recording
 
 __all__ = [
@@ -33,6 +33,7 @@ def simulate(
     *,
     fidelity: str = "high",
     record: Record = None,
+    features: Features = None,
     seed: int = 0,
     number: int = 0,
     lanes: str = "auto",
@@ -50,7 +51,12 @@ def simulate(
     fidelity : str
         ``high`` or ``low``.
     record : str or sequence of str, optional
-        What is kept, such as ``"user_position,motor_speed@400 Hz"``; see `record_plan`.
+        What is kept, such as ``"user_position,motor_speed@400 Hz"``; see `record_plan`. Empty,
+        with `features`: nothing.
+    features : str or sequence of str, optional
+        Features computed while simulating, such as ``"all@400 Hz"``; see `elevon.features`. They
+        stand in ``meta["features"]`` (SI; None where the motion gives none) and their units in
+        ``meta["feature_units"]``.
     seed, number : int
         Keys of the random numbers.
     lanes : str
@@ -85,7 +91,7 @@ def simulate(
         The core doubts the values together.
     """
     run = Run(actuator, scenario, seed, number=number)
-    prepared = [prepare(run, fidelity, record)]
+    prepared = [prepare(run, fidelity, record, features)]
     report([prepared[0].doubts], strict=strict)
     recording = _simulated(
         [run], prepared, fidelity=fidelity, threads=1, lanes=lanes, progress=progress
@@ -104,6 +110,7 @@ def simulate_batch(
     *,
     fidelity: str = "high",
     record: Record = None,
+    features: Features = None,
     threads: int | None = None,
     lanes: str = "auto",
     strict: bool = False,
@@ -117,7 +124,7 @@ def simulate_batch(
     ----------
     runs : sequence of Run
         Any mix of actuators and scenarios.
-    fidelity, record, lanes, strict, progress
+    fidelity, record, features, lanes, strict, progress
         As for `simulate`; what does not act is said once, however many runs set it.
     threads : int, optional
         Default, and most: one a core.
@@ -138,7 +145,7 @@ def simulate_batch(
     if not runs:
         raise InputError("a batch needs at least one run")
     checked_threads(threads)
-    prepared = [prepare_named(run, fidelity, record, len(runs) > 1) for run in runs]
+    prepared = [prepare_named(run, fidelity, record, len(runs) > 1, features) for run in runs]
     report([item.doubts for item in prepared], strict=strict)
     return _simulated(
         runs, prepared, fidelity=fidelity, threads=threads, lanes=lanes, progress=progress
@@ -234,7 +241,7 @@ def _groups(prepared: Sequence[Prepared]) -> list[list[int]]:
     """Indices of the runs that can go to the core together: one wiring, one recording plan."""
     groups: dict[Any, list[int]] = {}
     for index, item in enumerate(prepared):
-        key = (item.actuator.wiring, item.step, tuple(item.plan))
+        key = (item.actuator.wiring, item.step, tuple(item.plan), item.features)
         groups.setdefault(key, []).append(index)
     return list(groups.values())
 
@@ -265,7 +272,10 @@ def _run_core(
             first.actuator.wiring,
             fidelity,
             [item.core for item in part],
-            [clock.to_core() for clock in first.plan],
+            [
+                *(clock.to_core() for clock in first.plan),
+                *(clock.to_core() for clock in first.features),
+            ],
             checked_threads(threads),
             lanes,
             progress,

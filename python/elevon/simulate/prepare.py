@@ -10,6 +10,7 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.errors import InputError, unknown
+from elevon.features import FeaturePlan, feature_plans
 from elevon.parameters import records
 from elevon.record_plan import MOST_STEPS, ClockPlan, record_plan
 from elevon.scenario import Scenario, compile_scenario
@@ -18,6 +19,7 @@ from elevon.simulate.acting import Doubt, check_values, not_acting
 from elevon.simulate.stroke import check_stroke
 
 __all__ = [
+    "Features",
     "Prepared",
     "Record",
     "Run",
@@ -28,6 +30,7 @@ __all__ = [
 ]
 
 Record = str | Sequence[str] | None
+Features = str | Sequence[str] | None
 
 
 @dataclass(frozen=True)
@@ -67,27 +70,38 @@ class Prepared:
     bytes: int
     command_unit: str
     doubts: tuple[Doubt, ...] = ()
+    features: tuple[FeaturePlan, ...] = ()
 
 
 #: A recording's own objects, whatever it holds (measured: 15 to 20 kB).
 _RUN_BYTES = 20_000
 
 
-def prepare_named(run: Run, fidelity: str, record: Record, named: bool) -> Prepared:
+def prepare_named(
+    run: Run, fidelity: str, record: Record, named: bool, features: Features = None
+) -> Prepared:
     """Prepare a run of a batch; its errors name it."""
     place = f"run {run.label or run.number}" if named else ""
     try:
-        return prepare(run, fidelity, record)
+        return prepare(run, fidelity, record, features)
     except InputError as error:
         if not place:
             raise
         raise InputError(f"{place}: {error}") from error
 
 
-def prepare(run: Run, fidelity: str, record: Record, *, doubts: bool = True) -> Prepared:
+def prepare(
+    run: Run,
+    fidelity: str,
+    record: Record,
+    features: Features = None,
+    *,
+    doubts: bool = True,
+) -> Prepared:
     """Check a run and bring it into the form the core takes.
 
-    Without `doubts` nobody asks what does not act: whoever prepares many runs alike asks once.
+    With `features`, `record` may be empty: no raw signals are kept. Without `doubts` nobody asks
+    what does not act: whoever prepares many runs alike asks once.
 
     Raises
     ------
@@ -104,7 +118,17 @@ def prepare(run: Run, fidelity: str, record: Record, *, doubts: bool = True) -> 
     compiled = compile_scenario(run.scenario, actuator.wiring, fidelity)
     check_stroke(compiled, actuator)
     known = signal_records(actuator.wiring, fidelity)
-    plan = record_plan(record, {name: item["unit"] for name, item in known.items()}, step)
+    units = {name: item["unit"] for name, item in known.items()}
+    bare = features is not None and record is not None and not len(record)
+    plan = [] if bare else record_plan(record, units, step)
+    summed = feature_plans(
+        features,
+        actuator.wiring,
+        fidelity,
+        command_unit=compiled.command_unit,
+        step=step,
+        pole_pairs=actuator.parameters.value("motor.pole_pairs"),
+    )
     if compiled.duration < step:
         raise InputError(f"duration = {compiled.duration:g} s is shorter than a step ({step:g} s)")
     if compiled.duration / step >= MOST_STEPS:
@@ -132,6 +156,7 @@ def prepare(run: Run, fidelity: str, record: Record, *, doubts: bool = True) -> 
         8 * sum(n * m for n, m in rows) + _RUN_BYTES,
         compiled.command_unit,
         (*said, *(not_acting(actuator, compiled, fidelity) if doubts else ())),
+        summed,
     )
 
 

@@ -121,4 +121,22 @@ def _meta(run: Run, prepared: Prepared, fidelity: str, result: Mapping[str, Any]
         "ns_per_step": 1e9 * float(result["wall_s"]) / steps if steps else 0.0,
         "faults": [str(fault) for fault in run.scenario.fault],
         "scenario": run.scenario.to_dict(),
+        **_features(prepared, result),
     }
+
+
+def _features(prepared: Prepared, result: Mapping[str, Any]) -> dict[str, Any]:
+    """Features of the run, None where there is none; nothing where none were asked for."""
+    if not prepared.features:
+        return {}
+    values = {
+        name: value if value - value == 0.0 else None
+        for plan in prepared.features
+        for name, value in plan.values(result).items()
+    }
+    units = {
+        name: unit
+        for plan in prepared.features
+        for name, unit in zip(plan.names, plan.units, strict=True)
+    }
+    return {"features": values, "feature_units": units}

@@ -3,6 +3,9 @@
 //! Rows of motion follow `output = a + b angle -+ h`, the sign being that of the motion: least squares with one slope for both
 //! directions (analysis of covariance) in five sums a direction. The lost motion is `2 h`: play, and what the elastic parts
 //! give way to a friction that changes its sign.
+//!
+//! A row weighs as the square of the angle travelled since the motion last turned back: rows on their way through the play,
+//! which show part of it, hardly count (a play `p` in strokes `d` reads low by less than `(p/d)^2` of itself), and no play need be known before.
 
 use super::friction::LEAST_ROWS;
 use super::rows::{Columns, Role};
@@ -11,7 +14,7 @@ pub const RECORDS: [(&str, &str, &str); 2] = [
     (
         "lost_motion",
         "{output_position}",
-        "distance between the lines of output position over motor angle in backward and in forward motion, fitted with one slope; positive where the output lags (play, and friction over stiffness)",
+        "distance between the lines of output position over motor angle in backward and in forward motion, fitted with one slope, each row by the square of the motor angle travelled since the motion turned back; positive where the output lags (play, and friction over stiffness)",
     ),
     ("transmission_slope", "{output_position}/rad", "that slope: travel of the output per radian of the motor"),
 ];
@@ -19,7 +22,8 @@ pub const RECORDS: [(&str, &str, &str); 2] = [
 /// Sums of one direction, about the first row's angle and position.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
-    n: f64,
+    rows: f64,
+    w: f64,
     x: f64,
     y: f64,
     xx: f64,
@@ -28,10 +32,10 @@ struct Sums {
 
 impl Sums {
     fn spread(&self) -> f64 {
-        self.xx - self.x * self.x / self.n
+        self.xx - self.x * self.x / self.w
     }
     fn common(&self) -> f64 {
-        self.xy - self.x * self.y / self.n
+        self.xy - self.x * self.y / self.w
     }
 }
 
@@ -39,12 +43,14 @@ impl Sums {
 pub struct LostMotion {
     moving: f64,
     start: Option<(f64, f64)>,
+    /// Direction of the stroke and angle at which it began.
+    stroke: Option<(usize, f64)>,
     ways: [Sums; 2],
 }
 
 impl LostMotion {
     pub fn new(moving: f64) -> Self {
-        Self { moving, start: None, ways: [Sums::default(); 2] }
+        Self { moving, start: None, stroke: None, ways: [Sums::default(); 2] }
     }
 
     #[inline(always)]
@@ -55,26 +61,34 @@ impl LostMotion {
             let (a, o) = *self.start.get_or_insert((angle[i], output[i]));
             if speed[i].abs() > self.moving {
                 let (x, y) = (angle[i] - a, output[i] - o);
-                let sums = &mut self.ways[usize::from(speed[i] < 0.0)];
-                sums.n += 1.0;
-                sums.x += x;
-                sums.y += y;
-                sums.xx += x * x;
-                sums.xy += x * y;
+                let way = usize::from(speed[i] < 0.0);
+                let begun = match self.stroke {
+                    Some((same, begun)) if same == way => begun,
+                    _ => x,
+                };
+                self.stroke = Some((way, begun));
+                let w = (x - begun) * (x - begun);
+                let sums = &mut self.ways[way];
+                sums.rows += 1.0;
+                sums.w += w;
+                sums.x += w * x;
+                sums.y += w * y;
+                sums.xx += w * x * x;
+                sums.xy += w * x * y;
             }
         }
     }
 
     pub fn finish(&self, out: &mut Vec<f64>) {
         let [forward, backward] = &self.ways;
-        if forward.n < LEAST_ROWS || backward.n < LEAST_ROWS {
+        if forward.rows < LEAST_ROWS || backward.rows < LEAST_ROWS {
             out.extend([f64::NAN; 2]);
             return;
         }
         let spread = forward.spread() + backward.spread();
         // Angles that do not move give no slope; rounding of their squares may.
         let slope = if spread > 1e-9 * (forward.xx + backward.xx) { (forward.common() + backward.common()) / spread } else { f64::NAN };
-        let line = |s: &Sums| (s.y - slope * s.x) / s.n;
+        let line = |s: &Sums| (s.y - slope * s.x) / s.w;
         out.extend([slope.signum() * (line(backward) - line(forward)), slope]);
     }
 }
@@ -85,13 +99,17 @@ mod tests {
 
     #[test]
     fn the_play_of_a_ratio_is_recovered() {
-        let phase = |i: i32| 0.01 * f64::from(i);
-        let angle: Vec<f64> = (0..2000).map(|i| 900.0 + 40.0 * libm::sin(phase(i))).collect();
-        let speed: Vec<f64> = (0..2000).map(|i| 50.0 * libm::cos(phase(i))).collect();
-        for ratio in [124.0, -124.0] {
-            let play = 1.0e-4;
-            let output: Vec<f64> =
-                angle.iter().zip(&speed).map(|(a, v)| a / ratio - 0.5 * play * v.signum() * f64::signum(ratio)).collect();
+        for (ratio, play) in [(124.0, 1.0e-4), (-124.0, 0.1)] {
+            // The output rests while the motor crosses the play.
+            let half = 0.5 * play * f64::abs(ratio);
+            let angle: Vec<f64> = (0..2000).map(|i| 900.0 + 40.0 * libm::sin(0.01 * f64::from(i))).collect();
+            let speed: Vec<f64> = (0..2000).map(|i| 50.0 * libm::cos(0.01 * f64::from(i))).collect();
+            let mut rests = angle[0];
+            let follow = |a: &f64| {
+                rests = rests.clamp(a - half, a + half);
+                rests / ratio
+            };
+            let output: Vec<f64> = angle.iter().map(follow).collect();
             let mut rows = Columns::default();
             rows.set(Role::OutputPosition, &output);
             rows.set(Role::MotorPosition, &angle);
@@ -99,8 +117,9 @@ mod tests {
             let (mut lost, mut out) = (LostMotion::new(1.0), Vec::new());
             lost.push(&rows);
             lost.finish(&mut out);
-            assert!((out[0] - play).abs() < 1e-9 * play.max(1e-3), "{}", out[0]);
-            assert!((out[1] - 1.0 / ratio).abs() < 1e-12);
+            let seen_low = (play * f64::abs(ratio) / 80.0_f64).powi(2);
+            assert!((out[0] - play).abs() < play * (1e-6 + seen_low), "{} {play}", out[0]);
+            assert!((out[1] * ratio - 1.0).abs() < 1e-6 + seen_low);
         }
     }
 }

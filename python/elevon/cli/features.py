@@ -1,0 +1,65 @@
+"""``elevon features``: features of a recording or a log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from elevon.cli.common import JsonOption
+from elevon.cli.output import print_json, print_table, say
+
+app = typer.Typer(rich_markup_mode=None)
+
+
+@app.command()
+def features(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="A recording, or a log to import.")],
+    *,
+    wanted: Annotated[
+        str, typer.Option("--features", help="Names, families or all, with commas between.")
+    ] = "all",
+    role: Annotated[
+        list[str] | None,
+        typer.Option("--role", metavar="ROLE=CHANNEL", help="Which channel serves; repeatable."),
+    ] = None,
+    pole_pairs: Annotated[
+        float | None, typer.Option(help="Of the motor: for features per electrical turn.")
+    ] = None,
+    clock: Annotated[str | None, typer.Option(help="Clock whose channels serve.")] = None,
+    json: JsonOption = False,
+) -> int:
+    """Compute features of a log, by the code that computes them while simulating."""
+    from elevon.features import recording_features
+    from elevon.logs.importing import import_log
+
+    imported = import_log(log, sidecars=False)
+    for finding in imported.report.findings:
+        if finding.level == "warning":
+            say(f"{log}: {finding.place}: {finding.text}")
+    result = recording_features(
+        imported.recording, wanted, roles=_roles(role), clock=clock, pole_pairs=pole_pairs
+    )
+    rows = [
+        {"name": name, "value": value, "unit": result.units[name]}
+        for name, value in result.values.items()
+    ]
+    if json:
+        print_json({"features": rows, "signals": result.signals, "rate_hz": result.rate})
+        return 0
+    cells = [(row["name"], f"{row['value']:.6g}", row["unit"]) for row in rows]
+    print_table(("feature", "value", "unit"), cells)
+    return 0
+
+
+def _roles(given: list[str] | None) -> dict[str, str]:
+    from elevon.errors import InputError
+
+    roles = {}
+    for text in given or ():
+        name, equals, channel = text.partition("=")
+        if not equals or not channel:
+            raise InputError(f"--role {text!r} is not of the form ROLE=CHANNEL")
+        roles[name.strip()] = channel.strip()
+    return roles

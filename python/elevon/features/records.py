@@ -1,0 +1,113 @@
+"""The catalogue of features, as the core has it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+from elevon.errors import unknown
+
+__all__ = ["ALL", "FeatureRecord", "families", "feature_records", "wanted_records"]
+
+#: Stands for every feature that the columns and the rate allow.
+ALL = "all"
+
+
+@dataclass(frozen=True)
+class FeatureRecord:
+    """One feature.
+
+    Attributes
+    ----------
+    name, text : str
+        Name and definition.
+    unit : str
+        SI; ``{role}`` stands for the unit of that role's column.
+    family : str
+        Features that are summed up together; a family's name stands for all of them.
+    roles : tuple of str
+        The columns it needs.
+    minimum_rate : float
+        Hz; 0 where any rate will do.
+    """
+
+    name: str
+    unit: str
+    text: str
+    family: str
+    roles: tuple[str, ...]
+    minimum_rate: float
+
+    def unit_of(self, units: Mapping[str, str]) -> str:
+        """Return the unit, given that of each role's column."""
+        text = re.sub(r"\{(\w+)\}", lambda match: units[match[1]], self.unit)
+        return "1" if text == "1 rad" else text
+
+
+@lru_cache(maxsize=1)
+def feature_records() -> Mapping[str, FeatureRecord]:
+    """Return every feature by name, in the order in which they are listed."""
+    from elevon import _core
+
+    return {
+        item["name"]: FeatureRecord(
+            item["name"],
+            item["unit"],
+            item["text"],
+            item["family"],
+            tuple(item["roles"]),
+            item["minimum_rate"],
+        )
+        for item in _core.feature_records()
+    }
+
+
+def families() -> list[str]:
+    """Return the names of the families."""
+    return list(dict.fromkeys(record.family for record in feature_records().values()))
+
+
+def wanted_records(
+    names: Iterable[str], roles: Iterable[str], rate: float, place: str
+) -> tuple[list[FeatureRecord], list[str]]:
+    """Return the features that names, families or ``all`` stand for.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Features, families, or ``all``.
+    roles : iterable of str
+        Those that have a column.
+    rate : float
+        Hz.
+    place : str
+        For errors.
+
+    Returns
+    -------
+    list of FeatureRecord, list of str
+        In the order asked for, each once; and the names of those asked for that cannot be. A
+        feature of a family, or of ``all``, that lacks a column or the rate is left out.
+
+    Raises
+    ------
+    UnknownNameError
+        No such feature or family.
+    """
+    known, groups, there = feature_records(), families(), set(roles)
+    chosen: dict[str, FeatureRecord] = {}
+    lacking: list[str] = []
+    for name in names:
+        if name in known:
+            group = [known[name]]
+        elif name == ALL or name in groups:
+            group = [r for r in known.values() if name in (ALL, r.family)]
+        else:
+            raise unknown("feature", name, [*known, *groups, ALL], place)
+        able = [r for r in group if there.issuperset(r.roles) and rate >= r.minimum_rate]
+        chosen.update((r.name, r) for r in able)
+        if not able:
+            lacking.append(name)
+    return list(chosen.values()), lacking
