@@ -1,15 +1,216 @@
-"""The data card of a campaign folder: what is in it and how to read it."""
+"""The data card of a campaign folder, in Markdown and as one page."""
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterator, Sequence
+from typing import Any
 
-from elevon.campaign.store import Manifest
+from elevon.campaign.dataset import Dataset
+from elevon.campaign.describe import describe, typical_runs
+from elevon.errors import ElevonError
 from elevon.files import write_text
+from elevon.memory import format_bytes
+from elevon.report import Report, Section, Table
 
 __all__ = ["write_cards"]
 
+_FAILED_SHOWN = 20
 
-def write_cards(folder: Path, manifest: Manifest) -> None:
-    """Write ``README.md``."""
-    write_text(folder / "README.md", f"# {manifest.name}\n", force=True)
+
+def write_cards(ds: Dataset) -> None:
+    """Write ``README.md`` and ``card.html``."""
+    about = describe(ds)
+    write_text(ds.folder / "README.md", _markdown(about, ds), force=True)
+    write_text(ds.folder / "card.html", _page(about, ds), force=True)
+
+
+def _facts(about: dict[str, Any]) -> list[str]:
+    """Return the card's first lines."""
+    facts = [
+        f"Simulated with elevon {about['version']}: {about['actuator']}, {about['fidelity']} "
+        "fidelity.",
+        f"{about['runs']} runs ({_counts(about['statuses'])}), {format_bytes(about['bytes'])}.",
+    ]
+    if about["faults"]:
+        facts.append(f"{about['healthy']} runs have no fault at all.")
+    if about["splits"]:
+        facts.append(f"Parts: {_counts(about['splits'])}; no unit and no draw stands in two.")
+    if about["cases"]:
+        facts.append(f"Cases: {_counts(about['cases'])}.")
+    if about["design"]:
+        facts.append(f"Design: {_design(about['design'])}.")
+    if about["responses"]:
+        facts.append(f"Responses: {', '.join(about['responses'])}.")
+    return facts
+
+
+def _design(design: dict[str, Any]) -> str:
+    words = str(design["kind"]).replace("_", " ")
+    if "resolution" in design:
+        words += f" of resolution {design['resolution']}"
+    if design.get("generators"):
+        words += f", generators {', '.join(design['generators'])}"
+    extra = [f"{design[key]} {key}" for key in ("replicates", "blocks") if design.get(key, 1) > 1]
+    return ", ".join([words, *extra])
+
+
+def _counts(counts: dict[str, int]) -> str:
+    return ", ".join(f"{count} {name}" for name, count in counts.items())
+
+
+_FAULT_TITLES = ("fault", "unit", "runs", "smallest", "median", "largest", "distribution")
+_VARIED_TITLES = ("quantity", "role", "unit", "smallest", "median", "largest", "distribution")
+_BARS = " ▁▂▃▄▅▆▇█"
+
+
+def _fault_rows(about: dict[str, Any]) -> list[list[object]]:
+    return [[f["name"], f["unit"], f["runs"], *_shape(f)] for f in about["faults"]]
+
+
+def _varied_rows(about: dict[str, Any]) -> list[list[object]]:
+    return [[v["name"], v["role"], v["unit"], *_shape(v)] for v in about["varied"]]
+
+
+def _shape(item: dict[str, Any]) -> list[object]:
+    """Return smallest, median and largest value, and the histogram as a line of bars."""
+    if "counts" in item:
+        return ["", "", "", _counts(dict(list(item["counts"].items())[:6]))]
+    if "histogram" not in item:
+        return ["", "", "", ""]
+    most = max(item["histogram"])
+    bars = "".join(_BARS[-(-8 * count // most)] for count in item["histogram"])
+    return [item["min"], item["quartiles"][1], item["max"], bars]
+
+
+def _markdown(about: dict[str, Any], ds: Dataset) -> str:
+    lines = [f"# {about['name']}", "", about["text"] or "Simulated runs of one actuator.", ""]
+    lines += [f"* {fact}" for fact in _facts(about)]
+    lines += [
+        "* `plan.toml` is the plan as given, `resolved.json` everything it stands for,",
+        "  `manifest.json` every file with its SHA-256; `elevon dataset verify` checks them.",
+        "* `card.html` shows typical signals of each fault.",
+        "",
+        "```python",
+        *_code(ds.folder.name).splitlines(),
+        "```",
+        *_md_table("Faults", _FAULT_TITLES, _fault_rows(about)),
+        *_md_table("Varied quantities", _VARIED_TITLES, _varied_rows(about)),
+        *_not_acting(about),
+        *_failed(about),
+    ]
+    for clock in about["clocks"]:
+        rows = [[c["name"], c["unit"], c["text"]] for c in clock["columns"]]
+        lines += _md_table(f"Columns of `runs/{clock['name']}`", ("column", "unit", "text"), rows)
+    return "\n".join(lines) + "\n"
+
+
+def _code(folder: str) -> str:
+    return (
+        "import elevon\n\n"
+        f'ds = elevon.load_campaign("{folder}")\n'
+        "runs = ds.runs.to_pandas()       # one row a run: faults in SI, 0 when absent\n"
+        "signals = ds.signals.to_pandas(runs=[0])"
+    )
+
+
+def _md_table(title: str, titles: Sequence[str], rows: Sequence[Sequence[object]]) -> Iterator[str]:
+    if rows:
+        yield from ("", f"## {title}", "", f"| {' | '.join(titles)} |", "|---" * len(titles) + "|")
+        for row in rows:
+            cells = [f"{cell:.5g}" if isinstance(cell, float) else str(cell) for cell in row]
+            yield f"| {' | '.join(cell.replace('|', '/') for cell in cells)} |"
+
+
+def _not_acting(about: dict[str, Any]) -> Iterator[str]:
+    if about["not_acting"]:
+        yield from ("", "## Set, but not acting", "")
+        yield from (f"* {text}" for text in about["not_acting"])
+
+
+def _failed(about: dict[str, Any]) -> Iterator[str]:
+    if about["failed"]:
+        yield from ("", "## Runs that failed", "")
+        shown = about["failed"][:_FAILED_SHOWN]
+        yield from (f"* run {f['run']}: {f['status']}: {f['reason']}" for f in shown)
+        if len(about["failed"]) > len(shown):
+            yield "* and more: see `status` and `reason` in `runs.parquet`"
+
+
+def _page(about: dict[str, Any], ds: Dataset) -> str:
+    report = Report(about["name"], about["text"] or "Simulated runs of one actuator.")
+    report.fact("runs", str(about["runs"]), _counts(about["statuses"]))
+    report.fact("size", format_bytes(about["bytes"]))
+    section = report.section("What is in it").points(_facts(about))
+    section.code(_code(ds.folder.name))
+    if about["faults"]:
+        table = Table(_FAULT_TITLES, _fault_rows(about), "Severities of the runs that have it.")
+        report.section("Faults").table(table)
+    if about["varied"]:
+        report.section("Varied quantities").table(Table(_VARIED_TITLES, _varied_rows(about)))
+    if about["not_acting"]:
+        report.section("Set, but not acting").points(about["not_acting"])
+    if about["failed"]:
+        report.section("Runs that failed").points([*_failed(about)][3:])
+    _pictures(report.section("Typical signals"), ds)
+    for clock in about["clocks"]:
+        rows = [[c["name"], c["unit"], c["text"]] for c in clock["columns"]]
+        table = Table(("column", "unit", "text"), rows, folded=f"runs/{clock['name']}")
+        report.section(f"Columns of runs/{clock['name']}").table(table)
+    keys = ("version", "plan_hash", "actuator", "fidelity")
+    report.provenance({key: about[key] for key in keys} | about["sources"])
+    return report.html()
+
+
+def _pictures(section: Section, ds: Dataset) -> None:
+    """Add the responses (or first signals) of a typical run of each fault, and of one without."""
+    pairs = typical_runs(ds)
+    shown = _shown(ds)
+    if not pairs:
+        _curves(section, ds, {"run 0": 0}, shown, "run 0")
+    for name, (faulty, other) in pairs.items():
+        labels = {f"run {faulty}, {name}": faulty, f"run {other}, without": other}
+        _curves(section, ds, labels, shown, name)
+
+
+def _shown(ds: Dataset) -> list[dict[str, str]]:
+    """Return the columns that are drawn: the responses, else the first three signals."""
+    faults = {item["name"] for item in ds.manifest.faults}
+    columns = [
+        column
+        for column in ds.manifest.clocks[0]["columns"]
+        if column["name"] not in {"run", "time", *faults}
+    ]
+    asked = [column for column in columns if column["name"] in ds.manifest.responses]
+    return (asked or columns)[:3]
+
+
+def _curves(
+    section: Section,
+    ds: Dataset,
+    runs: dict[str, int],
+    shown: Sequence[dict[str, str]],
+    title: str,
+) -> None:
+    import numpy as np
+
+    try:
+        table = ds.signals.to_arrow(
+            ["run", "time", *(column["name"] for column in shown)], runs.values()
+        )
+    except ElevonError as error:
+        section.text(f"{title}: {error}")
+        return
+    number = table["run"].to_numpy()
+    kept = {label: number == run for label, run in runs.items()}
+    longest = max(kept.values(), key=np.count_nonzero)
+    time = table["time"].to_numpy()[longest]
+    if len(time) < 2:
+        return
+    for column in shown:
+        values = table[column["name"]].to_numpy()
+        lines = {
+            label: np.interp(time, table["time"].to_numpy()[mask], values[mask], right=np.nan)
+            for label, mask in kept.items()
+            if mask.any()
+        }
+        section.chart(f"{title}: {column['name']}", time, lines, y_label=column["unit"])

@@ -10,8 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from elevon.campaign.folder import work_log
-from elevon.campaign.store import RUNS, Manifest, read_manifest, read_resolved
+from elevon.campaign.store import RUNS, Manifest, read_manifest, read_resolved, work_log
 from elevon.errors import FormatError, InputError, unknown
 from elevon.worklog import Item, digest
 

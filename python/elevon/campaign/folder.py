@@ -8,9 +8,11 @@ from typing import Any
 
 from elevon.campaign.block import block_name
 from elevon.campaign.card import write_cards
+from elevon.campaign.dataset import Dataset
 from elevon.campaign.estimate import Estimate, check_disk
 from elevon.campaign.resolved import Resolved
 from elevon.campaign.store import (
+    LOG,
     MANIFEST,
     PLAN,
     RESOLVED,
@@ -22,6 +24,7 @@ from elevon.campaign.store import (
     read_manifest,
     read_outcome,
     resolved_text,
+    work_log,
     write_runs,
 )
 from elevon.errors import InputError, OutputError
@@ -29,10 +32,7 @@ from elevon.files import write_text
 from elevon.record_plan import ClockPlan
 from elevon.worklog import LOCK, Item, WorkLog, digest
 
-__all__ = ["LOG", "Work", "begin", "finish", "finished", "open_folder", "work_log"]
-
-LOG = "progress.log"
-"""The log of finished blocks, while the campaign runs."""
+__all__ = ["Work", "begin", "finish", "finished", "open_folder"]
 
 
 @dataclass
@@ -147,16 +147,10 @@ def finish(work: Work) -> dict[str, list[Any]]:
     manifest.status = "failed" if failed else "ok"
     paths = (runs, work.folder / RESOLVED, work.folder / PLAN)
     manifest.files = {path.name: digest(path) for path in paths}
-    write_cards(work.folder, manifest)
+    write_cards(Dataset(work.folder, manifest))
     manifest.write(work.folder)
     (work.folder / LOG).unlink(missing_ok=True)
     return outcome
-
-
-def work_log(folder: Path, manifest: Manifest) -> WorkLog | None:
-    """Return the log of a campaign that runs or was interrupted; None where it is finished."""
-    log = WorkLog.read(folder / LOG)
-    return log if log is not None and log.key == manifest.plan_hash else None
 
 
 def _found(folder: Path, resolved: Resolved, manifest: Manifest) -> Work:

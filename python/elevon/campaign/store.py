@@ -20,6 +20,7 @@ from elevon.errors import FormatError, InputError
 from elevon.files import write_text
 from elevon.parameters import ParameterSet
 from elevon.parameters.parameter import Parameter
+from elevon.worklog import WorkLog
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -29,6 +30,8 @@ __all__ = ["SCHEMA", "Manifest", "plan_hash", "read_manifest", "read_resolved", 
 SCHEMA = 2
 """Version of the folder's form, apart from the package's."""
 MANIFEST, RESOLVED, RUNS, PLAN = "manifest.json", "resolved.json", "runs.parquet", "plan.toml"
+LOG = "progress.log"
+"""The log of finished blocks, while the campaign runs."""
 
 
 @dataclass
@@ -115,6 +118,12 @@ def read_manifest(folder: str | os.PathLike[str]) -> Manifest:
         return Manifest(**data)
     except TypeError as error:
         raise FormatError(f"{path}: damaged: {error}") from error
+
+
+def work_log(folder: Path, manifest: Manifest) -> WorkLog | None:
+    """Return the log of a campaign that runs or was interrupted; None where it is finished."""
+    log = WorkLog.read(folder / LOG)
+    return log if log is not None and log.key == manifest.plan_hash else None
 
 
 def _seal(content: Mapping[str, Any]) -> str:

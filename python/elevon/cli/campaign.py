@@ -161,7 +161,7 @@ def status(folder: FolderArgument, *, json: JsonOption = False) -> int:
 
 def _status(folder: Path) -> dict[str, Any]:
     from elevon.campaign import load_campaign
-    from elevon.campaign.folder import work_log
+    from elevon.campaign.store import work_log
     from elevon.worklog import is_locked
 
     ds = load_campaign(folder)

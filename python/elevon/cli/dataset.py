@@ -1,0 +1,134 @@
+"""``elevon dataset``: what is in a campaign's folder, whether it is whole, other forms of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from elevon.cli.common import ForceOption, JsonOption
+from elevon.cli.output import print_json, print_table, progress_bar
+
+app = typer.Typer(rich_markup_mode=None, no_args_is_help=True)
+
+FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="The campaign's folder.")]
+
+
+@app.command()
+def describe(folder: FolderArgument, *, json: JsonOption = False) -> int:
+    """Say what is in a data set: runs, faults, distributions, columns."""
+    from elevon.campaign import load_campaign
+    from elevon.campaign.describe import describe as described
+
+    about = described(load_campaign(folder))
+    if json:
+        print_json(about)
+        return 0
+    typer.echo(f"{about['name']}: {about['actuator']}, {about['fidelity']} fidelity")
+    typer.echo(f"{about['runs']} runs ({_counts(about['statuses'])}), {about['bytes']} bytes")
+    if about["splits"]:
+        typer.echo(f"parts: {_counts(about['splits'])}")
+    rows = [[f["name"], f["unit"], f["runs"], *_ends(f)] for f in about["faults"]]
+    print_table(["fault", "unit", "runs", "smallest", "largest"], rows)
+    rows = [[v["name"], v["unit"], v["role"], *_ends(v)] for v in about["varied"]]
+    print_table(["varied", "unit", "role", "smallest", "largest"], rows)
+    for text in about["not_acting"]:
+        typer.echo(f"does not act: {text}")
+    return 0
+
+
+@app.command()
+def verify(folder: FolderArgument, *, json: JsonOption = False) -> int:
+    """Check that every file is as written, every run there once, and nothing leaks: exit 0 or 1."""
+    from elevon.campaign.verify import verify as verified
+    from elevon.report import all_passed
+
+    with progress_bar("verifying") as advance:
+        checks = verified(folder, advance)
+    passed = all_passed(checks)
+    if json:
+        status = "pass" if passed else "fail"
+        print_json({"status": status, "checks": [check.to_dict() for check in checks]})
+    else:
+        rows = [["pass" if c.passed else "FAIL", f"{c.value:.0f}", c.name] for c in checks]
+        print_table(["", "count", "what is wrong"], rows)
+    return 0 if passed else 1
+
+
+@app.command()
+def export(
+    folder: FolderArgument,
+    *,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the files.")],
+    form: Annotated[str, typer.Option("--format", help="mat, csv, nc or parquet.")] = "mat",
+    runs: Annotated[
+        str | None, typer.Option(metavar="LIST", help="Such as 0-99,250; default all.")
+    ] = None,
+    force: ForceOption = False,
+    json: JsonOption = False,
+) -> int:
+    """Write one file a run and a table of the runs, for MATLAB and other programs."""
+    from elevon.campaign import load_campaign
+    from elevon.campaign.export import export as exported
+    from elevon.campaign.export import run_numbers
+
+    ds = load_campaign(folder)
+    numbers = None if runs is None else run_numbers(runs, len(ds))
+    with progress_bar("writing") as advance:
+        files = exported(ds, out.expanduser(), form, numbers, force=force, progress=advance)
+    if json:
+        print_json({"status": "ok", "runs": len(files) - 1, "files": files, "out": out})
+    else:
+        typer.echo(f"{len(files)} files in {out}")
+    return 0
+
+
+@app.command()
+def split(
+    folder: FolderArgument,
+    *,
+    share: Annotated[
+        list[str], typer.Option("--share", metavar="NAME=SHARE", help="A part; repeatable.")
+    ],
+    by: Annotated[
+        str | None, typer.Option(help="unit or draw; default unit where there are units.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the dealing.")] = 0,
+    json: JsonOption = False,
+) -> int:
+    """Deal whole units or draws to parts anew; the samples stay as they are."""
+    from elevon.campaign.resplit import resplit
+
+    counts = resplit(folder, _shares(share), by=by, seed=seed)
+    if json:
+        print_json({"status": "ok", "splits": counts, "out": folder})
+    else:
+        typer.echo(_counts(counts))
+    return 0
+
+
+def _shares(texts: list[str]) -> dict[str, float]:
+    from elevon.errors import InputError
+
+    shares: dict[str, float] = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        try:
+            number = float(value)
+        except ValueError:
+            equals = ""
+        if not equals or not name.strip() or name.strip() in shares:
+            raise InputError(f"--share {text!r} is not of the form NAME=SHARE, once a name")
+        shares[name.strip()] = number
+    return shares
+
+
+def _counts(counts: dict[str, int]) -> str:
+    return ", ".join(f"{count} {name}" for name, count in counts.items())
+
+
+def _ends(item: dict[str, Any]) -> list[str]:
+    if "counts" in item:
+        return [_counts(item["counts"])[:60], ""]
+    return [f"{item[key]:.6g}" if key in item else "" for key in ("min", "max")]
