@@ -2,7 +2,9 @@
 
 pub mod acts;
 mod macros;
+pub mod role;
 
+pub use role::Role;
 use std::marker::PhantomData;
 
 /// Which register of numbers a parameter belongs to: what the plant is, what the controller
@@ -231,6 +233,8 @@ pub struct Signal {
     pub symbol: &'static str,
     pub unit: &'static str,
     pub text: &'static str,
+    /// What it is to the actuator; `None` for what only a simulation can show.
+    pub role: Option<Role>,
 }
 
 /// What a form of a component changes in one of its records. Empty texts leave the record's.

@@ -6,7 +6,7 @@ use elevon_core::fault::{profiles as fault_profiles, Attribute};
 use elevon_core::registry::KINDS;
 use elevon_core::solver::{Width, DERIVATIVES};
 use elevon_core::variable::acts::{records, Fidelity};
-use elevon_core::variable::{Group, Range};
+use elevon_core::variable::{Group, Range, Role};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -106,7 +106,18 @@ pub fn signals<'py>(py: Python<'py>, wiring: &str, fidelity: &str) -> Dicts<'py>
         d.set_item("name", s.name)?;
         d.set_item("symbol", s.symbol)?;
         d.set_item("unit", s.unit)?;
-        d.set_item("text", s.text)
+        d.set_item("text", s.text)?;
+        d.set_item("role", s.role.map(Role::name))
+    })
+}
+
+/// What signals may be to an actuator, in whose units.
+#[pyfunction]
+pub fn roles(py: Python<'_>) -> Dicts<'_> {
+    dicts(py, Role::ALL, |d, role| {
+        d.set_item("name", role.name())?;
+        d.set_item("units", role.units().to_vec())?;
+        d.set_item("text", role.text())
     })
 }
 

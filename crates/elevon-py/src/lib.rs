@@ -14,6 +14,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(describe::wirings, m)?)?;
     m.add_function(wrap_pyfunction!(describe::parameters, m)?)?;
     m.add_function(wrap_pyfunction!(describe::signals, m)?)?;
+    m.add_function(wrap_pyfunction!(describe::roles, m)?)?;
     m.add_function(wrap_pyfunction!(describe::ports, m)?)?;
     m.add_function(wrap_pyfunction!(describe::initial, m)?)?;
     m.add_function(wrap_pyfunction!(describe::faults, m)?)?;

@@ -37,7 +37,7 @@ macro_rules! variables {
 #[macro_export]
 macro_rules! signals {
     ($(#[$meta:meta])* $id:ident, $table:ident {
-        $($variant:ident => $name:literal, $symbol:literal, $unit:literal, $text:literal;)*
+        $($variant:ident => $name:literal, $symbol:literal, $unit:literal, $text:literal $(, $role:ident)?;)*
     }) => {
         $(#[$meta])*
         // Phases b and c are reached by counting from a: not every name is written out.
@@ -47,6 +47,7 @@ macro_rules! signals {
         pub enum $id { $($variant),* }
         pub const $table: &[$crate::variable::Signal] = &[$($crate::variable::Signal {
             name: $name, symbol: $symbol, unit: $unit, text: $text,
+            role: $crate::variable::role::only(&[$($crate::variable::Role::$role)?]),
         }),*];
     };
 }

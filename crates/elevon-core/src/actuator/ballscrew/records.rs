@@ -12,7 +12,7 @@ use crate::transmission::play::{PlayParameter as P, PLAY};
 use crate::transmission::screw::{RatingParameter, ScrewParameter, RATING, SCREW};
 use crate::transmission::tooth::{ToothParameter as W, TOOTH};
 use crate::transmission::vibration::{VibrationParameter, VIBRATION};
-use crate::variable::{extended, relabelled, Relabel, Signal, Variable};
+use crate::variable::{extended, relabelled, Relabel, Role, Signal, Variable};
 
 const fn change(index: usize, name: &'static str, unit: &'static str, text: &'static str) -> Relabel {
     Relabel { index, name, unit, text, acts: None }
@@ -100,11 +100,11 @@ pub const PORTS: &[Port] = &[
 ];
 
 const fn signal(name: &'static str, unit: &'static str, text: &'static str) -> Signal {
-    Signal { name, symbol: "-", unit, text }
+    Signal { name, symbol: "-", unit, text, role: None }
 }
 
 const NUT: [Signal; 2] = [
-    signal("nut_temperature", "K", "temperature of the nut"),
+    Signal { role: Some(Role::NutTemperature), ..signal("nut_temperature", "K", "temperature of the nut") },
     signal("heat_nut", "W", "friction heat that stays in the nut, mean of the network's last tick"),
 ];
 const HIGH_OWN: &[Signal] = &[
@@ -117,7 +117,10 @@ const HIGH_OWN: &[Signal] = &[
     signal("screw_efficiency_aiding", "1", "applied efficiency under a load that aids motion"),
     NUT[0],
     NUT[1],
-    signal("vibration", "m/s2", "acceleration that the accelerometer on the screw's housing shows"),
+    Signal {
+        role: Some(Role::Vibration),
+        ..signal("vibration", "m/s2", "acceleration that the accelerometer on the screw's housing shows")
+    },
 ];
 const LOW_OWN: &[Signal] = &[
     signal("ram_position", "m", "ram position, on the nut's side of the play"),
