@@ -12,6 +12,8 @@ from elevon.errors import FormatError, InputError, unknown
 from elevon.recording.channel import Channel, in_si
 from elevon.recording.clock import Clock
 from elevon.recording.header import plain
+from elevon.recording.roles import channel_of, roles_of
+from elevon.recording.window import cut
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -155,6 +157,15 @@ class Recording:
         """`ok`, `tripped`, `diverged`, `interrupted`; `measured` when nothing was simulated."""
         return str(self.meta.get("status", "measured"))
 
+    @property
+    def roles(self) -> dict[str, str]:
+        """Role (``"motor_speed"``) to channel name; empty where nothing says what is what."""
+        return roles_of(self)
+
+    def role(self, name: str) -> Channel:
+        """Return the channel that plays a role; `InputError` where none does."""
+        return channel_of(self, name)
+
     def __getitem__(self, name: str) -> Channel:
         try:
             return self._channels[name]
@@ -226,19 +237,8 @@ class Recording:
 
     def window(self, start: float = -np.inf, stop: float = np.inf) -> "Recording":
         """Return the part with start <= time <= stop (s), on every clock, sharing the values."""
-        cut: dict[str, tuple[Clock, slice]] = {}
-        for clock in self.clocks.values():
-            first = int(np.searchsorted(clock.time, start, "left"))
-            last = max(first, int(np.searchsorted(clock.time, stop, "right")))
-            gaps = [gap - first for gap in clock.gaps if first <= gap < last - 1]
-            part = slice(first, last)
-            cut[clock.name] = Clock(clock.name, clock.time[part], clock.rate, gaps), part
-        channels = []
-        for channel in self.channels:
-            base, part = cut[channel.clock.name]
-            values = channel.values[part]
-            channels.append(Channel(channel.name, channel.unit, values, base, channel.text))
-        return self._with(channels, [clock for clock, _ in cut.values()])
+        channels, clocks = cut(self.channels, self.clocks.values(), start, stop)
+        return self._with(channels, clocks)
 
     def joined(self, other: "Recording") -> "Recording":
         """Return a recording with the channels and clocks of both; meta of `other` wins.
@@ -259,13 +259,9 @@ class Recording:
 
     def with_meta(self, **entries: Any) -> "Recording":
         """Return the same recording with entries of `meta` added or replaced."""
-        return Recording(
-            self.channels,
-            clocks=self.clocks.values(),
-            meta={**self.meta, **entries},
-            labels=self.labels,
-            final=self.final,
-        )
+        same = self._with(self.channels, self.clocks.values())
+        same.meta = plain({**self.meta, **entries}, "meta")
+        return same
 
     def _with(self, channels: Iterable[Channel], clocks: Iterable[Clock]) -> "Recording":
         return Recording(

@@ -43,7 +43,7 @@ class CompiledScenario:
 
 
 @lru_cache(maxsize=32)
-def signal_records(wiring: str, fidelity: str) -> Mapping[str, Mapping[str, str]]:
+def signal_records(wiring: str, fidelity: str) -> Mapping[str, Mapping[str, Any]]:
     """Return the core's records of every recordable signal, by name, in the core's order."""
     from elevon import _core
 

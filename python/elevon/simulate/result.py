@@ -119,6 +119,7 @@ def _meta(run: Run, prepared: Prepared, fidelity: str, result: Mapping[str, Any]
         "sim_s": float(result["time"]),
         "wall_s": float(result["wall_s"]),
         "ns_per_step": 1e9 * float(result["wall_s"]) / steps if steps else 0.0,
+        "roles": _roles(prepared, fidelity),
         "faults": [str(fault) for fault in run.scenario.fault],
         "scenario": run.scenario.to_dict(),
         **_features(prepared, result),
@@ -140,3 +141,11 @@ def _features(prepared: Prepared, result: Mapping[str, Any]) -> dict[str, Any]:
         for name, unit in zip(plan.names, plan.units, strict=True)
     }
     return {"features": values, "feature_units": units}
+
+
+def _roles(prepared: Prepared, fidelity: str) -> dict[str, str]:
+    """Role to recorded signal; of several the last, since a sensor stands behind what it senses."""
+    recorded = {name for plan in prepared.plan for name in plan.signals}
+    known = signal_records(prepared.actuator.wiring, fidelity)
+    played = {name: item.get("role") for name, item in known.items() if name in recorded}
+    return {role: name for name, role in played.items() if role}
