@@ -121,10 +121,10 @@ impl<F: Form> Wiring for Low<F> {
         count: Steps,
     ) {
         let x = Stretch { structure, models, inputs, states, from, count };
-        if structure.full {
-            x.run::<LowStep<true>>();
-        } else {
-            x.run::<LowStep<false>>();
+        match (structure.full, structure.extra) {
+            (false, _) => x.run::<LowStep<false, false>>(),
+            (true, false) => x.run::<LowStep<true, false>>(),
+            (true, true) => x.run::<LowStep<true, true>>(),
         }
     }
 

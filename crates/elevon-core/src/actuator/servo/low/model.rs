@@ -37,6 +37,10 @@ details! {
         motor: MotorStructure = MotorStructure::read(&parts.motor()).with_unbalance(shaft.unbalance).with_weak_pole(WeakPole::<f64>::needed(&parts.pole()));
     }
     full {
+        detailed_shaft = shaft.full;
+        detailed_sensing = sensing.full;
+    }
+    extra {
         shorted = parts.motor().any_away([MotorParameter::TurnsA, MotorParameter::TurnsB, MotorParameter::TurnsC]);
         /// A lost resolver opens the bridge.
         stops = Resolver::<f64>::lost(&parts.resolver())
@@ -63,10 +67,6 @@ details! {
             || shorted;
         heat = Network::<f64>::needed(&parts.thermal());
         link = DcLink::<f64>::needed(&parts.link());
-        detailed_shaft = shaft.full;
-        detailed_sensing = sensing.full;
-    }
-    extra {
         extra_shaft = shaft.extra;
         extra_sensing = sensing.extra;
     }

@@ -65,9 +65,9 @@ pub(super) fn coefficients<S: Scalar>(m: &Model<S>, structure: &Structure, posit
 
 /// The phase at the shaft's angle, its currents imposed at the angle that the drive reads.
 #[inline(always)]
-pub(super) fn phase<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &State<S>, reading: &Reading<S>) -> Phase<S> {
-    if !FULL || !structure.angle {
-        return if FULL && structure.heat { warm(m, s) } else { m.healthy };
+pub(super) fn phase<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, reading: &Reading<S>) -> Phase<S> {
+    if !structure.angle {
+        return warm(m, s);
     }
     let k = coefficients(m, structure, s.shaft.motor_position);
     let (sin, cos) = m.star.electrical_angle(s.shaft.motor_position).sin_cos();

@@ -60,10 +60,10 @@ fn position_pid<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>
 
 /// Current and voltage of the phase after a step towards the torque reference.
 #[inline(always)]
-fn electric_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &Instant<S>, s: &mut State<S>, p: &Phase<S>) {
+fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structure, x: &Instant<S>, s: &mut State<S>, p: &Phase<S>) {
     let speed = s.shaft.motor_speed;
     let mut emf = S::splat(2.0 / 3.0) * p.torque_constant * speed;
-    if FULL && structure.loops {
+    if EXTRA && structure.loops {
         emf = emf + m.circuits.voltage(s, p);
     }
     let current_ref = s.torque_ref * m.control.per_torque_constant;
@@ -76,7 +76,7 @@ fn electric_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structur
     };
     let driving = circuit.voltage(s.current, target);
     let source = x.supply * m.drive.supply_scale;
-    let supply = if FULL && structure.link { m.drive.link.voltage(&s.link, source) } else { source };
+    let supply = if EXTRA && structure.link { m.drive.link.voltage(&s.link, source) } else { source };
     let cross = m.drive.electrical_inductance * speed * s.current;
     let largest = m.drive.voltage_ratio * supply;
     // v_q^2 + v_d^2 stays inside the largest phase voltage; v_d is the cross coupling p omega L i_q.
@@ -100,23 +100,23 @@ fn electric_step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structur
     // Terminal power of the three phases, 3/2 v_q i_q.
     let mut power = S::splat(1.5) * s.voltage * middle;
     let phases = s.phases;
-    if FULL && structure.angle {
+    if EXTRA && structure.angle {
         s.phases = three!(|j| p.imposed[j] * reached);
     }
-    if FULL && structure.passive {
+    if EXTRA && structure.passive {
         (loss, power) = without_gates(m, structure, supply, s, p, phases, [loss, power]);
     }
-    if FULL && structure.link {
+    if EXTRA && structure.link {
         m.drive.link.step(&mut s.link, source, power * m.dt);
     }
-    if FULL && structure.loops {
+    if EXTRA && structure.loops {
         let added = m.circuits.step(s, p, phases, s.phases);
         s.motor_torque = s.motor_torque + added.torque;
         s.network.collected[1] = m.dt.fma(added.copper, s.network.collected[1]);
         s.network.collected[2] = m.dt.fma(added.contact, s.network.collected[2]);
         s.copper = m.dt.fma(added.copper, s.copper);
     }
-    if FULL && structure.heat {
+    if EXTRA && structure.heat {
         let heat = loss * m.dt;
         s.network.collected[0] = s.network.collected[0] + heat;
         s.copper = s.copper + heat;
@@ -158,7 +158,7 @@ fn without_gates<S: Scalar>(
 }
 
 #[inline(always)]
-fn step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &Instant<S>, s: &mut State<S>) {
+fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure: &Structure, x: &Instant<S>, s: &mut State<S>) {
     // Sensors and control electronics.
     let reading = m.sensing.shaft::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed);
     if FULL && structure.sensing.counting {
@@ -168,16 +168,22 @@ fn step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &In
     let asked = demand(m, structure, s, x.command + s.command_noise, position, reading.speed);
 
     // Loads, and the acceleration that the derivative of the speed takes part in.
-    let mut p = phase::<S, FULL>(m, structure, s, &reading);
-    let mut derivative_inertia = m.control.derivative_inertia;
+    let here;
+    let p = if EXTRA && (structure.angle || structure.heat) {
+        here = phase(m, structure, s, &reading);
+        &here
+    } else {
+        &m.healthy
+    };
+    let (mut derivative_inertia, mut per_inertia) = (m.control.derivative_inertia, p.per_effective_inertia);
     if FULL && structure.sensing.resolver {
         // The derivative sees what the resolver shows of the acceleration.
         derivative_inertia = derivative_inertia * m.sensing.follows();
-        p.per_effective_inertia = S::one() / p.efficacy.fma(derivative_inertia, m.shaft.inertia);
+        per_inertia = S::one() / p.efficacy.fma(derivative_inertia, m.shaft.inertia);
     }
     let torque = p.efficacy * asked.torque;
-    let mut loads = m.shaft.loads::<FULL, FULL>(&structure.shaft, x, &s.shaft, torque);
-    let acceleration = m.shaft.acceleration::<FULL>(&structure.shaft, &s.shaft, &loads, torque, p.per_effective_inertia);
+    let mut loads = m.shaft.loads::<FULL, EXTRA>(&structure.shaft, x, &s.shaft, torque);
+    let acceleration = m.shaft.acceleration::<EXTRA>(&structure.shaft, &s.shaft, &loads, torque, per_inertia);
     let unlimited = asked.torque - derivative_inertia * acceleration;
     s.torque_ref = unlimited.clamp_abs(m.control.torque_limit);
     s.speed_ref = asked.speed_ref;
@@ -190,27 +196,27 @@ fn step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &In
     }
 
     // Equivalent phase, motor and transmission dynamics.
-    electric_step::<S, FULL>(m, structure, x, s, &p);
+    electric_step::<S, EXTRA>(m, structure, x, s, p);
     s.motor_torque = m.star.saturate(s.motor_torque);
-    if FULL && structure.shaft.train.law.knows_torque() {
+    if EXTRA && structure.shaft.train.law.knows_torque() {
         // The friction knows the torque that acts, not the one that was asked for.
-        loads = m.shaft.loads::<FULL, FULL>(&structure.shaft, x, &s.shaft, s.motor_torque);
+        loads = m.shaft.loads::<FULL, EXTRA>(&structure.shaft, x, &s.shaft, s.motor_torque);
     }
-    m.shaft.step::<FULL, FULL>(&structure.shaft, x, &mut s.shaft, &loads, s.motor_torque);
+    m.shaft.step::<FULL, EXTRA>(&structure.shaft, x, &mut s.shaft, &loads, s.motor_torque);
 
     // Acquisition.
     s.filtered[0] = low_pass(m.filter, s.filtered[0], s.current_seen);
     s.filtered[1] = low_pass(m.filter, s.filtered[1], s.voltage);
 }
 
-/// The step of the inner loop with and without details.
-pub(super) struct LowStep<const FULL: bool>;
+/// The step of the inner loop: plain, with the loads of the shaft and the sensors, with every detail.
+pub(super) struct LowStep<const FULL: bool, const EXTRA: bool>;
 
-impl<S: Scalar, const FULL: bool> Stepper<S> for LowStep<FULL> {
+impl<S: Scalar, const FULL: bool, const EXTRA: bool> Stepper<S> for LowStep<FULL, EXTRA> {
     type Model = Model<S>;
     type Structure = Structure;
     type State = State<S>;
-    const IN_REGISTERS: bool = false;
+    const IN_REGISTERS: bool = !EXTRA;
 
     #[inline(always)]
     fn dt(model: &Model<S>) -> S {
@@ -218,6 +224,6 @@ impl<S: Scalar, const FULL: bool> Stepper<S> for LowStep<FULL> {
     }
     #[inline(always)]
     fn step(model: &Model<S>, structure: &Structure, instant: &Instant<S>, state: &mut State<S>) {
-        step::<S, FULL>(model, structure, instant, state);
+        step::<S, FULL, EXTRA>(model, structure, instant, state);
     }
 }
