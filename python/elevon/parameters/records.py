@@ -12,7 +12,7 @@ from typing import Any
 from elevon.errors import InputError, RangeError, UnknownNameError, did_you_mean, unknown
 from elevon.units import format_quantity, parse_quantity
 
-__all__ = ["Record", "positions", "record_of", "records", "wiring_names"]
+__all__ = ["Record", "positions", "record_of", "records", "wiring_names", "wirings"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,11 +108,17 @@ class Record:
         )
 
 
-def wiring_names() -> list[str]:
-    """Return the names of the wirings the core knows."""
+@lru_cache(maxsize=1)
+def wirings() -> Mapping[str, Mapping[str, Any]]:
+    """Return the core's wirings, by name."""
     from elevon import _core
 
-    return [wiring["name"] for wiring in _core.wirings()]
+    return MappingProxyType({item["name"]: item for item in _core.wirings()})
+
+
+def wiring_names() -> list[str]:
+    """Return the names of the wirings the core knows."""
+    return list(wirings())
 
 
 @lru_cache(maxsize=32)

@@ -41,7 +41,7 @@ class ParameterSet(Mapping[str, Parameter]):
         A parameter without a default is missing.
     """
 
-    __slots__ = ("_hash", "_items", "_vector", "wiring")
+    __slots__ = ("_away", "_hash", "_items", "_vector", "wiring")
 
     def __init__(self, wiring: str, entries: Mapping[str, Parameter], place: str = "") -> None:
         known = records(wiring)
@@ -60,6 +60,7 @@ class ParameterSet(Mapping[str, Parameter]):
         self._items = MappingProxyType(items)
         self._vector: npt.NDArray[np.float64] | None = None
         self._hash: str | None = None
+        self._away: Mapping[str, str] | None = None
 
     def __getitem__(self, path: str) -> Parameter:
         try:
@@ -96,6 +97,19 @@ class ParameterSet(Mapping[str, Parameter]):
             self._vector = np.array(numbers)
             self._vector.flags.writeable = False
         return self._vector
+
+    def away(self) -> Mapping[str, str]:
+        """Return what the user changed away from neutral: path to the value as written."""
+        if self._away is None:
+            known = records(self.wiring)
+            self._away = MappingProxyType(
+                {
+                    path: item.text
+                    for path, item in self._items.items()
+                    if item.changed and item.value != known[path].default_value()
+                }
+            )
+        return self._away
 
     def replaced(
         self,

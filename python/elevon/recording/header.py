@@ -120,6 +120,9 @@ def _clock(entry: Mapping[str, Any]) -> ClockHeader:
     return ClockHeader(str(entry["name"]), rate, list(gaps), samples, channels)
 
 
+_PLAIN = frozenset({str, int, float, bool, type(None)})
+
+
 def plain(value: Any, place: str, depth: int = 0) -> Any:
     """Return a private copy in JSON's own types, so that files give back what they were given.
 
@@ -135,10 +138,17 @@ def plain(value: Any, place: str, depth: int = 0) -> Any:
         value = value.tolist()
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
+    # Most items are plain already: their places are not written out.
     if isinstance(value, Mapping):
-        return {str(k): plain(v, f"{place}.{k}", depth + 1) for k, v in value.items()}
+        return {
+            str(k): v if type(v) in _PLAIN else plain(v, f"{place}.{k}", depth + 1)
+            for k, v in value.items()
+        }
     if isinstance(value, (list, tuple)):
-        return [plain(v, f"{place}[{k}]", depth + 1) for k, v in enumerate(value)]
+        return [
+            v if type(v) in _PLAIN else plain(v, f"{place}[{k}]", depth + 1)
+            for k, v in enumerate(value)
+        ]
     raise InputError(f"{place}: a {type(value).__name__} cannot be written to a file")
 
 

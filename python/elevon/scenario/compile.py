@@ -9,6 +9,7 @@ from typing import Any
 
 from elevon.errors import InputError, unknown
 from elevon.faults import check_together
+from elevon.parameters.records import wirings
 from elevon.scenario.scenario import Action, Scenario, Term, Terms
 from elevon.units import check_kind, parse_quantity, to_si
 from elevon.waveforms import TABLE, check_values, unit_of, wave_records
@@ -103,18 +104,12 @@ def compile_scenario(scenario: Scenario, wiring: str, fidelity: str) -> Compiled
 
 def _mode(scenario: Scenario, wiring: str) -> str:
     """Return what the command asks for; when nothing is said, the first thing the wiring takes."""
-    modes: list[str] = _wiring(wiring)["modes"]
+    modes: list[str] = wirings()[wiring]["modes"]
     command = scenario.command
     mode = command.mode if "mode" in command.model_fields_set else modes[0]
     if mode not in modes:
         raise InputError(f"command: the {wiring} wiring has no mode {mode!r}; {_listed(modes)}")
     return mode
-
-
-def _wiring(name: str) -> Mapping[str, Any]:
-    from elevon import _core
-
-    return next(item for item in _core.wirings() if item["name"] == name)
 
 
 def _listed(modes: list[str]) -> str:
@@ -143,12 +138,12 @@ def _port_units(mode: str, wiring: str) -> dict[str, str]:
     from elevon import _core
 
     units = {port["name"]: port["unit"] for port in _core.ports(wiring)}
-    return {**units, "command": _wiring(wiring)["mode_units"][mode]}
+    return {**units, "command": wirings()[wiring]["mode_units"][mode]}
 
 
 def _sequence(steps: Sequence[Action], wiring: str) -> dict[str, Any]:
     """Return a sequence of actions as a held table of their numbers."""
-    actions: list[str] = _wiring(wiring)["actions"]
+    actions: list[str] = wirings()[wiring]["actions"]
     times, values = [0.0], [0.0]
     for index, step in enumerate(steps):
         place = f"command.steps[{index}]"

@@ -74,12 +74,7 @@ def _asked(actuator: Actuator, compiled: CompiledScenario, fidelity: str) -> dic
     """
     from elevon import _core
 
-    known = records(actuator.wiring)
-    changed = {
-        path: item
-        for path, item in actuator.parameters.items()
-        if item.changed and item.value != known[path].default_value()
-    }
+    changed = actuator.parameters.away()
     faults = [fault for fault in compiled.faults if fault["severity"] != 0.0]
     if not changed and not faults:
         return {}
@@ -87,7 +82,7 @@ def _asked(actuator: Actuator, compiled: CompiledScenario, fidelity: str) -> dic
     paths = [*changed, *(path for fault in faults for path in _touched(fault, actuator.wiring))]
     rows = _core.not_acting(actuator.wiring, fidelity, vector, compiled.faults, paths)
     idle = {item["path"]: item["reason"] for item in rows}
-    asked = {f"{path} = {item.text}": idle.get(path, "") for path, item in changed.items()}
+    asked = {f"{path} = {text}": idle.get(path, "") for path, text in changed.items()}
     for fault in faults:
         asked.update(_of_fault(fault, actuator.wiring, idle))
     return asked

@@ -12,6 +12,7 @@ from elevon.actuator import Actuator
 from elevon.errors import InputError, unknown
 from elevon.features import FeaturePlan, feature_plans
 from elevon.parameters import records
+from elevon.parameters.records import wirings
 from elevon.record_plan import MOST_STEPS, ClockPlan, record_plan
 from elevon.scenario import Scenario, compile_scenario
 from elevon.scenario.compile import signal_records
@@ -162,9 +163,7 @@ def prepare(
 
 def check_fidelity(wiring: str, fidelity: str) -> None:
     """Raise `UnknownNameError` when the wiring has no such fidelity."""
-    from elevon import _core
-
-    known = next(item["fidelities"] for item in _core.wirings() if item["name"] == wiring)
+    known = wirings()[wiring]["fidelities"]
     if fidelity not in known:
         raise unknown("fidelity", fidelity, known)
 

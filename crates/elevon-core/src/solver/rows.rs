@@ -9,14 +9,18 @@ use crate::fault::FaultLanes;
 use crate::scalar::Scalar;
 use crate::time::Steps;
 
-/// Rows that gather before they are sorted by lane.
-const GATHERED: usize = 256;
+/// Rows of a clock with features that gather before they are sorted by lane.
+const SUMMED: usize = 256;
+/// Vectors of other clocks that gather: they stay in the nearest cache.
+const GATHERED: usize = 384;
 
 /// One clock of one chunk: rows of the clock's signals, then of the fault labels (as many as the lane with most of them has).
 #[derive(Clone, Debug)]
 struct Table<S> {
     columns: usize,
-    /// Columns of fault labels among them.
+    /// Rows that gather.
+    most: usize,
+    /// Columns of fault labels.
     labels: usize,
     gathered: Vec<S>,
     /// Row-major tables of the lanes that are recorded.
@@ -43,15 +47,17 @@ impl<S: Scalar> Rows<S> {
         let most_labels = labels.iter().copied().max().unwrap_or(0);
         let ended: Vec<bool> = all.map(|lane| lane >= real).collect();
         let table = |clock: &Clock| {
-            let summing = clock.features.as_ref().map(|plan| Summing::new(plan, clock.signals.len(), S::LANES, GATHERED));
+            let summing = clock.features.as_ref().map(|plan| Summing::new(plan, clock.signals.len(), S::LANES, SUMMED));
             let kept = if summing.is_some() { 0 } else { (steps / clock.period + 1) as usize };
             let labelled = if summing.is_some() { 0 } else { most_labels };
             let room = |(labels, &ended): (&usize, &bool)| if ended { 0 } else { kept * (clock.signals.len() + labels) * lift.width() };
             let columns = clock.signals.len() + labelled;
+            let most = if summing.is_some() { SUMMED } else { (GATHERED / columns.max(1)).max(1) };
             Table {
                 columns,
+                most,
                 labels: labelled,
-                gathered: Vec::with_capacity(GATHERED.min((steps / clock.period + 1) as usize) * columns),
+                gathered: Vec::with_capacity(most.min((steps / clock.period + 1) as usize) * columns),
                 lanes: labels.iter().zip(&ended).map(|lane| Vec::with_capacity(room(lane))).collect(),
                 summing,
             }
@@ -63,12 +69,12 @@ impl<S: Scalar> Rows<S> {
     /// Appends a row to the table of clock `index`.
     #[inline(always)]
     pub fn append<L: Lift<S>>(&mut self, index: usize, clock: &Clock, observed: &[S], faults: &FaultLanes, lift: &L) {
-        let Table { columns, labels, gathered, .. } = &mut self.tables[index];
+        let Table { columns, most, labels, gathered, .. } = &mut self.tables[index];
         gathered.extend(clock.signals.iter().map(|&signal| observed[signal]));
         for label in 0..*labels {
             gathered.push(S::from_fn(|lane| faults.label(self.first + lane, label)));
         }
-        if gathered.len() >= GATHERED * *columns {
+        if gathered.len() >= *most * *columns {
             self.sort(index, lift);
         }
     }
@@ -76,13 +82,17 @@ impl<S: Scalar> Rows<S> {
     /// The gathered rows of clock `index` go to the tables of the lanes that still record.
     #[inline(never)]
     fn sort<L: Lift<S>>(&mut self, index: usize, lift: &L) {
-        let Table { columns, labels, gathered, lanes, summing } = &mut self.tables[index];
+        let Table { columns, labels, gathered, lanes, summing, .. } = &mut self.tables[index];
         for (lane, out) in lanes.iter_mut().enumerate().filter(|(lane, _)| !self.ended[*lane]) {
             if let Some(summing) = summing {
                 summing.push(lane, gathered);
                 continue;
             }
             let used = *columns - *labels + self.labels[lane];
+            if used == *columns {
+                lift.emit_row(gathered, lane, out);
+                continue;
+            }
             for row in gathered.chunks_exact((*columns).max(1)) {
                 lift.emit_row(&row[..used], lane, out);
             }
