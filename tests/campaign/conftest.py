@@ -9,7 +9,6 @@ from elevon.cli import main
 PLAN = """
 actuator = "torino-rotary"
 fidelity = "low"
-record = "user_position,motor_speed@400 Hz"
 {head}
 [scenario]
 duration = "10 ms"
@@ -35,9 +34,10 @@ count = {count}
 def plan(tmp_path):
     """Write a plan of `count` frictions (0: none), 10 ms each, with further lines."""
 
-    def write(count=12, head="runs_per_file = 4", tail="", terms="", name="plan.toml"):
+    def write(count=12, head="runs_per_file = 4", tail="", terms="", name="plan.toml", bare=False):
         path = tmp_path / name
         vary = VARY.format(count=count) if count else ""
+        head = head if bare else f'record = "user_position,motor_speed@400 Hz"\n{head}'
         path.write_text(PLAN.format(vary=vary, head=head, tail=tail, terms=terms))
         return path
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elevon.campaign.features import feature_table
 from elevon.campaign.resolved import Resolved
 from elevon.errors import InputError, OutputError
 from elevon.files import atomic_path
@@ -88,12 +89,15 @@ def block_tables(
     prepared: Sequence[Prepared],
     results: Sequence[Result],
 ) -> dict[str, pa.Table]:
-    """Return a block's tables by the folder they go to: ``runs/CLOCK`` for each clock."""
+    """Return a block's tables by their folder: ``runs/CLOCK`` for each clock, ``features``."""
     clocks = {clock.name: clock for item in prepared for clock in item.plan}
-    return {
+    tables = {
         f"runs/{name}": _signals(resolved, clock, numbers, prepared, results)
         for name, clock in clocks.items()
     }
+    if resolved.features:
+        tables["features"] = feature_table(resolved, numbers, prepared, results)
+    return tables
 
 
 def block_outcome(results: Sequence[Result]) -> dict[str, Any]:

@@ -232,7 +232,15 @@ class Dataset:
 
     @property
     def signals(self) -> Table:
-        """The samples of the first clock: run, time, the channels, the faults' severities."""
+        """The samples of the first clock: run, time, the channels, the faults' severities.
+
+        Raises
+        ------
+        InputError
+            The campaign kept features only.
+        """
+        if not self.clocks:
+            raise InputError(f"{self.folder}: holds no signals, features only")
         return self.clock(self.clocks[0])
 
     @property

@@ -23,6 +23,8 @@ class Plan(Strict):
 
     Attributes
     ----------
+    features : str or tuple of str
+        Computed while simulating, such as ``all@400 Hz``; with them `record` may be empty.
     responses : tuple of str
         What the campaign is about: signals or features, named for the reader and for `effects`.
     split_by : str
@@ -38,6 +40,7 @@ class Plan(Strict):
     scenario: StrictStr | dict[str, Any] | None = None
     parameters: dict[str, Any] = Field(default_factory=dict)
     record: StrictStr | tuple[StrictStr, ...] | None = None
+    features: StrictStr | tuple[StrictStr, ...] = ()
     responses: tuple[StrictStr, ...] = ()
     seeds: tuple[StrictInt, ...] = (0,)
     population: Population | None = None

@@ -84,6 +84,7 @@ def resolve_plan(plan: Plan, document: Document) -> Resolved:
         actuator=actuator,
         fidelity=plan.fidelity,
         record=plan.record if plan.record is None else _texts(plan.record),
+        features=_texts(plan.features),
         scenario=base,
         variants=parts.variants,
         columns=[files.column(column_of(*item), document.place()) for item in quantities],

@@ -91,6 +91,7 @@ class Resolved:
     variants: list[Variant]
     columns: list[Column]
     index: Index
+    features: list[str] = field(default_factory=list)
     responses: list[str] = field(default_factory=list)
     allow_not_acting: bool = False
     runs_per_file: int | None = None
@@ -196,7 +197,9 @@ class Resolved:
         key = self.structure(number)
         if key not in self._known:
             try:
-                prepared = prepare(self.run(number), self.fidelity, self.record, doubts=False)
+                features = self.features or None
+                run = self.run(number)
+                prepared = prepare(run, self.fidelity, self.record, features, doubts=False)
             except InputError as error:
                 start = "" if str(error).startswith("run ") else f"run {number}: "
                 raise type(error)(f"{start}{error}") from error
@@ -231,7 +234,7 @@ _MOST_TEMPLATES = 512
 
 def _prepares(path: str) -> bool:
     """Whether a number decides more of a run's preparation than its own place in the vector."""
-    return path.endswith(".step") or path.startswith("stop.")
+    return path.endswith((".step", ".pole_pairs")) or path.startswith("stop.")
 
 
 def record_of_fault(name: str, wiring: str) -> FaultRecord:

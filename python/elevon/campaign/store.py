@@ -139,6 +139,7 @@ def resolved_text(resolved: Resolved) -> str:
         "text": resolved.text,
         "fidelity": resolved.fidelity,
         "record": resolved.record,
+        "features": resolved.features,
         "actuator": {
             "name": actuator.name,
             "title": actuator.title,
@@ -316,6 +317,9 @@ def _table(path: Path) -> Any:
     return pq.read_table(path, page_checksum_verification=True)
 
 
+_OWN = ("name", "text", "fidelity", "record", "features", "scenario", "responses")
+
+
 def _resolved(content: Mapping[str, Any], table: Any) -> Resolved:
     data = content["actuator"]
     entries = {item["path"]: _parameter(item) for item in data["parameters"]}
@@ -326,7 +330,7 @@ def _resolved(content: Mapping[str, Any], table: Any) -> Resolved:
         title=data["title"],
         references=data["references"],
     )
-    own = {c: content[c] for c in ("name", "text", "fidelity", "record", "scenario", "responses")}
+    own = {c: content[c] for c in _OWN}
     kept = ("allow_not_acting", "runs_per_file", "files", "sources", "design")
     variants = [Variant(**item) for item in content["variants"]]
     return Resolved(
