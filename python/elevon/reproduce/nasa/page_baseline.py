@@ -13,6 +13,7 @@ from elevon.reproduce.nasa.baseline_rows import MEASURES, BaselineResult
 from elevon.reproduce.nasa.histories import History
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["baseline_page"]
@@ -75,12 +76,16 @@ def _effects(report: Report, result: BaselineResult) -> None:
     )
     for name, found in result.effects.items():
         title, unit, digits = MEASURES[name]
-        rows = [[e.term, e.effect, e.low, e.high, e.p] for e in found]
+        rows = [[e.term, e.effect, e.low, e.high, _probability(e.p)] for e in found]
         number = f"+.{digits}f"
         section.table(
             Table(["Factor or pair", f"Effect [{unit}]", "from", "to", "p"], rows, title,
-                  formats=("", number, number, number, ".2g"))
+                  formats=("", number, number, number, ""))
         )  # fmt: skip
+
+
+def _probability(p: float) -> str:
+    return "< 1e-4" if p < 1e-4 else f"{p:.2g}"
 
 
 def _current_figure(result: BaselineResult) -> Figure:
@@ -112,7 +117,7 @@ def _history_figure(history: History) -> Figure:
         position.plot(history.time, 1e3 * curve["user_position"], color=COLOURS["blue"],
                       label="position", lw=1)  # fmt: skip
         position.set_ylabel("Position [mm]")
-        position.legend(fontsize=8)
+        _legend_above(position)
         load.plot(history.time, 1e-3 * curve["joint_force"], color=COLOURS["violet"], lw=1)
         load.set_ylabel("Load cell [kN]")
         current.plot(history.time, curve["current_ref"], color=COLOURS["orange"], lw=1)
@@ -121,10 +126,15 @@ def _history_figure(history: History) -> Figure:
             rise = curve[f"{name}_temperature"] - 273.15
             warm.plot(history.time, rise, color=COLOURS[colour], label=name)
         warm.set_ylabel("Temperature [degC]")
-        warm.legend(fontsize=8)
+        _legend_above(warm)
         for axes in grid[-1]:
             axes.set_xlabel("Time [s]")
     return figure
+
+
+def _legend_above(axes: Axes) -> None:
+    """The curves fill their axes."""
+    axes.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderpad=0.2)
 
 
 def _rows_table(result: BaselineResult) -> Table:
