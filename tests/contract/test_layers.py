@@ -23,7 +23,7 @@ ROWS = [
     ["logs"],
     ["simulate"],
     ["bench", "campaign", "calibrate", "compare"],
-    ["lowfit"],
+    ["lowfit", "analysis"],
     ["reproduce"],
     ["demo"],
     ["cli"],

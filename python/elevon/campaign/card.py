@@ -88,10 +88,10 @@ def _markdown(about: dict[str, Any], ds: Dataset) -> str:
     lines += [
         "* `plan.toml` is the plan as given, `resolved.json` everything it stands for,",
         "  `manifest.json` every file with its SHA-256; `elevon dataset verify` checks them.",
-        "* `card.html` shows typical signals of each fault.",
+        *(["* `card.html` shows typical signals of each fault."] if ds.clocks else []),
         "",
         "```python",
-        *_code(ds.folder.name).splitlines(),
+        *_code(ds).splitlines(),
         "```",
         *_md_table("Faults", _FAULT_TITLES, _fault_rows(about)),
         *_md_table("Varied quantities", _VARIED_TITLES, _varied_rows(about)),
@@ -104,12 +104,16 @@ def _markdown(about: dict[str, Any], ds: Dataset) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _code(folder: str) -> str:
+def _code(ds: Dataset) -> str:
     return (
         "import elevon\n\n"
-        f'ds = elevon.load_campaign("{folder}")\n'
+        f'ds = elevon.load_campaign("{ds.folder.name}")\n'
         "runs = ds.runs.to_pandas()       # one row a run: faults in SI, 0 when absent\n"
-        "signals = ds.signals.to_pandas(runs=[0])"
+        + (
+            "signals = ds.signals.to_pandas(runs=[0])"
+            if ds.clocks
+            else "features = ds.features.to_pandas()"
+        )
     )
 
 
@@ -141,7 +145,7 @@ def _page(about: dict[str, Any], ds: Dataset) -> str:
     report.fact("runs", str(about["runs"]), _counts(about["statuses"]))
     report.fact("size", format_bytes(about["bytes"]))
     section = report.section("What is in it").points(_facts(about))
-    section.code(_code(ds.folder.name))
+    section.code(_code(ds))
     if about["faults"]:
         table = Table(_FAULT_TITLES, _fault_rows(about), "Severities of the runs that have it.")
         report.section("Faults").table(table)
@@ -151,7 +155,8 @@ def _page(about: dict[str, Any], ds: Dataset) -> str:
         report.section("Set, but not acting").points(about["not_acting"])
     if about["failed"]:
         report.section("Runs that failed").points([*_failed(about)][3:])
-    _pictures(report.section("Typical signals"), ds)
+    if ds.clocks:
+        _pictures(report.section("Typical signals"), ds)
     for clock in about["clocks"]:
         rows = [[c["name"], c["unit"], c["text"]] for c in clock["columns"]]
         table = Table(("column", "unit", "text"), rows, folded=f"runs/{clock['name']}")

@@ -8,11 +8,12 @@ from typing import Annotated, Any
 
 import typer
 
-from elevon.cli import interrupt
+from elevon.cli import campaign_analysis, interrupt
 from elevon.cli.common import JsonOption, StrictOption
 from elevon.cli.output import print_json, print_table, progress_bar, say
 
 app = typer.Typer(rich_markup_mode=None, no_args_is_help=True)
+campaign_analysis.add_to(app)
 
 PlanArgument = Annotated[Path, typer.Argument(metavar="PLAN", help="The plan file (TOML).")]
 FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="The campaign's folder.")]

@@ -1,0 +1,256 @@
+"""Main effects and two-factor interactions of a response, with intervals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.analysis.response import Response
+from elevon.analysis.terms import Column, blocks_matrix, further_contrasts, separate
+from elevon.errors import InputError
+
+__all__ = ["Effects", "Term", "effects_of"]
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Term:
+    """One effect: the response's change from the lowest to the highest level.
+
+    Attributes
+    ----------
+    term, name : str
+        Letters, and the factors in full.
+    effect, low, high : float
+        Estimate and interval, in the response's unit; the interval is None where the design leaves
+        nothing to judge it by.
+    significant : bool or None
+        Whether the interval leaves out zero.
+    aliases : list of str
+        Terms whose effects are in this number too, with their signs.
+    """
+
+    term: str
+    name: str
+    effect: float
+    low: float | None
+    high: float | None
+    significant: bool | None
+    aliases: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Effects:
+    """Effects of a campaign's factors on a response.
+
+    Attributes
+    ----------
+    method : str
+        ``replicates`` (t, pure error), ``lenth`` (unreplicated two-level design), ``residual`` (t,
+        residual of the model) or ``none`` (nothing left to judge by).
+    error, margin : float or None
+        Standard error of an effect (of the first, where they differ) and half its interval.
+    df : float or None
+        Degrees of freedom of t; of Lenth's method a third of the contrasts.
+    terms : list of Term
+        Largest first.
+    blocked, partial : list of str
+        Terms confounded with the blocks; interactions partly aliased and left out.
+    """
+
+    response: str
+    unit: str
+    runs: int
+    left_out: list[int]
+    level: float
+    method: str
+    error: float | None
+    margin: float | None
+    df: float | None
+    mean: float
+    factors: list[dict[str, Any]]
+    terms: list[Term]
+    blocks: int
+    with_blocks: list[str]
+    blocked: list[str]
+    partial: list[str]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form."""
+        return {**vars(self), "terms": [vars(term) for term in self.terms]}
+
+
+def effects_of(response: Response, *, level: float = 0.95) -> Effects:
+    """Estimate main effects and two-factor interactions by least squares.
+
+    The model has the mean, the blocks and every term that can be told apart; an effect is twice its
+    coefficient with factors coded -1 to +1. Intervals: of a design with repeated points Student's t
+    with the pure error of the repeats; of an unreplicated orthogonal two-level design Lenth's
+    pseudo standard error (R. V. Lenth, Technometrics 31(4), 1989); of others t with the model's
+    residual, which then holds what the model lacks.
+
+    Parameters
+    ----------
+    response : Response
+        From `read_response`.
+    level : float
+        Of confidence, two-sided, each term by itself.
+
+    Raises
+    ------
+    InputError
+        Too few runs for the main effects.
+    """
+    if not 0.0 < level < 1.0:
+        raise InputError(f"level = {level} must lie between 0 and 1")
+    coded = [factor.coded for factor in response.factors]
+    head = blocks_matrix(response.block)
+    terms, blocked, partial = separate(coded, head)
+    letters = [factor.letter for factor in response.factors]
+    matrix = np.column_stack([head, *(term.values for term in terms)])
+    if np.linalg.matrix_rank(matrix) < matrix.shape[1]:
+        raise InputError(
+            f"{response.name}: {len(response.values)} runs do not tell {len(letters)} factors "
+            f"and {head.shape[1]} block(s) apart"
+        )
+    fit = _fit(matrix, head.shape[1], response)
+    judged = _judged(fit, response, coded, level)
+    rows = [
+        _row(term, effect, margin, letters, response)
+        for term, effect, margin in zip(terms, fit.effects, judged.margins, strict=True)
+    ]
+    return Effects(
+        response=response.name,
+        unit=response.unit,
+        runs=len(response.values),
+        left_out=response.left_out,
+        level=level,
+        method=judged.method,
+        error=judged.error,
+        margin=judged.margins[0] if rows else None,
+        df=judged.df,
+        mean=float(response.values.mean()),
+        factors=[_about(factor) for factor in response.factors],
+        terms=sorted(rows, key=lambda row: -abs(row.effect)),
+        blocks=head.shape[1],
+        with_blocks=response.with_blocks,
+        blocked=[_word(name, letters) for name in blocked],
+        partial=[_word(name, letters) for name in partial],
+    )
+
+
+@dataclass(frozen=True)
+class _Fit:
+    matrix: Floats
+    head: int
+    effects: Floats
+    #: Standard error of each effect over the standard deviation of a run.
+    scale: Floats
+    residual: Floats
+
+
+@dataclass(frozen=True)
+class _Judged:
+    method: str
+    error: float | None
+    df: float | None
+    margins: list[float | None]
+
+
+def _fit(matrix: Floats, head: int, response: Response) -> _Fit:
+    solution, *_ = np.linalg.lstsq(matrix, response.values)
+    inverse = np.linalg.pinv(matrix.T @ matrix)
+    scale: Floats = np.asarray(2.0 * np.sqrt(np.diag(inverse)[head:]), dtype=np.float64)
+    effects: Floats = np.asarray(2.0 * solution[head:], dtype=np.float64)
+    return _Fit(matrix, head, effects, scale, response.values - matrix @ solution)
+
+
+def _judged(fit: _Fit, response: Response, coded: list[Floats], level: float) -> _Judged:
+    """Judge the effects by repeats, by Lenth's method or by the residual."""
+    spread, df = _pure_error(response, coded)
+    if df >= 1:
+        return _by_t("replicates", spread, df, fit, level)
+    if _orthogonal(fit, coded):
+        return _by_lenth(fit, response, coded, level)
+    df = len(fit.residual) - fit.matrix.shape[1]
+    if df >= 1:
+        return _by_t("residual", float(np.sqrt(fit.residual @ fit.residual / df)), df, fit, level)
+    return _Judged("none", None, None, [None] * len(fit.effects))
+
+
+def _pure_error(response: Response, coded: list[Floats]) -> tuple[float, int]:
+    """Return the deviation of runs of one point, less the blocks, and its degrees of freedom."""
+    points = np.unique(np.column_stack(coded).round(12), axis=0, return_inverse=True)[1]
+    own = (points[:, None] == np.arange(points.max() + 1)).astype(np.float64)
+    matrix = np.column_stack([blocks_matrix(response.block), own])
+    df = len(points) - int(np.linalg.matrix_rank(matrix))
+    if df < 1:
+        return np.nan, 0
+    residual = response.values - matrix @ np.linalg.lstsq(matrix, response.values)[0]
+    return float(np.sqrt(residual @ residual / df)), df
+
+
+def _by_t(method: str, spread: float, df: int, fit: _Fit, level: float) -> _Judged:
+    from scipy.stats import t
+
+    quantile = float(t.ppf(0.5 + 0.5 * level, df))
+    errors = spread * fit.scale
+    return _Judged(method, float(errors[0]), df, [quantile * float(e) for e in errors])
+
+
+def _orthogonal(fit: _Fit, coded: list[Floats]) -> bool:
+    """Tell whether all factors have two levels and the terms' columns are orthogonal."""
+    two = all(np.allclose(np.abs(column), 1.0) for column in coded)
+    products = fit.matrix.T @ fit.matrix
+    return two and np.allclose(products, np.diag(np.diag(products)), atol=1e-6 * len(fit.matrix))
+
+
+def _by_lenth(fit: _Fit, response: Response, coded: list[Floats], level: float) -> _Judged:
+    from scipy.stats import t
+
+    further = further_contrasts(fit.matrix, coded)
+    rest = [2.0 * float(column @ response.values) / len(response.values) for column in further]
+    contrasts = np.abs([*fit.effects, *rest])
+    first = 1.5 * float(np.median(contrasts))
+    small = contrasts[contrasts < 2.5 * first]
+    if not small.size:
+        return _Judged("none", None, None, [None] * len(fit.effects))
+    error, df = 1.5 * float(np.median(small)), len(contrasts) / 3.0
+    margin = float(t.ppf(0.5 + 0.5 * level, df)) * error
+    return _Judged("lenth", error, df, [margin] * len(fit.effects))
+
+
+def _row(
+    term: Column, effect: float, margin: float | None, letters: list[str], response: Response
+) -> Term:
+    effect = float(effect)
+    known = margin is not None
+    return Term(
+        _word(term.factors, letters),
+        " x ".join(response.factors[k].name for k in term.factors),
+        effect,
+        effect - margin if margin is not None else None,
+        effect + margin if margin is not None else None,
+        abs(effect) > margin if margin is not None and known else None,
+        [("-" if sign < 0 else "") + _word(name, letters) for name, sign in term.aliases],
+    )
+
+
+def _word(name: tuple[int, ...], letters: list[str]) -> str:
+    parts = [letters[k] for k in name]
+    return "".join(parts) if all(len(part) == 1 for part in parts) else ":".join(parts)
+
+
+def _about(factor: Any) -> dict[str, Any]:
+    return {
+        "letter": factor.letter,
+        "name": factor.name,
+        "unit": factor.unit,
+        "role": factor.role,
+        "low": factor.levels[0],
+        "high": factor.levels[-1],
+    }
