@@ -61,13 +61,15 @@ pub fn six_step<S: Scalar>(sines: [S; 3]) -> [S; 3] {
     })
 }
 
-/// Leg transitions between two sets of commands added to `count`; most steps have none.
+/// Does any leg change?
+#[inline(always)]
+pub fn transition<S: Scalar>(old: [S; 3], new: [S; 3]) -> bool {
+    S::any(!(old[0].equals(new[0]) & old[1].equals(new[1]) & old[2].equals(new[2])))
+}
+
+/// Leg transitions between two sets of commands added to `count`.
 #[inline(always)]
 pub fn count_transitions<S: Scalar>(count: S, old: [S; 3], new: [S; 3]) -> S {
-    let same = old[0].equals(new[0]) & old[1].equals(new[1]) & old[2].equals(new[2]);
-    if !S::any(!same) {
-        return count;
-    }
     let sum = (new[0] - old[0]).abs() + (new[1] - old[1]).abs() + (new[2] - old[2]).abs();
     count + S::splat(0.5) * sum
 }

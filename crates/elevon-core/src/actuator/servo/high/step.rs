@@ -8,7 +8,7 @@ use super::model::{Model, State, E_INVERTER, E_SUPPLY};
 use crate::actuator::servo::advance::{Instant, Stepper};
 use crate::actuator::servo::details::Structure;
 use crate::actuator::servo::layout::DriveKind;
-use crate::inverter::hysteresis::{count_transitions, relays, six_step};
+use crate::inverter::hysteresis::{count_transitions, relays, six_step, transition};
 use crate::inverter::losses::switching_loss;
 use crate::scalar::{three_phase, Scalar};
 use crate::sensor::filter::low_pass;
@@ -138,21 +138,25 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     let supply = if EXTRA { link_voltage(m, structure, s, source) } else { source };
     let half_supply = S::splat(0.5) * supply;
     let old_legs = s.legs;
-    let mut error = [S::zero(); 3];
+    let (mut legs, mut error) = (old_legs, [S::zero(); 3]);
     if PWM || (FULL && structure.drive == DriveKind::Pwm) {
-        s.legs = m.current_control.compare(&s.current_control, x.t);
+        legs = m.current_control.compare(&s.current_control, x.t);
     } else if FULL && structure.drive == DriveKind::Off {
-        s.legs = [S::zero(); 3];
+        legs = [S::zero(); 3];
     } else {
         let shape = if EXTRA && structure.six_step { six_step(sin_phases) } else { sin_phases };
         error = three!(|j| s.current_ref * shape[j] - measured[j]);
-        s.legs = relays(m.half_band, old_legs, error);
+        legs = relays(m.half_band, old_legs, error);
     }
     if EXTRA && structure.stops {
         let lost = m.sensing.lost();
-        s.legs = three!(|j| S::select(lost, S::zero(), s.legs[j]));
+        legs = three!(|j| S::select(lost, S::zero(), legs[j]));
     }
-    s.transitions = count_transitions(s.transitions, old_legs, s.legs);
+    if transition(old_legs, legs) {
+        // Most steps have none: then the processor goes on with the old legs, and does not wait for the sensors.
+        s.transitions = count_transitions(s.transitions, old_legs, legs);
+        s.legs = legs;
+    }
     let drawn_before = s.energy[E_SUPPLY];
     if EXTRA && structure.switching {
         lose_switching(m, s, supply, old_legs, s.legs);
