@@ -21,7 +21,7 @@ mod parameters;
 #[cfg(test)]
 mod tests;
 
-pub use network::{Account, Discrete, Network, Outcome};
+pub use network::{Account, Discrete, Network};
 pub use parameters::{ShortParameter, TapParameter, SHORT, TAP};
 
 use super::star::{MotorParameter, ShortModel, Star};

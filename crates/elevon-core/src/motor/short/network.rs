@@ -33,8 +33,6 @@ pub struct Network<'a, S> {
     shorts: &'a Shorts<S>,
     discrete: &'a Discrete<S>,
     structure: ShortStructure,
-    /// Currents of the contacts at the step's start.
-    contact: &'a Contacts<S>,
     /// Ampere-turns at the end with terminal and neutral at one potential.
     free: [S; 3],
     ground: S,
@@ -43,13 +41,6 @@ pub struct Network<'a, S> {
     /// Of the legs at the step's start.
     legs: [S; 3],
     open: [S; 3],
-}
-
-/// What a step leaves.
-#[derive(Clone, Copy, Debug)]
-pub struct Outcome<S> {
-    pub turns: [S; 3],
-    pub contact: Contacts<S>,
 }
 
 /// Mean currents and heats of a step.
@@ -157,7 +148,7 @@ impl<'a, S: Scalar> Network<'a, S> {
         discrete: &'a Discrete<S>,
         structure: ShortStructure,
         turns: [S; 3],
-        contact: &'a Contacts<S>,
+        contact: &Contacts<S>,
         drop: [S; 3],
         ground: S,
         open: [S; 3],
@@ -169,7 +160,6 @@ impl<'a, S: Scalar> Network<'a, S> {
             shorts,
             discrete,
             structure,
-            contact,
             free,
             ground,
             inject: free,
@@ -180,7 +170,7 @@ impl<'a, S: Scalar> Network<'a, S> {
         for kind in 0..KINDS {
             if structure[kind] {
                 for j in 0..3 {
-                    net.inject(kind, j);
+                    net.inject(kind, j, contact[kind][j]);
                 }
             }
         }
@@ -189,9 +179,9 @@ impl<'a, S: Scalar> Network<'a, S> {
 
     /// Adds what a contact carries without a voltage.
     #[inline(always)]
-    fn inject(&mut self, kind: usize, j: usize) {
+    fn inject(&mut self, kind: usize, j: usize, before: S) {
         let ratio = self.shorts.contact[kind][j].ratio;
-        let mut current = self.discrete.end[1][kind][j] * self.contact[kind][j];
+        let mut current = self.discrete.end[1][kind][j] * before;
         if kind == GROUND {
             current = current - self.discrete.end[0][kind][j] * self.ground;
         }
@@ -238,27 +228,30 @@ impl<'a, S: Scalar> Network<'a, S> {
         }
     }
 
-    /// The step's end under terminal potentials `v` and neutral.
+    /// Ampere-turns at the step's end under terminal potentials `v` and neutral.
     #[inline(always)]
-    pub fn outcome(&self, v: [S; 3], neutral: S) -> Outcome<S> {
-        let phase: [S; 3] = three!(|j| v[j] - neutral);
-        let turns = three!(|j| self.discrete.per[j].fma(phase[j], self.free[j]));
-        Outcome { turns, contact: self.contacts(&self.discrete.end, phase, neutral) }
+    pub fn turns(&self, v: [S; 3], neutral: S) -> [S; 3] {
+        three!(|j| self.discrete.per[j].fma(v[j] - neutral, self.free[j]))
     }
 
-    /// Currents of the contacts, at the step's end or in their means.
+    /// The contacts' currents from the step's start to its end. In place: copies of the whole would wait for their parts.
     #[inline(always)]
-    fn contacts(&self, [conductance, stays]: &[Contacts<S>; 2], phase: [S; 3], neutral: S) -> Contacts<S> {
-        let mut current = *self.contact;
+    pub fn renew(&self, v: [S; 3], neutral: S, contact: &mut Contacts<S>) {
+        self.move_on(&self.discrete.end, v, neutral, contact);
+    }
+
+    /// From the start to what holds `[conductance, share that stays]`: the step's end, or its means.
+    #[inline(always)]
+    fn move_on(&self, [conductance, stays]: &[Contacts<S>; 2], v: [S; 3], neutral: S, contact: &mut Contacts<S>) {
+        let phase: [S; 3] = three!(|j| v[j] - neutral);
         for kind in 0..KINDS {
             if self.structure[kind] {
                 for j in 0..3 {
-                    let stays = stays[kind][j] * self.contact[kind][j];
-                    current[kind][j] = conductance[kind][j].fma(self.drive(kind, j, phase, neutral), stays);
+                    let stays = stays[kind][j] * contact[kind][j];
+                    contact[kind][j] = conductance[kind][j].fma(self.drive(kind, j, phase, neutral), stays);
                 }
             }
         }
-        current
     }
 
     /// Energies of the step: of contacts with their means over it, of windings with the middle of their ends. Only what
@@ -266,20 +259,29 @@ impl<'a, S: Scalar> Network<'a, S> {
     /// takes from the windings' inductances, of second order in the step, is heat of the contacts.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
-    pub fn account(&self, old: [S; 3], new: &Outcome<S>, v: [S; 3], neutral: S, resistance: [S; 3], factor: S) -> Account<S> {
+    pub fn account(
+        &self,
+        [old, new]: [[S; 3]; 2],
+        [before, after]: [&Contacts<S>; 2],
+        v: [S; 3],
+        neutral: S,
+        resistance: [S; 3],
+        factor: S,
+    ) -> Account<S> {
         let half = S::splat(0.5);
         let dt = self.shorts.dt;
         let phase: [S; 3] = three!(|j| v[j] - neutral);
-        let through = self.contacts(&self.discrete.mean, phase, neutral);
+        let mut through = *before;
+        self.move_on(&self.discrete.mean, v, neutral, &mut through);
         let conducts = self.discrete.per;
-        let change = (new.turns[0] - old[0]) + (new.turns[1] - old[1]) + (new.turns[2] - old[2]);
+        let change = (new[0] - old[0]) + (new[1] - old[1]) + (new[2] - old[2]);
         let per = S::one() / (conducts[0] + conducts[1] + conducts[2]);
         let mut out = Account { legs: old, ground: S::zero(), copper: S::zero(), loops: S::zero(), contact: S::zero(), tap: S::zero() };
         let mut excess = S::zero();
         for kind in 0..KINDS {
             if self.structure[kind] {
                 for j in 0..3 {
-                    let (c, was, mean) = (new.contact[kind][j], self.contact[kind][j], through[kind][j]);
+                    let (c, was, mean) = (after[kind][j], before[kind][j], through[kind][j]);
                     let x = self.shorts.contact[kind][j];
                     let imposed = loose(x.ratio, kind) * (half * (was + c) - mean);
                     excess = excess + imposed;
@@ -298,7 +300,7 @@ impl<'a, S: Scalar> Network<'a, S> {
                 }
             }
         }
-        let middle: [S; 3] = three!(|j| half * (old[j] + new.turns[j]) + conducts[j] * (per * excess));
+        let middle: [S; 3] = three!(|j| half * (old[j] + new[j]) + conducts[j] * (per * excess));
         out.legs = self.shorts.legs(&self.structure, middle, &through);
         let copper = three!(|j| dt * resistance[j] * middle[j] * middle[j]);
         out.copper = out.copper + (copper[0] + copper[1] + copper[2]);

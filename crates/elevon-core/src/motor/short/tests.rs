@@ -85,6 +85,13 @@ impl Rig {
     }
 }
 
+/// Ampere-turns and contacts after a step.
+fn outcome<S: Scalar>(net: &Network<'_, S>, contact: &Contacts<S>, v: [S; 3], neutral: S) -> ([S; 3], Contacts<S>) {
+    let mut after = *contact;
+    net.renew(v, neutral, &mut after);
+    (net.turns(v, neutral), after)
+}
+
 const REST: Contacts<f64> = [[0.0; 3]; KINDS];
 
 fn sines(amplitude: f64, angle: f64) -> [f64; 3] {
@@ -193,8 +200,8 @@ fn simulated(case: Case) -> (Vec<C>, Vec<C>) {
         let net = rig.network(m, &c, sines(K * SPEED, angle(0.5)), 0.0);
         let v = sines(VOLTS, angle(0.5));
         let neutral = net.neutral(v);
-        let (out, legs) = (net.outcome(v, neutral), net.ends(v, neutral));
-        (m, c) = (out.turns, out.contact);
+        let legs = net.ends(v, neutral);
+        (m, c) = outcome(&net, &c, v, neutral);
         if k >= begin {
             let share = 2.0 / period as f64;
             let (sin, cos) = (share * angle(1.0).sin(), share * angle(1.0).cos());
@@ -279,8 +286,7 @@ fn a_contact_without_conductance_is_the_healthy_motor() {
             for k in 0..20_000 {
                 for (rig, state) in [(&healthy, &mut x), (&open, &mut y)] {
                     let net = rig.network(state.0, &state.1, [0.0; 3], 0.0);
-                    let out = net.outcome(chopped(k), net.neutral(chopped(k)));
-                    *state = (out.turns, out.contact);
+                    *state = outcome(&net, &state.1, chopped(k), net.neutral(chopped(k)));
                 }
                 size = size.max(x.0[0].abs());
             }
@@ -304,14 +310,14 @@ fn flows_close_at_every_contact() {
                 let net = rig.network(m, &c, e, ground);
                 let v = chopped(k);
                 let neutral = net.neutral(v);
-                let out = net.outcome(v, neutral);
-                let x = net.account(m, &out, v, neutral, [R; 3], 1.0);
+                let (turns, contact) = outcome(&net, &c, v, neutral);
+                let x = net.account([m, turns], [&c, &contact], v, neutral, [R; 3], 1.0);
                 let power: f64 = (0..3).map(|j| v[j] * x.legs[j]).sum::<f64>() - ground * x.ground;
                 drawn += DT * power;
                 given += DT * power.abs();
                 heat += x.copper + x.contact + x.tap;
-                emf_work += (0..3).map(|j| DT * e[j] * 0.5 * (m[j] + out.turns[j])).sum::<f64>();
-                (m, c) = (out.turns, out.contact);
+                emf_work += (0..3).map(|j| DT * e[j] * 0.5 * (m[j] + turns[j])).sum::<f64>();
+                (m, c) = (turns, contact);
             }
             let stored = m.iter().map(|x| 0.5 * L * x * x).sum::<f64>() + rig.shorts.magnetic(&rig.structure, &c);
             let gap = drawn - heat - emf_work - stored;
@@ -330,10 +336,10 @@ fn at_its_onset_the_loop_carries_the_phase_current_and_cleared_it_carries_none()
     let mut burnt = REST;
     burnt[LOOP][0] = 6.0;
     let net = healthy.network(m, &burnt, [0.0; 3], 0.0);
-    let out = net.outcome([0.0; 3], net.neutral([0.0; 3]));
-    assert_eq!(out.contact, REST);
-    assert_eq!(healthy.shorts.loops(&healthy.structure, m, &out.contact), [0.0; 3]);
-    assert!((out.turns[0] + out.turns[1] + out.turns[2]).abs() < 1e-12);
+    let (turns, contact) = outcome(&net, &burnt, [0.0; 3], net.neutral([0.0; 3]));
+    assert_eq!(contact, REST);
+    assert_eq!(healthy.shorts.loops(&healthy.structure, m, &contact), [0.0; 3]);
+    assert!((turns[0] + turns[1] + turns[2]).abs() < 1e-12);
 }
 
 #[test]
@@ -342,10 +348,10 @@ fn the_contact_does_not_follow_the_coppers_temperature() {
     for factor in [1.0, 1.4] {
         let discrete = Discrete::new(&rig.shorts, [1e-12; 3], factor, 0.0);
         let net = Network::new(&rig.shorts, &discrete, rig.structure, [0.0; 3], &REST, [0.0; 3], 0.0, [0.0; 3]);
-        let out = net.outcome([100.0, -50.0, -50.0], 0.0);
+        let (_, contact) = outcome(&net, &REST, [100.0, -50.0, -50.0], 0.0);
         // mu v over R_c and the warm mu N R.
         let expected = 0.2 * 100.0 / (10.0 + factor * 0.2 * 0.8 * R);
-        assert!((out.contact[LOOP][0] - expected).abs() < 1e-12 * expected);
+        assert!((contact[LOOP][0] - expected).abs() < 1e-12 * expected);
     }
 }
 
@@ -401,10 +407,10 @@ fn stepped<S: Scalar>(raw: &[Vec<S>; 3]) -> Vec<S> {
         let net = Network::new(&shorts, &discrete, [true; KINDS], m, &c, drop, ground, splat([0.0; 3]));
         let connected = three!(|j| S::mask(!(k + j).is_multiple_of(4)));
         let (v, neutral) = net.solve(splat(chopped(40 * k)), splat([0.2; 3]), connected);
-        let new = net.outcome(v, neutral);
-        let x = net.account(m, &new, v, neutral, splat([R; 3]), S::splat(1.1));
+        let (turns, contact) = outcome(&net, &c, v, neutral);
+        let x = net.account([m, turns], [&c, &contact], v, neutral, splat([R; 3]), S::splat(1.1));
         let held = net.behind(v).1;
-        (m, c) = (new.turns, new.contact);
+        (m, c) = (turns, contact);
         out.extend([m[0], m[1], m[2], neutral, held, x.copper, x.contact, x.tap, x.loops, x.ground]);
         out.extend(c.iter().flatten().chain(&x.legs).copied());
     }

@@ -72,10 +72,11 @@ pub(crate) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
         resistance = three!(|j| resistance[j] * s.star.resistance_factor);
     }
     if EXTRA && structure.shorted {
-        return shorted_step(m, structure, s, c, &Fed { half_supply, old_legs, resistance });
+        let (turns, voltage) = shorted_step(m, structure, s, c, &Fed { half_supply, old_legs, resistance });
+        return (three!(|j| turns[j]), three!(|j| voltage[j]));
     }
     let speed = s.shaft.motor_speed;
-    let i = s.star.current;
+    let i = three!(|j| s.star.current[j]);
     let emf: [S; 3] = three!(|j| c.k[j] * speed);
     let mut terminal = three!(|j| s.legs[j] * half_supply);
     let mut rail = terminal;

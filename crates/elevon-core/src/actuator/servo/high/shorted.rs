@@ -31,20 +31,25 @@ pub(crate) fn shorted_step<S: Scalar>(
     c: &Coupling<S>,
     fed: &Fed<S>,
 ) -> ([S; 3], [S; 3]) {
-    let old = s.star.current;
+    let old = three!(|j| s.star.current[j]);
     let drop = three!(|j| (-fed.resistance[j]).fma(old[j], -(c.k[j] * s.shaft.motor_speed)));
     let ground = m.extra.shorts.ground(fed.half_supply);
     let net = Network::new(&m.extra.shorts, &s.extra.contacts, structure.shorts, old, &s.star.contact, drop, ground, m.star.open);
     let x = solve(m, structure, &mut s.bridge, s.legs, &net, fed);
-    let outcome = net.outcome(x.terminal, x.neutral);
+    let new = net.turns(x.terminal, x.neutral);
     if structure.accounts || structure.heat {
         let factor = if structure.thermal { s.star.resistance_factor } else { S::one() };
-        let account = net.account(old, &outcome, x.terminal, x.neutral, fed.resistance, factor);
+        let (before, mut after) = (s.star.contact, s.star.contact);
+        net.renew(x.terminal, x.neutral, &mut after);
+        let account = net.account([old, new], [&before, &after], x.terminal, x.neutral, fed.resistance, factor);
+        s.star.contact = after;
         book(m, structure, s, &x, &account, ground);
+    } else {
+        net.renew(x.terminal, x.neutral, &mut s.star.contact);
     }
-    s.star.contact = outcome.contact;
-    s.voltage = three!(|j| x.terminal[j] - x.neutral);
-    (outcome.turns, s.voltage)
+    let voltage = three!(|j| x.terminal[j] - x.neutral);
+    s.voltage = voltage;
+    (new, voltage)
 }
 
 #[inline(always)]

@@ -40,9 +40,11 @@ pub(crate) fn measured_current<S: Scalar, const FULL: bool, const EXTRA: bool>(
     structure: &Structure,
     s: &State<S>,
 ) -> [S; 3] {
-    let mut current = s.star.current;
+    // Phase by phase: what the last step stored as three numbers is slow to load as a whole.
+    let mut current = three!(|j| s.star.current[j]);
     if EXTRA && structure.shorted {
-        current = leg_current(m, structure, s);
+        let legs = leg_current(m, structure, s);
+        current = three!(|j| legs[j]);
     }
     if FULL && structure.measured_current {
         m.sensor.measure(current, s.current_noise, s.current_shown)
@@ -137,7 +139,7 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     let source = x.supply * m.supply_scale;
     let supply = if EXTRA { link_voltage(m, structure, s, source) } else { source };
     let half_supply = S::splat(0.5) * supply;
-    let old_legs = s.legs;
+    let old_legs = three!(|j| s.legs[j]);
     let (mut legs, mut error) = (old_legs, [S::zero(); 3]);
     if PWM || (FULL && structure.drive == DriveKind::Pwm) {
         legs = m.current_control.compare(&s.current_control, x.t);
@@ -165,13 +167,16 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     // Motor electromagnetics.
     let c = coupling::<S, FULL>(m, structure, s, sin, cos);
     let torque = motor_torque(m, s, &c);
-    let (current, voltage) = if EXTRA && structure.located {
+    let (current, voltage): ([S; 3], [S; 3]);
+    if EXTRA && structure.located {
         let rate = if structure.sensing.shows() && structure.sensing.commutated { reading.speed } else { s.shaft.motor_speed };
         let seen = Seen { error, sines: sin_phases, cosines: cos_phases, rate };
-        Located { model: m, structure, state: &mut *s, coupling: &c, half_supply, old_legs, seen }.step()
+        let (i, v) = Located { model: m, structure, state: &mut *s, coupling: &c, half_supply, old_legs, seen }.step();
+        (current, voltage) = (three!(|j| i[j]), three!(|j| v[j]));
     } else {
-        electric_step::<S, FULL, EXTRA>(m, structure, s, &c, half_supply, old_legs)
-    };
+        let (i, v) = electric_step::<S, FULL, EXTRA>(m, structure, s, &c, half_supply, old_legs);
+        (current, voltage) = (three!(|j| i[j]), three!(|j| v[j]));
+    }
     if EXTRA && structure.link {
         m.extra.link.step(&mut s.extra.link, source, s.energy[E_SUPPLY] - drawn_before);
     }
