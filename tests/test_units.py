@@ -201,3 +201,8 @@ def test_any_text_is_a_number_or_a_clear_error(text):
         assert str(error).startswith("place: ")  # noqa: PT017
     else:
         assert math.isfinite(value)
+
+
+def test_a_quantity_beyond_its_unit_is_shown_in_si() -> None:
+    """1.7e308 rad are no float of degrees."""
+    assert format_quantity(-1.7e308, "deg") == "-1.7e+308 (SI)"

@@ -196,9 +196,14 @@ def format_quantity(value: float, unit: str, digits: int = 6) -> str:
     Returns
     -------
     str
-        Such as ``"7.7 kg cm2"``; the unit ``"1"`` is not written.
+        Such as ``"7.7 kg cm2"``; the unit ``"1"`` is not written. A value too large for a float
+        in that unit is given in SI.
     """
-    number = f"{to_display(float(value), unit):.{digits}g}"
+    with np.errstate(over="ignore"):
+        shown = to_display(float(value), unit)
+    if math.isinf(shown) and math.isfinite(value):
+        return f"{value:.{digits}g} (SI)"
+    number = f"{shown:.{digits}g}"
     return number if unit in {"", "1"} else f"{number} {unit}"
 
 

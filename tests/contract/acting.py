@@ -147,7 +147,10 @@ def _faults(cell: Cell, path: str) -> Iterator[Any]:
 
 
 def _neighbours(cell: Cell, path: str) -> Iterator[dict[str, Any]]:
-    """Yield other values of the parameters of the same group, all at once and one at a time."""
+    """Yield other values of the parameters of the same group, all at once and one at a time.
+
+    Those whose names share most words with its own come first: knot 8 of a table needs speed 8.
+    """
     group = path.rpartition(".")[0]
     actuator = cell.actuator()
     moved = {
@@ -155,6 +158,9 @@ def _neighbours(cell: Cell, path: str) -> Iterator[dict[str, Any]]:
         for other, record in records(actuator.wiring).items()
         if other.rpartition(".")[0] == group and other != path
     }
+    words = set(path.split(".")) | set(path.rpartition(".")[2].split("_"))
+    alike = {other: len(words & set(other.rpartition(".")[2].split("_"))) for other in moved}
+    moved = dict(sorted(moved.items(), key=lambda item: -alike[item[0]]))
     for factor in FACTORS:
         yield {
             other: actuator.parameters.value(other) * factor

@@ -7,6 +7,7 @@ parameter costs seconds; that lanes change no bit is the contract of `test_actua
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -80,9 +81,19 @@ class Cell:
         chosen = sets.actuator(self.name).with_values(dict(self.choices), asked=False)
         return chosen.with_values(values or {})
 
-    def scenario(self, faults: Sequence[Values] = (), duration: float | None = None) -> Any:
-        """The short motion in which everything moves, under the cell's load."""
+    def scenario(
+        self,
+        faults: Sequence[Values] = (),
+        duration: float | None = None,
+        given: Sequence[str] = (),
+    ) -> Any:
+        """The short motion in which everything moves, under the cell's load.
+
+        What the motion itself sets of the parameters `given` gives way to theirs.
+        """
         data = sets.onwards(self.name) if self.onwards else sets.motion(self.name)
+        own = data.get("parameters", {})
+        data["parameters"] = {path: value for path, value in own.items() if path not in given}
         if self.load:
             data["load"] = {"user": {"terms": [{"kind": "constant", "value": self.load}]}}
         if duration is not None:
@@ -91,7 +102,7 @@ class Cell:
 
     def of(self, variant: Variant, duration: float | None = None) -> Any:
         """The run of a variant."""
-        scenario = self.scenario(variant.faults, duration)
+        scenario = self.scenario(variant.faults, duration, tuple(variant.values))
         return elevon.Run(self.actuator(variant.values), scenario, 5, variant.name)
 
     def run(self, variants: Sequence[Variant], duration: float | None = None) -> list[Outcome]:
@@ -141,7 +152,8 @@ def fault(
 ) -> Values:
     """A fault with its obligatory attributes at zero."""
     own = {a["name"]: 0.0 for a in record["attributes"] if a["default"] is None}
-    given = {"kind": kind, "place": place, "severity": severity, **own}
+    counted = math.ceil(severity) if record["whole"] else severity
+    given = {"kind": kind, "place": place, "severity": counted, **own}
     return given | {"profile": profile} if profile else dict(given)
 
 

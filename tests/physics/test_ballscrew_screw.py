@@ -66,6 +66,7 @@ def test_deceleration_follows_the_efficiencies(load: float, speed: float) -> Non
     assert rec.final["motor_speed"] == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.signature("return_jam", "screw")
 @pytest.mark.parametrize("blocked", [1, 2, 3, 4])
 def test_blocked_circuits_lower_the_efficiency(blocked: int) -> None:
     """mu grows by b/n of the way to sliding; the table of docs/theory/ballscrew.md."""
@@ -76,6 +77,39 @@ def test_blocked_circuits_lower_the_efficiency(blocked: int) -> None:
         healthy = mu_of(0.889 if aiding else 0.9, aiding)
         expected = eta_of(healthy + blocked / 4 * (0.10 - healthy), aiding)
         assert rec.final[name] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.signature("lubrication_loss", "screw")
+@pytest.mark.parametrize("lost", [0.3, 1.0])
+def test_lost_lubricant_leaves_dry_asperities(lost: float) -> None:
+    """Their share is exp(-3 s) of a film s, 0 of a whole one; at the end the nut slides dry."""
+    fault = {"kind": "lubrication_loss", "place": "screw", "severity": lost}
+    rec = run(FREE, duration=1e-3, record="screw_efficiency@1 kHz",
+              scenario={"fault": [fault]}, name=NAME)  # fmt: skip
+    dry = elevon.Actuator.load(NAME).parameters.value("screw.friction_dry")
+    share = (math.exp(-3 * (1 - lost)) - math.exp(-3)) / (1 - math.exp(-3))
+    expected = eta_of(mu_of(0.9) + share * (dry - mu_of(0.9)))
+    assert rec.final["screw_efficiency"] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.signature("contamination", "screw")
+@pytest.mark.parametrize("fidelity", ["high", "low"])
+def test_debris_scatters_the_dry_friction(fidelity: str) -> None:
+    """The friction coefficient gains half the mass fraction; its deviation is the root of it."""
+    debris = 0.01
+    fault = {"kind": "contamination", "place": "screw", "severity": debris}
+    values = FREE | {"friction.static": 0.3, "friction.dynamic": 0.3, "motor.inertia": 1e6}
+    rec = run(values, duration=1.0, record="friction_torque,screw_efficiency@1 kHz",
+              fidelity=fidelity, seed=3, name=NAME,
+              scenario={"initial": {"motor_speed": 20.0}, "fault": [fault]})  # fmt: skip
+    torque = rec["friction_torque"].values[1:]
+    assert rec.final["screw_efficiency"] == pytest.approx(eta_of(mu_of(0.9) + 0.5 * debris))
+    # The deviation of n draws is known to 1/sqrt(2 n); four of them.
+    draws = len(np.unique(torque))
+    assert draws > 100
+    assert torque.std() / torque.mean() == pytest.approx(
+        math.sqrt(debris), rel=4 / math.sqrt(2 * draws)
+    )
 
 
 def test_preload_rubs_by_its_two_halves() -> None:
@@ -241,6 +275,7 @@ def spalled(length: float, load: float, place: str = "groove", **more: Any) -> A
     return free({f"screw.spall_{place}": length, "motor.inertia": 1e6} | more, load, 20.0, 1.0)
 
 
+@pytest.mark.signature("spall", "screw")
 @pytest.mark.parametrize(("place", "passes"), [("groove", 8.552), ("nut", 6.448), ("ball", 4.940)])
 def test_spall_strikes_at_the_ball_passes(place: str, passes: float) -> None:
     """The strongest line about the first pass stands at the passes per turn of the geometry."""
@@ -300,6 +335,7 @@ def test_a_jam_blocks_whole_circuits_that_exist(severity: float, words: str) -> 
         run({}, duration=1e-3, record="user_position@1 kHz", scenario={"fault": [fault]}, name=NAME)
 
 
+@pytest.mark.signature("adapter_gap", "adapter")
 def test_gap_of_the_adapter_is_lost_motion_at_the_load() -> None:
     """The load lags the ram by half the gap on either side, plus the joint's deflection."""
     fault = {"kind": "adapter_gap", "place": "adapter", "severity": "1 mm"}

@@ -102,6 +102,7 @@ def test_cogging_does_no_work_over_a_turn() -> None:
     assert load == pytest.approx(0.2 / 24 * (1 - np.cos(24 * angle)), abs=2e-4)
 
 
+@pytest.mark.signature("bearing", "bearing")
 @pytest.mark.parametrize("place", ["outer", "inner", "ball"])
 @BOTH
 def test_bearing_defect_shows_at_its_shaft_order(fidelity: str, place: str) -> None:
@@ -187,6 +188,7 @@ def test_a_closed_gap_brakes_the_shaft(
     assert slowed == pytest.approx(0.05 * torque / INERTIA, rel=1e-3, abs=1e-12)
 
 
+@pytest.mark.signature("stator_rub", "motor")
 @BOTH
 def test_stator_rub_brakes_once_a_turn(fidelity: str) -> None:
     """What fills the gap lets static and dynamic eccentricity meet: one contact a turn.
@@ -212,6 +214,7 @@ def test_stator_rub_brakes_once_a_turn(fidelity: str) -> None:
     assert [label["severity"] for label in rec.labels] == [filled]
 
 
+@pytest.mark.signature("tooth_wear", "gear")
 @BOTH
 def test_tooth_wear_opens_the_play_over_each_mesh(fidelity: str) -> None:
     """Pushed forwards, the user lags by half the play and the wear's sin^2 of the mesh."""
@@ -248,6 +251,7 @@ def test_tooth_wear_ripples_the_torque_at_the_mesh_under_load(fidelity: str) -> 
     assert torque == pytest.approx(load * slope, abs=1e-9)
 
 
+@pytest.mark.signature("chipped_tooth", "gear")
 @BOTH
 def test_chipped_tooth_opens_the_play_once_a_turn(fidelity: str) -> None:
     """The lag is that of the play but while the chipped tooth carries: a cos^2 over its mesh."""

@@ -45,6 +45,7 @@ def fault(kind: str, place: str, severity: float, **attributes: Any) -> dict[str
     return {"kind": kind, "place": place, "severity": severity, **attributes}
 
 
+@pytest.mark.signature("short", "motor")
 @pytest.mark.parametrize("name", ["motor_torque", "current_q", "voltage_q_ref"])
 def test_short_ripples_at_twice_the_electrical_frequency(name: str) -> None:
     """The ripple at 2 theta_e grows with the severity and is absent when healthy."""
@@ -72,6 +73,7 @@ def test_shorted_torque_follows_the_coefficient_law() -> None:
     assert rec["motor_torque"].values == pytest.approx(torque, abs=1e-6 * np.max(np.abs(torque)))
 
 
+@pytest.mark.signature("eccentricity_static", "motor")
 @pytest.mark.parametrize("name", ["motor_torque", "voltage_q_ref"])
 def test_static_eccentricity_shows_at_the_electrical_frequency(name: str) -> None:
     """Printed law with sinusoidal currents: -0.75 k zeta i_q cos(theta_e + phi): first order,
@@ -84,6 +86,7 @@ def test_static_eccentricity_shows_at_the_electrical_frequency(name: str) -> Non
     assert ripple[2] > 1.6 * ripple[1]
 
 
+@pytest.mark.signature("eccentricity_dynamic", "motor")
 def test_dynamic_eccentricity_turns_with_the_shaft() -> None:
     """k_j (1 + zeta cos(theta_m - 2 pi (j-1)/3)) gives T = 1.5 k i_q - 0.75 k zeta i_q cos(2
     theta_e + theta_m): order 2 + 1/p of the electrical angle, where nothing healthy has a line.
@@ -97,6 +100,7 @@ def test_dynamic_eccentricity_turns_with_the_shaft() -> None:
     assert found > 5 * harmonic(turning([]), "motor_torque", order, whole=P)
 
 
+@pytest.mark.signature("demagnetisation", "motor")
 def test_demagnetisation_needs_more_current_for_the_same_torque() -> None:
     """Flux down by 20 %: i_q up by 1/0.8."""
     healthy, weak = turning([]), turning([fault("demagnetisation", "motor", 0.2)])
@@ -118,6 +122,7 @@ def friction_current(faults: list[dict[str, Any]], settings: dict[str, Any]) -> 
     return float(np.mean(rec["current_q"].values[rec["current_q"].time > 0.5]))
 
 
+@pytest.mark.signature("friction", "transmission")
 def test_friction_raises_the_moving_current_by_the_torque_balance() -> None:
     """+25 % of the dry friction: current up by 0.25 FDJ / kt."""
     dry = 0.4
@@ -128,6 +133,7 @@ def test_friction_raises_the_moving_current_by_the_torque_balance() -> None:
     assert extra == pytest.approx(0.25 * dry / (1.5 * K), rel=0.02)
 
 
+@pytest.mark.signature("lubrication", "transmission")
 def test_lubrication_raises_the_moving_current_in_proportion_to_speed() -> None:
     """+50 % of the viscous coefficient at 30 rad/s."""
     viscous = 0.01
@@ -138,6 +144,7 @@ def test_lubrication_raises_the_moving_current_in_proportion_to_speed() -> None:
     assert extra == pytest.approx(0.5 * viscous * 30.0 / (1.5 * K), rel=0.02)
 
 
+@pytest.mark.signature("play", "transmission")
 @pytest.mark.parametrize("extra", [0.13, 0.4])
 def test_play_widens_the_lost_motion_by_its_severity(extra: float) -> None:
     """Motor minus user over a reversal: the healthy total plus the extra one."""
@@ -157,6 +164,7 @@ def test_play_widens_the_lost_motion_by_its_severity(extra: float) -> None:
     assert math.degrees(more) == pytest.approx(extra, rel=1e-6)
 
 
+@pytest.mark.signature("jam", "transmission")
 def test_jam_stops_the_output_at_its_place() -> None:
     """A seizure torque far above the motor's at 3 deg: the output goes no further than the play
     allows.
@@ -171,6 +179,7 @@ def test_jam_stops_the_output_at_its_place() -> None:
     assert math.degrees(rec.final["user_position"]) == pytest.approx(3.0, abs=0.5)
 
 
+@pytest.mark.signature("gain_drift", "control")
 @pytest.mark.parametrize(
     ("place", "signal"), [("control.position", "speed_ref"), ("control.speed", "torque_ref")]
 )
@@ -192,6 +201,7 @@ def test_gain_drift_scales_the_loop_it_names(place: str, signal: str) -> None:
     assert first([fault("gain_drift", place, -0.2)]) == pytest.approx(0.8 * first([]), rel=1e-3)
 
 
+@pytest.mark.signature("dropout", "resolver")
 def test_lost_resolver_makes_the_position_jump_and_recover() -> None:
     """Power lost with a duty cycle: the output strays from the healthy run, then the loop brings
     it back.
@@ -216,6 +226,7 @@ def test_lost_resolver_makes_the_position_jump_and_recover() -> None:
     assert strayed[-50:].mean() < 0.5 * strayed.max()
 
 
+@pytest.mark.signature("gain", "current")
 def test_current_sensor_gain_changes_what_the_drive_delivers() -> None:
     """A gain error of +g on every phase makes the true current 1/(1+g) of the reference: read on
     one phase as a ripple at twice the electrical frequency, as a short's, with the sum of true
@@ -225,12 +236,14 @@ def test_current_sensor_gain_changes_what_the_drive_delivers() -> None:
     assert harmonic(rec, "current_q", 2) > 3 * harmonic(turning([]), "current_q", 2)
 
 
+@pytest.mark.signature("offset", "current")
 def test_current_sensor_offset_ripples_at_the_electrical_frequency() -> None:
     """A constant in one phase is a rotating vector in dq."""
     rec = turning([fault("offset", "sensor.current_a", 0.3)])
     assert harmonic(rec, "current_q", 1) > 3 * harmonic(turning([]), "current_q", 1)
 
 
+@pytest.mark.signature("sag", "supply")
 def test_supply_sag_lowers_the_speed_that_can_be_reached() -> None:
     """Half the link at the voltage limit: about half the speed."""
 
@@ -248,6 +261,7 @@ def test_supply_sag_lowers_the_speed_that_can_be_reached() -> None:
     assert top([fault("sag", "supply", 0.5)]) == pytest.approx(0.5 * top([]), rel=0.05)
 
 
+@pytest.mark.signature("missing_counts", "encoder")
 def test_missing_counts_make_the_encoder_read_short() -> None:
     """A fraction of counts lost: the encoder's travel is short by it, so the loop carries the
     output too far.
@@ -264,6 +278,7 @@ def test_missing_counts_make_the_encoder_read_short() -> None:
     )
 
 
+@pytest.mark.signature("open_switch", "inverter")
 @pytest.mark.parametrize(("leg", "sign"), [("a_high", -1), ("b_low", 1)])
 def test_open_switch_takes_one_half_wave_of_its_phase(leg: str, sign: int) -> None:
     """Without its upper switch a leg cannot drive current out of the bridge; diodes leave a rest.

@@ -57,6 +57,7 @@ def test_the_capacitor_rings_down_into_the_winding() -> None:
     assert volts[-1] < 50.0
 
 
+@pytest.mark.signature("connector_open", "supply")
 @pytest.mark.filterwarnings("ignore::elevon.errors.NotActingWarning")
 @pytest.mark.parametrize("fidelity", ["high", "low"])
 @pytest.mark.parametrize("drive", DRIVES)

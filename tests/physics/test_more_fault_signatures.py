@@ -28,6 +28,7 @@ from tests.physics.test_fault_signatures import fault, harmonic, turning
 PLACES = ("a", "b", "c")
 
 
+@pytest.mark.signature("open_phase", "motor")
 @pytest.mark.parametrize("phase", PLACES)
 def test_open_phase_leaves_one_loop_of_two_phases(phase: str) -> None:
     """Its current is zero, the other two are each other's negative."""
@@ -55,6 +56,7 @@ def test_open_phase_leaves_one_loop_of_two_phases(phase: str) -> None:
     assert one + other == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.signature("shorted_switch", "inverter")
 @pytest.mark.parametrize("leg", ["a_high", "c_low"])
 def test_shorted_switch_trips_the_drive_and_the_status_says_so(leg: str) -> None:
     """No gate fires any more; what still flows through the switch and the diodes only brakes."""
@@ -82,6 +84,7 @@ def test_shorted_switch_trips_the_drive_and_the_status_says_so(leg: str) -> None
     assert np.mean(power) < 0.0
 
 
+@pytest.mark.signature("mismatch", "resolver")
 def test_mismatched_resolver_errs_at_twice_the_shaft_frequency() -> None:
     """atan2(g sin, cos) - theta has amplitude (1 - g)/(1 + g) at 2 theta_m."""
     lost = 0.2
@@ -101,6 +104,7 @@ def test_mismatched_resolver_errs_at_twice_the_shaft_frequency() -> None:
     assert line == pytest.approx((1 - gain) / (1 + gain), rel=0.02)
 
 
+@pytest.mark.signature("offset", "resolver")
 def test_resolver_offset_costs_torque_by_the_cosine_of_the_electrical_error() -> None:
     """A drive that commutates x off gives 1.5 k cos(p x) per ampere it asks for."""
     offset = math.radians(8.0)
@@ -117,6 +121,8 @@ def test_resolver_offset_costs_torque_by_the_cosine_of_the_electrical_error() ->
     assert wrong / healthy == pytest.approx(math.cos(P * offset), rel=0.02)
 
 
+@pytest.mark.signature("offset", "encoder")
+@pytest.mark.signature("gain", "encoder")
 @pytest.mark.parametrize(("kind", "severity"), [("offset", 0.01), ("gain", 0.05)])
 def test_encoder_error_moves_the_output_the_other_way(kind: str, severity: float) -> None:
     """The loop brings the reading to the command: user = command - offset, or command/(1+gain)."""
@@ -137,6 +143,7 @@ def test_encoder_error_moves_the_output_the_other_way(kind: str, severity: float
     assert shown == pytest.approx(wanted, abs=1.01 * count)
 
 
+@pytest.mark.signature("gain", "resolver")
 def test_resolver_gain_shows_a_speed_off_by_it() -> None:
     """The speed loop holds the reading: the shaft turns at reference / (1 + gain)."""
     rec = run(
@@ -180,6 +187,7 @@ def test_growing_play_only_ever_widens() -> None:
     assert cycles[0] < cycles[1] < cycles[2]
 
 
+@pytest.mark.signature("unbalance", "motor")
 def test_unbalance_swings_the_speed_once_a_turn() -> None:
     """Coasting at w: the weight m e g of J_x * 22.94 1/m swings the speed by m e g / (J w)."""
     excess, speed = 5e-4, 100.0
@@ -200,6 +208,7 @@ def test_unbalance_swings_the_speed_once_a_turn() -> None:
     assert swing == pytest.approx(weight / ((INERTIA + excess) * mean), rel=0.01)
 
 
+@pytest.mark.signature("resistor_short", "motor")
 def test_resistor_draws_the_phase_voltage_over_its_resistance() -> None:
     """The windings no longer sum to zero: the rest is voltage_a / R, R = 25 ohm at one half."""
     rec = turning(

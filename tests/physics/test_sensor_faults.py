@@ -38,6 +38,7 @@ def there(start: float, end: float) -> dict[str, Any]:
     return {"kind": "intermittent", "start": start, "period": 10.0, "duty": (end - start) / 10.0}
 
 
+@pytest.mark.signature("winding_short", "resolver")
 @BOTH
 @pytest.mark.parametrize(("place", "a", "b"), [("sine", 0.6, 1.0), ("cosine", 1.0, 0.6)])
 def test_shorted_resolver_winding_shows_the_angle_of_its_channels(
@@ -61,6 +62,7 @@ def test_shorted_excitation_turns_no_angle_until_the_signal_is_lost(fidelity: st
     assert np.all(lost["resolver_speed"].values == 0.0)
 
 
+@pytest.mark.signature("winding_open", "resolver")
 @BOTH
 @pytest.mark.parametrize(("place", "zero"), [("sine", 0.0), ("cosine", math.pi / 2)])
 def test_open_resolver_winding_leaves_multiples_of_half_a_turn(
@@ -76,6 +78,7 @@ def test_open_resolver_winding_leaves_multiples_of_half_a_turn(
     assert np.ptp(none["resolver_position"].values) == 0.0
 
 
+@pytest.mark.signature("dark_sectors", "encoder")
 @BOTH
 def test_dark_sector_takes_its_share_of_the_disc(fidelity: str) -> None:
     """Three turns of the disc with a quarter of it dark: a quarter of the travel is lost, and
@@ -92,6 +95,8 @@ def test_dark_sector_takes_its_share_of_the_disc(fidelity: str) -> None:
     assert np.all(np.diff(shown)[(disc[:-1] > 0.65) | (disc[1:] < 0.35)] > 0.0)
 
 
+@pytest.mark.signature("stuck", "encoder")
+@pytest.mark.signature("dead", "encoder")
 @BOTH
 @pytest.mark.parametrize(("kind", "lost"), [("stuck", 0.0), ("dead", 0.4)])
 def test_encoder_that_stood_still_comes_back(fidelity: str, kind: str, lost: float) -> None:
@@ -105,6 +110,7 @@ def test_encoder_that_stood_still_comes_back(fidelity: str, kind: str, lost: flo
     assert user[-1] - shown[-1] == pytest.approx(lost, abs=2e-3)
 
 
+@pytest.mark.signature("stuck", "resolver")
 @BOTH
 def test_stuck_resolver_holds_angle_and_speed(fidelity: str) -> None:
     """What it showed at the onset; the true reading afterwards."""
@@ -116,6 +122,8 @@ def test_stuck_resolver_holds_angle_and_speed(fidelity: str) -> None:
     assert np.array_equal(shown[time > 0.71], rec["motor_position"].values[time > 0.71])
 
 
+@pytest.mark.signature("stuck", "current")
+@pytest.mark.signature("dead", "current")
 @pytest.mark.parametrize("kind", ["stuck", "dead"])
 @pytest.mark.parametrize("drive", [HYSTERESIS, PWM], ids=["hysteresis", "pwm"])
 def test_current_sensor_that_stands_still_frees_its_leg(kind: str, drive: dict[str, Any]) -> None:

@@ -227,6 +227,7 @@ def test_a_cleared_contact_leaves_the_healthy_motor(contact: str) -> None:
     assert np.max(np.abs(rec["current_a"].values[120_000:] - healthy[120_000:])) < 0.05
 
 
+@pytest.mark.signature("phase_short", "motor")
 @pytest.mark.parametrize(("drive", "turns"), [("pwm", 1.0), ("pwm", 0.5), ("hysteresis", 0.5)])
 def test_phase_short_draws_the_voltage_between_the_windings(drive: str, turns: float) -> None:
     """c = mu (v_a - v_b) / (1/G + 2 mu N R + jw 2 (1 - kappa) mu N L), beside what the windings
@@ -265,6 +266,7 @@ def test_phase_short_draws_the_voltage_between_the_windings(drive: str, turns: f
     assert torque == pytest.approx(0.5 * K * linked.real, rel=5e-3)
 
 
+@pytest.mark.signature("ground_short", "motor")
 def test_ground_short_returns_by_the_link() -> None:
     """From terminal a to the lower rail: the phase currents sum to what ground takes, and its mean
     is the mean voltage of the leg over the resistance: half the link, the middle of the three legs
@@ -317,6 +319,7 @@ def test_a_fault_too_fast_for_the_step_is_named_with_its_limit() -> None:
     run(MOTOR | HYSTERESIS | loop(0.0), duration=1e-3, record="current_a@1 kHz", scenario=severe)
 
 
+@pytest.mark.signature("local_demagnetisation", "motor")
 def test_local_demagnetisation_puts_sidebands_beside_the_emf() -> None:
     """One weak pole pair of four, the motor turned from outside: the EMF's amplitude at the
     electrical frequency falls by d/p, and at p +- n times the shaft's stand half the window's

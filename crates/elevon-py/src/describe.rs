@@ -170,6 +170,7 @@ pub fn faults<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
             targets.set_item(place.name, place.targets.iter().map(|t| t.path).collect::<Vec<_>>())?;
         }
         d.set_item("targets", targets)?;
+        d.set_item("whole", f.counted())?;
         carried(d, |fidelity| f.declined(model.groups(), fidelity))
     })
 }

@@ -38,19 +38,19 @@ variables! {
         DerivativeTime => "derivative_time", "T_d", "s", NonNegative, Controller, Some(0.0), "derivative time; 0: no derivative action",
             when(&[Chosen("control.mode", &["position", "speed"]), CASCADE]);
         DerivativeFilter => "derivative_filter", "N", "1", Positive, Controller, Some(1000.0), "the derivative's filter pole stands at N / T_d",
-            high_only("its derivative acts as inertia, without a filter").when(&[Chosen("control.mode", &["position", "speed"]), CASCADE, Away("control.derivative_time", 0.0)]);
+            when(&[Chosen("control.mode", &["position", "speed"]), CASCADE, Away("control.derivative_time", 0.0)]);
         SpeedLimit => "speed_limit", "omega_max", "rad/s", Positive, Controller, None, "limit of the speed reference",
             when(&[Chosen("control.mode", &["position", "speed"]), CASCADE]);
         CurrentLimit => "current_limit", "I_max", "A", Positive, Controller, None, "limit of the quadrature current reference, peak";
         TorqueConstant => "torque_constant", "k_t", "N m/A", Positive, Controller, None, "torque per peak ampere that the controller believes, 1.5 k when it knows the motor";
         AntiWindupRest => "anti_windup_rest", "AW1", "1", Choice(Switch::NAMES), Controller, Some(0.0), "freeze the integrator while the speed is zero for more than one step",
-            high_only("its PID integrates without anti-windup").when(&[Chosen("control.mode", &["position", "speed"]), CASCADE, Away("control.integral_time", 0.0)]);
+            when(&[Chosen("control.mode", &["position", "speed"]), CASCADE, Away("control.integral_time", 0.0)]);
         AntiWindupError => "anti_windup_error", "AW2", "1", Choice(ErrorHold::NAMES), Controller, Some(0.0), "freeze the integrator while the position error is below (T2) or above (T3) the threshold",
-            high_only("its PID integrates without anti-windup").when(&[Chosen("control.mode", &["position", "speed"]), CASCADE, Away("control.integral_time", 0.0)]);
+            when(&[Chosen("control.mode", &["position", "speed"]), CASCADE, Away("control.integral_time", 0.0)]);
         AntiWindupThreshold => "anti_windup_threshold", "-", "rad", NonNegative, Controller, Some(0.0), "position error threshold of anti_windup_error, at the user",
-            high_only("its PID integrates without anti-windup").when(&[Chosen("control.mode", &["position", "speed"]), CASCADE, Away("control.integral_time", 0.0), Chosen("control.anti_windup_error", &["below", "above"])]);
+            when(&[Chosen("control.mode", &["position", "speed"]), CASCADE, Away("control.integral_time", 0.0), Chosen("control.anti_windup_error", &["below", "above"])]);
         AntiWindupBackCalculation => "anti_windup_back_calculation", "AW3", "1/s", NonNegative, Controller, Some(0.0), "gain from (saturated - demanded) torque back to the integrator; 0: off",
-            high_only("its PID integrates without anti-windup").when(&[Chosen("control.mode", &["position", "speed"]), CASCADE, Away("control.integral_time", 0.0)]);
+            when(&[Chosen("control.mode", &["position", "speed"]), CASCADE, Away("control.integral_time", 0.0)]);
         ConditionalIntegration => "conditional_integration", "-", "1", Choice(Switch::NAMES), Controller, Some(0.0), "integrate only while the torque reference is not limited",
             when(&[Chosen("control.mode", &["position", "speed"]), Either(&[Away("control.integral_time", 0.0), Away("control.pid_integral_time", 0.0)])]);
         SampleTime => "sample_time", "T_s", "s", NonNegative, Controller, Some(0.0), "sample time of the controller; 0: every solver step",

@@ -68,6 +68,11 @@ pub struct FaultKind {
 }
 
 impl FaultKind {
+    /// Is the severity a count?
+    pub fn counted(&self) -> bool {
+        self.places.iter().flat_map(|p| p.targets).any(|t| t.op == Op::AddWhole)
+    }
+
     /// Why a fidelity of an actuator of these parameters does not carry the fault, if so: it acts where the parameters act
     /// that it moves.
     pub fn declined(&self, groups: &[Group], fidelity: Fidelity) -> Option<&'static str> {

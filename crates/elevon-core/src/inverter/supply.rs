@@ -16,8 +16,10 @@ variables! {
         Resistance => "resistance", "R_s", "ohm", Positive, Plant, None, "source and harness";
         Capacitance => "capacitance", "C", "F", Positive, Plant, None, "link capacitor";
         Regeneration => "regeneration", "-", "1", Choice(Regeneration::NAMES), Plant, Some(0.0), "does the source take current back, or does the link charge up to the dump resistor";
-        DumpVoltage => "dump_voltage", "-", "V", Positive, Plant, None, "link voltage above which the dump resistor conducts (regeneration = block)";
-        DumpResistance => "dump_resistance", "-", "ohm", Positive, Plant, None, "dump resistor";
+        DumpVoltage => "dump_voltage", "-", "V", Positive, Plant, None, "link voltage above which the dump resistor conducts (regeneration = block)",
+            when(&[Chosen("supply.regeneration", &["block"])]);
+        DumpResistance => "dump_resistance", "-", "ohm", Positive, Plant, None, "dump resistor, across the link while that is above dump_voltage",
+            when(&[Chosen("supply.regeneration", &["block"])]);
     }
 }
 

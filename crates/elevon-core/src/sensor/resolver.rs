@@ -59,6 +59,8 @@ pub struct Resolver<S> {
     gain_less: S,
     sine: S,
     cosine: S,
+    /// Of the excitation; none without power.
+    amplitude: S,
     offset: S,
     gain: S,
     /// 1 without power or signal.
@@ -101,6 +103,7 @@ impl<S: Scalar> Resolver<S> {
             gain_less: cosine_lost - sine_lost,
             sine,
             cosine,
+            amplitude: S::select(half.le(g(P::PowerOff)), S::zero(), one - g(P::ExcitationShort)),
             offset: g(P::Offset),
             gain: g(P::Gain),
             off: S::indicator(off),
@@ -152,6 +155,14 @@ impl<S: Scalar> Resolver<S> {
         }
     }
 
+    /// Size of the two channels' signal at angle `theta` over the healthy one; none without power.
+    #[inline(always)]
+    pub fn signal(&self, theta: S) -> S {
+        let (sin, cos) = theta.sin_cos();
+        let (sine, cosine) = (self.sine * sin, self.cosine * cos);
+        self.amplitude * (sine * sine + cosine * cosine).sqrt()
+    }
+
     /// Change of the speed shown over that of the shaft's: none without power or while it stands still.
     #[inline(always)]
     pub fn follows(&self) -> S {
@@ -169,8 +180,11 @@ impl<S: Scalar> Resolver<S> {
         let (ss, cc) = (sin * sin, cos * cos);
         let error = S::atan2_right(self.gain_less * sin * cos, self.cosine * cc + self.sine * ss);
         // d/dt atan2(a s, b c) = omega a b / (b^2 c^2 + a^2 s^2): the converter tracks what it shows.
-        let rate = self.sine * self.cosine / (self.cosine * self.cosine * cc + self.sine * self.sine * ss);
+        // Alike channels change no bit.
+        let alike = self.gain_less.equals(S::zero());
+        let tracked = self.sine * self.cosine / (self.cosine * self.cosine * cc + self.sine * self.sine * ss);
         let shown = theta + error + self.offset;
+        let rate = S::select(alike, S::one(), tracked);
         let turning = S::select(off, S::zero(), (omega * rate).clamp_abs(self.tracking_limit));
         held.angle = S::select(off | stuck, held.angle, shown);
         held.speed = S::select(stuck, held.speed, turning);

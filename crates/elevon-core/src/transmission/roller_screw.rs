@@ -14,10 +14,13 @@ variables! {
         EfficiencyLoaded => "efficiency_loaded", "eta_inf", "1", Fraction, Plant, None, "efficiency at very high load";
         EfficiencyForce => "efficiency_force", "F_c", "N", Positive, Plant, None, "load over which the efficiency falls e-fold";
         EfficiencyScale => "efficiency_scale", "-", "1", Fraction, Plant, Some(1.0), "healthy 1; less: the efficiency is lost";
-        Preload => "preload", "F_pr", "N", Positive, Plant, None, "preload of the nut; its friction 2 F_pr (1/eta_0 - 1) is part of the friction tables and is not added again";
+        Preload => "preload", "F_pr", "N", Positive, Plant, None, "preload of the nut; its friction 2 F_pr (1/eta_0 - 1) is part of the friction tables and is not added again",
+            nowhere("the friction tables contain its friction; it is there for reference");
         JamForce => "jam_force", "F_jam", "N", NonNegative, Plant, Some(0.0), "resistive force where the screw is jammed; 0: none";
-        JamPosition => "jam_position", "-", "m", Any, Plant, Some(0.0), "middle of the jammed travel of the nut";
-        JamWidth => "jam_width", "-", "m", NonNegative, Plant, Some(0.0), "length of the jammed travel; 0: jammed wherever it is";
+        JamPosition => "jam_position", "-", "m", Any, Plant, Some(0.0), "middle of the jammed travel of the nut",
+            when(&[Away("screw.jam_force", 0.0), Away("screw.jam_width", 0.0)]);
+        JamWidth => "jam_width", "-", "m", NonNegative, Plant, Some(0.0), "length of the jammed travel; 0: jammed wherever it is",
+            when(&[Away("screw.jam_force", 0.0)]);
     }
 }
 

@@ -8,7 +8,8 @@ crate::choices! {
     Fidelity { High "high", Low "low" }
 }
 
-/// What must hold for a parameter to act. Paths are whole ones; of a path that a wiring lacks the condition holds.
+/// What must hold for a parameter to act. Paths are whole ones; of a choice that a wiring lacks the condition holds, a number
+/// that it lacks is at rest.
 #[derive(Clone, Copy, Debug)]
 pub enum When {
     /// The choice is one of these.
@@ -94,7 +95,7 @@ impl Standing<'_> {
     }
 
     fn away(&self, path: &str, neutral: f64) -> bool {
-        self.find(path).is_none_or(|(i, v)| v.range.differ(self.raw[i], neutral) || self.touched[i])
+        self.find(path).is_some_and(|(i, v)| v.range.differ(self.raw[i], neutral) || self.touched[i])
     }
 
     fn chosen(&self, path: &str, names: &[&str]) -> bool {

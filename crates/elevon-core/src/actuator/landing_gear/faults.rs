@@ -239,7 +239,7 @@ fn mechanical() -> Vec<FaultKind> {
             range: Range::Between(0.0, 10.0),
             attributes: &[],
             places: places!("brake": "brake.drag" Add),
-            effect: "torque left when released, at most the brake's own",
+            effect: "torque left when released",
             source: "ASSUMED: worn or swollen disc",
         },
         FaultKind {

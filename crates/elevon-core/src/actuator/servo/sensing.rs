@@ -121,11 +121,12 @@ impl<S: Scalar> Sensing<S> {
         }
     }
 
-    /// Position of the encoder, position and speed of the resolver.
+    /// Position of the encoder; position, speed and signal of the resolver.
     #[inline(always)]
-    pub(super) fn show(&self, d: &SensingDetails, s: &ShaftState<S>, sensed: Sensed<S>) -> [S; 3] {
+    pub(super) fn show(&self, d: &SensingDetails, s: &ShaftState<S>, sensed: Sensed<S>) -> [S; 4] {
         let mut sensed = sensed;
         let reading = self.shaft::<true>(d, s, &mut sensed);
-        [self.count::<true>(d, s, &mut sensed), reading.position, reading.speed]
+        let signal = if d.resolver { self.resolver.signal(s.motor_position) } else { S::one() };
+        [self.count::<true>(d, s, &mut sensed), reading.position, reading.speed, signal]
     }
 }

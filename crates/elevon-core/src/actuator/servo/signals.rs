@@ -63,6 +63,7 @@ signals! {
         EncoderPosition => "encoder_position", "-", "rad", "user position the encoder shows", OutputPosition;
         ResolverPosition => "resolver_position", "-", "rad", "motor angle the resolver shows", MotorPosition;
         ResolverSpeed => "resolver_speed", "-", "rad/s", "motor speed the resolver shows", MotorSpeed;
+        ResolverSignal => "resolver_signal", "-", "1", "size of the resolver's sine and cosine over the healthy one";
         LegTransitions => "leg_transitions", "-", "1", "leg transitions since the start; with sampled relays (inverter.relay_crossing) at 1 us a quarter more than relays without delay make: the step's own, as is that part of the currents' ripple", Transitions;
         Tripped => "tripped", "-", "1", "1 once the drive has tripped";
         EnergySupply => "energy_supply", "-", "J", "energy drawn from the DC link (given by the source, where the link has a capacitor); while motor.torque_limit cuts the torque, what the EMF takes beyond it is in no other account";
@@ -115,6 +116,7 @@ signals! {
         EncoderPosition => "encoder_position", "-", "rad", "user position the encoder shows", OutputPosition;
         ResolverPosition => "resolver_position", "-", "rad", "motor angle the resolver shows", MotorPosition;
         ResolverSpeed => "resolver_speed", "-", "rad/s", "motor speed the resolver shows", MotorSpeed;
+        ResolverSignal => "resolver_signal", "-", "1", "size of the resolver's sine and cosine over the healthy one";
         Tripped => "tripped", "-", "1", "1 once the drive has tripped";
         EnergyCopper => "energy_copper", "-", "J", "copper losses, counted with a thermal network";
         EnergyHeatStored => "energy_heat_stored", "-", "J", "heat in winding and housing above that of the start";

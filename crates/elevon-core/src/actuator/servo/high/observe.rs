@@ -37,10 +37,11 @@ pub(crate) fn high<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, inpu
     set(Q::HeatDrive, s.extra.drive_heat.power);
     set(Q::ThermalWarning, m.extra.network.warns(warm));
     set(Q::Limited, m.control.limited(&s.control));
-    let [encoder, resolver, speed] = m.sensing.show(&structure.sensing, &s.shaft, s.sensed);
+    let [encoder, resolver, speed, signal] = m.sensing.show(&structure.sensing, &s.shaft, s.sensed);
     set(Q::EncoderPosition, encoder);
     set(Q::ResolverPosition, resolver);
     set(Q::ResolverSpeed, speed);
+    set(Q::ResolverSignal, signal);
     electrical(structure, m, inputs, s, t, out);
     let x = Instant::at(inputs, t);
     let shown = mechanical(structure, m, &x, s, out);

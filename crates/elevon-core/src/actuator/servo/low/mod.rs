@@ -1,6 +1,8 @@
 //! Low fidelity: one equivalent phase (reference sheet 1.9). Same blocks, same parameters where shared; PID
 //! without anti-windup and derivative filter; the shaft and its loads are those of the high fidelity.
 
+mod control;
+mod jump;
 mod loops;
 mod model;
 mod observe;

@@ -1,5 +1,7 @@
 //! Constants and state of a run at low fidelity.
 
+use super::control::Control;
+use super::jump::JumpState;
 use super::loops::Loops;
 use super::phase::Phase;
 use crate::actuator::servo::form::Form;
@@ -8,7 +10,7 @@ use crate::actuator::servo::layout::*;
 use crate::actuator::servo::sensing::{Sensed, Sensing, SensingDetails};
 use crate::actuator::servo::shaft::{Shaft, ShaftDetails, ShaftNeeds, ShaftState};
 use crate::control::current_dq::PwmParameter;
-use crate::control::position_speed::{ControlParameter, ControlStructure, Mode};
+use crate::control::position_speed::{ControlParameter, ControlStructure};
 use crate::details;
 use crate::inverter::bridge::{Bridge, BridgeState, BridgeStructure, InverterParameter};
 use crate::inverter::link::{DcLink, DcLinkState};
@@ -92,24 +94,6 @@ pub struct Model<S> {
     pub network: Network<S>,
 }
 
-/// What the controller believes: P, and PID whose derivative acts as inertia; or one PID on the position with a filter.
-#[derive(Clone, Copy, Debug)]
-pub struct Control<S> {
-    pub per_dt: S,
-    pub position_gain: S,
-    pub feedforward: S,
-    pub speed_gain: S,
-    pub integral_step: S,
-    pub derivative_inertia: S,
-    /// Of the position PID: torque per difference of its filter, and the filter's share of a step.
-    pub derivative_gain: S,
-    pub derivative_decay: S,
-    pub noise_deviation: S,
-    pub speed_limit: S,
-    pub torque_limit: S,
-    pub per_torque_constant: S,
-}
-
 /// The current loop and the voltage it has.
 #[derive(Clone, Copy, Debug)]
 pub struct Drive<S> {
@@ -151,6 +135,9 @@ pub struct State<S> {
     pub loops: [S; 3],
     pub bridge: BridgeState<S>,
     pub command_noise: S,
+    pub jumps: JumpState<S>,
+    /// 1: the speed shown was zero at the last step.
+    pub rested: S,
     pub voltage: S,
     pub integral: S,
     /// Position error as the PID's filter has it; NaN before the first step.
@@ -162,36 +149,6 @@ pub struct State<S> {
     pub filtered: [S; 2],
     pub tripped: S,
     pub shaft: ShaftState<S>,
-}
-
-impl<S: Scalar> Control<S> {
-    fn derive(raw: &[S], structure: &Structure, ratio: S, dt: S) -> Self {
-        let at = |p: ControlParameter| raw[p.at()];
-        let (zero, one) = (S::zero(), S::one());
-        let pid = structure.control.pid;
-        let gain = if pid { at(ControlParameter::PidGain) } else { at(ControlParameter::SpeedGain) * at(ControlParameter::SpeedGainScale) };
-        let ti = at(if pid { ControlParameter::PidIntegralTime } else { ControlParameter::IntegralTime });
-        let integrates = zero.lt(ti);
-        // A torque command passes the loops by, their derivative included.
-        let by_inertia = structure.control.mode != Mode::Torque && !pid;
-        let td = at(ControlParameter::PidDerivativeTime);
-        let derives = zero.lt(td);
-        let decay = one - (-(at(ControlParameter::PidDerivativeFilter) * dt / S::select(derives, td, one))).exp();
-        Self {
-            per_dt: one / dt,
-            position_gain: at(ControlParameter::PositionGain) * at(ControlParameter::PositionGainScale),
-            feedforward: at(ControlParameter::SpeedFeedforward) * ratio / dt,
-            speed_gain: gain,
-            integral_step: S::select(integrates, gain / S::select(integrates, ti, one) * dt, zero),
-            derivative_inertia: if by_inertia { gain * at(ControlParameter::DerivativeTime) } else { zero },
-            derivative_gain: gain * td / dt * decay,
-            derivative_decay: decay,
-            noise_deviation: at(ControlParameter::NoiseDeviation),
-            speed_limit: at(ControlParameter::SpeedLimit),
-            torque_limit: at(ControlParameter::TorqueConstant) * at(ControlParameter::CurrentLimit),
-            per_torque_constant: one / at(ControlParameter::TorqueConstant),
-        }
-    }
 }
 
 impl<S: Scalar> Drive<S> {
@@ -293,6 +250,8 @@ impl<S: Scalar> Model<S> {
             loops: [zero; 3],
             bridge: BridgeState::rest(),
             command_noise: zero,
+            jumps: JumpState::start(shaft.motor_speed),
+            rested: zero,
             voltage: zero,
             integral: zero,
             filtered_error: nan,

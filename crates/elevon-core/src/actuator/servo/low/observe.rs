@@ -12,7 +12,8 @@ use crate::scalar::Scalar;
 const OF_SHAFT: Signals = Signals::of(&[Q::UserSpeed as usize, Q::FrictionTorque as usize, Q::LoadTorque as usize, Q::StopTorque as usize])
     .and_from(LOW_OWN.len());
 const OF_INPUTS: Signals = Signals::of(&[Q::BrakeTorque as usize, Q::SupplyVoltage as usize]);
-const OF_SENSORS: Signals = Signals::of(&[Q::EncoderPosition as usize, Q::ResolverPosition as usize, Q::ResolverSpeed as usize]);
+const SENSORS: [Q; 4] = [Q::EncoderPosition, Q::ResolverPosition, Q::ResolverSpeed, Q::ResolverSignal];
+const OF_SENSORS: Signals = Signals::of(&[SENSORS[0] as usize, SENSORS[1] as usize, SENSORS[2] as usize, SENSORS[3] as usize]);
 
 #[inline(always)]
 pub(super) fn observe<F: Form, S: Scalar>(
@@ -55,7 +56,7 @@ pub(super) fn observe<F: Form, S: Scalar>(
     }
     if asked.any(OF_SENSORS) {
         let shown = m.sensing.show(&structure.sensing, &s.shaft, s.sensed);
-        for (q, value) in [Q::EncoderPosition, Q::ResolverPosition, Q::ResolverSpeed].into_iter().zip(shown) {
+        for (q, value) in SENSORS.into_iter().zip(shown) {
             out[q as usize] = value;
         }
     }

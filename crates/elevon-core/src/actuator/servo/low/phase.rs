@@ -1,6 +1,7 @@
 //! The equivalent phase at one rotor angle (docs/theory/low-fidelity.md, "From three phases to one").
 
-use super::model::{Control, Model, State, Structure};
+use super::control::Control;
+use super::model::{Model, State, Structure};
 use crate::inverter::hysteresis::six_step;
 use crate::motor::equivalent::{equivalent, imposed_shape, quadrature, Circuit};
 use crate::scalar::{three_phase, Scalar};

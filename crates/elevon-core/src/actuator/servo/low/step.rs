@@ -1,62 +1,15 @@
 //! One step of the low fidelity: sensors, control electronics, equivalent phase, shaft. The derivative of the measured
 //! speed is solved with the acceleration (docs/theory/low-fidelity.md, "The speed derivative as inertia").
 
+use super::control::{demand, integrate};
 use super::model::{Model, State, Structure};
 use super::passive::passive_step;
 use super::phase::{phase, Phase};
 use crate::actuator::servo::advance::{Instant, Stepper};
 use crate::actuator::servo::layout::DriveKind;
-use crate::control::position_speed::Mode;
 use crate::scalar::Scalar;
 use crate::sensor::filter::low_pass;
 use crate::three;
-
-/// What the controller asks for before the derivative of the speed is known.
-struct Demand<S> {
-    speed_ref: S,
-    error: S,
-    torque: S,
-}
-
-#[inline(always)]
-fn demand<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, command: S, position: S, speed: S) -> Demand<S> {
-    let c = &m.control;
-    if structure.control.pid {
-        return position_pid(m, structure, s, command - position);
-    }
-    let demanded = match structure.control.mode {
-        Mode::Position if structure.control.feedforward => {
-            let moved = command - s.command;
-            s.command = command;
-            let ahead = S::select(moved.equals(moved), c.feedforward * moved, S::zero());
-            c.position_gain * (command - position) + ahead
-        }
-        Mode::Position => c.position_gain * (command - position),
-        Mode::Speed | Mode::Torque => command,
-    };
-    let speed_ref = demanded.clamp_abs(c.speed_limit);
-    let error = speed_ref - speed;
-    let slope = (speed_ref - s.speed_ref) * c.per_dt;
-    let torque = match structure.control.mode {
-        Mode::Torque => command,
-        Mode::Position | Mode::Speed => c.speed_gain * error + s.integral + c.derivative_inertia * slope,
-    };
-    Demand { speed_ref, error, torque }
-}
-
-/// What one PID makes of the position error.
-#[inline(always)]
-fn position_pid<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, error: S) -> Demand<S> {
-    let c = &m.control;
-    let mut torque = c.speed_gain.fma(error, s.integral);
-    if structure.control.derivative {
-        let known = s.filtered_error.equals(s.filtered_error);
-        let difference = S::select(known, error - s.filtered_error, S::zero());
-        s.filtered_error = c.derivative_decay.fma(difference, error - difference);
-        torque = c.derivative_gain.fma(difference, torque);
-    }
-    Demand { speed_ref: S::zero(), error, torque }
-}
 
 /// Current and voltage of the phase after a step towards the torque reference.
 #[inline(always)]
@@ -165,7 +118,7 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
         m.sensing.count::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed);
     }
     let position = m.sensing.user::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed, &reading, m.shaft.gear.per_ratio);
-    let asked = demand(m, structure, s, x.command + s.command_noise, position, reading.speed);
+    let asked = demand::<S, FULL>(m, structure, s, [x.command + s.command_noise, x.supply], position, &reading);
 
     // Loads, and the acceleration that the derivative of the speed takes part in.
     let here;
@@ -186,14 +139,7 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
     let acceleration = m.shaft.acceleration::<EXTRA>(&structure.shaft, &s.shaft, &loads, torque, per_inertia);
     let unlimited = asked.torque - derivative_inertia * acceleration;
     s.torque_ref = unlimited.clamp_abs(m.control.torque_limit);
-    s.speed_ref = asked.speed_ref;
-    if structure.integral {
-        let mut change = m.control.integral_step * asked.error;
-        if structure.control.conditional {
-            change = S::select(s.torque_ref.equals(unlimited), change, S::zero());
-        }
-        s.integral = s.integral + change;
-    }
+    integrate(m, structure, s, &asked, unlimited);
 
     // Equivalent phase, motor and transmission dynamics.
     electric_step::<S, EXTRA>(m, structure, x, s, p);

@@ -1,0 +1,178 @@
+//! The controller of the low fidelity: P, and PID whose derivative acts as inertia (docs/theory/low-fidelity.md, "The speed
+//! derivative as inertia"); or one PID on the position. Jumps of the speed error pass the derivative's filter (`jump.rs`).
+
+use super::jump::Jumps;
+use super::model::{Model, State, Structure};
+use crate::actuator::servo::layout::*;
+use crate::control::position_speed::{ControlParameter, ErrorHold, Mode};
+use crate::scalar::Scalar;
+use crate::sensor::resolver::Reading;
+
+/// What the controller believes: P, and PID whose derivative acts as inertia; or one PID on the position with a filter.
+#[derive(Clone, Copy, Debug)]
+pub struct Control<S> {
+    per_dt: S,
+    position_gain: S,
+    feedforward: S,
+    speed_gain: S,
+    integral_step: S,
+    pub derivative_inertia: S,
+    /// Of the position PID: torque per difference of its filter, and the filter's share of a step.
+    derivative_gain: S,
+    derivative_decay: S,
+    jumps: Jumps<S>,
+    back_calculation: S,
+    threshold: S,
+    pub noise_deviation: S,
+    pub speed_limit: S,
+    pub torque_limit: S,
+    pub per_torque_constant: S,
+}
+
+impl<S: Scalar> Control<S> {
+    pub(super) fn derive(raw: &[S], structure: &Structure, ratio: S, dt: S) -> Self {
+        let at = |p: ControlParameter| raw[p.at()];
+        let (zero, one) = (S::zero(), S::one());
+        let pid = structure.control.pid;
+        let gain = if pid { at(ControlParameter::PidGain) } else { at(ControlParameter::SpeedGain) * at(ControlParameter::SpeedGainScale) };
+        let ti = at(if pid { ControlParameter::PidIntegralTime } else { ControlParameter::IntegralTime });
+        let integrates = zero.lt(ti);
+        // A torque command passes the loops by, their derivative included.
+        let by_inertia = structure.control.mode != Mode::Torque && !pid;
+        let td = at(ControlParameter::PidDerivativeTime);
+        let derives = zero.lt(td);
+        let decay = one - (-(at(ControlParameter::PidDerivativeFilter) * dt / S::select(derives, td, one))).exp();
+        Self {
+            per_dt: one / dt,
+            position_gain: at(ControlParameter::PositionGain) * at(ControlParameter::PositionGainScale),
+            feedforward: at(ControlParameter::SpeedFeedforward) * ratio / dt,
+            speed_gain: gain,
+            integral_step: S::select(integrates, gain / S::select(integrates, ti, one) * dt, zero),
+            derivative_inertia: if by_inertia { gain * at(ControlParameter::DerivativeTime) } else { zero },
+            derivative_gain: gain * td / dt * decay,
+            derivative_decay: decay,
+            jumps: Jumps::derive(raw, by_inertia, dt),
+            back_calculation: at(ControlParameter::AntiWindupBackCalculation),
+            threshold: at(ControlParameter::AntiWindupThreshold),
+            noise_deviation: at(ControlParameter::NoiseDeviation),
+            speed_limit: at(ControlParameter::SpeedLimit),
+            torque_limit: at(ControlParameter::TorqueConstant) * at(ControlParameter::CurrentLimit),
+            per_torque_constant: one / at(ControlParameter::TorqueConstant),
+        }
+    }
+}
+
+/// What the controller asks for before the derivative of the speed is known.
+pub(super) struct Demand<S> {
+    speed_ref: S,
+    error: S,
+    position_error: S,
+    /// What the sensors show of the speed.
+    speed: S,
+    pub torque: S,
+    /// Of jumps: what the torque limit cuts off them, N m s.
+    cut: S,
+}
+
+/// Largest slope of the torque that the believed torque constant gives the bridge's voltage, N m/s.
+#[inline(always)]
+fn slew<S: Scalar>(m: &Model<S>, supply: S) -> S {
+    m.drive.voltage_ratio * supply * m.drive.supply_scale / (m.cold[2] * m.control.per_torque_constant)
+}
+
+/// The controller's answer to a command and what the sensors show.
+#[inline(always)]
+pub(super) fn demand<S: Scalar, const FULL: bool>(
+    m: &Model<S>,
+    structure: &Structure,
+    s: &mut State<S>,
+    [command, supply]: [S; 2],
+    position: S,
+    reading: &Reading<S>,
+) -> Demand<S> {
+    let c = &m.control;
+    let (zero, speed) = (S::zero(), reading.speed);
+    let position_error = command - position;
+    if structure.control.pid {
+        return position_pid(m, structure, s, position_error, speed);
+    }
+    let demanded = match structure.control.mode {
+        Mode::Position if structure.control.feedforward => {
+            let moved = command - s.command;
+            s.command = command;
+            let ahead = S::select(moved.equals(moved), c.feedforward * moved, zero);
+            c.position_gain * position_error + ahead
+        }
+        Mode::Position => c.position_gain * position_error,
+        Mode::Speed | Mode::Torque => command,
+    };
+    let speed_ref = demanded.clamp_abs(c.speed_limit);
+    let error = speed_ref - speed;
+    let none = Demand { speed_ref, error, position_error, speed, torque: command, cut: zero };
+    if structure.control.mode == Mode::Torque {
+        return none;
+    }
+    let mut change = speed_ref - s.speed_ref;
+    if FULL && structure.sensing.resolver {
+        // What the resolver shows beside the shaft's own acceleration, which is solved for.
+        let shown = speed - s.jumps.shown;
+        change = change - (shown - m.sensing.follows() * (s.shaft.motor_speed - s.jumps.moved));
+        (s.jumps.shown, s.jumps.moved) = (speed, s.shaft.motor_speed);
+    }
+    let mut torque = c.speed_gain * error + s.integral;
+    let mut cut = zero;
+    if structure.control.derivative {
+        let (smooth, jump) = c.jumps.split(&mut s.jumps, change);
+        torque = torque + c.derivative_inertia * (smooth * c.per_dt);
+        if S::any(!(jump.equals(zero) & s.jumps.level.equals(zero))) {
+            let kick = c.jumps.pass(&mut s.jumps, jump, c.torque_limit, slew(m, supply));
+            torque = torque + kick.torque;
+            cut = kick.cut;
+        }
+    }
+    Demand { torque, cut, ..none }
+}
+
+/// Steps the integrator, with the anti-windup of the high fidelity's PID.
+#[inline(always)]
+pub(super) fn integrate<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, asked: &Demand<S>, unlimited: S) {
+    let c = &m.control;
+    s.speed_ref = asked.speed_ref;
+    if !structure.integral {
+        return;
+    }
+    let zero = S::zero();
+    let mut change = c.integral_step * asked.error;
+    if structure.control.conditional {
+        change = S::select(s.torque_ref.equals(unlimited), change, zero);
+    }
+    if structure.control.back_calculation {
+        let excess = (s.torque_ref - unlimited) / c.per_dt - asked.cut;
+        change = c.back_calculation.fma(excess, change);
+    }
+    if structure.control.hold_at_rest {
+        let rest = asked.speed.equals(zero);
+        change = S::select(rest & zero.lt(s.rested), zero, change);
+        s.rested = S::indicator(rest);
+    }
+    if structure.control.hold_on_error != ErrorHold::Off {
+        let below = asked.position_error.abs().lt(c.threshold);
+        let held = if structure.control.hold_on_error == ErrorHold::Below { below } else { !below };
+        change = S::select(held, zero, change);
+    }
+    s.integral = s.integral + change;
+}
+
+/// What one PID makes of the position error.
+#[inline(always)]
+fn position_pid<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, error: S, speed: S) -> Demand<S> {
+    let c = &m.control;
+    let mut torque = c.speed_gain.fma(error, s.integral);
+    if structure.control.derivative {
+        let known = s.filtered_error.equals(s.filtered_error);
+        let difference = S::select(known, error - s.filtered_error, S::zero());
+        s.filtered_error = c.derivative_decay.fma(difference, error - difference);
+        torque = c.derivative_gain.fma(difference, torque);
+    }
+    Demand { speed_ref: S::zero(), error, position_error: error, speed, torque, cut: S::zero() }
+}
