@@ -89,6 +89,23 @@ def test_trip_current() -> None:
             assert rec.meta["status"] == expected, (fidelity, trip)
 
 
+def test_a_jump_of_the_command_trips_in_neither() -> None:
+    """The derivative's kick is over before the current follows: 3.5 A are not reached."""
+    for fidelity in FIDELITIES:
+        rec = simulated(fidelity, {"inverter.trip_current": 3.5}, scenario={})
+        assert rec.meta["status"] == "ok", fidelity
+        assert np.abs(rec["motor_torque"].values).max() < 3.5 * 1.5 * K
+
+
+@pytest.mark.parametrize("duty", [0.1, 0.2, 0.4])
+def test_dropout_of_the_resolver_over_six_losses(duty: float) -> None:
+    """The field stands while it is lost, and each loss is a jump that unwinds the integrator."""
+    lost = LOADED | {"fault": [fault("dropout", "sensor.resolver", duty, period=0.1)]}
+    for signal in ("motor_speed", "motor_torque", "current_q"):
+        high, low = both({}, signal, scenario=lost, duration=0.6)
+        assert low == pytest.approx(high, rel=0.08), signal
+
+
 def test_noise_of_the_command() -> None:
     """Both fidelities draw the same noise from the same seed, and it moves the motor."""
     values = {"control.noise_deviation": 1e-3, "control.noise_sample_time": 1e-3}
@@ -179,7 +196,7 @@ def test_loop_short_over_whole_turns(
     values = {"motor.short_model": "loop", "motor.short_coupling": coupling}
     values |= {"thermal.model": "off"} if name == "nasa-ballscrew" else {}
     scenario = make_scenario(
-        duration=0.4, mode="speed", command=[constant("40 rad/s")],
+        duration=0.8, mode="speed", command=[constant("40 rad/s")],
         extra={"load": {"user": {"terms": [constant(load)]}},
                "fault": [fault("short", "motor.phase_a", severity)]},
     )  # fmt: skip
@@ -187,7 +204,7 @@ def test_loop_short_over_whole_turns(
     for fidelity, rate in (("high", 20), ("low", 2)):
         record = f"current_q@{rate} kHz"
         rec = elevon.simulate(actuator(values, name), scenario, fidelity=fidelity, record=record)
-        last = rec["current_q"].time > 0.4 - 4 * 2 * math.pi / (4 * 40.0)
+        last = rec["current_q"].time > 0.8 - 4 * 2 * math.pi / (4 * 40.0)
         means.append(float(rec["current_q"].values[last].mean()))
     assert means[1] == pytest.approx(means[0], rel=0.025)
 
