@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.calibrate.brake_level import Brake, brake_of
-from elevon.errors import InputError, did_you_mean
+from elevon.errors import InputError
 
 if TYPE_CHECKING:
     from elevon.logs.command.note import CommandNote
@@ -23,6 +23,8 @@ __all__ = ["BenchLog", "bench_log", "read_logs"]
 Floats = npt.NDArray[np.float64]
 _LEAST_SAMPLES = 200
 _NEEDED = ("speed_ref", "motor_speed")
+#: Roles of the torque current, the measured one first, and the signal a model shows for each.
+_CURRENTS = {"torque_current": "current_q_meas", "current_ref": "current_ref"}
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ class BenchLog:
     current : ndarray, shape (n,)
         Torque current, peak [A].
     current_signal : str
-        ``current_q_meas`` (r78) or, where that is missing, ``current_ref`` (r77).
+        ``current_q_meas`` or, where no current is measured, ``current_ref``: its set point.
     motor, user : ndarray, shape (n,), or None
         Positions [rad]: motor at the fast shaft, encoder at the user.
     brake : Brake
@@ -142,27 +144,28 @@ def bench_log(imported: ImportedLog) -> BenchLog:
     recording, report = imported.recording, imported.report
     name = Path(report.source).name
     for needed in _NEEDED:
-        if needed not in recording:
+        if needed not in recording.roles:
             raise InputError(
-                f"{name}: {needed} is missing; calibration needs the speed set point (r62), the "
-                f"actual speed (r63) and a torque current (r78 or r77)"
-                f"{did_you_mean(needed, recording.names)}"
+                f"{name}: no channel plays {needed}; calibration needs a speed set point, the "
+                f"motor's speed and a torque current; roles: {', '.join(recording.roles) or 'none'}"
             )
-    current_signal = next((s for s in ("current_q_meas", "current_ref") if s in recording), None)
-    if current_signal is None:
-        raise InputError(f"{name}: no torque current (r78 or r77); friction cannot be told")
-    clock = recording["speed_ref"].clock
+    current_role = next(
+        (r for r in ("torque_current", "current_ref") if r in recording.roles), None
+    )
+    if current_role is None:
+        raise InputError(f"{name}: no torque current; friction cannot be determined")
+    clock = recording.role("speed_ref").clock
     start = float(clock.time[0])
     time = np.asarray(clock.time, dtype=np.float64) - start
     if len(time) < _LEAST_SAMPLES:
         raise InputError(f"{name}: {len(time)} samples; calibration needs {_LEAST_SAMPLES}")
-    needed_signals = ("speed_ref", "motor_speed", current_signal)
-    columns = [np.array(recording[s].values, dtype=np.float64) for s in needed_signals]
+    needed_roles = ("speed_ref", "motor_speed", current_role)
+    columns = [np.array(recording.role(r).values, dtype=np.float64) for r in needed_roles]
     good = np.asarray(np.isfinite(np.column_stack(columns)).all(axis=1), dtype=np.bool_)
     if good.sum() < _LEAST_SAMPLES:
         raise InputError(f"{name}: {int(good.sum())} samples are complete; {_LEAST_SAMPLES} needed")
     ref, speed, current = (_filled(time, column) for column in columns)
-    target = _optional(recording, time, ("current_ref",))
+    target = _optional(recording, time, "current_ref")
     return BenchLog(
         name=name,
         start=start,
@@ -170,10 +173,10 @@ def bench_log(imported: ImportedLog) -> BenchLog:
         speed_ref=ref,
         speed=speed,
         current=current,
-        current_signal=current_signal,
+        current_signal=_CURRENTS[current_role],
         current_target=current if target is None else target,
-        motor=_optional(recording, time, ("resolver_position", "motor_position")),
-        user=_optional(recording, time, ("encoder_position", "user_position")),
+        motor=_optional(recording, time, "motor_position"),
+        user=_optional(recording, time, "output_position"),
         brake=brake_of(recording, imported.note, time, start, speed),
         note=imported.note,
         good=good,
@@ -187,10 +190,12 @@ def _filled(time: Floats, values: Floats) -> Floats:
     return values if good.all() else np.interp(time, time[good], values[good])
 
 
-def _optional(recording: Recording, time: Floats, names: Sequence[str]) -> Floats | None:
-    for name in names:
-        if name in recording and recording[name].clock is recording["speed_ref"].clock:
-            values = np.array(recording[name].values, dtype=np.float64)
-            if np.isfinite(values).sum() >= _LEAST_SAMPLES:
-                return _filled(time, values)
-    return None
+def _optional(recording: Recording, time: Floats, role: str) -> Floats | None:
+    """Return a role's channel where it stands on the drive's clock and is long enough."""
+    if role not in recording.roles:
+        return None
+    channel = recording.role(role)
+    if channel.clock is not recording.role("speed_ref").clock:
+        return None
+    values = np.array(channel.values, dtype=np.float64)
+    return _filled(time, values) if np.isfinite(values).sum() >= _LEAST_SAMPLES else None

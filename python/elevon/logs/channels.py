@@ -10,31 +10,30 @@ from elevon.logs.clocks.quality import clipped_share, stuck_spans
 from elevon.logs.command.reconstruct import SPEED_LIMIT
 from elevon.logs.formats.table import FloatArray
 from elevon.logs.report import ImportReport
+from elevon.recording import Recording
 
 __all__ = ["examine_channels"]
 
 _CLIP_SHARE = 0.01
 _FREE_TRAVEL = 0.08  # rad at the user: more than the widest play the bench can set (0.0457)
-_CLIPPING = {"speed_ref", "motor_speed", "current_ref", "current_q_meas", "current_d_meas",
-             "voltage_q_ref", "load_cell_force"}  # fmt: skip
+_CLIPPING = {"speed_ref", "motor_speed", "current_ref", "torque_current", "direct_current",
+             "torque_voltage", "load_cell"}  # fmt: skip
 
 
-def examine_channels(
-    time: FloatArray, values: Mapping[str, FloatArray], ratio: float, report: ImportReport
-) -> None:
-    """Add findings about every channel of one clock.
+def examine_channels(recording: Recording, ratio: float | None, report: ImportReport) -> None:
+    """Add findings about every channel of the drive's clock.
 
     Parameters
     ----------
-    time : ndarray, shape (n,)
-        Seconds.
-    values : mapping of str to ndarray, shape (n,)
-        SI values by signal.
-    ratio : float
-        Gear ratio, fast over slow.
+    recording : Recording
+        SI, with roles.
+    ratio : float or None
+        Motor over output, where it is known.
     report : ImportReport
         Findings are added to it.
     """
+    values = {channel.name: channel.values for channel in recording.channels}
+    roles = {name: role for role, name in recording.roles.items()}
     for name, data in values.items():
         missing = int(np.isnan(data).sum())
         if missing == len(data):
@@ -43,9 +42,10 @@ def examine_channels(
         if missing:
             report.warn(name, "missing", f"{missing} of {len(data)} samples are missing")
         _constant(name, data, values, report)
-        if name in _CLIPPING:
-            _clipping(name, data, report)
-    _stuck(time, values, ratio, report)
+        if roles.get(name) in _CLIPPING:
+            _clipping(name, data, report, limited=roles[name] == "speed_ref")
+    if ratio is not None and {"motor_position", "output_position"} <= recording.roles.keys():
+        _stuck(recording, ratio, report)
 
 
 def _constant(
@@ -64,12 +64,12 @@ def _constant(
             report.warn(name, "stuck", f"stands at {good[0]:.6g} through the whole log")
 
 
-def _clipping(name: str, data: FloatArray, report: ImportReport) -> None:
+def _clipping(name: str, data: FloatArray, report: ImportReport, *, limited: bool) -> None:
     shares = clipped_share(data)
     for share, value in zip(shares, (np.nanmin(data), np.nanmax(data)), strict=True):
         if share <= _CLIP_SHARE or value == 0.0:
             continue
-        if name == "speed_ref" and abs(abs(value) - SPEED_LIMIT) < 0.01 * SPEED_LIMIT:
+        if limited and abs(abs(value) - SPEED_LIMIT) < 0.01 * SPEED_LIMIT:
             report.note(
                 name,
                 "saturated",
@@ -81,17 +81,12 @@ def _clipping(name: str, data: FloatArray, report: ImportReport) -> None:
             )
 
 
-def _stuck(
-    time: FloatArray, values: Mapping[str, FloatArray], ratio: float, report: ImportReport
-) -> None:
-    motor, encoder = values.get("resolver_position"), values.get("encoder_position")
-    if motor is None or encoder is None:
+def _stuck(recording: Recording, ratio: float, report: ImportReport) -> None:
+    outer, inner = recording.role("output_position"), recording.role("motor_position")
+    if outer.unit != "rad":
         return
-    both = np.isfinite(motor) & np.isfinite(encoder)
-    t, motor, encoder = time[both], motor[both] / ratio, encoder[both]
-    for name, data, drive in (
-        ("encoder_position", encoder, motor),
-        ("resolver_position", motor, encoder),
-    ):
-        for start, end in stuck_spans(t, data, drive, _FREE_TRAVEL)[:10]:
+    both = np.isfinite(inner.values) & np.isfinite(outer.values)
+    motor, output = inner.values[both] / ratio, outer.values[both]
+    for name, data, drive in ((outer.name, output, motor), (inner.name, motor, output)):
+        for start, end in stuck_spans(outer.time[both], data, drive, _FREE_TRAVEL)[:10]:
             report.warn(name, "stuck", f"stands still from {start:.3f} s to {end:.3f} s")

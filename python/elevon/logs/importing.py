@@ -19,14 +19,15 @@ from elevon.logs.formats.detect import read_table
 from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits
 from elevon.logs.formats.matlab import has_variable
 from elevon.logs.formats.table import FloatArray, RawTable
+from elevon.logs.maps.agreement import check_agreement
 from elevon.logs.maps.assign import Assignment, assign_columns, rms_to_peak, settle_positions
-from elevon.logs.maps.column_map import ColumnMap, read_column_map
+from elevon.logs.maps.column_map import ColumnMap, find_map, shipped_map
+from elevon.logs.maps.columns import looks_like_drive
 from elevon.logs.report import ImportReport
 from elevon.recording import Recording
 
-__all__ = ["GEAR_RATIO", "ImportedLog", "find_sidecars", "import_log", "same_rate"]
+__all__ = ["ImportedLog", "find_sidecars", "import_log", "same_rate"]
 
-GEAR_RATIO = 124.0  # the Torino bench's gearbox
 _ROUNDING = 0.6  # ms: a clock written in whole ms jitters by half of one
 
 
@@ -78,7 +79,8 @@ def import_log(
     command : path, optional
         Command note; by default the one beside the log.
     gear_ratio : float, optional
-        Fast over slow; 124 unless given here or in the map.
+        Motor over output (rad a m for a linear output); else the map's. The traces of the Torino
+        drive have a map of their own.
     sidecars : bool
         Whether files beside the log are looked for.
     limits : Limits
@@ -104,19 +106,19 @@ def import_log(
     note = read_command_note(note_path) if note_path is not None else None
     mapped = column_map
     if mapped is not None and not isinstance(mapped, ColumnMap):
-        mapped = read_column_map(mapped)
+        mapped = find_map(mapped)
     table = read_table(path, log_format, limits)
     report = ImportReport(str(path), table.file_format)
     for text in table.notes:
         report.note("file", "format", text)
-    ratio = _ratio(gear_ratio, mapped)
-    found = assign_columns(table, mapped, ratio, report, layout=log_format)
-    quality, time = _clock(table, found, report)
-    settle_positions(found, table, time, quality.keep, ratio, report=report)
-    convention = _currents(found, mapped, note, report)
-    recording = _build(table, found, quality, time, report=report)
-    values = {channel.name: channel.values for channel in recording.channels}
-    examine_channels(time, values, ratio, report)
+    ratio = _ratio(gear_ratio, mapped, table, log_format)
+    assigned = assign_columns(table, mapped, ratio, report, layout=log_format)
+    quality, time = _clock(table, assigned, report)
+    settle_positions(assigned, table, time, quality.keep, ratio, report=report)
+    convention = _currents(assigned, mapped, note, report)
+    recording = _build(table, assigned, quality, time, report=report)
+    check_agreement(recording, ratio, report, mapped)
+    examine_channels(recording, ratio, report)
     cell = loadcell or near_cell
     if cell is not None:
         recording = join_loadcell(recording, cell, note, report, limits, gear_ratio=ratio)
@@ -173,18 +175,24 @@ def _is_saved(file: Path) -> bool:
     return False
 
 
-def _ratio(given: float | None, mapped: ColumnMap | None) -> float:
-    ratio = given if given is not None else mapped.gear_ratio if mapped else None
-    ratio = GEAR_RATIO if ratio is None else ratio
-    if not (math.isfinite(ratio) and ratio > 0.0):
+def _ratio(
+    given: float | None, mapped: ColumnMap | None, table: RawTable, layout: str
+) -> float | None:
+    """Motor over output, rad a rad or rad a m; None where nobody says it."""
+    ratio = given
+    if ratio is None and mapped is not None:
+        ratio = 2.0 * math.pi / mapped.travel if mapped.travel else mapped.gear_ratio
+    if ratio is None and (layout == "drive" or (layout != "csv" and looks_like_drive(table))):
+        ratio = shipped_map("torino").gear_ratio
+    if ratio is not None and not (math.isfinite(ratio) and ratio > 0.0):
         raise RangeError(f"gear ratio {ratio!r} must be above 0")
     return ratio
 
 
 def _clock(
-    table: RawTable, found: dict[str, Assignment], report: ImportReport
+    table: RawTable, assigned: dict[str, Assignment], report: ImportReport
 ) -> tuple[ClockQuality, FloatArray]:
-    base = found["time"]
+    base = assigned["time"]
     seconds = table.columns[base.column] * (base.factor or 1.0)
     quality = clock_quality(table.source, seconds)
     report.clocks["drive"] = _clock_facts(quality)
@@ -192,7 +200,7 @@ def _clock(
         report.warn(
             "drive",
             "duplicates",
-            f"{quality.duplicates} rows repeat a time stamp: the first of each is kept, the "
+            f"{quality.duplicates} rows repeat a time stamp: the first of each stays, the "
             "others are left out",
         )
     for start, end, missing in quality.gaps[:20]:
@@ -205,7 +213,7 @@ def _clock(
 
 
 def _currents(
-    found: dict[str, Assignment],
+    assigned: dict[str, Assignment],
     mapped: ColumnMap | None,
     note: CommandNote | None,
     report: ImportReport,
@@ -218,7 +226,7 @@ def _currents(
             "(rms, peak)"
         )
     convention = said.pop() if said else "rms"
-    changed = rms_to_peak(found) if convention == "rms" else []
+    changed = rms_to_peak(assigned) if convention == "rms" else []
     if changed and not (mapped and mapped.current) and not (note and note.current):
         report.warn(
             "currents",
@@ -233,21 +241,24 @@ def _currents(
 
 def _build(
     table: RawTable,
-    found: dict[str, Assignment],
+    assigned: dict[str, Assignment],
     quality: ClockQuality,
     time: FloatArray,
     *,
     report: ImportReport,
 ) -> Recording:
     values, units = {}, {}
-    for signal, item in found.items():
+    for signal, item in assigned.items():
         if signal == "time":
             continue
-        column = table.columns[item.column][quality.keep]
+        column = item.values(table)[quality.keep]
         values[signal] = column * (1.0 if item.factor is None else item.factor) + item.offset
         units[signal] = item.unit
-    recording = Recording.build(time, values, units, clock="drive", rate=quality.rate)
-    for signal, item in found.items():
+    roles = {item.role: signal for signal, item in assigned.items() if item.role}
+    recording = Recording.build(
+        time, values, units, clock="drive", rate=quality.rate, meta={"roles": roles}
+    )
+    for signal, item in assigned.items():
         if signal != "time":
             channel = recording[signal]
             report.channels.append(_channel_facts(signal, item.column, channel.values, channel))
@@ -290,7 +301,7 @@ def _meta(
     path: str | Path,
     report: ImportReport,
     note: CommandNote | None,
-    ratio: float,
+    ratio: float | None,
     convention: str,
 ) -> dict[str, Any]:
     if not report.channels:

@@ -28,7 +28,7 @@ def join_loadcell(
     report: ImportReport,
     limits: Limits,
     *,
-    gear_ratio: float,
+    gear_ratio: float | None,
 ) -> Recording:
     """Add the load cell's channels on a clock of their own, moved to the drive's time.
 
@@ -44,8 +44,8 @@ def join_loadcell(
         Findings and the synchronisation are added to it.
     limits : Limits
         Bounds on size.
-    gear_ratio : float
-        Fast over slow.
+    gear_ratio : float or None
+        Motor over output, where it is known.
 
     Returns
     -------
@@ -77,7 +77,9 @@ def join_loadcell(
     _check_overlap(recording, moved, report)
     values, units = _channels(log, value, note, report)
     cell = Recording.build(moved, values, units, clock="load_cell", rate=quality.rate)
-    return recording.joined(cell)
+    both = recording.joined(cell)
+    shown = "load_cell_torque" if "load_cell_torque" in cell else "load_cell_force"
+    return both.with_meta(roles={**recording.roles, "load_cell": shown})
 
 
 def _synchronise(
@@ -89,8 +91,8 @@ def _synchronise(
 ) -> ClockFit | None:
     drive = recording.clocks["drive"].time
     edge = None
-    if "trigger" in recording:
-        edge = find_trigger(drive, recording["trigger"].values)
+    if "trigger" in recording.roles:
+        edge = find_trigger(drive, recording.role("trigger").values)
         if edge is not None and edge.later:
             report.note(
                 "trigger", "more-edges", f"{edge.later} changes after the first; the first is used"
@@ -155,7 +157,9 @@ def _fit_findings(fit: ClockFit, report: ImportReport) -> None:
         )
 
 
-def _shared(recording: Recording, gear_ratio: float, note: CommandNote | None) -> list[FloatArray]:
+def _shared(
+    recording: Recording, gear_ratio: float | None, note: CommandNote | None
+) -> list[FloatArray]:
     """Return the sets of signals that may show what the load cell saw.
 
     A brake acts on the fast shaft, weights and springs on the user: these show in what they wind up
@@ -164,9 +168,9 @@ def _shared(recording: Recording, gear_ratio: float, note: CommandNote | None) -
     """
     brake = _braked(recording)
     wound = []
-    if "resolver_position" in recording and "encoder_position" in recording:
-        motor, user = (recording[f"{name}_position"].values for name in ("resolver", "encoder"))
-        wound.append((motor / gear_ratio - user)[:, None])
+    if gear_ratio and {"motor_position", "output_position"} <= recording.roles.keys():
+        motor, output = (recording.role(f"{name}_position").values for name in ("motor", "output"))
+        wound.append((motor / gear_ratio - output)[:, None])
     if brake and wound and note is not None and note.brake is not None:
         return brake if note.brake else wound
     return [*brake, *wound]
@@ -181,8 +185,8 @@ def _braked(recording: Recording) -> list[FloatArray]:
     cell that shows a size alone follows the same four times the direction of motion; where the
     shaft hardly moves, the current's size.
     """
-    names = [name for name in ("current_q_meas", "current_ref") if name in recording]
-    current = [recording[name].values for name in names[:1]]
+    names = [name for name in ("torque_current", "current_ref") if name in recording.roles]
+    current = [recording.role(name).values for name in names[:1]]
     sets = [np.column_stack((i, np.abs(i))) for i in current]
     speed = _speed(recording)
     size = 0.0 if speed is None else float(np.nanstd(speed))
@@ -195,11 +199,11 @@ def _braked(recording: Recording) -> list[FloatArray]:
 
 
 def _speed(recording: Recording) -> FloatArray | None:
-    if "motor_speed" in recording:
-        return recording["motor_speed"].values
-    if "resolver_position" not in recording:
+    if "motor_speed" in recording.roles:
+        return recording.role("motor_speed").values
+    if "motor_position" not in recording.roles:
         return None
-    position = recording["resolver_position"].values
+    position = recording.role("motor_position").values
     return np.asarray(np.gradient(position, recording.clocks["drive"].time), dtype=np.float64)
 
 

@@ -15,6 +15,7 @@ from elevon.errors import FormatError, did_you_mean
 from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits
 from elevon.logs.formats.table import FloatArray, RawTable
 from elevon.logs.formats.text import read_text_table
+from elevon.logs.maps.column_map import shipped_map
 from elevon.recording import Recording
 
 __all__ = ["DATA_DOI", "PAPER_DOI", "read_cranfield"]
@@ -94,6 +95,9 @@ def _recording(table: RawTable, rows: slice, words: list[str], path: Path) -> Re
         meta={
             "status": "measured",
             "log": path.name,
+            "roles": {
+                e.played: e.channel for e in shipped_map("cranfield").column if e.played != "time"
+            },
             "source": f"doi {DATA_DOI}; {PAPER_DOI}",
             "condition": condition,
             "profile": words[int(part["profile"][0])],

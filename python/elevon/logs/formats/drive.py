@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from elevon.errors import InputError, RangeError, did_you_mean
 from elevon.files import write_bytes
-from elevon.logs.maps.columns import DRIVE_COLUMNS
+from elevon.logs.maps.columns import drive_columns
 from elevon.units import to_display
 
 __all__ = ["DriveFormat", "write_drive_csv"]
@@ -107,7 +107,7 @@ def write_drive_csv(
         The file exists and `force` is false.
     """
     layout = layout or DriveFormat()
-    known = [column.signal for column in DRIVE_COLUMNS]
+    known = [entry.channel for entry in drive_columns().values()]
     signals = dict(signals)
     for given, wanted in _STAND_INS.items():
         if given in signals:
@@ -120,10 +120,10 @@ def write_drive_csv(
         raise InputError("drive trace: the signal 'time' is missing")
     arrays = {name: np.asarray(values, dtype=np.float64) for name, values in signals.items()}
     _check_arrays(arrays)
-    columns = [column for column in DRIVE_COLUMNS if column.signal in arrays]
-    scaled = [arrays[c.signal] * _factor(c.key, layout) for c in columns]
+    columns = {key: c for key, c in drive_columns().items() if c.channel in arrays}
+    scaled = [arrays[c.channel] * _factor(key, layout) for key, c in columns.items()]
     text = io.StringIO()
-    text.write(layout.delimiter.join(c.header for c in columns) + layout.line_end)
+    text.write(layout.delimiter.join(c.name for c in columns.values()) + layout.line_end)
     for row in np.column_stack(scaled).tolist():
         cells = [f"{value:.{layout.digits}g}" for value in row]
         line = layout.delimiter.join(cells)
@@ -138,8 +138,8 @@ def _factor(key: str, layout: DriveFormat) -> float:
         return shaft * to_display(1.0, layout.position_unit)
     if key in {"r76", "r77", "r78", "r1733"}:
         return float(np.sqrt(0.5)) if layout.current_convention == "rms" else 1.0
-    column = next(c for c in DRIVE_COLUMNS if c.key == key)
-    return to_display(1.0, column.unit) if column.unit else 1.0
+    unit = drive_columns()[key].unit
+    return to_display(1.0, unit) if unit else 1.0
 
 
 def _check_arrays(arrays: Mapping[str, npt.NDArray[np.float64]]) -> None:

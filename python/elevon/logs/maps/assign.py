@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from elevon.errors import FormatError, InputError, unknown
@@ -10,37 +11,50 @@ from elevon.logs.clocks.quality import IntArray
 from elevon.logs.formats.limits import quoted
 from elevon.logs.formats.table import FloatArray, RawTable
 from elevon.logs.maps.column_map import ColumnEntry, ColumnMap
-from elevon.logs.maps.columns import DRIVE_COLUMNS, find_drive_columns, looks_like_drive
+from elevon.logs.maps.columns import drive_columns, find_drive_columns, looks_like_drive
 from elevon.logs.maps.shafts import (
     PositionStatement,
     settle_encoder,
     settle_motor,
     travel_from_speed,
 )
-from elevon.logs.maps.signals import SIGNALS, safe_name
+from elevon.logs.maps.signals import known_roles, known_signals, safe_name, unit_among
 from elevon.logs.report import ImportReport
-from elevon.units import check_kind, parse_unit
+from elevon.units import parse_unit
 
-__all__ = ["Assignment", "assign_columns", "rms_to_peak", "settle_positions"]
-
-_POSITIONS = ("resolver_position", "encoder_position")
+__all__ = ["Assignment", "assign_columns", "playing", "rms_to_peak", "settle_positions"]
 
 
 @dataclass(slots=True)
 class Assignment:
-    """A signal: its column, its factor from the file to SI (offset for temperatures), its unit."""
+    """A signal: its column, its factor from the file to SI (offset for temperatures), its unit.
+
+    `role` is empty where it plays none; `subtract_from` names the column it is subtracted from.
+    """
 
     signal: str
     column: str
     factor: float | None
     unit: str
     offset: float = 0.0
+    role: str = ""
+    subtract_from: str | None = None
+
+    def values(self, table: RawTable) -> FloatArray:
+        """Return the column as the file means it, before factor and offset."""
+        column = table.columns[self.column]
+        return column if self.subtract_from is None else table.columns[self.subtract_from] - column
+
+
+def playing(assigned: Mapping[str, Assignment], role: str) -> Assignment | None:
+    """Return the signal that plays a role, if any."""
+    return next((item for item in assigned.values() if item.role == role), None)
 
 
 def assign_columns(
     table: RawTable,
     column_map: ColumnMap | None,
-    gear_ratio: float,
+    gear_ratio: float | None,
     report: ImportReport,
     *,
     layout: str = "auto",
@@ -53,8 +67,8 @@ def assign_columns(
         The log.
     column_map : ColumnMap or None
         What the user says; it wins over the headers.
-    gear_ratio : float
-        Fast over slow.
+    gear_ratio : float or None
+        Motor over output, where it is known.
     report : ImportReport
         Findings are added to it.
     layout : str
@@ -71,65 +85,76 @@ def assign_columns(
     InputError
         A mapped column that is not in the file, units of the wrong kind, no time.
     """
-    found: dict[str, Assignment] = {}
+    assigned: dict[str, Assignment] = {}
     for entry in column_map.column if column_map else ():
-        if entry.name not in table.columns:
-            raise unknown("column", entry.name, table.columns, table.source)
-        found[entry.signal] = _mapped(entry, table, gear_ratio)
+        for name in (entry.name, entry.subtract_from):
+            if name is not None and name not in table.columns:
+                raise unknown("column", name, table.columns, table.source)
+        assigned[entry.channel] = _mapped(entry, table, gear_ratio)
     if layout == "drive" or (layout != "csv" and looks_like_drive(table)):
         report.file_format = f"{table.file_format}, drive trace"
-        _add_drive(found, table)
+        _add_drive(assigned, table)
     else:
-        _add_named(found, table)
-    if "time" not in found:
-        raise FormatError(
-            f"{table.source}: no time column; columns: "
-            f"{', '.join(quoted(name) for name in list(table.columns)[:12])}; say which one it is "
-            "in a column map (--map)"
-        )
-    if len(found) < 2:
-        raise FormatError(
-            f"{table.source}: no column is known; columns: "
-            f"{', '.join(quoted(name) for name in list(table.columns)[:12])}; say what they are in "
-            "a column map (--map)"
-        )
-    _add_extra(found, table, report)
-    return found
+        _add_named(assigned, table)
+    _check_some(assigned, table)
+    _add_extra(assigned, table, report)
+    return assigned
+
+
+def _check_some(assigned: Mapping[str, Assignment], table: RawTable) -> None:
+    """Refuse a table without time, or without any column whose meaning is known."""
+    if "time" in assigned and len(assigned) > 1:
+        return
+    what = "no column is known" if "time" in assigned else "no time column"
+    raise FormatError(
+        f"{table.source}: {what}; columns: "
+        f"{', '.join(quoted(name) for name in list(table.columns)[:12])}; say what they are in "
+        "a column map (--map; elevon import --guess writes a first one)"
+    )
 
 
 def settle_positions(
-    found: dict[str, Assignment],
+    assigned: dict[str, Assignment],
     table: RawTable,
     time: FloatArray,
     keep: IntArray,
-    gear_ratio: float,
+    gear_ratio: float | None,
     *,
     report: ImportReport,
 ) -> None:
     """Give the positions their factors, and check those the user stated; errors as the settlers.
 
-    `time` and `keep` are the clock's instants and the rows they stand in.
+    `time` and `keep` are the clock's instants and the rows they stand in; `gear_ratio` in rad of
+    the motor for one rad or m of the output, None where nobody says it.
     """
     speeds = [
-        table.columns[found[name].column][keep] * (found[name].factor or 1.0)
-        for name in ("motor_speed", "speed_ref")
-        if name in found
+        item.values(table)[keep] * (item.factor or 1.0)
+        for role in ("motor_speed", "speed_ref")
+        if (item := playing(assigned, role)) is not None
     ]
-    motor, encoder = (found.get(name) for name in _POSITIONS)
+    motor, output = (playing(assigned, f"{which}_position") for which in ("motor", "output"))
     reference, trusted = None, False
     if motor is not None:
-        values = table.columns[motor.column][keep]
-        motor.factor, trusted = settle_motor(_statement(motor), time, values, speeds, report)
+        values = motor.values(table)[keep]
+        motor.factor, trusted = settle_motor(
+            _statement(motor), time, values, speeds, report, name=motor.signal
+        )
         reference = values * motor.factor
     elif speeds:
         reference, trusted = travel_from_speed(time, speeds[0]), True
-    if encoder is None:
+    if output is None or (gear_ratio is None and output.factor is not None):
         return
-    values = table.columns[encoder.column][keep]
+    values = output.values(table)[keep]
     if reference is None:
         reference = 0.0 * values
-    encoder.factor, _ = settle_encoder(
-        _statement(encoder), reference, values, gear_ratio, report, trusted=trusted
+    output.factor, _ = settle_encoder(
+        _statement(output),
+        reference,
+        values,
+        gear_ratio or 1.0,
+        report,
+        trusted=trusted and gear_ratio is not None,
+        name=output.signal,
     )
 
 
@@ -138,22 +163,31 @@ def _statement(assignment: Assignment) -> PositionStatement:
     return PositionStatement(quoted(assignment.column), per_rad)
 
 
-def _mapped(entry: ColumnEntry, table: RawTable, gear_ratio: float) -> Assignment:
-    signal = "time" if entry.signal == "time" else entry.signal
-    known = SIGNALS.get(signal)
+def _mapped(entry: ColumnEntry, table: RawTable, gear_ratio: float | None) -> Assignment:
+    known = known_roles()[entry.role] if entry.role else known_signals().get(entry.channel)
     stated = entry.unit if entry.unit is not None else table.units.get(entry.name)
-    expected = "s" if signal == "time" else (known.unit if known else stated or "1")
     place = f"{table.source}: column {quoted(entry.name)}"
-    unit = check_kind(stated, expected, place) if stated else parse_unit(expected)
+    expected = unit_among(known.units if known else (stated or "1",), stated, place)
+    unit = parse_unit(stated or expected, place)
     factor = float(unit.to_si(1.0) - unit.to_si(0.0)) * entry.sign * entry.scale
     offset = float(unit.to_si(0.0))
     if entry.shaft is not None:
-        if known is None or not known.shaft:
-            raise InputError(f"{place}: {signal} belongs to no shaft")
+        if known is None or not known.shaft or parse_unit(expected).dimension[0] == 1:
+            raise InputError(f"{place}: {entry.channel} belongs to no shaft")
         if entry.shaft != known.shaft:
+            if gear_ratio is None:
+                raise InputError(f"{place}: shaft = {entry.shaft!r} needs the map's gear_ratio")
             power = {"angle": 1.0, "torque": -1.0}[known.scaled]
             factor *= gear_ratio ** (power if entry.shaft == "slow" else -power)
-    return Assignment(signal, entry.name, factor, _si(expected), offset)
+    return Assignment(
+        entry.channel,
+        entry.name,
+        factor,
+        _si(expected),
+        offset,
+        "" if entry.played == "time" else entry.played,
+        entry.subtract_from,
+    )
 
 
 def _si(unit: str) -> str:
@@ -162,58 +196,68 @@ def _si(unit: str) -> str:
     return si_unit(unit)
 
 
-def _add_drive(found: dict[str, Assignment], table: RawTable) -> None:
-    taken = {assignment.column for assignment in found.values()}
-    mapped = {a.signal for a in found.values()}
-    columns = {c.key: c for c in DRIVE_COLUMNS}
-    free = {name: values for name, values in table.columns.items() if name not in taken}
-    covered = {c.key for c in DRIVE_COLUMNS if c.signal in mapped}
+def _add_drive(assigned: dict[str, Assignment], table: RawTable) -> None:
+    """Recognise the drive's columns among those that no map names."""
+    used = {item.column for item in assigned.values()}
+    free = {name: values for name, values in table.columns.items() if name not in used}
+    entries = drive_columns()
+    covered = {
+        key
+        for key, entry in entries.items()
+        if entry.channel in assigned or (entry.played and playing(assigned, entry.played))
+    }
     rest = RawTable(table.source, free or table.columns, table.units)
     for key, name in find_drive_columns(rest, given=covered).items():
-        column = columns[key]
-        if column.signal in found or name in taken:
+        entry = entries[key]
+        if key in covered or name in used:
             continue
-        stated = table.units.get(name) or column.unit
-        factor: float | None = None
-        if stated:
-            place = f"{table.source}: column {quoted(name)}"
-            factor = float(check_kind(stated, column.si_unit, place).to_si(1.0))
-        elif column.si_unit == "1":
-            factor = 1.0
-        found[column.signal] = Assignment(column.signal, name, factor, column.si_unit)
+        stated = table.units.get(name) or entry.unit
+        item = _mapped(entry.model_copy(update={"name": name, "unit": stated}), table, None)
+        if not stated:
+            item.factor = None  # settled by what the log itself shows
+        assigned[entry.channel] = item
 
 
-def _add_named(found: dict[str, Assignment], table: RawTable) -> None:
-    """Columns that carry a signal's own name, in the unit the file states, else SI."""
-    taken = {assignment.column for assignment in found.values()}
+def _add_named(assigned: dict[str, Assignment], table: RawTable) -> None:
+    """Columns that carry a signal's or a role's own name, in the unit the file states, else SI."""
+    used = {item.column for item in assigned.values()}
     for name in table.columns:
         signal = name.strip().lower()
-        if name in taken or signal in found or (signal not in SIGNALS and signal != "time"):
+        if name in used or signal in assigned:
             continue
-        entry = ColumnEntry(name=name, signal=signal)
-        found[signal] = _mapped(entry, table, 1.0)
+        if signal not in known_signals() and signal not in known_roles():
+            continue
+        entry = (
+            ColumnEntry(name=name, signal=signal)
+            if signal in known_signals()
+            else ColumnEntry(name=name, role=signal)
+        )
+        item = _mapped(entry, table, None)
+        if item.role and playing(assigned, item.role):
+            item.role = ""
+        assigned[signal] = item
 
 
-def _add_extra(found: dict[str, Assignment], table: RawTable, report: ImportReport) -> None:
-    taken = {assignment.column for assignment in found.values()}
+def _add_extra(assigned: dict[str, Assignment], table: RawTable, report: ImportReport) -> None:
+    used = {assignment.column for assignment in assigned.values()}
     for name in table.columns:
-        if name in taken:
+        if name in used:
             continue
-        signal = safe_name(name, set(found))
+        signal = safe_name(name, set(assigned))
         stated = table.units.get(name, "")
         report.note(
-            signal, "extra-column", f"column {quoted(name)} is not known; kept as it stands"
+            signal, "extra-column", f"column {quoted(name)} is not known; left as it stands"
         )
         if stated:
             report.note(signal, "extra-unit", f"its unit, as the file says: {quoted(stated)}")
-        found[signal] = Assignment(signal, name, 1.0, "1")
+        assigned[signal] = Assignment(signal, name, 1.0, "1")
 
 
-def rms_to_peak(found: dict[str, Assignment]) -> list[str]:
+def rms_to_peak(assigned: dict[str, Assignment]) -> list[str]:
     """Turn the drive's currents and voltage from rms to peak; return the signals concerned."""
     changed = []
-    for signal, assignment in found.items():
-        known = SIGNALS.get(signal)
+    for signal, assignment in assigned.items():
+        known = known_roles().get(assignment.role)
         if known is not None and known.drive_current and assignment.factor is not None:
             assignment.factor *= math.sqrt(2.0)
             changed.append(signal)

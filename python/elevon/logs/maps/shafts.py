@@ -51,6 +51,8 @@ def settle_motor(
     position: FloatArray,
     speeds: Sequence[FloatArray],
     report: ImportReport,
+    *,
+    name: str = "resolver_position",
 ) -> tuple[float, bool]:
     """Return the factor from the file's motor position to rad, and whether the log confirms it.
 
@@ -75,7 +77,7 @@ def settle_motor(
     fits = [_against(travel_from_speed(time, speed), position) for speed in speeds]
     usable = [fit for fit in fits if fit.usable and fit.travel > _LEAST_TRAVEL]
     if not usable:
-        return _unconfirmed(statement, "resolver_position", _why(fits), report), False
+        return _unconfirmed(statement, name, _why(fits), report), False
     slope = usable[0].slope
     if statement.per_rad is not None:
         _check_stated(statement, slope, "the integral of the motor's speed")
@@ -95,7 +97,7 @@ def settle_motor(
             "scale in a column map"
         )
     report.note(
-        "resolver_position",
+        name,
         "unit-confirmed",
         f"{statement.column} is in {found.unit}: it moves {slope / found.scale:.4f} of the "
         "integrated speed",
@@ -111,6 +113,7 @@ def settle_encoder(
     report: ImportReport,
     *,
     trusted: bool = True,
+    name: str = "encoder_position",
 ) -> tuple[float, bool]:
     """Return the factor from the file's encoder position to rad at the user, and if confirmed.
 
@@ -138,7 +141,7 @@ def settle_encoder(
     fit = slope_with_play(reference[good], position[good])
     if not (trusted and fit.usable and fit.travel > _LEAST_TRAVEL):
         why = "the motor's own unit is not confirmed" if not trusted else _why([fit])
-        return _unconfirmed(statement, "encoder_position", why, report, ratio), False
+        return _unconfirmed(statement, name, why, report, ratio), False
     play = math.degrees(fit.play / ratio)
     if statement.per_rad is not None:
         against = "the motor's position over the gear ratio"
@@ -157,7 +160,7 @@ def settle_encoder(
     if found.shaft == "fast":  # the drive has multiplied by its own ratio: it cannot be seen
         follows = f"it moves {fit.slope / found.scale:.4f} of the motor"
     report.note(
-        "encoder_position",
+        name,
         "shaft-confirmed",
         f"{statement.column} is on the {found.shaft} shaft in {found.unit}: {follows}; play about "
         f"{play:.3f} deg at the user",

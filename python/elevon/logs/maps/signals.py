@@ -1,63 +1,107 @@
-"""The signals a log may hold: their SI unit and the shaft they are referred to."""
+"""The signals a log may hold: their roles, their SI units, the shaft they are referred to."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
-__all__ = ["SIGNALS", "LogSignal", "safe_name"]
+from elevon.errors import InputError
+from elevon.units import parse_unit
+
+__all__ = ["LogSignal", "known_roles", "known_signals", "safe_name", "unit_among"]
 
 
 @dataclass(frozen=True, slots=True)
 class LogSignal:
-    """A signal's SI unit, its own shaft (``fast``, ``slow`` or none) and whether it is electrical.
+    """A signal's SI units, its own shaft (``fast``, ``slow`` or none) and what it is.
 
-    `scaled` tells how a value on the fast shaft becomes one on the slow shaft: ``angle`` divides by
-    the gear ratio, ``torque`` multiplies.
+    `scaled` says how a value on the fast shaft becomes one on the slow shaft: ``angle`` divides by
+    the gear ratio, ``torque`` multiplies. `drive_current`: the drive may log it as rms.
     """
 
-    unit: str
+    units: tuple[str, ...]
     shaft: str = ""
     scaled: str = ""
     drive_current: bool = False
+    role: str = ""
 
 
-_FAST_ANGLE = ("fast", "angle")
-_SLOW_ANGLE = ("slow", "angle")
-
-SIGNALS: dict[str, LogSignal] = {
-    "command": LogSignal("rad", *_SLOW_ANGLE),
-    "user_position": LogSignal("rad", *_SLOW_ANGLE),
-    "encoder_position": LogSignal("rad", *_SLOW_ANGLE),
-    "user_speed": LogSignal("rad/s", *_SLOW_ANGLE),
-    "motor_position": LogSignal("rad", *_FAST_ANGLE),
-    "resolver_position": LogSignal("rad", *_FAST_ANGLE),
-    "motor_speed": LogSignal("rad/s", *_FAST_ANGLE),
-    "speed_ref": LogSignal("rad/s", *_FAST_ANGLE),
-    "current_ref": LogSignal("A", drive_current=True),
-    "current_q_meas": LogSignal("A", drive_current=True),
-    "current_d_meas": LogSignal("A", drive_current=True),
-    "voltage_q_ref": LogSignal("V", drive_current=True),
-    "current_a_meas": LogSignal("A"),
-    "current_b_meas": LogSignal("A"),
-    "current_c_meas": LogSignal("A"),
-    "supply_voltage": LogSignal("V"),
-    "winding_temperature": LogSignal("K"),
-    "motor_torque": LogSignal("N m", "fast", "torque"),
-    "brake_torque": LogSignal("N m", "fast", "torque"),
-    "load_torque": LogSignal("N m", "fast", "torque"),
-    "load_cell_force": LogSignal("N"),
-    "load_cell_torque": LogSignal("N m"),
-    "trigger": LogSignal("1"),
+_SHAFTS = {
+    "command": ("slow", "angle"),
+    "output_position": ("slow", "angle"),
+    "output_speed": ("slow", "angle"),
+    "motor_position": ("fast", "angle"),
+    "motor_speed": ("fast", "angle"),
+    "speed_ref": ("fast", "angle"),
+}
+_TORQUES = ("motor_torque", "brake_torque", "load_torque")  # on the fast shaft
+_OF_THE_DRIVE = ("current_ref", "torque_current", "direct_current", "torque_voltage")
+_OF_LOGS = {  # channels that only logs have
+    "position_ref": "command",
+    "position": "output_position",
+    "load_cell_force": "load_cell",
+    "load_cell_torque": "load_cell",
+    "trigger": "trigger",
 }
 
 
-def safe_name(foreign: str, taken: set[str]) -> str:
-    """Return a channel name for a foreign column: ASCII, at most 31 characters, not yet taken."""
+@lru_cache(maxsize=1)
+def known_roles() -> Mapping[str, LogSignal]:
+    """Return what a signal in each role is; ``time`` among them."""
+    from elevon import _core
+
+    roles = {
+        role["name"]: LogSignal(
+            tuple(role["units"]),
+            *_SHAFTS.get(role["name"], ("", "")),
+            role["name"] in _OF_THE_DRIVE,
+            role["name"],
+        )
+        for role in _core.roles()
+    }
+    return {"time": LogSignal(("s",)), **roles}
+
+
+@lru_cache(maxsize=1)
+def known_signals() -> Mapping[str, LogSignal]:
+    """Return every signal that a wiring can record or a log may hold, by its channel's name."""
+    from elevon import _core
+
+    roles, known = known_roles(), {"time": LogSignal(("s",))}
+    for wiring in _core.wirings():
+        for fidelity in wiring["fidelities"]:
+            for item in _core.signals(wiring["name"], fidelity):
+                torque = ("fast", "torque") if item["name"] in _TORQUES else ("", "")
+                plain = LogSignal((item["unit"] or "1",), *torque)
+                known.setdefault(item["name"], roles.get(item["role"] or "", plain))
+    return known | {name: roles[role] for name, role in _OF_LOGS.items()}
+
+
+def unit_among(units: tuple[str, ...], stated: str | None, place: str) -> str:
+    """Return the SI unit, of those a signal may have, that a stated unit is of; the first if none.
+
+    Raises
+    ------
+    InputError
+        A unit of another kind, or none that is known.
+    """
+    if not stated:
+        return units[0]
+    dimension = parse_unit(stated, place).dimension
+    for unit in units:
+        if parse_unit(unit).dimension == dimension:
+            return unit
+    raise InputError(f"{place}: unit {stated!r}; expected {' or '.join(units)}, or the like")
+
+
+def safe_name(foreign: str, used: set[str]) -> str:
+    """Return a channel name for a foreign column: ASCII, at most 31 characters, not yet used."""
     text = re.sub(r"[^A-Za-z0-9]+", "_", foreign).strip("_") or "column"
     text = text if text[0].isalpha() else f"column_{text}"
     stem = f"extra_{text}"[:27].rstrip("_")
     name, number = stem, 2
-    while name.lower() in {other.lower() for other in taken}:
+    while name.lower() in {other.lower() for other in used}:
         name, number = f"{stem}_{number}", number + 1
     return name

@@ -1,0 +1,100 @@
+"""Do the columns agree with each other? A position is the integral of its speed, and so on.
+
+What a map states and the data contradict is refused with the figure; what nothing shows stays as
+stated. Where both a command and the position that follows it are logged, they must run the same
+way and be of one size.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from elevon.errors import InputError
+from elevon.logs.formats.table import FloatArray
+from elevon.logs.maps.column_map import ColumnMap
+from elevon.logs.report import ImportReport
+from elevon.recording import Recording
+
+__all__ = ["check_agreement", "slope_and_fit"]
+
+#: What follows what: (role, reference, how the reference is turned into it).
+_PAIRS = (
+    ("output_position", "output_speed", "integral"),
+    ("output_speed", "motor_speed", "ratio"),
+    ("output_position", "command", "follows"),
+    ("motor_speed", "speed_ref", "follows"),
+)
+_AGAINST = {"integral": "the integral of {}", "ratio": "{} over the ratio", "follows": "{}"}
+_EXPLAINED = 0.9  # share of the variance below which nothing is concluded
+_OFF = 0.15  # log of the factor by which an integral or a ratio may be off
+_FOLLOWS = math.log(2.0)  # a servo follows its command within this factor, where it follows
+_LEAST = 30  # samples
+
+
+def check_agreement(
+    recording: Recording, ratio: float | None, report: ImportReport, column_map: ColumnMap | None
+) -> None:
+    """Compare the columns of a log with each other.
+
+    Parameters
+    ----------
+    recording : Recording
+        With roles.
+    ratio : float or None
+        Motor over output, rad a rad or rad a m.
+    report : ImportReport
+        Findings are added to it.
+    column_map : ColumnMap or None
+        What the user states: a contradiction is an error; without a map it is a warning.
+
+    Raises
+    ------
+    InputError
+        The data contradict the map; role, figure and reference are named.
+    """
+    for role, other, how in _PAIRS:
+        if role not in recording.roles or other not in recording.roles:
+            continue
+        value, reference = recording.role(role), recording.role(other)
+        if how == "follows" and value.unit != reference.unit:
+            continue
+        if how == "ratio" and ratio is None:
+            continue
+        seen = np.asarray(reference.values, dtype=np.float64)
+        if how == "integral":
+            seen = _integral(value.time, seen)
+        elif how == "ratio":
+            seen = seen / float(ratio or 1.0)
+        slope, explained = slope_and_fit(seen, np.asarray(value.values, dtype=np.float64))
+        if explained < _EXPLAINED:
+            continue
+        if slope > 0.0 and abs(math.log(slope)) < (_FOLLOWS if how == "follows" else _OFF):
+            continue
+        text = f"{role} moves {slope:.4g} times {_AGAINST[how].format(other)}"
+        if column_map is not None:
+            raise InputError(
+                f"{report.source}: the map contradicts the data: {text}; "
+                "check unit, scale, sign and ratio of both columns"
+            )
+        report.warn(role, "disagrees", f"{text}: unit, sign or scale of one of them is wrong")
+
+
+def slope_and_fit(x: FloatArray, y: FloatArray) -> tuple[float, float]:
+    """Slope of y over x and the share of y's variance that it explains; (0, 0) where x stands."""
+    good = np.isfinite(x) & np.isfinite(y)
+    if good.sum() < _LEAST:
+        return 0.0, 0.0
+    dx, dy = x[good] - x[good].mean(), y[good] - y[good].mean()
+    power, spread = float(dx @ dx), float(dy @ dy)
+    if not (power > 0.0 and spread > 0.0):
+        return 0.0, 0.0
+    slope = float(dx @ dy) / power
+    return slope, 1.0 - float(np.sum((dy - slope * dx) ** 2)) / spread
+
+
+def _integral(time: FloatArray, rate: FloatArray) -> FloatArray:
+    filled = np.where(np.isfinite(rate), rate, 0.0)
+    steps = 0.5 * (filled[1:] + filled[:-1]) * np.diff(time)
+    return np.concatenate(([0.0], np.cumsum(steps)))
