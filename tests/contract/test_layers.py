@@ -24,6 +24,7 @@ ROWS = [
     ["simulate"],
     ["bench", "campaign", "calibrate", "compare"],
     ["lowfit", "analysis"],
+    ["diagnose"],
     ["reproduce"],
     ["demo"],
     ["cli"],

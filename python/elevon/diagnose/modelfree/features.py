@@ -1,0 +1,284 @@
+"""Features of trapezoidal motions under a load, from position, reference and current alone.
+
+The strokes are named by what the load does to them, not by their sign: the assisted one needs the
+smaller current, the opposed one the larger. What friction, play and ripple do to the assisted
+stroke is then the same at a load that pushes and at one that pulls.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.diagnose.modelfree.strokes import LEAST_HOLD, Stroke, find_strokes
+from elevon.errors import FormatError, InputError, unknown
+from elevon.recording import Recording
+
+__all__ = ["FRICTION", "FULL", "MARKER", "TRANSFER", "FeatureTable", "feature_table"]
+
+Floats = npt.NDArray[np.float64]
+
+_STARTS = {"breakaway": (0.12, 0.28), "recovery_1": (0.28, 0.52), "recovery_2": (0.52, 0.88),
+           "recovery_3": (0.88, 1.44)}  # fmt: skip
+_STEADY, _BEFORE_STOP, _SETTLED, _BEFORE_START = 1.6, 0.08, 1.4, 0.04
+_BANDS = {"drift": (0.3, 1.2), "slow": (1.2, 4.0), "screw": (4.0, 5.6), "fast": (5.6, 12.5)}
+"""Of the ripple in steady motion [Hz]; the Cranfield screw turns at 4.8 Hz."""
+
+FRICTION = ("breakaway_assisted", "breakaway_opposed", "recovery_assisted", "recovery_opposed")
+"""Currents during the start above the steady one: what the load itself needs drops out."""
+TRANSFER = (*FRICTION, "tracking_noise", "hold_noise", "tracking_slow", "tracking_screw",
+            "current_slow", "current_screw")  # fmt: skip
+"""What keeps its meaning from one load to another."""
+MARKER = "hold_coupling"
+"""Correlation of current and tracking error at standstill: tells sessions apart, no fault."""
+_SAME_RATE = 0.02
+_SIDES = ("assisted", "opposed")
+_BOTH_WAYS = (
+    "current", "slope", "breakaway", "recovery_1", "recovery_2", "recovery_3",
+    "first_current", "peak_error", "noise_ratio",
+    *(f"{signal}_{band}" for signal in ("tracking", "current") for band in _BANDS),
+)  # fmt: skip
+FULL = (
+    *(f"{name}_{side}" for name in _BOTH_WAYS for side in _SIDES),
+    "hold_current", "hold_noise", "hold_current_noise", "stop_current", "stop_error",
+)  # fmt: skip
+"""Everything, the level of the current included: for one load, where its level is known."""
+
+
+@dataclass(frozen=True, slots=True)
+class FeatureTable:
+    """Features of many recordings.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the columns.
+    values : array, (recordings, features)
+        Finite numbers.
+    load : array, (recordings,)
+        Mean load force of each recording, rounded to 1 N [N]; zero where none was recorded.
+    rate : float
+        Sample rate that all recordings share [Hz].
+    """
+
+    names: tuple[str, ...]
+    values: Floats
+    load: Floats
+    rate: float
+
+    def select(self, names: Sequence[str]) -> Floats:
+        """Return the columns of some features; an unknown name is an error."""
+        for name in names:
+            if name not in self.names:
+                raise unknown("feature", name, self.names)
+        return self.values[:, [self.names.index(name) for name in names]]
+
+    @classmethod
+    def joined(cls, tables: Sequence[FeatureTable]) -> FeatureTable:
+        """Put tables one below the other.
+
+        Raises
+        ------
+        FormatError
+            Their sample rates differ by over 2 %.
+        InputError
+            There is none.
+        """
+        if not tables:
+            raise InputError("features: there is nothing to join")
+        first = tables[0]
+        for table in tables:
+            if abs(table.rate / first.rate - 1.0) > _SAME_RATE:
+                raise FormatError(
+                    f"features at {table.rate:g} Hz and at {first.rate:g} Hz: noise and ripple of "
+                    "different sample rates do not compare"
+                )
+        values = np.vstack([table.values for table in tables])
+        return cls(first.names, values, np.concatenate([t.load for t in tables]), first.rate)
+
+
+def feature_table(recordings: Sequence[Recording]) -> FeatureTable:
+    """Compute the features of recordings of one sample rate.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Each holds ``position_ref``, ``position`` [m], ``current`` [A] on one clock, and
+        ``load_force`` [N] where the load is known.
+
+    Returns
+    -------
+    FeatureTable
+        One row a recording.
+
+    Raises
+    ------
+    FormatError
+        A channel is missing, no stroke can be used, or the sample rates differ.
+    InputError
+        No recording was given.
+    """
+    if not recordings:
+        raise InputError("features: no recording was given")
+    return FeatureTable.joined([_table(recording) for recording in recordings])
+
+
+def _table(recording: Recording) -> FeatureTable:
+    row = _features(recording)
+    values = np.array([list(row.values())])
+    return FeatureTable(tuple(row), values, np.array([_load(recording)]), _rate(recording))
+
+
+def _name(recording: Recording) -> str:
+    meta = recording.meta
+    parts = [str(meta.get("log", "recording"))]
+    parts += [f"{key} {meta[key]}" for key in ("load_kgf", "run") if key in meta]
+    return ", ".join(parts)
+
+
+def _rate(recording: Recording) -> float:
+    time = recording.clock().time
+    if len(time) < 3:
+        raise FormatError(f"{_name(recording)}: {len(time)} samples: too short for any feature")
+    return float(1.0 / np.median(np.diff(time)))
+
+
+def _load(recording: Recording) -> float:
+    if "load_force" not in recording:
+        return 0.0
+    values = np.asarray(recording["load_force"].values, dtype=np.float64)
+    return float(np.round(np.nanmean(values))) if np.isfinite(values).any() else 0.0
+
+
+def _features(recording: Recording) -> dict[str, float]:
+    for name in ("position_ref", "position", "current"):
+        if name not in recording:
+            raise FormatError(f"{_name(recording)}: no channel {name!r}, which features need")
+    period = 1.0 / _rate(recording)
+    error = recording["position_ref"].values - recording["position"].values
+    current = np.asarray(recording["current"].values, dtype=np.float64)
+    strokes = find_strokes(recording)
+    whole = [s for s in strokes if _finite(error, current, s.start, s.end)]
+    if {stroke.direction for stroke in whole} != {-1, 1}:
+        raise FormatError(
+            f"{_name(recording)}: every stroke of one direction has samples that are not numbers"
+        )
+    hold = _hold(whole, error, current, period, recording)
+    ways = [
+        _one_way([s for s in whole if s.direction == way], error, current, period, hold)
+        for way in (1, -1)
+    ]
+    sides = sorted(ways, key=lambda values: values["current"])
+    row = {f"{name}_{side}": values[name] for side, values in zip(_SIDES, sides, strict=True)
+           for name in values}  # fmt: skip
+    return row | hold | _joined(sides, hold)
+
+
+def _finite(error: Floats, current: Floats, start: int, end: int) -> bool:
+    return bool(np.isfinite(error[start:end]).all() and np.isfinite(current[start:end]).all())
+
+
+def _hold(
+    strokes: list[Stroke], error: Floats, current: Floats, period: float, recording: Recording
+) -> dict[str, float]:
+    """Standstill between strokes: its current, the noise of both sensors, how they go together."""
+    skip, keep = round(_SETTLED / period), round(_BEFORE_START / period)
+    rests = [
+        slice(stroke.stop + skip, stroke.end - keep)
+        for stroke in strokes
+        if stroke.end - stroke.stop >= LEAST_HOLD / period
+    ]
+    if not rests:
+        raise FormatError(
+            f"{_name(recording)}: no rest of {LEAST_HOLD:g} s after a stroke, which the noise of "
+            "the sensors is taken from"
+        )
+    stops = [s.stop for s in strokes if s.end - s.stop >= LEAST_HOLD / period]
+    after = [slice(s + round(0.36 / period), s + round(0.72 / period)) for s in stops]
+    peaks = [slice(s, s + round(1.0 / period)) for s in stops]
+    level = float(np.mean([current[r].mean() for r in rests]))
+    coupling = [float(np.corrcoef(error[r], current[r])[0, 1]) for r in rests]
+    return {
+        "hold_current": level,
+        "hold_noise": _noise(error, rests),
+        "hold_current_noise": _noise(current, rests),
+        "stop_current": float(np.mean([current[r].mean() for r in after])) - level,
+        "stop_error": float(np.mean([_peak(error[r]) for r in peaks])),
+        MARKER: float(np.mean(coupling)),
+    }
+
+
+def _noise(values: Floats, parts: list[slice]) -> float:
+    """Logarithm of the deviation of differences: blind to slow motion, the median over parts."""
+    return float(np.log(np.median([np.std(np.diff(values[part])) for part in parts]) + 1e-12))
+
+
+def _one_way(
+    strokes: list[Stroke], error: Floats, current: Floats, period: float, hold: dict[str, float]
+) -> dict[str, float]:
+    begin, end = round(_STEADY / period), round(_BEFORE_STOP / period)
+    steady = [slice(stroke.start + begin, stroke.stop - end) for stroke in strokes]
+    level = float(np.mean([current[part].mean() for part in steady]))
+    row = {"current": level - hold["hold_current"]}
+    for name, (first, last) in _STARTS.items():
+        parts = [
+            current[s.start + round(first / period) : s.start + round(last / period)]
+            for s in strokes
+        ]
+        row[name] = float(np.mean([part.mean() for part in parts])) - level
+    row["recovery"] = float(np.mean([row[f"recovery_{k}"] for k in (1, 2, 3)]))
+    first_second = [slice(s.start, s.start + round(1.2 / period)) for s in strokes]
+    row["peak_error"] = float(np.mean([_peak(error[part]) for part in first_second]))
+    starts = [slice(s.start, s.start + max(1, round(0.16 / period))) for s in strokes]
+    lowest = float(np.median([current[part].min() for part in starts]))
+    row["first_current"] = lowest - hold["hold_current"]
+    row["noise_ratio"] = _noise(error, steady) - hold["hold_noise"]
+    row["slope"] = float(np.mean([_slope(current[part]) for part in steady]))
+    for signal, values in (("tracking", error), ("current", current)):
+        for band, power in _band_powers(values, steady, period).items():
+            row[f"{signal}_{band}"] = power
+    return row
+
+
+def _peak(values: Floats) -> float:
+    """Mean of the four largest magnitudes."""
+    return float(np.sort(np.abs(values))[-4:].mean())
+
+
+def _slope(values: Floats) -> float:
+    """Change over half of a steady motion."""
+    return float(np.polyfit(np.linspace(-1.0, 1.0, len(values)), values, 1)[0])
+
+
+def _band_powers(values: Floats, parts: list[slice], period: float) -> dict[str, float]:
+    """Logarithm of the mean power of the ripple about a parabola, in each band."""
+    spectra = [_spectrum(values[part], period) for part in parts]
+    powers: dict[str, float] = {}
+    for band, (low, high) in _BANDS.items():
+        means = [power[(frequency >= low) & (frequency < high)] for frequency, power in spectra]
+        total = [float(mean.mean()) if mean.size else 0.0 for mean in means]
+        powers[band] = float(np.log(np.mean(total) + 1e-15))
+    return powers
+
+
+def _spectrum(values: Floats, period: float) -> tuple[Floats, Floats]:
+    count = len(values)
+    base = np.arange(count) - 0.5 * (count - 1)
+    rest = values - np.polyval(np.polyfit(base, values, 2), base)
+    power: Floats = np.abs(np.fft.rfft(rest * np.hanning(count))) ** 2 / count
+    return np.asarray(np.fft.rfftfreq(count, period), np.float64), power
+
+
+def _joined(sides: list[dict[str, float]], hold: dict[str, float]) -> dict[str, float]:
+    """What is not asked of each stroke apart."""
+    mean = {name: float(np.mean([side[name] for side in sides])) for name in sides[0]}
+    return {
+        "tracking_noise": mean["noise_ratio"] + hold["hold_noise"],
+        "tracking_slow": mean["tracking_slow"],
+        "tracking_screw": mean["tracking_screw"],
+        "current_slow": mean["current_slow"],
+        "current_screw": mean["current_screw"],
+    }
