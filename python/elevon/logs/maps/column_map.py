@@ -67,19 +67,15 @@ class ColumnEntry(BaseModel):
             raise ValueError(f"unknown role {value!r}{did_you_mean(value, known_roles())}")
         return value
 
-    @field_validator("signal")
-    @classmethod
-    def _known_signal(cls, value: str | None) -> str | None:
-        if value is None or value in known_signals():
-            return value
-        if nearest(value, known_signals()):
-            raise ValueError(f"unknown signal {value!r}{did_you_mean(value, known_signals())}")
-        return check_name(value)
-
     @model_validator(mode="after")
     def _said(self) -> Self:
         if self.role is None and self.signal is None:
             raise ValueError(f"column {self.name!r}: needs a role or a signal")
+        name, known = self.channel, known_signals()
+        if self.role is None and name not in known and nearest(name, known):
+            raise ValueError(f"unknown signal {name!r}{did_you_mean(name, known)}")
+        if name not in known:
+            check_name(name)
         return self
 
     @property
