@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from elevon.cli.common import ForceOption, JsonOption, check_outputs
-from elevon.cli.output import print_json, print_table
+from elevon.cli.output import print_json, print_table, progress_bar
 
 __all__ = ["add_to"]
 
@@ -24,6 +24,7 @@ ReportOption = Annotated[
 def add_to(app: typer.Typer) -> None:
     """Add the commands to ``elevon campaign``."""
     app.command()(effects)
+    app.command()(surrogate)
 
 
 def effects(
@@ -66,3 +67,72 @@ def _interval(term: Any) -> str:
     if term.low is None:
         return "not known"
     return f"{term.low:.4g} to {term.high:.4g}{' *' if term.significant else ''}"
+
+
+def surrogate(
+    folder: FolderArgument,
+    *,
+    response: ResponseOption,
+    low: Annotated[
+        Path | None,
+        typer.Option("--low", metavar="DIR", help="The same plan at low fidelity: co-kriging."),
+    ] = None,
+    cost_ratio: Annotated[
+        float | None,
+        typer.Option(min=1.0, help="Cost of a high run over a low one; default: as estimated."),
+    ] = None,
+    budget: Annotated[int | None, typer.Option(min=1, help="Cost in high runs.")] = None,
+    splits: Annotated[int, typer.Option(min=2, help="Random splits.")] = 10,
+    seed: Annotated[int, typer.Option(min=0, help="Of the splits.")] = 0,
+    json: JsonOption = False,
+) -> int:
+    """Fit a surrogate of a response, and say how well it predicts runs it has not seen.
+
+    With --low: kriging of the high runs against co-kriging of both fidelities at equal cost.
+    """
+    from elevon.analysis.pairs import pair, samples_of
+    from elevon.analysis.response import read_response
+    from elevon.analysis.surrogate import study
+    from elevon.campaign import load_campaign
+
+    high = load_campaign(folder)
+    found = read_response(high, response)
+    pairs = ratio = None
+    if low is not None:
+        below = load_campaign(low)
+        pairs = pair(high, below, response)
+        ratio = cost_ratio or _cost_ratio(high, below)
+    with progress_bar("fitting surrogates") as advance:
+        result = study(
+            samples_of(found) if pairs is None else pairs.high,
+            pairs,
+            response=response,
+            unit=found.unit,
+            cost_ratio=ratio or 1.0,
+            budget=budget,
+            splits=splits,
+            seed=seed,
+            progress=advance,
+        )
+    if json:
+        print_json({"status": "ok", **result.to_dict()})
+        return 0
+    rows = [
+        [v.name, v.high, v.low, f"{v.mean:.3g}", f"{v.interval[0]:.3g} to {v.interval[1]:.3g}"]
+        for v in result.variants
+    ]
+    title = f"{response}: error on held-out high runs over the response's standard deviation"
+    print_table(("surrogate", "high runs", "low runs", "error", "interval"), rows, title=title)
+    if result.gain is not None and result.gain_interval is not None:
+        first, last = result.gain_interval
+        typer.echo(
+            f"kriging less co-kriging at equal cost (a high run costs {result.cost_ratio:.3g} low "
+            f"ones): {result.gain:.3g}, interval {first:.3g} to {last:.3g}"
+        )
+    return 0
+
+
+def _cost_ratio(high: Any, low: Any) -> float:
+    """Return what a high run costs over a low one, as the campaigns were estimated."""
+    cost = [ds.manifest.estimate["seconds"] / len(ds) for ds in (high, low)]
+    return max(float(cost[0] / cost[1]), 1.0)

@@ -1,0 +1,232 @@
+"""How well a surrogate predicts a response it has not seen: one fidelity against two."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.analysis.kriging import CoKriging, Kriging, Surrogate
+from elevon.analysis.pairs import Pairs, Samples
+from elevon.errors import InputError, Interrupted
+
+__all__ = ["Study", "Variant", "study"]
+
+Floats = npt.NDArray[np.float64]
+
+#: Part of the high points that is held out, and of the budget that co-kriging spends on high runs.
+_HELD_OUT, _HIGH_SHARE = 0.3, 0.5
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A surrogate's error on held-out high points over random splits.
+
+    Attributes
+    ----------
+    name : str
+        ``kriging``, ``cokriging``, ``low`` (kriging of the low fidelity alone) or ``mean`` (no
+        surrogate: the training runs' mean).
+    high, low : int
+        Runs it was given.
+    errors : list of float
+        Root mean square error of each split over the response's standard deviation.
+    mean, interval : float, (float, float)
+        Of `errors`; 95 %, Student's t over the splits.
+    """
+
+    name: str
+    high: int
+    low: int
+    errors: list[float]
+    mean: float
+    interval: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Study:
+    """Surrogates of one response at equal cost.
+
+    Attributes
+    ----------
+    cost_ratio : float or None
+        Cost of a high run over that of a low one.
+    budget : int
+        In high runs.
+    gain, gain_interval : float and (float, float), or None
+        Error of kriging less that of co-kriging, split by split: positive where two fidelities
+        help.
+    """
+
+    response: str
+    unit: str
+    points: int
+    held_out: int
+    splits: int
+    budget: int
+    cost_ratio: float | None
+    correlation: float | None
+    variants: list[Variant]
+    gain: float | None
+    gain_interval: tuple[float, float] | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form."""
+        return {**vars(self), "variants": [vars(item) for item in self.variants]}
+
+
+def study(
+    high: Samples,
+    pairs: Pairs | None = None,
+    *,
+    response: str = "",
+    unit: str = "1",
+    cost_ratio: float = 1.0,
+    budget: int | None = None,
+    splits: int = 10,
+    seed: int = 0,
+    progress: Callable[[float], Any] | None = None,
+) -> Study:
+    """Compare surrogates on held-out points at equal cost.
+
+    In each of `splits` random splits 30 % of the high points are held out. Kriging gets `budget` of
+    the others; co-kriging half as many, and low runs for the rest of the cost, the paired points
+    first (never a held-out point's partner); kriging of the low fidelity alone gets low runs only.
+
+    Parameters
+    ----------
+    high : Samples
+        Of the high fidelity.
+    pairs : Pairs, optional
+        With the low fidelity.
+    cost_ratio : float
+        Cost of a high run over that of a low one.
+    budget : int, optional
+        High runs; default half of those not held out.
+    splits, seed : int
+        Number of random splits, and their seed.
+    progress : callable, optional
+        Called with the done fraction; returning False interrupts.
+
+    Raises
+    ------
+    InputError
+        Too few points, or a budget that they do not have.
+    """
+    count = len(high.values)
+    held = max(round(_HELD_OUT * count), 1)
+    budget = (count - held) // 2 if budget is None else budget
+    least = 2 * (high.points.shape[1] + 1)
+    if not least <= budget <= count - held:
+        raise InputError(
+            f"budget = {budget} high runs of {count} points, {held} of them held out: give "
+            f"{least} to {count - held}"
+        )
+    generator = np.random.default_rng(seed)
+    errors: dict[str, list[float]] = {}
+    runs: dict[str, tuple[int, int]] = {}
+    for split in range(splits):
+        order = generator.permutation(count)
+        for name, made in _fits(high, pairs, order, held, budget, cost_ratio, split):
+            model, runs[name] = made
+            errors.setdefault(name, []).append(_error(model, high, order[:held]))
+        if progress is not None and progress((split + 1) / splits) is False:
+            raise Interrupted(f"interrupted after {split + 1} of {splits} splits")
+    variants = [_variant(name, *runs[name], errors[name]) for name in errors]
+    gain = None
+    if "cokriging" in errors:
+        gain = _interval(np.subtract(errors["kriging"], errors["cokriging"]))
+    return Study(
+        response=response,
+        unit=unit,
+        points=count,
+        held_out=held,
+        splits=splits,
+        budget=budget,
+        cost_ratio=None if pairs is None else cost_ratio,
+        correlation=None if pairs is None else pairs.correlation,
+        variants=variants,
+        gain=None if gain is None else gain[0],
+        gain_interval=None if gain is None else gain[1],
+    )
+
+
+@dataclass(frozen=True)
+class _Mean:
+    value: float
+
+    def predict(self, points: Floats) -> tuple[Floats, Floats]:
+        return np.full(len(points), self.value), np.zeros(len(points))
+
+
+def _fits(  # noqa: PLR0917 - one split, all of it needed
+    high: Samples,
+    pairs: Pairs | None,
+    order: npt.NDArray[np.int64],
+    held: int,
+    budget: int,
+    ratio: float,
+    seed: int,
+) -> list[tuple[str, tuple[Surrogate, tuple[int, int]]]]:
+    own = order[held : held + budget]
+    points, values = high.points[own], high.values[own]
+    fits: list[tuple[str, tuple[Surrogate, tuple[int, int]]]] = [
+        ("mean", (_Mean(float(values.mean())), (budget, 0))),
+        ("kriging", (Kriging.fit(points, values, seed), (budget, 0))),
+    ]
+    if pairs is None:
+        return fits
+    some = own[: max(round(_HIGH_SHARE * budget), high.points.shape[1] + 2)]
+    low = _low_runs(pairs, order, held, round((budget - len(some)) * ratio), some)
+    every = _low_runs(pairs, order, held, round(budget * ratio), own)
+    below = pairs.low
+    both = CoKriging.fit(
+        below.points[low],
+        below.values[low],
+        high.points[some],
+        high.values[some],
+        seed=seed,
+    )
+    alone = Kriging.fit(below.points[every], below.values[every], seed)
+    fits.append(("cokriging", (both, (len(some), len(low)))))
+    fits.append(("low", (alone, (0, len(every)))))
+    return fits
+
+
+def _low_runs(
+    pairs: Pairs,
+    order: npt.NDArray[np.int64],
+    held: int,
+    most: int,
+    first: Sequence[int] | npt.NDArray[np.int64],
+) -> npt.NDArray[np.int64]:
+    """Return low runs for a cost: the partners of the high runs first, none of a held-out one."""
+    out = set(pairs.partner[order[:held]].tolist())
+    partners = [int(p) for p in pairs.partner[first] if p >= 0]
+    rest = np.random.default_rng(order[:1]).permutation(len(pairs.low.values))
+    chosen = dict.fromkeys([*partners, *(int(r) for r in rest)])
+    wanted = [index for index in chosen if index not in out]
+    return np.array(wanted[: max(most, 4)], dtype=np.int64)
+
+
+def _error(model: Surrogate, high: Samples, held: npt.NDArray[np.int64]) -> float:
+    mean, _ = model.predict(high.points[held])
+    spread = float(high.values.std())
+    return float(np.sqrt(np.mean((mean - high.values[held]) ** 2)) / spread)
+
+
+def _variant(name: str, high: int, low: int, errors: list[float]) -> Variant:
+    return Variant(name, high, low, errors, *_interval(np.array(errors)))
+
+
+def _interval(values: Floats) -> tuple[float, tuple[float, float]]:
+    from scipy.stats import t
+
+    mean, count = float(np.mean(values)), len(values)
+    if count < 2:
+        return mean, (float("nan"), float("nan"))
+    half = float(t.ppf(0.975, count - 1) * np.std(values, ddof=1) / np.sqrt(count))
+    return mean, (mean - half, mean + half)
