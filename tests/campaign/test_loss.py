@@ -381,3 +381,45 @@ def test_a_log_that_cannot_grow_is_as_before(tmp_path, monkeypatch):
         log.note("first", [])
     assert (tmp_path / "log").read_bytes() == before
     assert not log.items
+
+
+def limited(out, path, megabytes):
+    """Run a campaign in a process whose files may not grow beyond so much."""
+    code = (
+        "import resource, signal, sys\n"
+        "from elevon.cli import main\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({int(1e6 * megabytes)},) * 2)\n"
+        f"sys.exit(main(['campaign', 'run', {str(path)!r}, '--out', {str(out)!r}]))\n"
+    )
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+
+
+def test_a_disk_that_is_full(plan, cli, tmp_path):
+    """A file cannot grow: the message is clear, what is done is whole, and it goes on later."""
+    path, out = plan(), tmp_path / "out"
+    path.write_text(path.read_text().replace('"10 ms"', '"4 s"').replace("400 Hz", "2 kHz"))
+    first = limited(out, path, 0.2)
+    assert first.returncode == 2
+    assert "block_00000.parquet: cannot be written" in first.stderr
+    assert "Traceback" not in first.stderr
+    assert not [p for p in out.rglob(".*") if p.name != LOCK]
+    assert all(item.intact(out) for item in elevon.load_campaign(out).items)
+    assert cli("campaign", "run", path, "--out", out)[0] == 0
+    assert cli("dataset", "verify", out)[0] == 0
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root writes everywhere")
+def test_a_folder_that_is_read_only(plan, cli, tmp_path):
+    path, out = plan(), tmp_path / "out"
+    out.mkdir(mode=0o500)
+    code, _, err = cli("campaign", "run", path, "--out", out)
+    assert code == 2
+    assert "cannot be written" in err
+
+
+def test_a_folder_that_cannot_be_made(plan, cli, tmp_path):
+    (tmp_path / "file").write_text("")
+    code, _, err = cli("campaign", "run", plan(), "--out", tmp_path / "file" / "out")
+    assert code == 2
+    assert "file/out: cannot be written" in err

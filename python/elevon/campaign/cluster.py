@@ -6,6 +6,7 @@ there, each whole, and returns what goes into the log; only this process writes 
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -59,7 +60,7 @@ def in_cluster(work: Work, address: str, progress: Callable[[float], Any] | None
     with _client(address) as client:
         slots = _AHEAD * max(len(client.scheduler_info()["workers"]), 1)
         futures = [_submitted(client, work, block) for block in _some(waiting, slots)]
-        queue = import_module("distributed").as_completed(futures)
+        queue = import_module("distributed").as_completed(futures, loop=client.loop)
         for future in queue:
             check_there(work.folder)
             work.log.add(future.result())
@@ -119,7 +120,12 @@ def _client(address: str) -> Iterator[Client]:
     count = int(local[1])
     if not 1 <= count <= _MOST_WORKERS:
         raise InputError(f"--cluster {address}: {count} workers is outside 1 to {_MOST_WORKERS}")
-    options = {"threads_per_worker": 1, "dashboard_address": None, "processes": True}
+    options: dict[str, Any] = {
+        "threads_per_worker": 1,
+        "dashboard_address": None,
+        "processes": True,
+        "silence_logs": logging.ERROR,
+    }
     with (
         distributed.LocalCluster(n_workers=count, **options) as cluster,
         distributed.Client(cluster, set_as_default=False) as client,
