@@ -140,7 +140,8 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     let supply = if EXTRA { link_voltage(m, structure, s, source) } else { source };
     let half_supply = S::splat(0.5) * supply;
     let old_legs = three!(|j| s.legs[j]);
-    let (mut legs, mut error) = (old_legs, [S::zero(); 3]);
+    let mut error = [S::zero(); 3];
+    let mut legs;
     if PWM || (FULL && structure.drive == DriveKind::Pwm) {
         legs = m.current_control.compare(&s.current_control, x.t);
     } else if FULL && structure.drive == DriveKind::Off {

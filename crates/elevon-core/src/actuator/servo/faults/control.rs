@@ -1,0 +1,156 @@
+//! Faults of the controller and of the sensors of position.
+
+use super::{attribute, Side};
+use crate::fault::{Attribute, FaultKind};
+use crate::places;
+use crate::variable::Range;
+
+/// Faults of controller and position sensors.
+pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
+    const PERIOD: &[Attribute] =
+        &[Attribute { name: "period", unit: "s", default: Some(0.1), path: "", flag: "", text: "period of the interruptions" }];
+    const SECTORS: &[Attribute] = &[
+        Attribute {
+            default: Some(1.0),
+            ..attribute("sectors", "1", "sensor.encoder.dark_sectors", "number of dark sectors, equal and evenly spread")
+        },
+        Attribute {
+            default: Some(0.0),
+            ..attribute("position", "rad", "sensor.encoder.dark_position", "angle of the disc at the middle of a dark sector")
+        },
+    ];
+    vec![
+        FaultKind {
+            kind: "gain_drift",
+            unit: "1",
+            range: Range::Between(-1.0, 10.0),
+            attributes: &[],
+            places: places!("control.position": "control.position_gain_scale" Grow, "control.speed": "control.speed_gain_scale" Grow),
+            effect: "relative drift of a loop gain: -0.2 means gain x 0.8",
+            source: "T1 (proportional gain drift)",
+        },
+        FaultKind {
+            kind: "dropout",
+            unit: "1",
+            range: Range::Between(0.0, 1.0),
+            attributes: PERIOD,
+            places: places!("sensor.resolver": "sensor.resolver.power_off" Pulse),
+            effect: "duty of the resolver's power lost: while off the drive sees a shaft at rest, then the position jumps back",
+            source: "N 4.5",
+        },
+        FaultKind {
+            kind: "mismatch",
+            unit: "1",
+            range: Range::Between(0.0, 0.99),
+            attributes: &[],
+            places: places!("sensor.resolver": "sensor.resolver.mismatch" Add),
+            effect: "amplitude lost by one resolver channel: atan2(g sin, cos), an angle error at twice the shaft frequency",
+            source: "N 4.5",
+        },
+        FaultKind {
+            kind: "offset",
+            unit: "rad",
+            range: Range::Any,
+            attributes: &[],
+            places: places!("sensor.resolver": "sensor.resolver.offset" Add),
+            effect: "offset of the motor's position; it misplaces the commutation where the resolver gives its angle",
+            source: "T3 Table 1.1 (position sensor)",
+        },
+        FaultKind {
+            kind: "offset",
+            unit: side.coordinate,
+            range: Range::Any,
+            attributes: &[],
+            places: places!("sensor.encoder": "sensor.encoder.offset" Add),
+            effect: "offset of the shown user position; the position loop feels it where control.position_feedback = encoder",
+            source: "T3 Table 1.1 (position sensor)",
+        },
+        FaultKind {
+            kind: "gain",
+            unit: "1",
+            range: Range::Between(-1.0, 10.0),
+            attributes: &[],
+            places: places!("sensor.resolver": "sensor.resolver.gain" Grow, "sensor.encoder": "sensor.encoder.gain" Grow),
+            effect: "relative gain error of a position sensor; the position loop feels the encoder's where control.position_feedback = encoder, the resolver's where it is resolver",
+            source: "T3 Table 1.1 (position sensor)",
+        },
+        FaultKind {
+            kind: "missing_counts",
+            unit: "1",
+            range: Range::Unit,
+            attributes: &[],
+            places: places!("sensor.encoder": "sensor.encoder.missing_counts" Add),
+            effect: "fraction of the encoder's counts lost, spread evenly: the shown travel is too short; the position loop feels it where control.position_feedback = encoder",
+            source: "N 4.5",
+        },
+        FaultKind {
+            kind: "dark_sectors",
+            unit: "1",
+            range: Range::Unit,
+            attributes: SECTORS,
+            places: places!("sensor.encoder": "sensor.encoder.dark_share" Add),
+            effect: "share of the encoder's disc that gives no counts: the shown position stands in a dark sector, and what was lost stays lost until the disc turns back through it or the drive is referenced anew; the position loop feels it where control.position_feedback = encoder",
+            source: "N 4.5 (sectors of the disc)",
+        },
+        FaultKind {
+            kind: "winding_short",
+            unit: "1",
+            range: Range::Between(0.0, 0.99),
+            attributes: &[],
+            places: places!(
+                "sensor.resolver.sine": "sensor.resolver.sine_short" Add, "sensor.resolver.cosine": "sensor.resolver.cosine_short" Add,
+                "sensor.resolver.excitation": "sensor.resolver.excitation_short" Add,
+            ),
+            effect: "fraction of a resolver winding's turns shorted: a secondary one falsifies the angle twice a turn, the excitation turns no angle until less than sensor.resolver.least_signal is left, then the drive sees a shaft at rest",
+            source: "N 4.5 (windings of the resolver; amplitude alone, no phase shift: ASSUMED)",
+        },
+        FaultKind {
+            kind: "winding_open",
+            unit: "1",
+            range: Range::Unit,
+            attributes: &[],
+            places: places!(
+                "sensor.resolver.sine": "sensor.resolver.sine_open" Set, "sensor.resolver.cosine": "sensor.resolver.cosine_open" Set,
+                "sensor.resolver.excitation": "sensor.resolver.power_off" Set,
+            ),
+            effect: "1: the winding is interrupted; with one channel dead the shown angle leaps by half a turn, without excitation the shaft seems to rest",
+            source: "N 4.5 (windings of the resolver)",
+        },
+        FaultKind {
+            kind: "stuck",
+            unit: "1",
+            range: Range::Unit,
+            attributes: &[],
+            places: places!("sensor.resolver": "sensor.resolver.stuck" Set, "sensor.encoder": "sensor.encoder.stuck" Set),
+            effect: "1: the reading stands still at its value of the onset, afterwards it is the true one again; of the encoder the position loop feels it where control.position_feedback = encoder",
+            source: "T3 Table 1.1 (position sensor)",
+        },
+        FaultKind {
+            kind: "stuck",
+            unit: "1",
+            range: Range::Unit,
+            attributes: &[],
+            places: places!("sensor.current_a": "sensor.current.stuck_a" Set, "sensor.current_b": "sensor.current.stuck_b" Set, "sensor.current_c": "sensor.current.stuck_c" Set),
+            effect: "1: the current sensor stands still at its value of the onset: its leg controls nothing; between relays the other two legs leave its phase what the star allows, a carrier drive controls a wrong current",
+            source: "ASSUMED: the usual failure of a sensor's electronics, beside gain and offset of T2",
+        },
+        FaultKind {
+            kind: "dead",
+            unit: "1",
+            range: Range::Unit,
+            attributes: &[],
+            places: places!("sensor.encoder": "sensor.encoder.dead" Set),
+            effect: "1: no counts come: the shown position stands still, and what was lost stays lost until the drive is referenced anew; the position loop feels it where control.position_feedback = encoder",
+            source: "N 4.5",
+        },
+        FaultKind {
+            kind: "dead",
+            unit: "1",
+            range: Range::Unit,
+            attributes: &[],
+            places: places!("sensor.current_a": "sensor.current.dead_a" Set, "sensor.current_b": "sensor.current.dead_b" Set, "sensor.current_c": "sensor.current.dead_c" Set),
+            effect: "1: the current sensor shows nothing: its leg controls nothing; between relays the other two legs leave its phase what the star allows, a carrier drive controls a wrong current",
+            source: "ASSUMED: broken wire, beside gain and offset of T2",
+        },
+    ]
+}

@@ -1,0 +1,57 @@
+//! The fault catalogue of a servo.
+
+mod control;
+mod electrical;
+mod mechanical;
+
+use crate::fault::{Attribute, FaultKind};
+
+#[macro_export]
+macro_rules! targets {
+    ($($path:literal $op:ident),*) => {{
+        const TARGETS: &[$crate::fault::Target] = &[$($crate::fault::Target { path: $path, op: $crate::fault::Op::$op }),*];
+        TARGETS
+    }};
+}
+#[macro_export]
+macro_rules! places {
+    ($($name:literal: $path:literal $op:ident),* $(,)?) => {{
+        const PLACES: &[$crate::fault::Place] = &[$($crate::fault::Place { name: $name, targets: $crate::targets!($path $op) }),*];
+        PLACES
+    }};
+}
+
+pub const fn attribute(name: &'static str, unit: &'static str, path: &'static str, text: &'static str) -> Attribute {
+    Attribute { name, unit, default: None, path, flag: "", text }
+}
+
+/// What differs between a turning and a travelling output.
+#[derive(Clone, Copy, Debug)]
+pub struct Side {
+    coordinate: &'static str,
+    /// Largest play that a fault may add.
+    play: f64,
+    jam: &'static [Attribute],
+}
+
+const fn jam_position(unit: &'static str) -> Attribute {
+    Attribute {
+        name: "position",
+        unit,
+        default: None,
+        path: "friction.jam_position",
+        flag: "friction.jam_anywhere",
+        text: "user position at which it seizes when first reached; not given: at once",
+    }
+}
+
+pub const ROTARY: Side = Side { coordinate: "rad", play: 1.0, jam: &[jam_position("rad")] };
+pub const LINEAR: Side = Side { coordinate: "m", play: 5e-3, jam: &[jam_position("m")] };
+
+/// The whole catalogue.
+pub fn catalogue(side: Side) -> Vec<FaultKind> {
+    let mut all = electrical::electrical();
+    all.extend(mechanical::mechanical(side));
+    all.extend(control::control_and_sensors(side));
+    all
+}
