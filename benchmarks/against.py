@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -19,18 +20,22 @@ from typing import Any
 
 HERE = Path(__file__).resolve().parent
 FIGURES = {
-    "single": ("ns/step", "run.high(False)['core']"),
-    "full": ("ns/step", "run.high(True)['core']"),
+    "single": ("ns/step", "run.high(False)['call']"),
+    "full": ("ns/step", "run.high(True)['call']"),
     "batch": ("ns/lane step", "run.batch(False)"),
     "batch_full": ("ns/lane step", "run.batch(True)"),
     "low": ("x real time", "run.low()"),
     "low_batch": ("x real time", "run.low_batch()"),
     "thousand": ("s", "run.thousand()['seconds']"),
 }
-YARDSTICKS = {"c": 1_000_000, "c_batch": 1_000_000}
+#: Lanes of the C programs.
+YARDSTICKS = {"c": 1, "c_batch": 64}
+STEPS = 1_000_000
 WORKER = """
-import json, sys
+import json, sys, time
 sys.path.insert(0, sys.argv[1])
+if sys.argv[2] == "cpu":
+    time.perf_counter = time.process_time
 import run
 for line in sys.stdin:
     print(json.dumps(eval(line)), flush=True)
@@ -40,11 +45,15 @@ for line in sys.stdin:
 class Checkout:
     """A process that evaluates the ``run.py`` functions of one checkout."""
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, clock: str) -> None:
         paths = [str(root / "python"), os.environ.get("PYTHONPATH", "")]
         self.process = subprocess.Popen(
-            [sys.executable, "-c", WORKER, str(root / "benchmarks")],
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+            [sys.executable, "-c", WORKER, str(root / "benchmarks"), clock],
+            env={
+                **os.environ,
+                "PYTHONPATH": os.pathsep.join(paths),
+                "OPENBLAS_NUM_THREADS": "1",
+            },
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
@@ -63,19 +72,28 @@ def better(unit: str, values: list[float]) -> float:
     return max(values) if unit.startswith("x") else min(values)
 
 
-def rounds(other: Path, names: list[str], count: int) -> dict[str, dict[str, Any]]:
+def yardstick(stick: Any, steps: int, lanes: int, clock: str) -> float:
+    """Nanoseconds a step of a C program, by its own clock or by the CPU's."""
+    begin = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    result = stick.run(steps)
+    if clock == "cpu":
+        used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - begin
+        return used / steps / lanes * 1e9
+    return float(result.get("ns_per_step") or result["ns_per_lane_step"])
+
+
+def rounds(other: Path, names: list[str], count: int, clock: str) -> dict[str, dict[str, Any]]:
     """Every figure of both checkouts, and the yardsticks', `count` times in turn."""
     import yardsticks
 
-    before, after = Checkout(other), Checkout(HERE.parent)
+    before, after = Checkout(other, clock), Checkout(HERE.parent, clock)
     kept: dict[str, dict[str, list[float]]] = {n: {"before": [], "after": []} for n in names}
     c: dict[str, list[float]] = {name: [] for name in YARDSTICKS}
     with tempfile.TemporaryDirectory() as folder:
         sticks = yardsticks.build(Path(folder))
         for index in range(count):
-            for name, steps in YARDSTICKS.items():
-                result = sticks[name].run(steps)
-                c[name].append(result.get("ns_per_step") or result["ns_per_lane_step"])
+            for name, lanes in YARDSTICKS.items():
+                c[name].append(yardstick(sticks[name], STEPS, lanes, clock))
             for name in names:
                 call = FIGURES[name][1]
                 kept[name]["before"].append(before.measure(call))
@@ -121,9 +139,14 @@ def main() -> int:
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
     parser.add_argument("--rounds", type=int, default=7, help="interleaved repetitions (7)")
     parser.add_argument("--figures", default=",".join(FIGURES), help="which, separated by commas")
+    parser.add_argument(
+        "--cpu", action="store_true", help="CPU time instead of wall time: where others work, too"
+    )
     given = parser.parse_args()
     sys.path.insert(0, str(HERE))
-    table = rounds(given.other.resolve(), given.figures.split(","), given.rounds)
+    names = [name for name in given.figures.split(",") if not (given.cpu and name == "thousand")]
+    clock = "cpu" if given.cpu else "wall"
+    table = rounds(given.other.resolve(), names, given.rounds, clock)
     if given.json:
         print(json.dumps(table))
     else:
