@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from elevon.parameters import records
 from tests.contract import sets
 from tests.contract.cells import Cell, Outcome, Variant, drives, fault, load, severe
 
@@ -225,6 +226,7 @@ def _latched(outcome: Outcome) -> bool:
 
 def apart(name: str, choices: tuple[tuple[str, str], ...], push: float) -> Iterator[str]:
     """Faults that both models carry and in which they part: sign, or a factor of 1.5."""
+    choices = (*choices, *_shared(name))
     high, low = (Cell(name, fidelity, choices, push) for fidelity in ("high", "low"))
     healthy, found = rows(high, FEW)
     healthy_low, found_low = rows(low, FEW)
@@ -249,6 +251,18 @@ def apart(name: str, choices: tuple[tuple[str, str], ...], push: float) -> Itera
             ratio = change_low / change
             if not 1.0 / FACTOR <= ratio <= FACTOR:
                 yield f"{row.name}: {key} {change:+.3g} high, {change_low:+.3g} low ({ratio:.2f})"
+
+
+def _shared(name: str) -> tuple[tuple[str, str], ...]:
+    """Choices that the low model declines, at their defaults: both then have the same model."""
+    actuator = sets.actuator(name)
+    return tuple(
+        (path, record.choices[int(record.default)])
+        for path, record in records(actuator.wiring).items()
+        if record.choices and "low" not in record.fidelities and "high" in record.fidelities
+        and record.default is not None
+        and actuator.parameters[path].value != record.choices[int(record.default)]
+    )  # fmt: skip
 
 
 def features(outcome: Outcome) -> dict[str, float]:

@@ -67,6 +67,8 @@ details! {
             || gains
             || interrupted(&parts.motor())
             || shorted;
+        /// Relays whose references the star's currents cannot have all: of an interrupted phase, of unlike sensors.
+        torn = drive == DriveKind::Hysteresis && (gains || interrupted(&parts.motor()));
         heat = Network::<f64>::needed(&parts.thermal());
         link = DcLink::<f64>::needed(&parts.link());
         extra_shaft = shaft.extra;

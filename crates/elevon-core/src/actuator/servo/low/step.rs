@@ -21,18 +21,34 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
     }
     let current_ref = s.torque_ref * m.control.per_torque_constant;
     let circuit = &p.circuit;
+    let mut band = [m.drive.band; 2];
+    if EXTRA && structure.torn {
+        // The loop's current stays as the references turn over it.
+        let along = three!(|j| p.imposed[j] * s.phases[j]);
+        let squares = three!(|j| p.imposed[j] * p.imposed[j]);
+        let square = (squares[0] + squares[1] + squares[2]).maximum(S::splat(1e-6));
+        s.current = S::select(p.size.equals(S::one()), s.current, (along[0] + along[1] + along[2]) / square);
+        let forward = S::zero().le(current_ref);
+        let [up, down] = p.torn;
+        let (above, below) = (S::select(forward, up, down), S::select(forward, down, up));
+        band = [above, below].map(|reach| reach.fma(current_ref.abs(), m.drive.band / p.size));
+    }
     let target = match structure.drive {
         // The relays act only at the edges of their band; inside it the EMF drives the current.
-        DriveKind::Hysteresis => circuit.current(s.current, -emf).clamp(current_ref - m.drive.band, current_ref + m.drive.band),
+        DriveKind::Hysteresis => circuit.current(s.current, -emf).clamp(current_ref - band[1], current_ref + band[0]),
         DriveKind::Pwm => s.current + m.drive.tracking * (current_ref - s.current),
         DriveKind::Off => S::zero(),
     };
     let driving = circuit.voltage(s.current, target);
     let source = x.supply * m.drive.supply_scale;
     let supply = if EXTRA && structure.link { m.drive.link.voltage(&s.link, source) } else { source };
-    let cross = m.drive.electrical_inductance * speed * s.current;
+    let mut cross = m.drive.electrical_inductance * speed * s.current;
+    if EXTRA && structure.angle {
+        cross = cross - p.direct * speed;
+    }
     let largest = m.drive.voltage_ratio * supply;
-    // v_q^2 + v_d^2 stays inside the largest phase voltage; v_d is the cross coupling p omega L i_q.
+    // v_q^2 + v_d^2 stays inside the largest phase voltage; v_d is the cross coupling p omega L i_q, and
+    // the EMF where the references are misplaced.
     let room = largest * largest - cross * cross;
     s.voltage = driving + emf;
     let limited = room.lt(s.voltage * s.voltage);
