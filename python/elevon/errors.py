@@ -10,6 +10,7 @@ from typing import ClassVar
 
 __all__ = [
     "BusyError",
+    "DamageError",
     "DivergedError",
     "ElevonError",
     "ElevonWarning",
@@ -23,6 +24,7 @@ __all__ = [
     "OutputExistsError",
     "RangeError",
     "SimulationError",
+    "UncheckedWarning",
     "UnitError",
     "UnknownNameError",
     "did_you_mean",
@@ -80,6 +82,10 @@ class RangeError(InputError):
 
 class FormatError(InputError):
     """A file whose content is not what its ending promises."""
+
+
+class DamageError(FormatError):
+    """A file that is not as it was written: its checksum says so."""
 
 
 class OutputError(InputError, OSError):
@@ -145,6 +151,10 @@ class ElevonWarning(UserWarning):
 
 class NotActingWarning(ElevonWarning):
     """A parameter or fault was set away from neutral where it cannot act."""
+
+
+class UncheckedWarning(ElevonWarning):
+    """A file carries no checksum: whether it is as it was written nobody can tell."""
 
 
 class FindingWarning(ElevonWarning):

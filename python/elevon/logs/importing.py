@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from elevon.errors import FormatError, InputError, RangeError
+from elevon.errors import DamageError, FormatError, InputError, RangeError
 from elevon.logs.channels import examine_channels
 from elevon.logs.clocks.loadcell_join import join_loadcell
 from elevon.logs.clocks.quality import ClockQuality, clock_quality
@@ -170,6 +170,8 @@ def _is_saved(file: Path) -> bool:
         if file.suffix.lower() in {".parquet", ".nc", ".mat"}:
             Recording.load(file)
             return True
+    except DamageError:
+        raise  # ours, and not as it was written: no table of somebody else's
     except (InputError, OSError):
         return False
     return False

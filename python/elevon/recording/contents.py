@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.errors import FormatError, InputError
+from elevon.errors import DamageError, FormatError, InputError
 from elevon.recording.channel import Channel
 from elevon.recording.clock import Clock
 from elevon.recording.header import Header
@@ -63,7 +63,8 @@ def rebuild(
     FormatError
         A column is missing, of another length, or breaks a rule of `Clock` or `Channel`.
     """
-    clocks, channels = [], []
+    clocks: list[Clock] = []
+    channels: list[Channel] = []
     try:
         for entry in header.clocks:
             arrays = columns(entry.name)
@@ -80,6 +81,13 @@ def rebuild(
                 Channel(name, unit, arrays[name], clock, text)
                 for name, (unit, text) in entry.channels.items()
             ]
+        by_clock = [
+            values
+            for clock in clocks
+            for values in (clock.time, *(c.values for c in channels if c.clock is clock))
+        ]
+        if header.digest(by_clock) != header.sha256:
+            raise DamageError(f"{place}: damaged: not as it was written (SHA-256)")
         return Contents(channels, clocks, header.meta, header.labels, header.final)
     except FormatError:
         raise

@@ -47,7 +47,7 @@ def to_xarray(recording: Recording) -> xr.Dataset:
         for channel in recording.on_clock(clock.name):
             notes = {"units": channel.unit, "long_name": channel.text or channel.name}
             variables[channel.name] = xr.Variable((dimension,), channel.values, notes)
-    return xr.Dataset(variables, coordinates, {"elevon": Header.of(recording).to_json()})
+    return xr.Dataset(variables, coordinates, {"elevon": Header.sealed(recording).to_json()})
 
 
 def to_arrow(recording: Recording, clock: str | None) -> pa.Table:
@@ -61,5 +61,5 @@ def to_arrow(recording: Recording, clock: str | None) -> pa.Table:
         pa.field(c.name, pa.float64(), metadata={"unit": c.unit, "text": c.text}) for c in channels
     ]
     arrays = [pa.array(base.time), *(pa.array(c.values) for c in channels)]
-    header = Header.of(recording.select(clock=base.name)).to_json()
+    header = Header.sealed(recording.select(clock=base.name)).to_json()
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata={"elevon": header}))

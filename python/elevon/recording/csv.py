@@ -11,13 +11,14 @@ A table without the first line is read as well, in any units, as a recording wit
 from __future__ import annotations
 
 import re
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from elevon.errors import FormatError, InputError
+from elevon.errors import FormatError, InputError, UncheckedWarning
 from elevon.recording.channel import in_si
 from elevon.recording.clock import Clock
 from elevon.recording.contents import Contents, check_size, header_bytes, rebuild
@@ -56,7 +57,7 @@ def write(recording: Recording, path: Path) -> None:
     arrays = [pa.array(recording.clock().time), *(pa.array(c.values) for c in channels)]
     options = csv.WriteOptions(include_header=False, quoting_style="none")
     with path.open("wb") as stream:
-        stream.write(f"{_MARK}{Header.of(recording).to_json()}\n{','.join(heads)}\n".encode())
+        stream.write(f"{_MARK}{Header.sealed(recording).to_json()}\n{','.join(heads)}\n".encode())
         csv.write_csv(pa.Table.from_arrays(arrays, heads), stream, options)
 
 
@@ -75,7 +76,9 @@ def read(path: Path, max_bytes: int) -> Contents:
         columns = _heads(path, first)
         arrays = _numbers(path, stream, list(columns))
     if header is None:
-        return _without_header(path, columns, arrays)
+        contents = _without_header(path, columns, arrays)
+        warnings.warn(f"{path}: carries no checksum: damage cannot be seen", UncheckedWarning, 4)
+        return contents
     if len(header.clocks) != 1:
         raise FormatError(f"{path}: describes {len(header.clocks)} clocks, a .csv holds one")
     described = {name: unit for name, (unit, _) in header.clocks[0].channels.items()}

@@ -1,15 +1,19 @@
 """What a recording file says beside its numbers: one JSON text, the same in every format.
 
-Numbers that JSON cannot write (NaN, infinities) are written ``{"$float": "nan"}``.
+Numbers that JSON cannot write (NaN, infinities) are written ``{"$float": "nan"}``. The entry
+``sha256`` is that of the description without it and of every time and value: whatever bit of a
+file changes, loading it is an error or gives back what was saved.
 """
 
+import hashlib
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from elevon.errors import FormatError, InputError
 
@@ -18,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SCHEMA", "ClockHeader", "Header", "plain"]
 
-SCHEMA = 1
+SCHEMA = 2
 """Version of the files' layout, apart from the version of the package."""
 
 _LONGEST = 64 * 2**20
@@ -44,6 +48,7 @@ class Header:
     meta: dict[str, Any] = field(default_factory=dict)
     labels: Any = None
     final: dict[str, float] = field(default_factory=dict)
+    sha256: str = ""
 
     @classmethod
     def of(cls, recording: "Recording") -> "Header":
@@ -55,6 +60,29 @@ class Header:
                 ClockHeader(clock.name, clock.rate, list(clock.gaps), len(clock), channels)
             )
         return cls(clocks, recording.meta, recording.labels, recording.final)
+
+    @classmethod
+    def sealed(cls, recording: "Recording") -> "Header":
+        """Describe a recording for a file, with the SHA-256 of all its content."""
+        header = cls.of(recording)
+        arrays = [
+            values
+            for clock in recording.clocks.values()
+            for values in (clock.time, *(c.values for c in recording.on_clock(clock.name)))
+        ]
+        return replace(header, sha256=header.digest(arrays))
+
+    def digest(self, arrays: "Iterable[npt.NDArray[np.float64]]") -> str:
+        """Return the SHA-256 of this description and of times and values, clock by clock.
+
+        Every NaN counts as the plain one: text knows no other.
+        """
+        mark = hashlib.sha256(replace(self, sha256="").to_json().encode("ascii"))
+        for values in arrays:
+            missing = np.isnan(values)
+            plain_values = np.where(missing, np.nan, values) if missing.any() else values
+            mark.update(np.ascontiguousarray(plain_values, dtype="<f8").tobytes())
+        return mark.hexdigest()
 
     def to_json(self) -> str:
         """Return the text written into files (ASCII)."""
@@ -76,6 +104,7 @@ class Header:
             "meta": self.meta,
             "labels": self.labels,
             "final": self.final,
+            **({"sha256": self.sha256} if self.sha256 else {}),
         }
         return json.dumps(_encoded(document), allow_nan=False, separators=(",", ":"))
 
@@ -99,7 +128,7 @@ class Header:
                 )
             clocks = [_clock(entry) for entry in document["clocks"]]
             meta, final = dict(document["meta"]), dict(document["final"])
-            return cls(clocks, meta, document["labels"], final)
+            return cls(clocks, meta, document["labels"], final, str(document["sha256"]))
         except FormatError:
             raise
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:

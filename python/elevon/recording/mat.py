@@ -51,7 +51,7 @@ def write(recording: Recording, path: Path) -> None:
     """Write the structs."""
     from scipy.io import savemat
 
-    content: dict[str, Any] = {"elevon": Header.of(recording).to_json()}
+    content: dict[str, Any] = {"elevon": Header.sealed(recording).to_json()}
     content["units"] = {channel.name: channel.unit for channel in recording.channels}
     for clock in recording.clocks.values():
         columns = {"time": clock.time}

@@ -41,7 +41,7 @@ def write(recording: Recording, path: Path) -> None:
     import h5netcdf
 
     memory = io.BytesIO()
-    text = np.frombuffer(Header.of(recording).to_json().encode("ascii"), dtype="S1")
+    text = np.frombuffer(Header.sealed(recording).to_json().encode("ascii"), dtype="S1")
     with h5netcdf.File(memory, "w") as file:
         file.dimensions = {"elevon_length": text.size}
         file.create_variable("elevon", ("elevon_length",), "S1", data=text)

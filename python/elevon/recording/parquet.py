@@ -1,6 +1,6 @@
 """Recordings in Parquet: one file, whatever the number of clocks.
 
-Layout, version 1. The schema metadata entry ``elevon`` holds the description (`Header`); each
+Layout, version 2. The schema metadata entry ``elevon`` holds the description (`Header`); each
 field has its ``unit`` and ``text``. With one clock the columns are ``time`` and the channels. With
 several clocks a first column ``clock`` names the clock of the row; the rows of the clocks follow
 each other, every clock starting a row group, and a channel is null in the rows of the others. So
@@ -41,7 +41,12 @@ def write(recording: Recording, path: Path) -> None:
 
     schema = _schema(recording)
     with pq.ParquetWriter(
-        path, schema, compression="snappy", use_byte_stream_split=False, use_dictionary=["clock"]
+        path,
+        schema,
+        compression="snappy",
+        use_byte_stream_split=False,
+        use_dictionary=["clock"],
+        write_page_checksum=True,
     ) as writer:
         for batch in _tables(recording, schema):
             writer.write_table(batch, row_group_size=_GROUP)
@@ -53,7 +58,7 @@ def read(path: Path, max_bytes: int) -> Contents:
     import pyarrow.parquet as pq
 
     try:
-        with pq.ParquetFile(path, memory_map=False) as file:
+        with pq.ParquetFile(path, memory_map=False, page_checksum_verification=True) as file:
             header = _header(path, file)
             check_size(str(path), header_bytes(header), max_bytes)
             starts = _row_groups(path, file, header)
@@ -76,7 +81,7 @@ def _schema(recording: Recording) -> Any:
         pa.field(c.name, pa.float64(), metadata={"unit": c.unit, "text": c.text})
         for c in recording.channels
     ]
-    return pa.schema(fields, metadata={"elevon": Header.of(recording).to_json()})
+    return pa.schema(fields, metadata={"elevon": Header.sealed(recording).to_json()})
 
 
 def _tables(recording: Recording, schema: Any) -> Iterator[Any]:
