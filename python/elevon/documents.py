@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     Model = TypeVar("Model", bound=BaseModel)
 
-__all__ = ["Document", "dotted", "read_toml", "validated"]
+__all__ = ["Document", "check_depth", "dotted", "read_toml", "validated"]
 
 Location = tuple[str | int, ...]
 
@@ -96,14 +96,19 @@ def read_toml(path: str | Path) -> Document:
         raise FormatError(f"{file}: not valid TOML: {error}") from error
     except RecursionError as error:
         raise FormatError(f"{file}: {_TOO_DEEP}") from error
-    if _depth(data) > _DEEPEST:
-        raise FormatError(f"{file}: {_TOO_DEEP}")
+    check_depth(data, str(file))
     return Document(str(file), text, data, file.parent)
 
 
 #: Levels of tables and lists that any file of ours can need, with room to spare.
 _DEEPEST = 32
 _TOO_DEEP = f"tables and lists are nested deeper than {_DEEPEST} levels"
+
+
+def check_depth(data: Any, place: str) -> None:
+    """Raise `FormatError` where tables and lists are nested deeper than any file of ours needs."""
+    if _depth(data) > _DEEPEST:
+        raise FormatError(f"{place}: {_TOO_DEEP}")
 
 
 def _depth(data: Any) -> int:

@@ -135,6 +135,8 @@ def _note(setup: Setup, layout: DriveFormat) -> dict[str, Any]:
     mode = setup.trace.command.mode
     if mode == "position" and len(terms) == 1 and terms[0].kind in FREE:
         note |= _waveform(terms[0])
+    elif terms:
+        note["command"] = setup.trace.command.model_dump(exclude_unset=True, mode="json")
     note["brake"] = "on" if setup.brake is not None else "off"
     rig = setup.rig
     if setup.brake is not None:

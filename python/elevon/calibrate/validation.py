@@ -12,6 +12,7 @@ import numpy.typing as npt
 from elevon.calibrate.kinematics import command_fit
 from elevon.calibrate.log import BenchLog
 from elevon.errors import InputError, Interrupted, unknown
+from elevon.logs.command.known import align_noted
 from elevon.logs.command.reconstruct import reconstruct
 from elevon.progress import Progress
 
@@ -310,6 +311,9 @@ def _command(log: BenchLog, actuator: Actuator) -> tuple[Floats, str]:
             f"{log.name}: the speed set point is inside its limit ({limit:.4g} rad/s) for only "
             f"{100 * trace.coverage:.0f} % of the log: the command cannot be rebuilt"
         )
+    if log.note is not None and log.note.command is not None and log.note.command.terms:
+        noted = align_noted(trace, log.note)
+        return noted.values, f"as noted, from {noted.start:.4g} s"
     known = np.interp(log.time, log.time[trace.valid], trace.position[trace.valid])
     fit = command_fit(log, gain, limit)
     if fit is None:

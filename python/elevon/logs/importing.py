@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ from elevon.logs.maps.column_map import ColumnMap, find_map, shipped_map
 from elevon.logs.maps.columns import looks_like_drive
 from elevon.logs.report import ImportReport
 from elevon.recording import Recording
+from elevon.scenario import Scenario
 
 __all__ = ["ImportedLog", "find_sidecars", "import_log", "same_rate"]
 
@@ -38,6 +40,11 @@ class ImportedLog:
     recording: Recording
     report: ImportReport
     note: CommandNote | None
+
+    @property
+    def scenario(self) -> Scenario | None:
+        """What was asked, where the log is a simulation's own recording."""
+        return _scenario(self.recording, self.report.source)
 
 
 def find_sidecars(path: str | Path) -> tuple[Path | None, Path | None]:
@@ -99,6 +106,8 @@ def import_log(
     """
     if log_format in {"auto", "recording"}:
         saved = _saved(path, log_format)
+        if saved is not None and command is not None:
+            return dataclasses.replace(saved, note=read_command_note(command))
         if saved is not None:
             return saved
     near_cell, near_note = find_sidecars(path) if sidecars else (None, None)
@@ -157,7 +166,27 @@ def _saved(path: str | Path, log_format: str) -> ImportedLog | None:
     for channel in recording.channels:
         report.channels.append(_channel_facts(channel.name, channel.name, channel.values, channel))
     report.clocks.setdefault("drive", next(iter(report.clocks.values()), {}))
-    return ImportedLog(recording, report, None)
+    return ImportedLog(recording, report, _own_note(recording, str(path)))
+
+
+def _own_note(recording: Recording, source: str) -> CommandNote | None:
+    """Return what a saved recording says of its command: the note imported with it, or a scenario.
+
+    Files come from outside: what cannot be read as one says nothing.
+    """
+    noted = recording.meta.get("command_note")
+    try:
+        if isinstance(noted, Mapping):
+            return CommandNote.from_dict(noted, source)
+        scenario = _scenario(recording, source)
+    except (InputError, TypeError, ValueError):
+        return None
+    return None if scenario is None else CommandNote.of_scenario(scenario, source)
+
+
+def _scenario(recording: Recording, source: str) -> Scenario | None:
+    stated = recording.meta.get("scenario")
+    return Scenario.from_dict(stated, source) if isinstance(stated, Mapping) else None
 
 
 def _is_saved(file: Path) -> bool:

@@ -14,7 +14,7 @@ from elevon.scenario.scenario import Action, Scenario, Term, Terms
 from elevon.units import check_kind, parse_quantity, to_si
 from elevon.waveforms import TABLE, check_values, unit_of, wave_records
 
-__all__ = ["CompiledScenario", "compile_scenario", "signal_records", "signal_units"]
+__all__ = ["CompiledScenario", "compile_scenario", "compile_term", "signal_records", "signal_units"]
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,8 @@ def compile_scenario(scenario: Scenario, wiring: str, fidelity: str) -> Compiled
     units = _port_units(mode, wiring)
     inputs = {
         port: [
-            _term(term, units[port], f"{place}.terms[{index}]") for index, term in enumerate(terms)
+            compile_term(term, units[port], f"{place}.terms[{index}]")
+            for index, term in enumerate(terms)
         ]
         for port, place, terms in _ports(scenario, units)
     }
@@ -170,7 +171,8 @@ def _sequence(steps: Sequence[Action], wiring: str) -> dict[str, Any]:
     }
 
 
-def _term(term: Term, own: str, place: str) -> dict[str, Any]:
+def compile_term(term: Term, own: str, place: str) -> dict[str, Any]:
+    """Return one waveform as the core takes it, for a quantity in the SI unit `own`."""
     record = wave_records()[term.kind]
     values: dict[str, float] = {}
     for parameter in record.parameters:

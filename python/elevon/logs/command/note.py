@@ -1,7 +1,10 @@
 """What the operator knows, beside a log: the command, the brake, the load cell's arm.
 
-Values are in degrees, Hz and s at the user side, and m. Other software writes these files: the
-names of keys are taken in several spellings; keys that mean nothing here are reported, not refused.
+The command stands in one of two forms. The short one is a single waveform; its values are in
+degrees, Hz and s at the user side, and m, its keys are accepted in several spellings (other
+software writes these files), and keys that mean nothing are reported, not refused. The full one is
+a table ``[command]`` with ``terms`` or ``steps`` by the grammar of scenario files: sums, tables,
+sequences of actions; its bare numbers are SI and unknown keys are errors.
 """
 
 from __future__ import annotations
@@ -10,19 +13,23 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from elevon.documents import Document, check_depth, validated
 from elevon.errors import FormatError, InputError, did_you_mean
 from elevon.logs.command.guess import FREE
-from elevon.logs.formats.limits import existing_file, quoted
+from elevon.logs.formats.limits import Limits, existing_file, quoted
+from elevon.scenario.scenario import Command, Scenario
 from elevon.units import parse_quantity
 from elevon.waveforms import wave_records
 
 __all__ = ["CommandNote", "read_command_note"]
 
 _MOST_BYTES = 1_000_000
+_MOST_TERMS = 1000
+_MOST_TABLE = 50_000_000  # bytes of a table's file
 _KINDS: dict[str, str] = {
     "amplitude": "deg", "bias": "deg", "phase": "deg", "initial": "deg", "final": "deg",
     "low": "deg", "high": "deg", "value": "deg", "slope": "deg/s",
@@ -69,6 +76,8 @@ class CommandNote:
         Brake shaft's chain ratio.
     current : str or None
         ``rms`` or ``peak``.
+    command : Command or None
+        The full form, where it was given.
     ignored : tuple of str
         Keys that mean nothing here.
     """
@@ -81,6 +90,7 @@ class CommandNote:
     chain_ratio: float | None = None
     current: str | None = None
     ignored: tuple[str, ...] = ()
+    command: Command | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain types for a recording's metadata."""
@@ -91,7 +101,33 @@ class CommandNote:
             "load_cell_arm": self.load_cell_arm,
             "chain_ratio": self.chain_ratio,
             "current": self.current,
+            "command": None if self.command is None else _plain(self.command),
         }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], source: str) -> CommandNote:
+        """Return the note that `to_dict` wrote, from a recording's metadata."""
+        command = data.get("command")
+        return cls(
+            source,
+            waveform=data.get("waveform"),
+            parameters=dict(data.get("parameters") or {}),
+            brake=data.get("brake"),
+            load_cell_arm=data.get("load_cell_arm"),
+            chain_ratio=data.get("chain_ratio"),
+            current=data.get("current"),
+            command=None if command is None else _command(command, source, None),
+        )
+
+    @classmethod
+    def of_scenario(cls, scenario: Scenario, source: str) -> CommandNote:
+        """Return what a simulated log's own scenario says: nothing of it has to be noted."""
+        brake = any(term.enabled for term in scenario.loads.brake.terms)
+        return cls(source, brake=brake, current="peak", command=scenario.command)
+
+
+def _plain(command: Command) -> dict[str, Any]:
+    return command.model_dump(exclude_unset=True, mode="json")
 
 
 def read_command_note(path: str | Path) -> CommandNote:
@@ -104,7 +140,11 @@ def read_command_note(path: str | Path) -> CommandNote:
     """
     file = existing_file(path)
     place = str(file)
-    flat = _flatten(_document(file), place)
+    document = dict(_document(file))
+    command = None
+    if _is_full(document.get("command")):
+        command = _command(document.pop("command"), place, file.parent)
+    flat = _flatten(document, place)
     values: dict[str, Any] = {}
     ignored = []
     for key, value in flat.items():
@@ -115,7 +155,31 @@ def read_command_note(path: str | Path) -> CommandNote:
             raise InputError(f"{place}: {quoted(key)} gives {name} a second time")
         else:
             values[name] = value
-    return _note(place, values, tuple(ignored))
+    note = _note(place, values, tuple(ignored))
+    if command is not None and note.waveform is not None:
+        raise InputError(f"{place}: a waveform and a table [command] both say what was asked")
+    return replace(note, command=command)
+
+
+def _is_full(given: Any) -> bool:
+    return isinstance(given, Mapping) and bool({"terms", "steps", "mode"} & given.keys())
+
+
+def _command(given: Mapping[str, Any], place: str, folder: Path | None) -> Command:
+    """Read the full form; tables in files must lie beside the note."""
+    terms = given.get("terms", ())
+    terms = [dict(t) if isinstance(t, Mapping) else t for t in terms if t is not None]
+    if len(terms) > _MOST_TERMS:
+        raise InputError(f"{place}: command: {len(terms)} terms, at most {_MOST_TERMS}")
+    for term in terms:
+        name = term.get("file") if isinstance(term, dict) else None
+        if isinstance(name, str) and folder is not None:
+            if Path(name).name != name:
+                raise InputError(f"{place}: command: file {quoted(name)} must lie beside the note")
+            existing_file(folder / name, Limits(file_bytes=_MOST_TABLE))
+            term["file"] = str(folder / name)
+    data = {**given, "terms": terms} if terms else dict(given)
+    return validated(Command, data, Document(place, "", {}, prefix=("command",)))
 
 
 def _document(file: Path) -> Mapping[str, Any]:
@@ -130,6 +194,7 @@ def _document(file: Path) -> Mapping[str, Any]:
         raise FormatError(f"{file}: neither JSON nor TOML: {quoted(str(error))}") from error
     if not isinstance(document, dict):
         raise FormatError(f"{file}: a table of keys and values is expected")
+    check_depth(document, str(file))
     return document
 
 
@@ -139,7 +204,10 @@ def _flatten(document: Mapping[str, Any], place: str) -> dict[str, Any]:
     for key, value in document.items():
         if isinstance(value, list) and value and isinstance(value[0], dict):
             if len(value) > 1:
-                raise InputError(f"{place}: {quoted(key)}: only one waveform can be noted")
+                raise InputError(
+                    f"{place}: {quoted(key)}: the short form notes one waveform; write a sum as "
+                    "[[command.terms]], by the grammar of scenario files"
+                )
             value = value[0]  # noqa: PLW2901 - a list of one term is that term
         inner = value if isinstance(value, dict) else {key: value}
         for name, item in inner.items():
