@@ -25,16 +25,22 @@ pub struct FaultSpec {
 }
 
 impl FaultSpec {
-    /// Parameters that differ from healthy at some time; none when nothing acts of the severity, as of a switch below
-    /// one half.
-    pub fn touched(&self) -> impl Iterator<Item = usize> + '_ {
-        self.writes.iter().filter(|w| w.op.acting(self.severity) != 0.0).map(|w| w.index)
+    /// Parameters that differ from healthy at some time of a run of steps `dt`; none when nothing acts of the severity, as
+    /// of a switch below one half or a pulse below half a step.
+    pub fn touched(&self, dt: f64) -> impl Iterator<Item = usize> + '_ {
+        let acts = move |op: Op| op.acting(self.severity) != 0.0 && !(op == Op::Pulse && self.vanishes(self.severity, dt));
+        self.writes.iter().filter(move |w| acts(w.op)).map(|w| w.index)
+    }
+
+    /// Is a pulse of this duty shorter than half a step?
+    fn vanishes(&self, duty: f64, dt: f64) -> bool {
+        duty * self.period < 0.5 * dt
     }
 
     /// Parameters that the fault or its attributes move at some time; none when the severity is zero.
     pub fn moved(&self) -> impl Iterator<Item = usize> + '_ {
         let live = self.severity != 0.0;
-        self.touched().chain(self.settings.iter().filter(move |_| live).map(|s| s.0))
+        self.touched(0.0).chain(self.settings.iter().filter(move |_| live).map(|s| s.0))
     }
 
     /// Held (label, profile factor, pulse state) at step `k` and the step of the next change.
@@ -46,7 +52,7 @@ impl FaultSpec {
         let given = factor * self.severity;
         let mut label = self.writes.first().map_or(given, |w| w.op.acting(given));
         let mut pulse = false;
-        if self.writes.iter().any(|w| w.op == Op::Pulse) && label * self.period < 0.5 * dt {
+        if self.writes.iter().any(|w| w.op == Op::Pulse) && self.vanishes(label, dt) {
             label = 0.0;
         } else if self.writes.iter().any(|w| w.op == Op::Pulse) {
             let origin = (t / self.period).floor() * self.period;
@@ -200,8 +206,8 @@ mod tests {
 
     #[test]
     fn what_does_not_act_touches_nothing() {
-        let touched = |op, severity| fault(op, severity, Profile::Constant, 0.1).touched().count();
-        for (op, below, from) in [(Op::Set, 0.499, 0.5), (Op::AddWhole, 0.9, 1.0), (Op::Lose, 0.0, 1e-9)] {
+        let touched = |op, severity| fault(op, severity, Profile::Constant, 0.1).touched(1e-3).count();
+        for (op, below, from) in [(Op::Set, 0.499, 0.5), (Op::AddWhole, 0.9, 1.0), (Op::Lose, 0.0, 1e-9), (Op::Pulse, 4e-3, 6e-3)] {
             assert_eq!((touched(op, below), touched(op, from)), (0, 1), "{op:?}");
         }
     }

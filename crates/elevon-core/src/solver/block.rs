@@ -18,7 +18,8 @@ const STRETCH: Steps = 4096;
 /// The structure of a run, which all runs of its block must share.
 pub fn structure<W: Wiring>(run: &RunSpec, recorded: &[usize]) -> W::Structure {
     let mut touched = vec![false; run.parameters.len()];
-    for index in run.faults.iter().flat_map(|f| f.touched()) {
+    let dt = W::step(&run.parameters);
+    for index in run.faults.iter().flat_map(|f| f.touched(dt)) {
         touched[index] = true;
     }
     W::structure(&Setup { raw: &run.parameters, touched: &touched, driven: &run.driven, recorded })
