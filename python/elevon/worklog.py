@@ -26,7 +26,7 @@ from elevon.files import write_text
 __all__ = ["LOCK", "Item", "WorkLog", "digest", "is_locked", "locked", "sweep"]
 
 LOCK = ".elevon.lock"
-"""Name of the lock in a folder. It stays there; what counts is whether a process holds it."""
+"""Name of the lock in a folder. A killed process leaves the file, but holds it no more."""
 
 #: How `elevon.files.atomic_path` names what it writes to.
 _PART = re.compile(r"\..*\.[0-9a-f]{12}\.part(\.[A-Za-z0-9]+)?")
@@ -184,18 +184,31 @@ def locked(folder: Path) -> Iterator[None]:
         The folder cannot be made or written.
     """
     path = folder / LOCK
+    handle = _taken(folder, path)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be written: {error.strerror or error}") from error
-    try:
-        if not _held(handle):
-            raise BusyError(f"{folder}: another process works there{_holder(path)}")
         _sign(handle)
         yield
     finally:
+        with suppress(OSError):
+            path.unlink()
         os.close(handle)  # the lock goes with it
+
+
+def _taken(folder: Path, path: Path) -> int:
+    """Open a folder's lock and take it: the file that has the name when the lock is held."""
+    while True:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        except OSError as error:
+            raise OutputError(f"{folder}: cannot be written: {error.strerror or error}") from error
+        if not _held(handle):
+            os.close(handle)
+            raise BusyError(f"{folder}: another process works there{_holder(path)}")
+        with suppress(OSError):
+            if os.path.samestat(os.fstat(handle), path.stat()):
+                return handle
+        os.close(handle)  # whoever held it has removed it meanwhile: take the new one
 
 
 def is_locked(folder: Path) -> bool:
@@ -271,7 +284,7 @@ def _sha(path: Path) -> str:
 
 def _sealed(content: Mapping[str, Any]) -> str:
     """Return a line with its own checksum."""
-    body = json.dumps(content, separators=(",", ":"), allow_nan=False)
+    body = json.dumps(content, separators=(",", ":"))
     return f"{hashlib.sha256(body.encode()).hexdigest()[:16]} {body}\n"
 
 

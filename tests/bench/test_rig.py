@@ -12,6 +12,7 @@ from elevon.bench.micrometer import INTRINSIC_PLAY
 from elevon.bench.procedure import Procedure, load_procedure, procedure_names
 from elevon.bench.rig import setups
 from elevon.bench.run import claim_bench, run_procedure
+from elevon.bench.state import finished_logs
 from elevon.cli import main
 from elevon.documents import Document, validated
 from elevon.errors import InputError, Interrupted, OutputExistsError
@@ -61,7 +62,7 @@ def test_loaded_runs_have_the_published_plays_and_brake(actuator):
 def test_it_writes_the_drives_columns_and_nothing_it_cannot_know(tmp_path, actuator):
     result = run_procedure(procedure(brake_step("0.8 N m")), actuator, tmp_path, seed=2)
     names = sorted(path.name for path in tmp_path.iterdir())
-    assert names == ["bench-short.json", "short.csv", "short_command.json", "short_loadcell.csv"]
+    assert names == ["bench-short.log", "short.csv", "short_command.json", "short_loadcell.csv"]
     assert result.to_dict()["status"] == "ok"
     lines = (tmp_path / "short.csv").read_text().splitlines()
     assert lines[0] == HEADER
@@ -109,7 +110,7 @@ def test_a_fault_reaches_the_log(tmp_path, actuator):
         rms.append(np.abs(recording["current_q_meas"].values[moving]).mean())
     assert rms[1] > 1.2 * rms[0]
     assert "friction" not in (tmp_path / "worn" / "short_command.json").read_text()
-    assert "friction" not in (tmp_path / "worn" / "bench-short.json").read_text()
+    assert "friction" not in (tmp_path / "worn" / "bench-short.log").read_text()
 
 
 def test_an_interrupted_procedure_goes_on_where_it_stopped(tmp_path, actuator):
@@ -179,8 +180,7 @@ def test_a_half_done_tripped_procedure_agrees_with_one_made_in_one_go(
         patch.setattr(bench_run, "_one", first_only)
         with pytest.raises(Interrupted):
             run_procedure(pair, actuator, tmp_path / "halves", faults=[TRIPS])
-    state = json.loads((tmp_path / "halves" / "bench-pair.json").read_text())
-    assert list(state["logs"]) == ["one"]
+    assert finished_logs(tmp_path / "halves" / "bench-pair.log") == ["one"]
     later = run_procedure(pair, actuator, tmp_path / "halves", faults=[TRIPS])
     assert [log.resumed for log in later.logs] == [True, False]
     assert [log.status for log in later.logs] == [log.status for log in once.logs]
@@ -201,8 +201,8 @@ def test_a_log_that_is_not_as_it_was_written_is_made_again(tmp_path, actuator):
     assert json.loads((tmp_path / "t.json").read_text())["logs"] == json.loads(
         json.dumps(first.hidden["logs"], default=str)
     )
-    state = tmp_path / "bench-pair.json"
-    state.write_text(json.dumps({"bench": json.loads(state.read_text())["bench"]}))
+    state = tmp_path / "bench-pair.log"
+    state.write_text(state.read_text().splitlines(keepends=True)[0])
     unknown = run_procedure(pair, actuator, tmp_path, fidelity="low")
     assert [log.resumed for log in unknown.logs] == [False, False]
     with pytest.raises(OutputExistsError, match=r"t\.json"):

@@ -1,6 +1,5 @@
 """Ctrl-C at any moment: exit 130, one line on stderr that says what is kept, nothing on stdout."""
 
-import json
 import os
 import signal
 import subprocess
@@ -10,6 +9,7 @@ import weakref
 
 import pytest
 
+from elevon.bench.state import finished_logs
 from elevon.cli import interrupt, main
 from elevon.errors import OutputExistsError
 from elevon.files import journal, write_text
@@ -236,14 +236,14 @@ def test_a_process_group_stopped_in_the_core_goes_on_later(tmp_path):
     (tmp_path / "p.toml").write_text(text)
     run = ("bench", "run", "p.toml", "--actuator", "torino-rotary", "--out", "logs", "--json")
     process = start(*run, cwd=tmp_path)
-    state = tmp_path / "logs" / "bench-p.json"
+    state = tmp_path / "logs" / "bench-p.log"
     until(lambda: state.is_file() and '"one"' in state.read_text(), process)
     time.sleep(0.2)
     os.killpg(process.pid, signal.SIGINT)
     out, err = process.communicate(timeout=20)
     assert (process.returncode, out) == (130, ""), err
     assert "interrupted; 1 of 2 logs are kept in logs" in err.splitlines()[-1]
-    assert list(json.loads(state.read_text())["logs"]) == ["one"]
+    assert finished_logs(state) == ["one"]
     assert not (tmp_path / "logs" / "two.csv").exists()
 
 

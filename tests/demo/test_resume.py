@@ -144,9 +144,9 @@ def test_a_step_counts_only_as_it_was_kept(tmp_path):
     page.write_text("edited")
     assert kept.load("backlash", "in", read) is None
     page.write_text("page")
-    file = tmp_path / "unfinished" / "backlash.json"
+    file = tmp_path / "unfinished.log"
     file.write_text(file.read_text()[:-20])
-    assert kept.load("backlash", "in", read) is None
+    assert Kept(tmp_path, "a" * 32).load("backlash", "in", read) is None
     kept.clear()
     assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
 
@@ -253,7 +253,7 @@ def test_every_interruption_keeps_what_is_finished(chain, tmp_path, capsys):
     assert calls == ["report"]
     assert [step["resumed"] for step in resumed["steps"]] == [True, True, False, True, True, True]
     assert resumed["steps"][1]["kept"] == "3 of 3 logs kept from the interrupted run"
-    assert not (out / "unfinished").exists()
+    assert not (out / "unfinished.log").exists()
     assert chain.run(tmp_path / "once")[0] == code
     once = json.loads(capsys.readouterr().out)
     assert not any(step["resumed"] for step in once["steps"])
@@ -311,7 +311,7 @@ def test_files_of_someone_else_are_refused_before_any_work(chain, tmp_path, caps
         assert path.name in capsys.readouterr().err
         assert path.read_text() == "mine"
         path.unlink()
-    assert not (out / "unfinished").exists()
+    assert not (out / "unfinished.log").exists()
 
 
 def test_the_library_raises_what_stopped_it(chain, tmp_path):
@@ -327,11 +327,15 @@ def test_the_library_raises_what_stopped_it(chain, tmp_path):
 def test_the_whole_chain_interrupted_by_signals(tmp_path):
     """SIGINT to the group: while a log is made, within the calibration, while the page is drawn."""
     out = tmp_path / "demo"
-    state, unfinished = out / "logs" / "bench-demo.json", out / "unfinished"
+    state, unfinished = out / "logs" / "bench-demo.log", out / "unfinished.log"
+
+    def has(name):
+        return lambda: unfinished.is_file() and f'"item":"{name}"' in unfinished.read_text()
+
     moments = [
         (lambda: state.is_file() and '"sine"' in state.read_text(), 0.3, "of 4 logs"),
-        ((unfinished / "before.json").is_file, 0.3, "the calibration"),
-        ((unfinished / "after.json").is_file, 0.5, "of the calibrated values"),
+        (has("before"), 0.3, "the calibration"),
+        (has("after"), 0.5, "of the calibrated values"),
     ]
     command = [sys.executable, "-m", "elevon.cli", "demo", "--out", str(out), "--json"]
     for condition, wait, text in [*moments, (lambda: False, 0.0, "")]:

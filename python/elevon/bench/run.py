@@ -16,6 +16,7 @@ from elevon.bench.traces import recorded, write_traces
 from elevon.files import check_output, write_text
 from elevon.logs.formats.drive import DriveFormat
 from elevon.progress import Progress, part
+from elevon.worklog import locked, sweep
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -85,7 +86,7 @@ class BenchResult:
 
 def state_file(folder: Path, procedure: str) -> Path:
     """Return the file beside a procedure's logs that holds how each of them ended."""
-    return folder / f"bench-{procedure}.json"
+    return folder / f"bench-{procedure}.log"
 
 
 def claim_bench(
@@ -156,6 +157,8 @@ def run_procedure(
         Actuator, procedure, faults or outputs that cannot be.
     OutputExistsError
         The folder holds logs of other work.
+    BusyError
+        Another process works in the folder.
     DivergedError, Interrupted
         As `elevon.simulate`. Logs that were complete stay.
     """
@@ -168,13 +171,15 @@ def run_procedure(
     same = truth is not None and _holds(Path(truth).expanduser(), text)
     if truth is not None and not same:
         check_output(truth, force=force)
-    state = _claim(procedure, folder, found, fidelity, layout, force=force)
     logs, simulated = [], 0.0
-    for number, setup in enumerate(found):
-        share = part(progress, number / len(found), (number + 1) / len(found))
-        log, seconds = _one(setup, state, layout, fidelity, share, force=force)
-        logs.append(log)
-        simulated += seconds
+    with locked(folder):
+        sweep(folder)
+        state = _claim(procedure, folder, found, fidelity, layout, force=force)
+        for number, setup in enumerate(found):
+            share = part(progress, number / len(found), (number + 1) / len(found))
+            log, seconds = _one(setup, state, layout, fidelity, share, force=force)
+            logs.append(log)
+            simulated += seconds
     written = None if truth is None else write_text(truth, text, force=force or same)
     wall = clock.perf_counter() - begin
     return BenchResult(procedure.name, tuple(logs), written, simulated, wall, hidden)

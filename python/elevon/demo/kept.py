@@ -1,7 +1,7 @@
 """What an interrupted demonstration leaves for the next one: its finished steps, as JSON.
 
-A folder ``unfinished`` beside the reports names the work; each finished step adds a file with its
-result, written whole. The work is told by the package's own files, the seed and both parameter
+A file ``unfinished.log`` beside the reports names the work; each finished step adds a line with its
+result. The work is told by the package's own files, the seed and both parameter
 sets, a step also by what it was made from. What does not fit to the digit is made again.
 """
 
@@ -9,14 +9,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from elevon.bench.state import digests
-from elevon.errors import OutputExistsError
-from elevon.files import write_text
+from elevon.errors import FormatError, OutputExistsError
+from elevon.worklog import WorkLog, digest
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -24,8 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["STEPS", "Kept", "finished_steps", "inputs_of", "work_key"]
 
 Result = TypeVar("Result")
-FOLDER = "unfinished"
-_WORK = "work.json"
+LOG = "unfinished.log"
 _CODE = {".py", ".so", ".pyd", ".toml", ".csv", ".j2", ".css", ".js"}
 
 #: Steps that are kept, by the name of their file, and what they are called.
@@ -42,12 +39,12 @@ def work_key(seed: int, base: Actuator, hidden: Actuator) -> str:
     import elevon
 
     root = Path(str(elevon.__file__)).parent
-    digest = hashlib.sha256()
+    mark = hashlib.sha256()
     for path in sorted(path for path in root.rglob("*") if path.suffix in _CODE):
-        digest.update(f"{path.relative_to(root).as_posix()}\n".encode())
-        digest.update(hashlib.sha256(path.read_bytes()).digest())
-    digest.update(json.dumps([elevon.__version__, seed, base.hash, hidden.hash]).encode())
-    return digest.hexdigest()[:32]
+        mark.update(f"{path.relative_to(root).as_posix()}\n".encode())
+        mark.update(hashlib.sha256(path.read_bytes()).digest())
+    mark.update(json.dumps([elevon.__version__, seed, base.hash, hidden.hash]).encode())
+    return mark.hexdigest()[:32]
 
 
 class Kept:
@@ -62,9 +59,9 @@ class Kept:
     """
 
     def __init__(self, out: Path, key: str) -> None:
-        self.out = out
-        self.folder = out / FOLDER
+        self.path = out / LOG
         self.key = key
+        self._log: WorkLog | None = None
 
     def begun(self, *, force: bool) -> bool:
         """Whether this very work was begun here and not finished.
@@ -74,20 +71,20 @@ class Kept:
         OutputExistsError
             Without `force`: other work was.
         """
-        found = _key(self.folder)
-        if found == self.key:
+        log = _read(self.path)
+        if log is not None and log.key == self.key:
+            self._log = log
             return True
-        if found is not None and not force:
+        if log is not None and not force:
             raise OutputExistsError(
-                f"{self.folder}: holds an unfinished demonstration of other work; use force "
+                f"{self.path}: tells of an unfinished demonstration of other work; use force "
                 "(--force) to replace it"
             )
         return False
 
     def begin(self) -> None:
         """Forget whatever was kept and name the work."""
-        self.clear()
-        write_text(self.folder / _WORK, json.dumps({"work": self.key}) + "\n", force=True)
+        self._log = WorkLog.begin(self.path, self.key)
 
     def load(
         self, name: str, inputs: str, read: Callable[[Any], Result]
@@ -102,16 +99,14 @@ class Kept:
             What the step is made from, in digits.
         read : callable
             Turns the JSON form into the result; a `KeyError`, `TypeError` or `ValueError` of it
-            means that the file is damaged.
+            means that it does not fit.
         """
-        data = _read(self.folder / f"{name}.json")
-        if (data.get("work"), data.get("inputs")) != (self.key, inputs):
-            return None
-        files = data.get("files")
-        if not isinstance(files, Mapping) or digests(self.out / n for n in files) != files:
+        log = self._own()
+        item = None if log is None else log.kept(name)
+        if item is None or item.data.get("inputs") != inputs:
             return None
         try:
-            return read(data["result"]), float(data["seconds"])
+            return read(item.data["result"]), float(item.data["seconds"])
         except (KeyError, TypeError, ValueError):
             return None
 
@@ -119,21 +114,23 @@ class Kept:
         self, name: str, inputs: str, result: Any, seconds: float, files: Sequence[Path]
     ) -> None:
         """Keep the JSON form of a step's result; it counts while `files` are as they are now."""
-        content = {
-            "work": self.key,
-            "inputs": inputs,
-            "seconds": seconds,
-            "files": digests(files),
-            "result": result,
-        }
-        write_text(self.folder / f"{name}.json", json.dumps(content) + "\n", force=True)
+        log = self._own()
+        if log is None:
+            self.begin()
+            log = self._log
+        assert log is not None
+        log.note(name, files, inputs=inputs, result=result, seconds=seconds)
 
     def clear(self) -> None:
         """Remove what is kept: the work is done, or another one begins."""
-        for path in (self.folder / _WORK, *(self.folder / f"{name}.json" for name in STEPS)):
-            path.unlink(missing_ok=True)
-        with suppress(OSError):  # not there, or something of another's is in it
-            self.folder.rmdir()
+        self._log = None
+        self.path.unlink(missing_ok=True)
+
+    def _own(self) -> WorkLog | None:
+        """Return this work's log, None where the folder has none or that of other work."""
+        log = self._log or _read(self.path)
+        self._log = log if log is not None and log.key == self.key else None
+        return self._log
 
 
 def finished_steps(out: Path) -> list[str]:
@@ -142,30 +139,23 @@ def finished_steps(out: Path) -> list[str]:
     from elevon.bench.state import finished_logs
     from elevon.demo.procedure import demo_procedure
 
-    folder = out / FOLDER
-    key = _key(folder)
-    if key is None:
+    log = _read(out / LOG)
+    if log is None:
         return []
-    found = [text for n, text in STEPS.items() if _read(folder / f"{n}.json").get("work") == key]
+    steps = [text for name, text in STEPS.items() if name in log.items]
     procedure = demo_procedure()
     logs = len(finished_logs(state_file(out / "logs", procedure.name)))
-    return [*found, *([f"{logs} of {len(procedure.traces)} logs"] if logs else [])]
+    return [*steps, *([f"{logs} of {len(procedure.traces)} logs"] if logs else [])]
 
 
 def inputs_of(files: Iterable[Path], *more: str) -> str:
     """Return digits over files and texts that a step is made from."""
-    content = json.dumps([sorted(digests(files).items()), *more])
-    return hashlib.sha256(content.encode()).hexdigest()[:32]
+    marks = sorted((path.name, digest(path)["sha256"]) for path in files if path.is_file())
+    return hashlib.sha256(json.dumps([marks, *more]).encode()).hexdigest()[:32]
 
 
-def _key(folder: Path) -> str | None:
-    key = _read(folder / _WORK).get("work")
-    return key if isinstance(key, str) else None
-
-
-def _read(path: Path) -> dict[str, Any]:
+def _read(path: Path) -> WorkLog | None:
     try:
-        found = json.loads(path.read_text("utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return found if isinstance(found, dict) else {}
+        return WorkLog.read(path)
+    except FormatError:
+        return None

@@ -184,7 +184,7 @@ def run_demo(
     """Run the demonstration and write its report.
 
     A run that was interrupted goes on where it stopped when it is started again with the same
-    arguments: what is kept in the folder ``unfinished`` is used, as long as it belongs to exactly
+    arguments: what is kept in ``unfinished.log`` is used, as long as it belongs to exactly
     this work, done by exactly this package.
 
     Parameters
