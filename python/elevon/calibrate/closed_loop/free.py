@@ -1,0 +1,190 @@
+"""What the closed loop may free: parameters of the servo, and delays and offsets of the log."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.calibrate.closed_loop.log import LoopLog
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["STRUCTURES", "Free", "free_list", "in_set", "inner", "outer"]
+
+Floats = npt.NDArray[np.float64]
+
+STRUCTURES = ("cascade", "pid")
+#: Static over dynamic friction: the fit's own variable, so that rest never holds less.
+STICK = "friction.stick"
+
+
+@dataclass(frozen=True)
+class Free:
+    """One number that the fit may move.
+
+    Attributes
+    ----------
+    path : str
+        Parameter path, ``friction.stick``, or ``sensor.CHANNEL_delay`` and ``sensor.CHANNEL_offset``.
+    unit, register : str
+        SI unit and register, for the report.
+    log_scale : bool
+        Fitted as a logarithm.
+    start : float
+        First value, SI.
+    spread : float
+        Deviation of what is believed before the logs: of the logarithm, or in SI.
+    low, high : float
+        Bounds, SI.
+    """
+
+    path: str
+    unit: str
+    register: str
+    log_scale: bool
+    start: float
+    spread: float
+    low: float
+    high: float
+
+    def inner(self, value: float) -> float:
+        """Return the fitted variable, in its spreads."""
+        return (math.log(value) if self.log_scale else value) / self.spread
+
+    def outer(self, x: float) -> float:
+        """Return the value of a fitted variable."""
+        return math.exp(x * self.spread) if self.log_scale else x * self.spread
+
+    def slope(self, x: float) -> float:
+        """Return d value / d fitted variable."""
+        return self.spread * (math.exp(x * self.spread) if self.log_scale else 1.0)
+
+
+def inner(free: Sequence[Free], values: Mapping[str, float] | None = None) -> Floats:
+    """Return the point of some values (of the starts), clipped to the bounds."""
+    given = values or {}
+    return np.array(
+        [f.inner(min(max(given.get(f.path, f.start), f.low), f.high)) for f in free]
+    )
+
+
+def outer(free: Sequence[Free], x: Floats) -> dict[str, float]:
+    """Return paths and values of a point."""
+    return {f.path: f.outer(float(v)) for f, v in zip(free, x, strict=True)}
+
+
+def in_set(path: str) -> bool:
+    """Whether a parameter set has a place for it."""
+    return not path.startswith("sensor.") or not path.endswith(("_delay", "_offset"))
+
+
+def free_list(
+    actuator: Actuator, logs: Sequence[LoopLog], structure: str, starts: Mapping[str, float]
+) -> list[Free]:
+    """List what the logs may tell of a servo under one structure of its controller.
+
+    `starts` are first values from the signals; what is not there starts from the set.
+    """
+    channels = {name for log in logs for name in log.signals}
+    items = [*_plant(actuator, channels), *_controller(actuator, structure)]
+    items += _limits(actuator, logs, channels)
+    found = [_started(item, actuator, starts) for item in items]
+    return found + _shown(logs, channels)
+
+
+def _row(path: str, unit: str, register: str, spread: float, low: float, high: float) -> Free:
+    return Free(path, unit, register, True, math.nan, spread, low, high)
+
+
+def _plant(actuator: Actuator, channels: set[str]) -> list[Free]:
+    linear = actuator.wiring == "ballscrew"
+    rows = [
+        _row("motor.inertia", "kg m2", "plant", 1.5, 1e-9, 1e3),
+        _row("friction.dynamic", "N m", "plant", 1.5, 1e-7, 1e4),
+        _row(STICK, "1", "plant", 0.3, 1.0, 5.0),
+        _row("friction.reverse_scale", "1", "plant", 0.5, 0.1, 10.0),
+        _row("friction.viscous", "N m s/rad", "plant", 2.0, 1e-9, 1e3),
+    ]
+    weight = _torque_scale(actuator) * _per_output(actuator)
+    rows.append(
+        Free("load.constant", "N" if linear else "N m", "load", False, 0.0, weight,
+             -50.0 * weight, 50.0 * weight)
+    )  # fmt: skip
+    return rows
+
+
+def _controller(actuator: Actuator, structure: str) -> list[Free]:
+    linear = actuator.wiring == "ballscrew"
+    if structure == "pid":
+        return [
+            _row("control.pid_gain", "N" if linear else "N m/rad", "controller", 2.0, 1e-6, 1e9),
+            _row("control.pid_integral_time", "s", "controller", 1.5, 1e-3, 1e3),
+            _row("control.pid_derivative_time", "s", "controller", 1.5, 1e-5, 1e2),
+            _row("control.pid_derivative_filter", "1", "controller", 0.7, 1.0, 1e3),
+        ]
+    return [
+        _row("control.position_gain", "rad/(m s)" if linear else "1/s", "controller", 2.0, 1e-3, 1e8),
+        _row("control.speed_gain", "N m s/rad", "controller", 2.0, 1e-9, 1e4),
+        _row("control.integral_time", "s", "controller", 1.5, 1e-3, 1e3),
+        _row("control.speed_limit", "rad/s", "controller", 1.0, 1e-2, 1e5),
+    ]
+
+
+def _limits(actuator: Actuator, logs: Sequence[LoopLog], channels: set[str]) -> list[Free]:
+    del actuator, logs
+    rows = [_row("inverter.supply_voltage", "V", "plant", 0.7, 1e-1, 1e5)]
+    if "current" in channels:
+        rows.insert(0, _row("control.current_limit", "A", "controller", 0.7, 1e-3, 1e5))
+        rows.append(_row("sensor.filter_cutoff", "Hz", "sensor", 1.0, 0.5, 1e5))
+    return rows
+
+
+def _shown(logs: Sequence[LoopLog], channels: set[str]) -> list[Free]:
+    period = max(log.period for log in logs)
+    late = max(1.5 * period, 2e-3)
+    units = {"position": "", "motor_position": "rad", "speed": "", "motor_speed": "rad/s",
+             "current": "A", "voltage": "V"}  # fmt: skip
+    rows = []
+    for name in sorted(channels):
+        rows.append(
+            Free(f"sensor.{name}_delay", "s", "sensor", False, 0.5 * period, late, -late, 20.0 * late)
+        )
+        size = max(log.sigma(name) for log in logs if name in log.signals)
+        if size > 0.0 and not any(log.magnitude for log in logs if name == "current"):
+            step = 0.1 * size
+            rows.append(
+                Free(f"sensor.{name}_offset", units[name], "sensor", False, 0.0, step,
+                     -20.0 * step, 20.0 * step)
+            )  # fmt: skip
+    return rows
+
+
+def _started(item: Free, actuator: Actuator, starts: Mapping[str, float]) -> Free:
+    """Give a row its first value and bring it inside its bounds."""
+    from dataclasses import replace
+
+    first = starts.get(item.path)
+    if first is None:
+        first = 1.1 if item.path == STICK else actuator.parameters.value(item.path)
+    if item.log_scale and not first > 0.0:
+        first = math.sqrt(item.low * item.high)
+    return replace(item, start=min(max(float(first), item.low), item.high))
+
+
+def _per_output(actuator: Actuator) -> float:
+    """Motor angle over the output's coordinate."""
+    value = actuator.parameters.value
+    lead = value("screw.lead") if actuator.wiring == "ballscrew" else 1.0
+    return value("gear.ratio") / lead
+
+
+def _torque_scale(actuator: Actuator) -> float:
+    """A torque that means something on the fast shaft: a tenth of what the drive can give."""
+    value = actuator.parameters.value
+    return max(0.1 * value("control.torque_constant") * value("control.current_limit"), 1e-9)

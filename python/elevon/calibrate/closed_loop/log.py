@@ -1,0 +1,138 @@
+"""A log as the closed loop needs it: what was demanded, and whatever of the motion was shown."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.errors import InputError, unknown
+
+__all__ = ["CHANNELS", "LoopLog"]
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+#: What a log may show, and what it is: output side, motor, torque current (peak) and its voltage.
+CHANNELS: dict[str, str] = {
+    "position": "position of the output",
+    "motor_position": "angle of the motor",
+    "speed": "speed of the output",
+    "motor_speed": "speed of the motor",
+    "current": "torque current",
+    "voltage": "quadrature voltage",
+}
+_FEWEST = 50  # samples
+_JUMP = 0.02  # of the demand's range within one sample: a step, not a slope
+
+
+@dataclass(frozen=True)
+class LoopLog:
+    """A log on its own clock, SI.
+
+    Attributes
+    ----------
+    name : str
+        File name.
+    time : ndarray, shape (n,)
+        s, from zero, increasing.
+    command : ndarray, shape (n,)
+        Position demanded, in the output's unit.
+    signals : mapping of str to ndarray, shape (n,)
+        Some of `CHANNELS`; NaN where a sample is missing.
+    load : (ndarray, ndarray) or None
+        Times and signed load on the output, where it was measured.
+    magnitude : bool
+        The current has no sign.
+    used : ndarray of bool, shape (n,)
+        Samples that count.
+
+    Raises
+    ------
+    InputError
+        Too short, time that does not increase, an unknown channel, a demand that never changes.
+    """
+
+    name: str
+    time: Floats
+    command: Floats
+    signals: Mapping[str, Floats]
+    load: tuple[Floats, Floats] | None = None
+    magnitude: bool = False
+    used: Bools = field(default_factory=lambda: np.empty(0, dtype=bool))
+
+    def __post_init__(self) -> None:
+        if len(self.time) < _FEWEST:
+            raise InputError(f"{self.name}: {len(self.time)} samples; at least {_FEWEST}")
+        if not np.all(np.diff(self.time) > 0.0):
+            raise InputError(f"{self.name}: time does not increase")
+        for channel in self.signals:
+            if channel not in CHANNELS:
+                raise unknown("channel", channel, CHANNELS, self.name)
+        if not self.signals:
+            raise InputError(f"{self.name}: nothing of the motion was recorded")
+        if not float(np.ptp(self.command)) > 0.0:
+            raise InputError(f"{self.name}: the demand never changes; nothing can be learned from it")
+        if not len(self.used):
+            object.__setattr__(self, "used", np.ones(len(self.time), dtype=bool))
+
+    @property
+    def duration(self) -> float:
+        """Length in s."""
+        return float(self.time[-1])
+
+    @cached_property
+    def period(self) -> float:
+        """Median of the clock's steps, s."""
+        return float(np.median(np.diff(self.time)))
+
+    def sigma(self, channel: str) -> float:
+        """Return the spread of a channel about its mean over the samples that count."""
+        return float(np.nanstd(self.signals[channel][self.used]))
+
+    @cached_property
+    def table(self) -> tuple[Floats, Floats]:
+        """The demand as points: linear between samples, but a jump stays a jump."""
+        jump = np.abs(np.diff(self.command)) > _JUMP * float(np.ptp(self.command))
+        steps = np.flatnonzero(jump) + 1
+        # Held until just before the sample that shows the new value.
+        edge = self.time[steps] - 1e-3 * np.diff(self.time)[steps - 1]
+        times = np.insert(self.time, steps, edge)
+        return times, np.insert(self.command, steps, self.command[steps - 1])
+
+    def restricted(self, used: Bools) -> LoopLog:
+        """Return the log with fewer samples that count."""
+        return LoopLog(
+            self.name, self.time, self.command, self.signals, self.load, self.magnitude,
+            self.used & used,
+        )  # fmt: skip
+
+    def window(self, begin: float, end: float, settle: float) -> LoopLog:
+        """Return a stretch as a log of its own, whose first `settle` seconds do not count."""
+        keep = (self.time >= begin) & (self.time <= end)
+        time = self.time[keep] - self.time[keep][0]
+        return LoopLog(
+            self.name, time, self.command[keep],
+            {name: values[keep] for name, values in self.signals.items()},
+            None if self.load is None else (self.load[0] - begin, self.load[1]),
+            self.magnitude, self.used[keep] & (time >= settle),
+        )  # fmt: skip
+
+    def motion(self, per_output: float) -> tuple[Floats, Floats]:
+        """Return motor speed and position error at the output, NaN where nothing shows them."""
+        position = self.signals.get("position")
+        if position is None and "motor_position" in self.signals:
+            position = self.signals["motor_position"] / per_output
+        if "motor_speed" in self.signals:
+            speed = self.signals["motor_speed"]
+        elif "speed" in self.signals:
+            speed = self.signals["speed"] * per_output
+        elif position is not None:
+            speed = np.gradient(position, self.time) * per_output
+        else:
+            speed = np.full(len(self.time), np.nan)
+        error = np.full(len(speed), np.nan) if position is None else self.command - position
+        return np.asarray(speed, dtype=np.float64), np.asarray(error, dtype=np.float64)

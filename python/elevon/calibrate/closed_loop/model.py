@@ -1,0 +1,181 @@
+"""The servo's own closed loop on recorded demands: many parameter vectors, one batch of lanes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.calibrate.closed_loop.free import STICK
+from elevon.calibrate.closed_loop.log import LoopLog
+from elevon.errors import InputError, Interrupted
+from elevon.parameters.records import positions
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["LoopModel", "Shown"]
+
+Floats = npt.NDArray[np.float64]
+#: Channels of one run on its log's clock; None where it left the finite numbers.
+Shown = dict[str, Floats] | None
+
+_SOURCES = {
+    "position": "user_position",
+    "motor_position": "motor_position",
+    "speed": "motor_speed",
+    "motor_speed": "motor_speed",
+    "current": "current_q_meas",
+    "voltage": "voltage_q_meas",
+}
+_FINE = 2  # recorded samples a sample of the log
+
+
+class LoopModel:
+    """Runs of one servo on some logs, under one structure of its controller.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        Everything that is not moved.
+    logs : sequence of LoopLog
+        Demands, clocks, initial positions.
+    structure : str
+        ``cascade`` or ``pid``.
+    check : callable
+        Asked while running; False stops.
+    """
+
+    def __init__(
+        self,
+        actuator: Actuator,
+        logs: Sequence[LoopLog],
+        structure: str,
+        check: Callable[[], bool] = lambda: True,
+    ) -> None:
+        self.actuator = actuator.with_values(
+            {"control.structure": structure}, source="calibration"
+        )
+        self.logs = tuple(logs)
+        self.structure = structure
+        self.check = check
+        self.runs = 0
+        self._place = positions(actuator.wiring)
+        value = actuator.parameters.value
+        lead = value("screw.lead") if actuator.wiring == "ballscrew" else 1.0
+        self.per_output = value("gear.ratio") / lead
+        self.channels = tuple(
+            name for name in _SOURCES if any(name in log.signals for log in logs)
+        )
+        self._prepare()
+
+    def _prepare(self) -> None:
+        from elevon.scenario import Scenario
+        from elevon.simulate.prepare import Run, prepare, solver_step
+
+        table = {"kind": "table", "times": [0.0, 1.0], "values": [0.0, 0.0]}
+        zero = Scenario.from_dict(
+            {
+                "duration": 1.0,
+                "command": {"mode": "position", "terms": [table]},
+                "load": {"user": {"terms": [dict(table)]}},
+            }
+        )
+        names = ",".join(dict.fromkeys(_SOURCES[name] for name in self.channels))
+        # The gains of the set are another machine's, perhaps: the fit brings its own.
+        calm = self.actuator.with_values({"control.speed_gain": 0.0}, source="calibration")
+        prepared = prepare(Run(calm, zero), "low", f"{names}@every")
+        self._names = list(prepared.plan[0].signals)
+        step = solver_step(self.actuator, "low")
+        period = min(log.period for log in self.logs)
+        every = max(1, round(period / _FINE / step))
+        self._plan = [{**prepared.plan[0].to_core(), "period_steps": every}]
+        self._clock = str(self._plan[0]["clock"])
+        self._cores = [self._core(prepared.core, log) for log in self.logs]
+
+    def _core(self, base: Mapping[str, Any], log: LoopLog) -> dict[str, Any]:
+        inputs = dict(base["inputs"])
+        times, values = log.table
+        inputs["command"] = [{**inputs["command"][0], "times": times, "values": values}]
+        if log.load is not None:
+            inputs["user"] = [
+                {**inputs["user"][0], "times": log.load[0], "values": log.load[1]}
+            ]
+        at = self._start(log)
+        speed = log.motion(self.per_output)[0][:3]
+        moving = float(np.nanmean(speed)) if np.isfinite(speed).any() else 0.0
+        initial = {"motor_position": at * self.per_output, "user_position": at}
+        if abs(moving) > 0.1 * float(np.nanmax(np.abs(log.motion(self.per_output)[0]), initial=0.0)):
+            initial["motor_speed"] = moving
+        return {
+            **base, "inputs": inputs, "initial": initial, "duration": log.duration + 4.0 * log.period
+        }  # fmt: skip
+
+    def _start(self, log: LoopLog) -> float:
+        """Where the output stood when the log began: as shown, else as demanded."""
+        first = slice(0, 3)
+        if "position" in log.signals:
+            return float(np.nanmean(log.signals["position"][first]))
+        if "motor_position" in log.signals:
+            return float(np.nanmean(log.signals["motor_position"][first])) / self.per_output
+        return float(log.command[0])
+
+    def vector(self, values: Mapping[str, float]) -> Floats:
+        """Return the core's parameter vector with some values changed."""
+        vector = np.array(self._cores[0]["parameters"])
+        for path, value in values.items():
+            if path in self._place:
+                vector[self._place[path]] = value
+        at = self._place
+        stick = values.get(STICK)
+        dynamic = vector[at["friction.dynamic"]]
+        if stick is not None:
+            vector[at["friction.static"]] = stick * dynamic
+        vector[at["friction.static"]] = max(vector[at["friction.static"]], dynamic)
+        return vector
+
+    def simulate(self, points: Sequence[Mapping[str, float]]) -> list[list[Shown]]:
+        """Run every log at every point; result[point][log]."""
+        from elevon import _core
+
+        if not self.check():
+            raise Interrupted("calibration stopped")
+        vectors = [self.vector(point) for point in points]
+        cores = [{**core, "parameters": vector} for vector in vectors for core in self._cores]
+        self.runs += len(cores)
+        try:
+            results = _core.simulate(
+                self.actuator.wiring, "low", cores, self._plan, 0, "auto",
+                lambda _fraction: self.check(),
+            )  # fmt: skip
+        except ValueError as error:
+            raise InputError(str(error)) from error
+        if any(item["status"] == "interrupted" for item in results):
+            raise Interrupted("calibration stopped")
+        width = len(self.logs)
+        return [
+            [self._shown(results[k * width + i], log, point) for i, log in enumerate(self.logs)]
+            for k, point in enumerate(points)
+        ]
+
+    def _shown(self, result: Mapping[str, Any], log: LoopLog, values: Mapping[str, float]) -> Shown:
+        """What the log would show of a run: delays, offsets, the current's sign."""
+        rows = result["clocks"][self._clock]
+        if result["status"] not in {"ok", "tripped"} or not np.isfinite(rows["values"]).all():
+            return None
+        shown = {}
+        for name in self.channels:
+            if name not in log.signals:
+                continue
+            fine = rows["values"][:, self._names.index(_SOURCES[name])]
+            if name == "speed":
+                fine = fine / self.per_output
+            if name == "current" and log.magnitude:
+                fine = np.abs(fine)
+            at = log.time - values.get(f"sensor.{name}_delay", 0.0)
+            shown[name] = np.interp(at, rows["time"], fine) + values.get(
+                f"sensor.{name}_offset", 0.0
+            )
+        return shown

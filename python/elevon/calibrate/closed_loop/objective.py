@@ -1,0 +1,107 @@
+"""Residuals of a loop model in deviations, with a weak belief in the first values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.calibrate.closed_loop.free import Free, outer
+from elevon.calibrate.closed_loop.model import LoopModel, Shown
+
+__all__ = ["SOFT", "Objective", "robust"]
+
+Floats = npt.NDArray[np.float64]
+SOFT = 3.0  # deviations beyond which a residual weighs less
+_BIG = 1e3  # residual of a run that left the finite numbers
+#: First deviations, as shares of a channel's spread: what a fair model of an unknown drive leaves.
+_FIRST = {"position": 0.03, "motor_position": 0.03, "speed": 0.12, "motor_speed": 0.12,
+          "current": 0.4, "voltage": 0.4}  # fmt: skip
+
+
+class Objective:
+    """Residuals by point, stacked over logs and channels.
+
+    Attributes
+    ----------
+    model : LoopModel
+        What runs.
+    free : tuple of Free
+        What moves.
+    scales : dict of (int, str) to float
+        Deviation of each log's channels.
+    """
+
+    def __init__(self, model: LoopModel, free: Sequence[Free], belief: float = 1.0) -> None:
+        self.model = model
+        self.free = tuple(free)
+        self.belief = belief
+        self.first = np.array([f.inner(f.start) for f in free])
+        self.low = np.array([f.inner(f.low) for f in free])
+        self.high = np.array([f.inner(f.high) for f in free])
+        self.scales: dict[tuple[int, str], float] = {}
+        self.keys = [
+            (k, name)
+            for k, log in enumerate(model.logs)
+            for name in model.channels
+            if name in log.signals
+        ]
+        self.masks = {
+            (k, name): model.logs[k].used & np.isfinite(model.logs[k].signals[name])
+            for k, name in self.keys
+        }
+        for k, name in self.keys:
+            self.scales[k, name] = max(_FIRST[name] * model.logs[k].sigma(name), 1e-12)
+
+    def runs(self, x: Floats) -> list[list[Shown]]:
+        """Run points, shape (m, p)."""
+        return self.model.simulate([outer(self.free, row) for row in np.atleast_2d(x)])
+
+    def parts(self, shown: Sequence[Shown]) -> dict[tuple[int, str], Floats]:
+        """Residual of each log and channel in deviations, samples that count only."""
+        found = {}
+        for k, name in self.keys:
+            mask, run = self.masks[k, name], shown[k]
+            if run is None:
+                found[k, name] = np.full(int(mask.sum()), _BIG)
+                continue
+            rest = (run[name] - self.model.logs[k].signals[name])[mask] / self.scales[k, name]
+            found[k, name] = np.clip(rest, -_BIG, _BIG)
+        return found
+
+    def residual(self, x: Floats) -> Floats:
+        """Stacked residuals of points, shape (m, n)."""
+        rows = []
+        for shown in self.runs(x):
+            parts = self.parts(shown)
+            rows.append(np.concatenate([parts[key] for key in self.keys]))
+        return np.array(rows)
+
+    def prior(self, x: Floats) -> Floats:
+        """Rows of the belief: how far from the first value, in its spreads; shape (p,)."""
+        return (x - self.first) * self.belief
+
+    def cost(self, residual: Floats, x: Floats) -> float:
+        """Robust cost of one point: samples thinned to what is independent count the more."""
+        return float(np.sum(robust(residual)) + np.sum(self.prior(x) ** 2))
+
+    def refresh(self, x: Floats) -> None:
+        """Set the deviations to what the residuals really have."""
+        shown = self.runs(x)[0]
+        parts = self.parts(shown)
+        for key in self.keys:
+            rms = float(np.sqrt(np.mean(np.minimum(parts[key] ** 2, (2.0 * SOFT) ** 2))))
+            k, name = key
+            least = 1e-3 * self.model.logs[k].sigma(name)
+            self.scales[key] = max(self.scales[key] * rms, least, 1e-12)
+
+
+def robust(residual: Floats) -> Floats:
+    """Soft absolute cost: squares up to some deviations, then linear."""
+    return np.asarray(2.0 * SOFT**2 * (np.sqrt(1.0 + (residual / SOFT) ** 2) - 1.0))
+
+
+def values_of(free: Sequence[Free], x: Floats) -> Mapping[str, float]:
+    """Return paths and values of a point."""
+    return outer(free, x)

@@ -1,0 +1,126 @@
+"""Where a search begins: windows of the logs, first values from the signals, a cloud about them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.calibrate.closed_loop.free import Free, inner
+from elevon.calibrate.closed_loop.log import LoopLog
+from elevon.calibrate.closed_loop.model import LoopModel
+
+__all__ = ["cloud", "first_values", "windows"]
+
+Floats = npt.NDArray[np.float64]
+_WINDOW = 6.0  # s
+_SETTLE = 0.4  # s
+_PLACES = (0.6, 0.95)  # quantiles of unrest at which windows of a log are taken
+#: Bandwidths that a servo may have, rad/s: speed loop, position loop, integral action.
+_SPEED, _POSITION, _INTEGRAL = (10.0, 1500.0), (1.0, 80.0), (0.05, 20.0)
+
+
+def windows(logs: Sequence[LoopLog], per_output: float) -> list[LoopLog]:
+    """Return short stretches of the logs: a busy one and a calmer one of each."""
+    found = []
+    for log in logs:
+        if log.duration <= 2.0 * _WINDOW:
+            found.append(log)
+            continue
+        speed = log.motion(per_output)[0]
+        begins = np.arange(0.0, log.duration - _WINDOW, 0.5 * _WINDOW)
+        unrest = []
+        for begin in begins:
+            inside = (log.time >= begin) & (log.time < begin + _WINDOW)
+            unrest.append(float(np.sqrt(np.nanmean(speed[inside] ** 2))))
+        order = np.argsort(unrest)
+        chosen = {int(order[round(q * (len(order) - 1))]) for q in _PLACES}
+        found += [
+            log.window(begins[k], begins[k] + _WINDOW, _SETTLE) for k in sorted(chosen)
+        ]
+    return found
+
+
+def first_values(model: LoopModel) -> dict[str, float]:
+    """Return what currents and speeds suggest; only paths the signals speak of."""
+    constant = model.actuator.parameters.value("control.torque_constant")
+    top = max(float(np.nanmax(np.abs(log.motion(model.per_output)[0]))) for log in model.logs)
+    found: dict[str, float] = {}
+    if top > 0.0 and np.isfinite(top):
+        found["control.speed_limit"] = 1.05 * top
+    current = [log.signals["current"][log.used] for log in model.logs if "current" in log.signals]
+    if current:
+        peak = float(np.nanmax(np.abs(np.concatenate(current))))
+        found["control.current_limit"] = max(1.05 * peak, 1e-3)
+        found.update(_friction(model, constant))
+    return found
+
+
+def _friction(model: LoopModel, constant: float) -> dict[str, float]:
+    """Dry friction and a constant load, from the current while it moves either way."""
+    levels: dict[int, list[Floats]] = {1: [], -1: []}
+    for log in model.logs:
+        if "current" not in log.signals:
+            continue
+        speed = log.motion(model.per_output)[0]
+        slow = 0.05 * float(np.nanmax(np.abs(speed)))
+        for way in levels:
+            levels[way].append(log.signals["current"][log.used & (way * speed > slow)])
+    forth, back = (np.concatenate(levels[way]) for way in (1, -1))
+    if len(forth) < 10 or len(back) < 10:
+        return {}
+    a, b = constant * float(np.nanmedian(forth)), constant * float(np.nanmedian(back))
+    signed = not any(log.magnitude for log in model.logs)
+    found = {"friction.dynamic": max(0.5 * (abs(a) + abs(b)), 1e-6)}
+    if signed:
+        found["friction.dynamic"] = max(0.5 * (a - b), 0.1 * found["friction.dynamic"])
+        found["load.constant"] = 0.5 * (a + b) * model.per_output
+    return found
+
+
+def cloud(free: Sequence[Free], model: LoopModel, number: int, seed: int) -> Floats:
+    """Return starts, shape (number, p): loops of every bandwidth, the plant about its first values.
+
+    Gains are drawn through the bandwidths they give to the inertia that each start has.
+    """
+    from scipy.stats import qmc
+
+    base = {item.path: item.start for item in free}
+    rows = qmc.Sobol(7, seed=seed).random(1 << (number - 1).bit_length())[:number]
+    points = []
+    for row in rows:
+        values = dict(base)
+        inertia = base["motor.inertia"] * 3.0 ** (2.0 * row[0] - 1.0)
+        values["motor.inertia"] = inertia
+        values["friction.dynamic"] = base["friction.dynamic"] * 3.0 ** (row[1] - 0.7)
+        values["friction.viscous"] = base["friction.viscous"] * 10.0 ** (2.0 * row[2] - 1.0)
+        whole = inertia + _fixed_inertia(model)
+        values.update(_gains(row[3:], whole, model.per_output))
+        points.append(inner(free, values))
+    return np.array(points)
+
+
+def _gains(row: Floats, inertia: float, per_output: float) -> Mapping[str, float]:
+    """Gains of both structures from bandwidths drawn evenly over their logarithms."""
+    speed, position, integral = (
+        low * (high / low) ** share
+        for (low, high), share in zip((_SPEED, _POSITION, _INTEGRAL), row, strict=False)
+    )
+    damping = inertia * speed
+    return {
+        "control.speed_gain": damping,
+        "control.position_gain": position * per_output,
+        "control.integral_time": 1.0 / integral,
+        "control.pid_gain": damping * per_output * position,
+        "control.pid_derivative_time": 1.0 / position,
+        "control.pid_integral_time": 1.0 / integral,
+    }
+
+
+def _fixed_inertia(model: LoopModel) -> float:
+    """What turns with the motor beside its own inertia."""
+    value = model.actuator.parameters.value
+    load = value("load.mass" if model.actuator.wiring == "ballscrew" else "load.inertia")
+    screw = value("screw.inertia") if model.actuator.wiring == "ballscrew" else 0.0
+    return float(value("gear.inertia") + screw / value("gear.ratio") ** 2 + load / model.per_output**2)
