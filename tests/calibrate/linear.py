@@ -151,8 +151,8 @@ def log(bench, demand, duration=40.0, logger=None, seed=0):
 def draw(seed, **changes):
     """A bench of its own: every number drawn about the first one."""
     rng = np.random.default_rng([seed, 3])
-    spread = {"mass": 0.5, "inertia": 0.2, "dry": 0.4, "stick": 0.3, "viscous": 0.5, "gain": 0.25,
-              "integral": 0.4, "derivative": 0.15, "current_limit": 0.15, "per_load": 0.5}  # fmt: skip
+    spread = {"mass": 0.5, "inertia": 0.2, "dry": 0.4, "stick": 0.3, "viscous": 0.5, "gain": 0.25}
+    spread |= {"integral": 0.4, "derivative": 0.15, "current_limit": 0.15, "per_load": 0.5}
     base = Linear()
     values = {k: getattr(base, k) * np.exp(s * rng.normal()) for k, s in spread.items()}
     values["reverse"] = float(np.exp(0.2 * rng.normal()))

@@ -31,7 +31,7 @@ class Free:
     Attributes
     ----------
     path : str
-        Parameter path, ``friction.stick``, or ``sensor.CHANNEL_delay`` and ``sensor.CHANNEL_offset``.
+        Parameter path, ``friction.stick``, ``sensor.CHANNEL_delay`` or ``sensor.CHANNEL_offset``.
     unit, register : str
         SI unit and register, for the report.
     log_scale : bool
@@ -69,9 +69,7 @@ class Free:
 def inner(free: Sequence[Free], values: Mapping[str, float] | None = None) -> Floats:
     """Return the point of some values (of the starts), clipped to the bounds."""
     given = values or {}
-    return np.array(
-        [f.inner(min(max(given.get(f.path, f.start), f.low), f.high)) for f in free]
-    )
+    return np.array([f.inner(min(max(given.get(f.path, f.start), f.low), f.high)) for f in free])
 
 
 def outer(free: Sequence[Free], x: Floats) -> dict[str, float]:
@@ -92,24 +90,24 @@ def free_list(
     `starts` are first values from the signals; what is not there starts from the set.
     """
     channels = {name for log in logs for name in log.signals}
-    items = [*_plant(actuator, channels), *_controller(actuator, structure)]
-    items += _limits(actuator, logs, channels)
+    items = [*_plant(actuator), *_controller(actuator, structure)]
+    items += _limits(channels)
     found = [_started(item, actuator, starts) for item in items]
     return found + _shown(logs, channels)
 
 
-def _row(path: str, unit: str, register: str, spread: float, low: float, high: float) -> Free:
-    return Free(path, unit, register, True, math.nan, spread, low, high)
+def _row(path: str, unit: str, register: str, spread: float, bounds: tuple[float, float]) -> Free:
+    return Free(path, unit, register, True, math.nan, spread, *bounds)
 
 
-def _plant(actuator: Actuator, channels: set[str]) -> list[Free]:
+def _plant(actuator: Actuator) -> list[Free]:
     linear = actuator.wiring == "ballscrew"
     rows = [
-        _row("motor.inertia", "kg m2", "plant", 1.5, 1e-9, 1e3),
-        _row("friction.dynamic", "N m", "plant", 1.5, 1e-7, 1e4),
-        _row(STICK, "1", "plant", 0.3, 1.0, 5.0),
-        _row("friction.reverse_scale", "1", "plant", 0.5, 0.1, 10.0),
-        _row("friction.viscous", "N m s/rad", "plant", 2.0, 1e-9, 1e3),
+        _row("motor.inertia", "kg m2", "plant", 1.5, (1e-9, 1e3)),
+        _row("friction.dynamic", "N m", "plant", 1.5, (1e-7, 1e4)),
+        _row(STICK, "1", "plant", 0.3, (1.0, 5.0)),
+        _row("friction.reverse_scale", "1", "plant", 0.2, (0.1, 10.0)),
+        _row("friction.viscous", "N m s/rad", "plant", 2.0, (1e-9, 1e3)),
     ]
     weight = _torque_scale(actuator) * _per_output(actuator)
     rows.append(
@@ -123,25 +121,25 @@ def _controller(actuator: Actuator, structure: str) -> list[Free]:
     linear = actuator.wiring == "ballscrew"
     if structure == "pid":
         return [
-            _row("control.pid_gain", "N" if linear else "N m/rad", "controller", 2.0, 1e-6, 1e9),
-            _row("control.pid_integral_time", "s", "controller", 1.5, 1e-3, 1e3),
-            _row("control.pid_derivative_time", "s", "controller", 1.5, 1e-5, 1e2),
-            _row("control.pid_derivative_filter", "1", "controller", 0.7, 1.0, 1e3),
+            _row("control.pid_gain", "N" if linear else "N m/rad", "controller", 2.0, (1e-6, 1e9)),
+            _row("control.pid_integral_time", "s", "controller", 1.5, (1e-3, 1e3)),
+            _row("control.pid_derivative_time", "s", "controller", 1.5, (1e-5, 1e2)),
+            _row("control.pid_derivative_filter", "1", "controller", 0.7, (1.0, 1e3)),
         ]
+    gain = "rad/(m s)" if linear else "1/s"
     return [
-        _row("control.position_gain", "rad/(m s)" if linear else "1/s", "controller", 2.0, 1e-3, 1e8),
-        _row("control.speed_gain", "N m s/rad", "controller", 2.0, 1e-9, 1e4),
-        _row("control.integral_time", "s", "controller", 1.5, 1e-3, 1e3),
-        _row("control.speed_limit", "rad/s", "controller", 1.0, 1e-2, 1e5),
+        _row("control.position_gain", gain, "controller", 2.0, (1e-3, 1e8)),
+        _row("control.speed_gain", "N m s/rad", "controller", 2.0, (1e-9, 1e4)),
+        _row("control.integral_time", "s", "controller", 1.5, (1e-3, 1e3)),
+        _row("control.speed_limit", "rad/s", "controller", 1.0, (1e-2, 1e5)),
     ]
 
 
-def _limits(actuator: Actuator, logs: Sequence[LoopLog], channels: set[str]) -> list[Free]:
-    del actuator, logs
-    rows = [_row("inverter.supply_voltage", "V", "plant", 0.7, 1e-1, 1e5)]
+def _limits(channels: set[str]) -> list[Free]:
+    rows = [_row("inverter.supply_voltage", "V", "plant", 0.7, (1e-1, 1e5))]
     if "current" in channels:
-        rows.insert(0, _row("control.current_limit", "A", "controller", 0.7, 1e-3, 1e5))
-        rows.append(_row("sensor.filter_cutoff", "Hz", "sensor", 1.0, 0.5, 1e5))
+        rows.insert(0, _row("control.current_limit", "A", "controller", 0.7, (1e-3, 1e5)))
+        rows.append(_row("sensor.filter_cutoff", "Hz", "sensor", 1.0, (0.5, 1e5)))
     return rows
 
 
@@ -153,7 +151,9 @@ def _shown(logs: Sequence[LoopLog], channels: set[str]) -> list[Free]:
     rows = []
     for name in sorted(channels):
         rows.append(
-            Free(f"sensor.{name}_delay", "s", "sensor", False, 0.5 * period, late, -late, 20.0 * late)
+            Free(
+                f"sensor.{name}_delay", "s", "sensor", False, 0.5 * period, late, -late, 20.0 * late
+            )
         )
         size = max(log.sigma(name) for log in logs if name in log.signals)
         if size > 0.0 and not any(log.magnitude for log in logs if name == "current"):

@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import InputError, unknown
 
-__all__ = ["CHANNELS", "LoopLog"]
+if TYPE_CHECKING:
+    from elevon.recording import Recording
+
+__all__ = ["CHANNELS", "ROLES", "LoopLog", "loop_log"]
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -25,8 +29,18 @@ CHANNELS: dict[str, str] = {
     "current": "torque current",
     "voltage": "quadrature voltage",
 }
+#: Roles of a recording that serve a channel, and names that do where no roles are stated.
+ROLES: dict[str, tuple[str, ...]] = {
+    "position": ("output_position", "encoder_position", "user_position"),
+    "motor_position": ("motor_position", "resolver_position"),
+    "speed": ("output_speed", "user_speed"),
+    "motor_speed": ("motor_speed", "resolver_speed"),
+    "current": ("torque_current", "current_q_meas", "current_q"),
+    "voltage": ("torque_voltage", "voltage_q_meas"),
+}
 _FEWEST = 50  # samples
-_JUMP = 0.02  # of the demand's range within one sample: a step, not a slope
+_JUMP = 0.02  # of the demand's range within one sample, ...
+_ALONE = 5.0  # ... and so many times what changes beside it: a step, not a slope
 
 
 @dataclass(frozen=True)
@@ -75,7 +89,9 @@ class LoopLog:
         if not self.signals:
             raise InputError(f"{self.name}: nothing of the motion was recorded")
         if not float(np.ptp(self.command)) > 0.0:
-            raise InputError(f"{self.name}: the demand never changes; nothing can be learned from it")
+            raise InputError(
+                f"{self.name}: the demand never changes; nothing can be learned from it"
+            )
         if not len(self.used):
             object.__setattr__(self, "used", np.ones(len(self.time), dtype=bool))
 
@@ -96,7 +112,9 @@ class LoopLog:
     @cached_property
     def table(self) -> tuple[Floats, Floats]:
         """The demand as points: linear between samples, but a jump stays a jump."""
-        jump = np.abs(np.diff(self.command)) > _JUMP * float(np.ptp(self.command))
+        size = np.abs(np.diff(self.command))
+        beside = np.maximum(np.append(size[1:], 0.0), np.insert(size[:-1], 0, 0.0))
+        jump = (size > _JUMP * float(np.ptp(self.command))) & (size > _ALONE * beside)
         steps = np.flatnonzero(jump) + 1
         # Held until just before the sample that shows the new value.
         edge = self.time[steps] - 1e-3 * np.diff(self.time)[steps - 1]
@@ -136,3 +154,65 @@ class LoopLog:
             speed = np.full(len(self.time), np.nan)
         error = np.full(len(speed), np.nan) if position is None else self.command - position
         return np.asarray(speed, dtype=np.float64), np.asarray(error, dtype=np.float64)
+
+
+def loop_log(recording: Recording, name: str, *, magnitude: bool | None = None) -> LoopLog:
+    """Return what the closed loop needs of a recording, by the roles it states, else by names.
+
+    Parameters
+    ----------
+    recording : Recording
+        With a position command and at least one channel of the motion on the same clock.
+    name : str
+        Of the log.
+    magnitude : bool, optional
+        Whether the current has no sign; default: where it is never negative though the motion is.
+
+    Raises
+    ------
+    InputError
+        No command, nothing of the motion; and as `LoopLog`.
+    """
+    roles = recording.meta.get("roles")
+    roles = roles if isinstance(roles, Mapping) else {}
+
+    def channel(words: tuple[str, ...]) -> str | None:
+        played = (str(roles[word]) for word in words if word in roles)
+        return next((n for n in (*played, *words) if n in recording), None)
+
+    command = channel(("command", "position_ref"))
+    if command is None:
+        raise InputError(f"{name}: no channel plays the role 'command': nothing to run the loop on")
+    clock = recording[command].time
+    served = {key: channel(words) for key, words in ROLES.items()}
+    signals = {
+        key: np.interp(clock, recording[found].time, recording[found].values)
+        for key, found in served.items()
+        if found is not None
+    }
+    if magnitude is None:
+        magnitude = _unsigned(signals)
+    load = channel(("load", "load_force"))
+    return LoopLog(
+        name,
+        np.asarray(clock - clock[0], dtype=np.float64),
+        np.asarray(recording[command].values, dtype=np.float64),
+        signals,
+        None if load is None else (recording[load].time - clock[0], recording[load].values),
+        magnitude,
+    )
+
+
+def _unsigned(signals: Mapping[str, Floats]) -> bool:
+    """A current that is never below zero though the motion goes both ways has lost its sign."""
+    current = signals.get("current")
+    if current is None:
+        return False
+    moves = next((signals[k] for k in ("motor_speed", "speed") if k in signals), None)
+    if moves is None:
+        moves = np.gradient(
+            next(signals[k] for k in ("position", "motor_position") if k in signals)
+        )
+    both = float(np.nanmin(moves)) < 0.0 < float(np.nanmax(moves))
+    size = float(np.nanmax(np.abs(current)))
+    return bool(both and size > 0.0 and float(np.nanmin(current)) > -0.02 * size)

@@ -55,9 +55,7 @@ class LoopModel:
         structure: str,
         check: Callable[[], bool] = lambda: True,
     ) -> None:
-        self.actuator = actuator.with_values(
-            {"control.structure": structure}, source="calibration"
-        )
+        self.actuator = actuator.with_values({"control.structure": structure}, source="calibration")
         self.logs = tuple(logs)
         self.structure = structure
         self.check = check
@@ -66,9 +64,7 @@ class LoopModel:
         value = actuator.parameters.value
         lead = value("screw.lead") if actuator.wiring == "ballscrew" else 1.0
         self.per_output = value("gear.ratio") / lead
-        self.channels = tuple(
-            name for name in _SOURCES if any(name in log.signals for log in logs)
-        )
+        self.channels = tuple(name for name in _SOURCES if any(name in log.signals for log in logs))
         self._prepare()
 
     def _prepare(self) -> None:
@@ -100,18 +96,16 @@ class LoopModel:
         times, values = log.table
         inputs["command"] = [{**inputs["command"][0], "times": times, "values": values}]
         if log.load is not None:
-            inputs["user"] = [
-                {**inputs["user"][0], "times": log.load[0], "values": log.load[1]}
-            ]
+            inputs["user"] = [{**inputs["user"][0], "times": log.load[0], "values": log.load[1]}]
         at = self._start(log)
-        speed = log.motion(self.per_output)[0][:3]
-        moving = float(np.nanmean(speed)) if np.isfinite(speed).any() else 0.0
+        speed = log.motion(self.per_output)[0]
+        top = float(np.nanmax(np.abs(speed), initial=0.0))
+        moving = float(np.nanmean(speed[:3])) if np.isfinite(speed[:3]).any() else 0.0
         initial = {"motor_position": at * self.per_output, "user_position": at}
-        if abs(moving) > 0.1 * float(np.nanmax(np.abs(log.motion(self.per_output)[0]), initial=0.0)):
+        if abs(moving) > 0.1 * top:
             initial["motor_speed"] = moving
-        return {
-            **base, "inputs": inputs, "initial": initial, "duration": log.duration + 4.0 * log.period
-        }  # fmt: skip
+        end = log.duration + 4.0 * log.period
+        return {**base, "inputs": inputs, "initial": initial, "duration": end}
 
     def _start(self, log: LoopLog) -> float:
         """Where the output stood when the log began: as shown, else as demanded."""
@@ -121,6 +115,12 @@ class LoopModel:
         if "motor_position" in log.signals:
             return float(np.nanmean(log.signals["motor_position"][first])) / self.per_output
         return float(log.command[0])
+
+    def keep_gains(self, actuator: Actuator) -> None:
+        """Run with all of a set's own values: where nothing is searched."""
+        own = actuator.parameters.vector()
+        for core in self._cores:
+            core["parameters"] = own
 
     def vector(self, values: Mapping[str, float]) -> Floats:
         """Return the core's parameter vector with some values changed."""

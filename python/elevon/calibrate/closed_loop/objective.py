@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -80,7 +80,7 @@ class Objective:
 
     def prior(self, x: Floats) -> Floats:
         """Rows of the belief: how far from the first value, in its spreads; shape (p,)."""
-        return (x - self.first) * self.belief
+        return np.asarray((x - self.first) * self.belief)
 
     def cost(self, residual: Floats, x: Floats) -> float:
         """Robust cost of one point: samples thinned to what is independent count the more."""
@@ -100,8 +100,3 @@ class Objective:
 def robust(residual: Floats) -> Floats:
     """Soft absolute cost: squares up to some deviations, then linear."""
     return np.asarray(2.0 * SOFT**2 * (np.sqrt(1.0 + (residual / SOFT) ** 2) - 1.0))
-
-
-def values_of(free: Sequence[Free], x: Floats) -> Mapping[str, float]:
-    """Return paths and values of a point."""
-    return outer(free, x)

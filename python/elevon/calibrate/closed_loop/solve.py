@@ -1,4 +1,4 @@
-"""Levenberg and Marquardt from several starts at once: every run of a step is a lane of one batch."""
+"""Levenberg and Marquardt from several starts at once: the runs of a step are lanes of a batch."""
 
 from __future__ import annotations
 
@@ -36,9 +36,7 @@ def steps(objective: Objective) -> Floats:
     )
 
 
-def jacobian(
-    objective: Objective, points: list[Point], *, central: bool = False
-) -> list[Floats]:
+def jacobian(objective: Objective, points: list[Point], *, central: bool = False) -> list[Floats]:
     """Return derivatives of the residuals, one array (n, p) a point, by differences over lanes."""
     h = steps(objective)
     size = len(h)
@@ -78,9 +76,7 @@ def solve(
     """
     starts = np.clip(np.atleast_2d(starts), objective.low, objective.high)
     first = objective.residual(starts)
-    points = [
-        Point(x, r, objective.cost(r, x)) for x, r in zip(starts, first, strict=True)
-    ]
+    points = [Point(x, r, objective.cost(r, x)) for x, r in zip(starts, first, strict=True)]
     points.sort(key=lambda point: point.cost)
     if keep is not None:
         points = points[: 3 * keep]
@@ -106,9 +102,7 @@ def _round(objective: Objective, points: list[Point], central: bool) -> None:
     width = len(_LADDER)
     for k, point in enumerate(points):
         part = slice(k * width, (k + 1) * width)
-        costs = [
-            objective.cost(r, x) for r, x in zip(found[part], trials[part], strict=True)
-        ]
+        costs = [objective.cost(r, x) for r, x in zip(found[part], trials[part], strict=True)]
         best = int(np.argmin(costs))
         if not costs[best] < point.cost:
             point.settled = point.damping >= 1e6

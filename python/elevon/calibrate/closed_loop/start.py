@@ -36,9 +36,7 @@ def windows(logs: Sequence[LoopLog], per_output: float) -> list[LoopLog]:
             unrest.append(float(np.sqrt(np.nanmean(speed[inside] ** 2))))
         order = np.argsort(unrest)
         chosen = {int(order[round(q * (len(order) - 1))]) for q in _PLACES}
-        found += [
-            log.window(begins[k], begins[k] + _WINDOW, _SETTLE) for k in sorted(chosen)
-        ]
+        found += [log.window(begins[k], begins[k] + _WINDOW, _SETTLE) for k in sorted(chosen)]
     return found
 
 
@@ -65,8 +63,8 @@ def _friction(model: LoopModel, constant: float) -> dict[str, float]:
             continue
         speed = log.motion(model.per_output)[0]
         slow = 0.05 * float(np.nanmax(np.abs(speed)))
-        for way in levels:
-            levels[way].append(log.signals["current"][log.used & (way * speed > slow)])
+        for way, level in levels.items():
+            level.append(log.signals["current"][log.used & (way * speed > slow)])
     forth, back = (np.concatenate(levels[way]) for way in (1, -1))
     if len(forth) < 10 or len(back) < 10:
         return {}
@@ -123,4 +121,6 @@ def _fixed_inertia(model: LoopModel) -> float:
     value = model.actuator.parameters.value
     load = value("load.mass" if model.actuator.wiring == "ballscrew" else "load.inertia")
     screw = value("screw.inertia") if model.actuator.wiring == "ballscrew" else 0.0
-    return float(value("gear.inertia") + screw / value("gear.ratio") ** 2 + load / model.per_output**2)
+    return float(
+        value("gear.inertia") + screw / value("gear.ratio") ** 2 + load / model.per_output**2
+    )

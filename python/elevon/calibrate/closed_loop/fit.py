@@ -1,0 +1,186 @@
+"""Search, choice of the controller's structure, and the final fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.calibrate.closed_loop.free import Free, free_list, outer
+from elevon.calibrate.closed_loop.log import LoopLog
+from elevon.calibrate.closed_loop.model import LoopModel
+from elevon.calibrate.closed_loop.objective import Objective
+from elevon.calibrate.closed_loop.solve import solve
+from elevon.calibrate.closed_loop.start import cloud, first_values, windows
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["Fitted", "Searched", "choose", "final_fit", "search"]
+
+Floats = npt.NDArray[np.float64]
+Check = Callable[[], bool]
+_STARTS = 32
+_KEEP = 3
+_MEMORY = 0.5  # s, of residuals
+_DECIDED = 3.0  # of the log-likelihood of held-out data, in nats, between two structures
+
+
+@dataclass(frozen=True)
+class Searched:
+    """The best point of one structure on windows of the logs, and what it predicts.
+
+    Attributes
+    ----------
+    structure : str
+        Of the controller.
+    free : tuple of Free
+        What was moved.
+    x : ndarray, shape (p,)
+        Best point.
+    held_out : float
+        Log-likelihood of windows left out of the fit, nats of independent samples.
+    runs : int
+        Model runs.
+    """
+
+    structure: str
+    free: tuple[Free, ...]
+    x: Floats
+    held_out: float
+    runs: int
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """The final fit on whole logs."""
+
+    objective: Objective
+    x: Floats
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Values by path."""
+        return outer(self.objective.free, self.x)
+
+
+def search(
+    actuator: Actuator,
+    logs: Sequence[LoopLog],
+    structure: str,
+    *,
+    seed: int = 0,
+    check: Check = lambda: True,
+    advance: Callable[[float], object] = lambda _f: None,
+) -> Searched:
+    """Search one structure on windows of the logs, and predict each window from the others."""
+    whole = LoopModel(actuator, logs, structure, check)
+    parts = windows(logs, whole.per_output)
+    free = free_list(actuator, logs, structure, first_values(whole))
+    model = LoopModel(actuator, parts, structure, check)
+    objective = Objective(model, free)
+    points = solve(
+        objective, cloud(free, model, _STARTS, seed), rounds=14, keep=_KEEP,
+        advance=lambda f: advance(0.6 * f),
+    )  # fmt: skip
+    for _ in range(2):
+        objective.refresh(points[0].x)
+        points = solve(objective, np.array([point.x for point in points[:2]]), rounds=6)
+    best = points[0].x
+    advance(0.7)
+    score, runs = _held_out(model, free, best)
+    advance(1.0)
+    return Searched(structure, tuple(free), best, score, model.runs + runs)
+
+
+def _folds(parts: Sequence[LoopLog]) -> list[tuple[list[LoopLog], list[LoopLog]]]:
+    """Pairs of windows kept and left out: one log left out, or of a single one every other."""
+    names = list(dict.fromkeys(part.name for part in parts))
+    if len(names) > 1:
+        return [
+            ([p for p in parts if p.name != name], [p for p in parts if p.name == name])
+            for name in names
+        ]
+    if len(parts) > 1:
+        return [(list(parts[::2]), list(parts[1::2])), (list(parts[1::2]), list(parts[::2]))]
+    log = parts[0]
+    early = log.time < 0.5 * log.duration
+    return [([log.restricted(early)], [log.restricted(~early)])]
+
+
+def _held_out(searched: LoopModel, free: Sequence[Free], x: Floats) -> tuple[float, int]:
+    """Log-likelihood of each window under values fitted to the others, and the runs it took."""
+    total, runs = 0.0, 0
+    for inside, outside in _folds(searched.logs):
+        model, other = (
+            LoopModel(searched.actuator, logs, searched.structure, searched.check)
+            for logs in (inside, outside)
+        )
+        objective = Objective(model, free)
+        objective.refresh(x)
+        point = solve(objective, x[None, :], rounds=5)[0]
+        total += _likelihood(Objective(other, free), point.x)
+        runs += model.runs + other.runs
+    return total, runs
+
+
+def _likelihood(objective: Objective, x: Floats) -> float:
+    """Gaussian log-likelihood of held-out residuals at their own spread, nats.
+
+    The spread is robust (one jump missed by a sample does not decide), and a log counts one
+    independent sample a memory of fixed length, so that structures are compared alike.
+    """
+    total = 0.0
+    shown = objective.runs(x)[0]
+    for k, name in objective.keys:
+        log = objective.model.logs[k]
+        run, mask = shown[k], objective.masks[k, name]
+        if run is None:
+            return -np.inf
+        rest = ((run[name] - log.signals[name])[mask]) / log.sigma(name)
+        typical = float(np.median(np.abs(rest))) + 1e-9
+        spread = float(np.sqrt(np.mean(np.minimum(rest**2, (5.0 * typical) ** 2))))
+        total -= mask.sum() * log.period / _MEMORY * np.log(spread + 1e-4)
+    return float(total)
+
+
+def choose(found: Sequence[Searched]) -> tuple[Searched, str]:
+    """Return the structure that predicts best what was left out, and why, in words."""
+    order = sorted(found, key=lambda item: item.held_out, reverse=True)
+    best = order[0]
+    if len(order) == 1:
+        return best, "as given"
+    gap = best.held_out - order[1].held_out
+    if gap < _DECIDED:
+        return best, (
+            f"not decided: the logs held out are {gap:.1f} nats more likely than with "
+            f"{order[1].structure}"
+        )
+    return best, f"the logs held out are {gap:.0f} nats more likely than with {order[1].structure}"
+
+
+def final_fit(
+    actuator: Actuator,
+    logs: Sequence[LoopLog],
+    chosen: Searched,
+    *,
+    rounds: int = 6,
+    free: Sequence[Free] | None = None,
+    check: Check = lambda: True,
+    advance: Callable[[float], object] = lambda _f: None,
+) -> Fitted:
+    """Fit whole logs from the best point of the search, deviations renewed between rounds."""
+    model = LoopModel(actuator, logs, chosen.structure, check)
+    items = tuple(free) if free is not None else chosen.free
+    start = outer(chosen.free, chosen.x)
+    objective = Objective(model, items)
+    x = np.array([f.inner(min(max(start[f.path], f.low), f.high)) for f in items])
+    for number in range(3):
+        objective.refresh(x)
+        x = solve(objective, x[None, :], rounds=rounds, central=number == 2)[0].x
+        advance((number + 1) / 3)
+    objective.refresh(x)
+    return Fitted(objective, x)

@@ -1,0 +1,168 @@
+"""How well each number is known: colour of residuals, misfit of the model, what is confounded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.calibrate.blocks import block_length
+from elevon.calibrate.closed_loop.fit import Fitted
+from elevon.calibrate.closed_loop.free import Free
+from elevon.calibrate.closed_loop.objective import SOFT, Objective
+from elevon.calibrate.closed_loop.solve import Point, jacobian
+
+__all__ = ["SILENT", "Known", "known"]
+
+Floats = npt.NDArray[np.float64]
+_SHARE = 0.2  # of a logarithm: a deviation above which a number is not determined
+_TENTH = 0.5  # of its meaningful size, for an offset or a delay
+_SILENT = 1.0  # deviations of all residuals together that a whole spread moves
+_TOGETHER = 0.7  # correlation that is named
+_WEIGHTS = (0.25, 4.0)  # of a channel or log against the others: what a misfit would change
+#: Reasons of numbers that the logs do not feel: they stay as given.
+SILENT = ("changes nothing that the logs show", "the logs do not reach this limit")
+_LIMITS = ("control.current_limit", "control.speed_limit", "inverter.supply_voltage")
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of one number.
+
+    Attributes
+    ----------
+    free : Free
+        Which.
+    x : float
+        Fitted variable.
+    std : float
+        Its deviation, in the fitted variable.
+    reason : str
+        Why it is not determined; empty: it is.
+    """
+
+    free: Free
+    x: float
+    std: float
+    reason: str
+
+    @property
+    def value(self) -> float:
+        """SI."""
+        return self.free.outer(self.x)
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation, SI."""
+        return abs(self.free.slope(self.x)) * self.std
+
+    def interval(self, width: float) -> tuple[float, float]:
+        """Return the interval of some deviations' half width, inside the bounds."""
+        low, high = (self.free.outer(self.x + s * width * self.std) for s in (-1.0, 1.0))
+        return max(low, self.free.low), min(high, self.free.high)
+
+
+def known(fitted: Fitted) -> tuple[list[Known], float]:
+    """Return what is known of each number, and the degrees of freedom of the intervals."""
+    objective, x = fitted.objective, fitted.x
+    residual = objective.residual(x[None, :])[0]
+    point = Point(x, residual, objective.cost(residual, x))
+    jac = jacobian(objective, [point], central=True)[0]
+    weight = 1.0 / np.sqrt(1.0 + (residual / SOFT) ** 2)
+    belief = objective.belief**2 * np.eye(len(x))
+    normal = jac.T @ (weight[:, None] * jac) + belief
+    bread = np.linalg.inv(normal)
+    sums = _block_sums(objective, jac, weight * residual)
+    degrees = float(max(len(sums) - len(x), 1))
+    colour = sums.T @ sums * (len(sums) / degrees)
+    covariance = bread @ (colour + belief) @ bread + _misfit(objective, point, jac, weight)
+    strength = np.sqrt(np.einsum("np,n,np->p", jac, weight, jac))
+    return [
+        Known(f, float(x[k]), float(np.sqrt(covariance[k, k])), reason)
+        for k, (f, reason) in enumerate(
+            zip(objective.free, _reasons(objective, x, covariance, strength), strict=True)
+        )
+    ], degrees
+
+
+def _slices(objective: Objective) -> dict[tuple[int, str], slice]:
+    begin, found = 0, {}
+    for key in objective.keys:
+        count = int(objective.masks[key].sum())
+        found[key] = slice(begin, begin + count)
+        begin += count
+    return found
+
+
+def _block_sums(objective: Objective, jac: Floats, weighted: Floats) -> Floats:
+    """Scores of all channels summed over blocks of time longer than any residual's memory."""
+    places = _slices(objective)
+    sums = []
+    for k, log in enumerate(objective.model.logs):
+        keys = [key for key in objective.keys if key[0] == k]
+        memory = max(block_length(weighted[places[key]], log.period) for key in keys)
+        total = np.zeros((int(log.duration / memory) + 1, jac.shape[1]))
+        for key in keys:
+            block = np.floor(log.time[objective.masks[key]] / memory).astype(np.int64)
+            score = jac[places[key]] * weighted[places[key], None]
+            np.add.at(total, block, score)
+        sums.append(total[np.any(total != 0.0, axis=1)])
+    return np.vstack(sums)
+
+
+def _misfit(objective: Objective, point: Point, jac: Floats, weight: Floats) -> Floats:
+    """Spread of the values over other weights of channels and logs, by one step of Newton each.
+
+    A model that is not the machine fits each channel with values of its own; where they agree,
+    weights do not matter.
+    """
+    places = _slices(objective)
+    groups = [[key for key in places if key[1] == name] for name in objective.model.channels]
+    groups += [[key for key in places if key[0] == k] for k in range(len(objective.model.logs))]
+    groups = [group for group in groups if group and len(group) < len(places)]
+    size = jac.shape[1]
+    total = np.zeros((size, size))
+    count = 0
+    for group in groups:
+        for factor in _WEIGHTS:
+            w = weight.copy()
+            for key in group:
+                w[places[key]] *= factor
+            normal = jac.T @ (w[:, None] * jac) + objective.belief**2 * np.eye(size)
+            slope = jac.T @ (w * point.residual) + objective.belief * objective.prior(point.x)
+            moved = -np.linalg.solve(normal, slope)
+            total += np.outer(moved, moved)
+            count += 1
+    return total / max(count, 1)
+
+
+def _reasons(objective: Objective, x: Floats, covariance: Floats, strength: Floats) -> list[str]:
+    """Why each number is not determined; empty where it is."""
+    spread = np.sqrt(np.diag(covariance))
+    together = covariance / np.outer(spread, spread)
+    found = []
+    for k, f in enumerate(objective.free):
+        wide = spread[k] * f.spread > _SHARE if f.log_scale else spread[k] > _TENTH
+        bound = min(x[k] - objective.low[k], objective.high[k] - x[k]) < 1e-6
+        if not wide and not bound:
+            found.append("")
+        elif strength[k] < _SILENT and f.path in _LIMITS:
+            found.append(SILENT[1])
+        elif strength[k] < _SILENT:
+            found.append(SILENT[0])
+        elif bound and f.path != "friction.stick":
+            found.append(f"ends at its bound, {f.outer(float(x[k])):.4g} {f.unit}")
+        else:
+            found.append(_confounded(objective.free, together[k], k, wide))
+    return found
+
+
+def _confounded(free: Sequence[Free], row: Floats, k: int, wide: bool) -> str:
+    order = [j for j in np.argsort(-np.abs(row)) if j != k and abs(row[j]) > _TOGETHER]
+    if not wide:
+        return ""
+    if order:
+        return "changes the logs as " + " and ".join(free[j].path for j in order[:2]) + " would"
+    return "the residuals are larger than its effect"

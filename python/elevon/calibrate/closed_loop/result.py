@@ -1,0 +1,259 @@
+"""Calibration in closed loop: from logs and datasheet numbers to a set with intervals."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elevon.calibrate.closed_loop.fit import Fitted, Searched, choose, final_fit, search
+from elevon.calibrate.closed_loop.free import STICK, STRUCTURES, in_set
+from elevon.calibrate.closed_loop.intervals import SILENT, Known, known
+from elevon.calibrate.closed_loop.log import LoopLog
+from elevon.calibrate.closed_loop.predict import Agreement, errors_of
+from elevon.calibrate.estimate import Estimate, quantile
+from elevon.errors import InputError, Interrupted
+from elevon.progress import Progress
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["Agreement", "LoopCalibration", "agreement", "calibrate_loop"]
+
+#: What scales with the torque constant that the current is read by.
+_SCALED = {
+    "motor.inertia", "friction.dynamic", "friction.static", "friction.viscous", "load.constant",
+    "control.pid_gain", "control.speed_gain",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class LoopCalibration:
+    """The answer.
+
+    Attributes
+    ----------
+    actuator, before : Actuator
+        With the fitted values, and as given.
+    logs : tuple of LoopLog
+        The data.
+    estimates : tuple of Estimate
+        What the logs determine.
+    undetermined : mapping of str to str
+        What they do not, and why.
+    structure : str
+        Of the controller that explains the logs.
+    why : str
+        In words.
+    searched : tuple of Searched
+        Each structure tried.
+    agreement : tuple of Agreement
+        Errors of the fit.
+    shown : mapping of str to float
+        Delays and offsets of the log, and `friction.stick`: what is no parameter of a set.
+    wall_s : float
+        Time it took.
+    """
+
+    actuator: Actuator
+    before: Actuator
+    logs: tuple[LoopLog, ...]
+    estimates: tuple[Estimate, ...]
+    undetermined: Mapping[str, str]
+    structure: str
+    why: str
+    searched: tuple[Searched, ...]
+    agreement: tuple[Agreement, ...]
+    shown: Mapping[str, float]
+    wall_s: float = field(compare=False)
+
+    def __getitem__(self, path: str) -> Estimate:
+        for item in self.estimates:
+            if item.path == path:
+                return item
+        from elevon.errors import unknown
+
+        raise unknown("estimate", path, [item.path for item in self.estimates])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form."""
+        return {
+            "status": "ok",
+            "actuator": self.before.name,
+            "logs": [
+                {"name": log.name, "samples": len(log.time), "rate_hz": 1.0 / log.period}
+                for log in self.logs
+            ],
+            "parameters": {item.path: item.to_dict() for item in self.estimates},
+            "undetermined": dict(self.undetermined),
+            "structure": {
+                "chosen": self.structure,
+                "why": self.why,
+                "held_out": {item.structure: item.held_out for item in self.searched},
+            },
+            "agreement": [item.to_dict() for item in self.agreement],
+            "wall_s": self.wall_s,
+        }
+
+
+def calibrate_loop(
+    logs: Sequence[LoopLog],
+    actuator: Actuator,
+    *,
+    structure: str | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> LoopCalibration:
+    """Estimate what recorded demands and whatever was shown of the motion determine.
+
+    Parameters
+    ----------
+    logs : sequence of LoopLog
+        Demands and channels on one clock each.
+    actuator : Actuator
+        A servo with the numbers of its datasheets; what they do not say is a first guess.
+    structure : str, optional
+        ``cascade`` or ``pid``; default: whichever predicts held-out data better.
+    seed : int
+        Of the search's starts.
+    progress : callable, optional
+        Told the done fraction; returns False to stop.
+
+    Raises
+    ------
+    InputError
+        No log, an actuator that is no servo, or nothing determined.
+    Interrupted
+        `progress` returned False.
+    """
+    begin = clock.perf_counter()
+    _check(logs, actuator, structure)
+    say = _Reporter(progress)
+    tried = [structure] if structure else list(STRUCTURES)
+    each = 0.6 / len(tried)
+    searched = []
+    for k, name in enumerate(tried):
+
+        def share(fraction: float, k: int = k) -> None:
+            say(each * (k + fraction))
+
+        searched.append(search(actuator, logs, name, seed=seed, check=say.go, advance=share))
+    chosen, why = choose(searched)
+    fitted = final_fit(actuator, logs, chosen, check=say.go, advance=lambda f: say(0.6 + 0.35 * f))
+    rows, degrees = known(fitted)
+    estimates, missing = _estimates(rows, degrees, actuator)
+    if not estimates:
+        raise InputError("the logs determine no parameter: nothing in them moves enough")
+    say(1.0)
+    return LoopCalibration(
+        actuator=_with(actuator, fitted, chosen.structure, missing),
+        before=actuator,
+        logs=tuple(logs),
+        estimates=tuple(estimates),
+        undetermined=missing,
+        structure=chosen.structure,
+        why=why,
+        searched=tuple(searched),
+        agreement=tuple(agreement(fitted)),
+        shown={p: v for p, v in fitted.values.items() if not in_set(p) or p == STICK},
+        wall_s=clock.perf_counter() - begin,
+    )
+
+
+class _Reporter:
+    """Progress that can be asked whether to go on."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self.progress = progress
+        self.fraction = 0.0
+
+    def __call__(self, fraction: float) -> None:
+        self.fraction = max(self.fraction, fraction)
+        if not self.go():
+            raise Interrupted("calibration stopped")
+
+    def go(self) -> bool:
+        return self.progress is None or self.progress(self.fraction) is not False
+
+
+def _check(logs: Sequence[LoopLog], actuator: Actuator, structure: str | None) -> None:
+    from elevon.errors import unknown
+    from elevon.parameters.records import records
+
+    if not logs:
+        raise InputError("calibration needs at least one log")
+    if "control.pid_gain" not in records(actuator.wiring):
+        raise InputError(f"{actuator.name}: the wiring {actuator.wiring!r} has no servo's loop")
+    if structure is not None and structure not in STRUCTURES:
+        raise unknown("structure", structure, STRUCTURES)
+
+
+def _estimates(
+    rows: Sequence[Known], degrees: float, actuator: Actuator
+) -> tuple[list[Estimate], dict[str, str]]:
+    width = quantile(degrees)
+    found, missing = [], {}
+    by_path = {row.free.path: row for row in rows}
+    for row in rows:
+        path = row.free.path
+        if row.reason:
+            missing[path if path != STICK else "friction.static"] = row.reason
+            continue
+        seen = row
+        if path == STICK:
+            seen = _static(row, by_path["friction.dynamic"])
+            path = "friction.static"
+        old = actuator.parameters.value(path) if in_set(path) else None
+        found.append(
+            Estimate(
+                path=path, value=seen.value, std=seen.deviation, interval=seen.interval(width),
+                unit=row.free.unit, register=row.free.register, old=old, method="simulation",
+                given=("control.torque_constant",) if path in _SCALED else (),
+                in_set=in_set(path),
+            )
+        )  # fmt: skip
+    return found, missing
+
+
+def _static(stick: Known, dynamic: Known) -> Known:
+    """Static friction from its share of the dynamic one; their deviations add."""
+    from dataclasses import replace
+
+    spread = stick.free.spread
+    std = float(np.hypot(stick.std * spread, dynamic.std * dynamic.free.spread)) / spread
+    free = replace(dynamic.free, path="friction.static", spread=spread, low=dynamic.free.low)
+    return Known(free, free.inner(stick.value * dynamic.value), std, "")
+
+
+def _with(
+    actuator: Actuator, fitted: Fitted, structure: str, missing: Mapping[str, str]
+) -> Actuator:
+    """Fitted values; what the logs do not feel stays as given."""
+    values: dict[str, str | float] = {"control.structure": structure}
+    for path, value in fitted.values.items():
+        silent = missing.get(path, "") in SILENT
+        if path == STICK:
+            values["friction.static"] = value * fitted.values["friction.dynamic"]
+        elif in_set(path) and not (silent and path not in _loops(structure)):
+            values[path] = value
+    return actuator.with_values(values, source="calibration")
+
+
+def _loops(structure: str) -> tuple[str, ...]:
+    """What has no meaning as it was given."""
+    return ("control.speed_limit",) if structure == "cascade" else ()
+
+
+def agreement(fitted: Fitted) -> list[Agreement]:
+    """Return the RMS errors of a fit by log and channel."""
+    model = fitted.objective.model
+    shown = fitted.objective.runs(fitted.x)[0]
+    return [
+        row
+        for log, run in zip(model.logs, shown, strict=True)
+        if run is not None
+        for row in errors_of(log, run)
+    ]
