@@ -1,0 +1,169 @@
+"""Calibration in closed loop, on a linear actuator that is not in the project."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from elevon.calibrate.closed_loop import LoopLog, calibrate_loop, predict
+from elevon.calibrate.closed_loop.fit import Searched, choose
+from elevon.errors import InputError, UnknownNameError
+from tests.calibrate.linear import Linear, Logger, draw, log, square, sweep
+from tests.calibrate.linear_set import datasheet, loop, truth
+
+#: What a fit by hand reached: position and speed in shares of the range, current of the RMS.
+BAR = {"position": 0.008, "speed": 0.03, "current": 0.18}
+SQUARES_FROM_SWEEP = {"position": 0.009, "speed": 0.026, "current": 0.25}
+SWEEP_FROM_SQUARES = {"position": 0.03, "speed": 0.06, "current": 0.35}
+PID = Linear(weight=60.0, reverse=1.2)
+CASCADE = replace(PID, cascade=1.0, gain=12.0, integral=0.15, derivative=0.03)
+
+
+def errors(rows):
+    """Share by log and channel: of the range, of the current's RMS."""
+    return {
+        (row.log, row.channel): row.of_rms if row.channel == "current" else row.of_range
+        for row in rows
+    }
+
+
+def above(rows, bar):
+    return {key: value for key, value in errors(rows).items() if value > bar[key[1]]}
+
+
+def both(bench, seed=0, **logger):
+    made = Logger(**logger)
+    return [
+        loop("square", log(bench, square, 25.0, made, seed), magnitude=made.magnitude),
+        loop("sweep", log(bench, sweep, 41.0, made, seed + 1), magnitude=made.magnitude),
+    ]
+
+
+def table(command):
+    time = 0.01 * np.arange(len(command))
+    return LoopLog("log", time, command, {"position": command})
+
+
+def test_a_step_of_the_demand_stays_a_step_and_a_slope_a_slope():
+    time = 0.01 * np.arange(200)
+    stepped = table(np.where(time < 1.0, 0.0, 0.03))
+    assert np.interp(0.9985, *stepped.table) == 0.0
+    fast = table(0.012 * np.sin(2 * np.pi * 1.6 * time))
+    assert len(fast.table[0]) == len(time)
+
+
+def test_what_cannot_be_a_log_is_refused():
+    time = 0.01 * np.arange(100)
+    wave = np.sin(time)
+    for bad, said in (
+        ((time[:20], wave[:20], {"position": wave[:20]}), "at least 50"),
+        ((time[::-1], wave, {"position": wave}), "increase"),
+        ((time, wave, {}), "nothing of the motion"),
+        ((time, 0.0 * wave, {"position": wave}), "never changes"),
+    ):
+        with pytest.raises(InputError, match=said):
+            LoopLog("log", *bad)
+    with pytest.raises(UnknownNameError, match="position"):
+        LoopLog("log", time, wave, {"postion": wave})
+
+
+def test_the_structure_is_chosen_by_what_it_predicts():
+    one, other = (Searched(name, (), np.zeros(0), score, 1) for name, score in
+                  (("cascade", 10.0), ("pid", 40.0)))  # fmt: skip
+    chosen, why = choose([one, other])
+    assert chosen.structure == "pid"
+    assert "30 nats" in why
+    assert "not decided" in choose([one, replace(other, held_out=11.0)])[1]
+
+
+@pytest.fixture(scope="module")
+def short():
+    """One log of 14 s under a known structure: what the unit suite can afford."""
+    data = loop("square", log(PID, square, 12.0))
+    return data, calibrate_loop([data], datasheet(PID), structure="pid")
+
+
+def test_a_short_log_of_square_waves_alone(short):
+    _, result = short
+    assert above(result.agreement, BAR) == {}
+    true = truth(PID)
+    for path in ("control.pid_gain", "control.pid_derivative_time", "motor.inertia"):
+        assert result[path].value == pytest.approx(true[path], rel=0.15), path
+    document = result.to_dict()
+    entry = document["parameters"]["control.pid_gain"]
+    assert entry["low"] < entry["value"] < entry["high"]
+
+
+def test_everything_is_determined_or_listed_with_a_reason(short):
+    _, result = short
+    determined = {item.path for item in result.estimates}
+    assert not determined & result.undetermined.keys()
+    assert all(result.undetermined.values())
+    for path in ("motor.inertia", "friction.dynamic", "friction.static", "friction.reverse_scale",
+                 "load.constant", "control.current_limit", "inverter.supply_voltage"):  # fmt: skip
+        assert path in determined | result.undetermined.keys()
+
+
+def test_the_calibrated_servo_predicts_its_own_log(short):
+    data, result = short
+    rows, traces = predict([data], result.actuator, result.shown)
+    assert above(rows, BAR) == {}
+    assert traces[0]["position"].shape == data.time.shape
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("bench", "structure"), [(PID, "pid"), (CASCADE, "cascade")])
+def test_the_bar_of_a_fit_by_hand(bench, structure):
+    data = both(bench)
+    result = calibrate_loop(data, datasheet(bench))
+    assert result.structure == structure, result.why
+    assert above(result.agreement, BAR) == {}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("bench", [PID, CASCADE])
+@pytest.mark.parametrize(("fitted", "bar"), [(1, SQUARES_FROM_SWEEP), (0, SWEEP_FROM_SQUARES)])
+def test_one_kind_of_test_predicts_the_other(bench, fitted, bar):
+    data = both(bench)
+    result = calibrate_loop([data[fitted]], datasheet(bench))
+    rows, _ = predict([data[1 - fitted]], result.actuator, result.shown)
+    assert above(rows, bar) == {}
+
+
+@pytest.mark.long
+def test_logs_of_fewer_channels():
+    """Position alone; a current without its sign; 50 Hz."""
+    data = both(PID, magnitude=True)
+    unsigned = calibrate_loop(data, datasheet(PID), structure="pid")
+    assert above(unsigned.agreement, {**BAR, "current": 0.35}) == {}
+    alone = [replace(item, signals={"position": item.signals["position"]}) for item in data]
+    slow = [
+        LoopLog(
+            item.name,
+            item.time[::2],
+            item.command[::2],
+            {"position": item.signals["position"][::2]},
+        )
+        for item in alone
+    ]
+    result = calibrate_loop(slow, datasheet(PID), structure="pid")
+    assert above(result.agreement, BAR) == {}
+    assert "control.current_limit" not in {item.path for item in result.estimates}
+
+
+@pytest.mark.long
+def test_twelve_benches_and_their_intervals():
+    """Medians within 5 %, and 90 % intervals that hold 70 to 99 % of the truths: the plant has a
+    friction and a sampled drive that the model has not."""
+    off, hits = {}, []
+    for seed in range(12):
+        bench = draw(seed)
+        result = calibrate_loop(both(bench, seed), datasheet(bench), structure="pid")
+        known = {item.path: item for item in result.estimates}
+        for path, value in truth(bench).items():
+            if path in known:
+                low, high = known[path].interval
+                off.setdefault(path, []).append(abs(known[path].value / value - 1.0))
+                hits.append(low <= value <= high)
+    assert {path: np.median(e) for path, e in off.items() if np.median(e) > 0.05} == {}
+    assert 0.7 <= np.mean(hits) <= 0.99
