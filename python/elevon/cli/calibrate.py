@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from elevon.cli.calibrate_drops import is_drop_table, run_drops
+from elevon.cli.closed_loop import calibrate_closed_loop, read_loop_logs
 from elevon.cli.common import (
     ForceOption,
     JsonOption,
@@ -95,6 +96,27 @@ def read(
     return found
 
 
+def direct_logs(
+    model: Actuator,
+    logs: list[Path],
+    loadcell: list[Path] | None,
+    command: list[Path] | None,
+    column_map: Path | None,
+) -> list[BenchLog] | None:
+    """Return logs whose signals allow direct estimates; None where the closed loop must serve."""
+    if model.wiring != "rotary":
+        return None
+    try:
+        return read(logs, loadcell, command, column_map)
+    except InputError as error:
+        try:
+            read_loop_logs(logs, column_map)
+        except InputError:
+            raise error from None
+        say(f"in closed loop, since {error}")
+        return None
+
+
 @app.command()
 def calibrate(
     logs: LogsArgument,
@@ -127,7 +149,12 @@ def calibrate(
     model = read_actuator(actuator, settings)
     if len(logs) == 1 and is_drop_table(logs[0]):
         return _drops(logs[0], model, out, as_json=json, force=force)
-    data = read(logs, loadcell, command, column_map)
+    data = direct_logs(model, logs, loadcell, command, column_map)
+    if data is None:
+        if free is not None and _paths(free) is not None:
+            raise InputError("--free: in closed loop everything is freed and ranked; leave it out")
+        few = read_loop_logs(logs, column_map)
+        return calibrate_closed_loop(few, model, out, as_json=json, force=force)
     with progress_bar("calibrating") as advance:
         result = run(
             data,

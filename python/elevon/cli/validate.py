@@ -15,8 +15,9 @@ from elevon.cli.calibrate import (
     ReportOption,
     TransientOption,
     _provenance,
-    read,
+    direct_logs,
 )
+from elevon.cli.closed_loop import read_loop_logs, validate_closed_loop
 from elevon.cli.common import (
     ForceOption,
     JsonOption,
@@ -53,10 +54,13 @@ def validate(
 
     check_outputs([report], force=force)
     model = read_actuator(actuator, settings)
-    data = read(logs, loadcell, command, column_map)
-    with progress_bar("validating") as advance:
-        result = run(data, model, fidelity=fidelity, transient=transient, progress=advance)
-        advance(1.0)
+    data = direct_logs(model, logs, loadcell, command, column_map)
+    if data is None:
+        result = validate_closed_loop(read_loop_logs(logs, column_map), model, transient)
+    else:
+        with progress_bar("validating") as advance:
+            result = run(data, model, fidelity=fidelity, transient=transient, progress=advance)
+            advance(1.0)
     if report is not None:
         page = validation_report(result, provenance=_provenance(), date=date)
         say(f"report: {page.save(report, force=force)}")

@@ -11,6 +11,7 @@ import numpy as np
 
 from elevon.calibrate.closed_loop.fit import Fitted, Searched, choose, final_fit, search
 from elevon.calibrate.closed_loop.free import STICK, STRUCTURES, in_set
+from elevon.calibrate.closed_loop.held_out import held_out_errors
 from elevon.calibrate.closed_loop.intervals import SILENT, Known, known
 from elevon.calibrate.closed_loop.log import LoopLog
 from elevon.calibrate.closed_loop.predict import Agreement, errors_of
@@ -20,6 +21,7 @@ from elevon.progress import Progress
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
+    from elevon.calibrate.validation import Validation
 
 __all__ = ["Agreement", "LoopCalibration", "agreement", "calibrate_loop"]
 
@@ -54,6 +56,8 @@ class LoopCalibration:
         Errors of the fit.
     shown : mapping of str to float
         Delays and offsets of the log, and `friction.stick`: what is no parameter of a set.
+    held_out : Validation
+        Errors of each log under values fitted to the others.
     wall_s : float
         Time it took.
     """
@@ -68,6 +72,7 @@ class LoopCalibration:
     searched: tuple[Searched, ...]
     agreement: tuple[Agreement, ...]
     shown: Mapping[str, float]
+    held_out: Validation
     wall_s: float = field(compare=False)
 
     def __getitem__(self, path: str) -> Estimate:
@@ -95,6 +100,7 @@ class LoopCalibration:
                 "held_out": {item.structure: item.held_out for item in self.searched},
             },
             "agreement": [item.to_dict() for item in self.agreement],
+            "held_out": [item.to_dict() for item in self.held_out.errors],
             "wall_s": self.wall_s,
         }
 
@@ -144,6 +150,7 @@ def calibrate_loop(
     chosen, why = choose(searched)
     fitted = final_fit(actuator, logs, chosen, check=say.go, advance=lambda f: say(0.6 + 0.35 * f))
     rows, degrees = known(fitted)
+    held = held_out_errors(fitted)
     estimates, missing = _estimates(rows, degrees, actuator)
     if not estimates:
         raise InputError("the logs determine no parameter: nothing in them moves enough")
@@ -159,6 +166,7 @@ def calibrate_loop(
         searched=tuple(searched),
         agreement=tuple(agreement(fitted)),
         shown={p: v for p, v in fitted.values.items() if not in_set(p) or p == STICK},
+        held_out=held,
         wall_s=clock.perf_counter() - begin,
     )
 

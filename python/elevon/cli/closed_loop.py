@@ -1,0 +1,101 @@
+"""`elevon calibrate` and `elevon validate` on logs with few channels: in closed loop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from elevon.cli.output import print_json, print_table, progress_bar, say
+from elevon.errors import FormatError, InputError
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.calibrate.closed_loop import LoopCalibration, LoopLog
+    from elevon.calibrate.validation import Validation
+    from elevon.recording import Recording
+
+__all__ = ["calibrate_closed_loop", "read_loop_logs", "validate_closed_loop"]
+
+
+def read_loop_logs(paths: Sequence[Path], column_map: Path | None) -> list[LoopLog]:
+    """Read recordings, or logs through a column map, by the roles of their channels."""
+    from elevon.calibrate.closed_loop import loop_log
+
+    return [loop_log(_recording(path, column_map), path.name) for path in paths]
+
+
+def _recording(path: Path, column_map: Path | None) -> Recording:
+    from elevon.logs.importing import import_log
+    from elevon.recording import Recording
+
+    if column_map is None:
+        try:
+            return Recording.load(path)
+        except (FormatError, InputError):
+            pass
+    return import_log(path, column_map=column_map).recording
+
+
+def calibrate_closed_loop(
+    logs: Sequence[LoopLog],
+    model: Actuator,
+    out: Path | None,
+    *,
+    as_json: bool,
+    force: bool,
+) -> int:
+    """Calibrate, write the set with thresholds from held-out data, print."""
+    from elevon.calibrate.closed_loop import calibrate_loop
+    from elevon.calibrate.closed_loop.held_out import validate_loop
+    from elevon.calibrate.write import write_calibration
+
+    with progress_bar("calibrating in closed loop") as advance:
+        result = calibrate_loop(logs, model, progress=advance)
+        advance(1.0)
+    if out is not None:
+        say(f"set: {write_calibration(out, result, validation=result.held_out, force=force)}")
+    after = validate_loop(logs, result.actuator)
+    if as_json:
+        document = result.to_dict()
+        document["out"] = None if out is None else str(out)
+        document["validation"] = {"before": None, "after": after.to_dict()}
+        print_json(document)
+        return 0
+    _print(result, after)
+    return 0
+
+
+def _print(result: LoopCalibration, after: Validation) -> None:
+    say(f"controller: {result.structure} ({result.why})")
+    print_table(
+        ("parameter", "before", "after", "low", "high", "unit", "holds for"),
+        [
+            (
+                item.path,
+                "" if item.old is None else f"{item.old:.5g}",
+                f"{item.value:.5g}",
+                f"{item.interval[0]:.5g}",
+                f"{item.interval[1]:.5g}",
+                item.unit,
+                ", ".join(item.given),
+            )
+            for item in result.estimates
+        ],
+    )
+    for path, reason in result.undetermined.items():
+        say(f"{path} is not determined: {reason}")
+    for error in after.errors:
+        say(
+            f"{error.log}: {error.signal} within {error.of_range:.2g} % of its range, "
+            f"{error.of_rms:.3g} % of its RMS"
+        )
+
+
+def validate_closed_loop(
+    logs: Sequence[LoopLog], model: Actuator, transient: float | None
+) -> Validation:
+    """Hold a set against logs; the set's thresholds judge."""
+    from elevon.calibrate.closed_loop.held_out import validate_loop
+
+    return validate_loop(logs, model, transient)
