@@ -17,6 +17,7 @@ from elevon.parameters.write import updated_set
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.calibrate.calibration import Calibration
+    from elevon.calibrate.closed_loop import LoopCalibration
     from elevon.calibrate.validation import Validation
 
 __all__ = ["calibrated_parameters", "set_text", "thresholds", "write_calibration", "write_values"]
@@ -24,8 +25,9 @@ __all__ = ["calibrated_parameters", "set_text", "thresholds", "write_calibration
 _MARGIN = 2.0  # a threshold over the largest error seen on the logs it comes from
 
 
-def calibrated_parameters(result: Calibration) -> list[Parameter]:
+def calibrated_parameters(result: Calibration | LoopCalibration) -> list[Parameter]:
     """Return the changed parameters with source, old value and interval."""
+    reasons = getattr(result, "undetermined", {})
     names = ", ".join(log.name for log in result.logs)
     source = f"calibrated from {names}"
     known = {item.path: item for item in result.estimates if item.in_set}
@@ -43,7 +45,7 @@ def calibrated_parameters(result: Calibration) -> list[Parameter]:
             changes.append(Parameter(path, entry.value, unit, source_before, "", "assumed"))
             continue
         if item is None:
-            note = _followed(path)
+            note = f"not determined: {reasons[path]}" if path in reasons else _followed(path)
             changes.append(
                 Parameter(path, entry.value, unit, source, note, "calibrated", old.value)
             )
@@ -66,6 +68,7 @@ def _followed(path: str) -> str:
         "friction.static": "not determined: its ratio to friction.dynamic is kept",
         "control.torque_constant": "the controller is taken to know the motor, as before",
         "drive.kind": "the kind of drive whose model explains the logs better",
+        "control.structure": "the structure that predicts held-out data better",
     }
     return reasons.get(path, "scaled with motor.inertia: only the sum is determined")
 
@@ -84,7 +87,9 @@ def _up(value: float) -> float:
     return float(f"{math.ceil(value / unit) * unit:.6g}")
 
 
-def set_text(result: Calibration, *, name: str, base: str, validation: Validation | None) -> str:
+def set_text(
+    result: Calibration | LoopCalibration, *, name: str, base: str, validation: Validation | None
+) -> str:
     """Return the TOML text of the calibrated set."""
     import tomlkit
 
@@ -112,7 +117,7 @@ def set_text(result: Calibration, *, name: str, base: str, validation: Validatio
 
 def write_calibration(
     path: str | os.PathLike[str],
-    result: Calibration,
+    result: Calibration | LoopCalibration,
     *,
     validation: Validation | None = None,
     force: bool = False,

@@ -129,10 +129,17 @@ def _errors(trace: Trace, limits: Mapping[str, float], wiring: str) -> list[Sign
         unit = "rad/s" if name == "motor_speed" else unit
         found.append(
             SignalError(
-                trace.log, name, unit, rms, most, *(100.0 * _over(rms, x) for x in (about, span)),
-                100.0 * _over(most, span), limits.get(name),
+                trace.log,
+                name,
+                unit,
+                rms,
+                most,
+                100.0 * _over(rms, about),
+                100.0 * _over(rms, span),
+                100.0 * _over(most, span),
+                limits.get(name),
             )
-        )  # fmt: skip
+        )
     return found
 
 
