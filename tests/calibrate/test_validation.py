@@ -5,9 +5,10 @@ import pytest
 
 from elevon import Actuator
 from elevon.calibrate import calibrate, read_logs, validate
+from elevon.calibrate.promise import held_out_agreement, outliers, thresholds
 from elevon.calibrate.report import calibration_report, validation_report
-from elevon.calibrate.validation import SIGNALS
-from elevon.calibrate.write import thresholds, write_calibration
+from elevon.calibrate.validation import SIGNALS, SignalError, Validation
+from elevon.calibrate.write import write_calibration
 from elevon.errors import InputError, UnknownNameError
 from tests.calibrate.bench import write_logs
 
@@ -99,3 +100,29 @@ def test_names_of_logs_are_escaped(truth, tmp_path, before):
     html = validation_report(validate(data, before)).html()
     assert "<img" not in html
     assert "&lt;img" in html
+
+
+def judged(errors):
+    """A validation of logs a, b, c with these errors of the speed, in percent of its range."""
+    rows = tuple(
+        SignalError(name, "motor_speed", "rad/s", 1.0, 1.0, 1.0, error, 1.0, None)
+        for name, error in zip("abc", errors, strict=False)
+    )
+    return Validation("set", "low", 1.0, rows, {}, ())
+
+
+def test_a_log_that_fits_badly_does_not_widen_the_thresholds():
+    assert thresholds(judged([0.5, 0.6, 3.9])) == {"motor_speed": 1.2}
+    assert outliers(judged([0.5, 0.6, 3.9])) == ["c"]
+    assert outliers(judged([0.5, 3.9])) == []
+    assert thresholds(judged([0.5, 1.0, 1.2])) == {"motor_speed": 2.4}
+
+
+@pytest.mark.long
+def test_thresholds_come_from_logs_held_out(logs, result, before):
+    after = validate(logs, result.actuator)
+    held = held_out_agreement(logs, before, None, after)
+    assert {row.log for row in held.errors} <= {log.name for log in logs}
+    pairs = {(row.log, row.signal): row.of_range for row in after.errors}
+    worse = [row.of_range >= 0.9 * pairs[row.log, row.signal] for row in held.errors]
+    assert np.mean(worse) > 0.7

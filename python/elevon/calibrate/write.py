@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from elevon.calibrate.estimate import LEVEL, Estimate
+from elevon.calibrate.promise import thresholds
 from elevon.files import write_text
 from elevon.parameters import Parameter
 from elevon.parameters.records import record_of
@@ -20,9 +20,7 @@ if TYPE_CHECKING:
     from elevon.calibrate.closed_loop import LoopCalibration
     from elevon.calibrate.validation import Validation
 
-__all__ = ["calibrated_parameters", "set_text", "thresholds", "write_calibration", "write_values"]
-
-_MARGIN = 2.0  # a threshold over the largest error seen on the logs it comes from
+__all__ = ["calibrated_parameters", "set_text", "write_calibration", "write_values"]
 
 
 def calibrated_parameters(result: Calibration | LoopCalibration) -> list[Parameter]:
@@ -73,20 +71,6 @@ def _followed(path: str) -> str:
     return reasons.get(path, "scaled with motor.inertia: only the sum is determined")
 
 
-def thresholds(validation: Validation) -> dict[str, float]:
-    """Return twice the largest error of each signal over the logs, two digits, rounded up."""
-    found: dict[str, float] = {}
-    for error in validation.errors:
-        if math.isfinite(error.of_range) and error.log not in validation.notes:
-            found[error.signal] = max(found.get(error.signal, 0.0), _MARGIN * error.of_range)
-    return {name: _up(value) for name, value in found.items() if value > 0.0}
-
-
-def _up(value: float) -> float:
-    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
-    return float(f"{math.ceil(value / unit) * unit:.6g}")
-
-
 def set_text(
     result: Calibration | LoopCalibration, *, name: str, base: str, validation: Validation | None
 ) -> str:
@@ -131,7 +115,7 @@ def write_calibration(
     result : Calibration
         What was found.
     validation : Validation, optional
-        On the same logs: gives the set its thresholds.
+        On data held out of the fit, where there are any: gives the set its thresholds.
     force : bool
         Whether an existing file may be replaced.
     """

@@ -165,9 +165,11 @@ def calibrate(
             progress=lambda f: advance(0.9 * f),
         )
         before, after = _agreement(data, result, transient)
+        advance(0.95)
+        promise = after if out is None or after is None else _promise(data, model, free, after)
         advance(1.0)
     if out is not None:
-        say(f"set: {write_calibration(out, result, validation=after, force=force)}")
+        say(f"set: {write_calibration(out, result, validation=promise, force=force)}")
     if report is not None:
         page = _page(result, before, after, date)
         say(f"report: {page.save(report, force=force)}")
@@ -222,6 +224,21 @@ def _agreement(
     except InputError as error:
         say(f"the closed loop is not compared: {error}")
         return None, None
+
+
+def _promise(
+    data: list[BenchLog], model: Actuator, free: list[str] | None, after: Validation
+) -> Validation:
+    """What the thresholds come from: logs held out, or where there is one log, that log."""
+    from elevon.calibrate.promise import held_out_agreement, outliers
+
+    held = held_out_agreement(data, model, _paths(free), after)
+    if held is None:
+        say("thresholds: from the fit itself, since no log could be held out")
+        return after
+    for name in outliers(held):
+        say(f"{name}: predicted far worse than the other logs; the thresholds leave it out")
+    return held
 
 
 def _page(
