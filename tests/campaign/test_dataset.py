@@ -13,6 +13,7 @@ from elevon.campaign.export import identifiers, run_numbers
 from elevon.cli import main
 from elevon.errors import InputError
 
+HEAD = 'runs_per_file = 4\nrecord = "user_position,motor_speed@400 Hz"'
 TAIL = """
 [[case]]
 name = "healthy"
@@ -37,7 +38,7 @@ def made(tmp_path_factory):
     from tests.campaign.conftest import PLAN, VARY
 
     folder = tmp_path_factory.mktemp("made")
-    text = PLAN.format(vary=VARY.format(count=3), head="runs_per_file = 4", tail=TAIL, terms="")
+    text = PLAN.format(vary=VARY.format(count=3), head=HEAD, tail=TAIL, terms="")
     (folder / "plan.toml").write_text(text)
     assert main(["campaign", "run", str(folder / "plan.toml"), "--out", str(folder / "set")]) == 0
     return folder / "set"

@@ -17,7 +17,7 @@ from elevon.record_plan import ClockPlan
 from elevon.scenario.compile import signal_records
 from elevon.simulate.batch import simulate_prepared
 from elevon.simulate.prepare import Prepared
-from elevon.worklog import LOCK, Item, digest
+from elevon.worklog import Item, digest
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 __all__ = ["block_name", "finish_block", "run_block", "simulate_block", "write_table"]
 
 Result = Mapping[str, Any]
+
+#: What tells that a folder is a campaign's still.
+_SIGN = "manifest.json"
 
 #: Rows of a row group: reading one run reads no more than some of these.
 _GROUP = 32_768
@@ -130,7 +133,7 @@ def write_block(
 
 def check_there(folder: Path) -> None:
     """Raise `OutputError` when a campaign's folder has gone: writing would make half a new one."""
-    if not (folder / LOCK).is_file():
+    if not (folder / _SIGN).is_file():
         raise OutputError(
             f"{folder}: the folder has gone since the campaign began; nothing more is written"
         )

@@ -64,6 +64,8 @@ def export(
         A file exists already or cannot be written.
     """
     suffix = check_ending(f"x.{ending}")
+    if not ds.clocks:
+        raise InputError(f"{ds.folder}: holds no signals, features only; read features/*.parquet")
     numbers = list(range(len(ds))) if runs is None else list(runs)
     table = out / f"runs{suffix}"
     check_output(table, force=force)
