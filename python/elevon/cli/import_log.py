@@ -25,11 +25,15 @@ def import_(
     *,
     logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Log files.")],
     out: Annotated[
-        Path,
+        Path | None,
         typer.Option(
             help="Recording to write (.parquet, .nc, .mat, .csv); a folder for several logs."
         ),
-    ],
+    ] = None,
+    guess: Annotated[
+        Path | None,
+        typer.Option(help="Write a first column map (TOML) of one log, to be corrected."),
+    ] = None,
     log_format: Annotated[
         str,
         typer.Option(
@@ -37,7 +41,10 @@ def import_(
             help="auto, drive, csv, parquet, netcdf, mat, recording or cranfield.",
         ),
     ] = "auto",
-    column_map: Annotated[Path | None, typer.Option("--map", help="Column map (TOML).")] = None,
+    column_map: Annotated[
+        Path | None,
+        typer.Option("--map", help="Column map (TOML), or torino, cranfield, pisa."),
+    ] = None,
     loadcell: Annotated[
         list[Path] | None, typer.Option(help="Load-cell file; one for each log, in their order.")
     ] = None,
@@ -46,7 +53,7 @@ def import_(
         typer.Option(help="Command note (TOML or JSON); one for each log, or one for all."),
     ] = None,
     gear_ratio: Annotated[
-        float | None, typer.Option(help="Fast over slow shaft; 124 unless the map says it.")
+        float | None, typer.Option(help="Motor over output, unless the map says it.")
     ] = None,
     sidecars: Annotated[
         bool, typer.Option(help="Look for NAME_loadcell.csv and NAME_command.json beside a log.")
@@ -60,6 +67,10 @@ def import_(
 
     if log_format not in FORMATS:
         raise unknown("format", log_format, FORMATS, "--format")
+    if guess is not None:
+        return _guess(logs, guess, out, log_format=log_format, force=force, json=json)
+    if out is None:
+        raise InputError("--out is missing: a recording to write; or --guess, a first column map")
     if log_format == "cranfield":
         return _cranfield(logs, out, force=force, json=json)
     logs = without_companions(logs) if sidecars else logs
@@ -78,6 +89,37 @@ def import_(
     else:
         for log, target in zip(imported, targets, strict=True):
             _show(log.report, target)
+    return 0
+
+
+def _guess(
+    logs: list[Path], target: Path, out: Path | None, *, log_format: str, force: bool, json: bool
+) -> int:
+    """Write a first column map, and say why every column is what it is."""
+    from elevon.files import check_output, write_text
+    from elevon.logs.formats.detect import read_table
+    from elevon.logs.maps.guess import guess_map
+    from elevon.logs.maps.guess_write import guess_text
+
+    if len(logs) != 1 or out is not None:
+        raise InputError("--guess writes the map of one log, and no recording")
+    check_output(target, force=force)
+    guess = guess_map(read_table(logs[0], log_format))
+    write_text(target, guess_text(guess), force=force)
+    if json:
+        print_json(
+            {
+                "status": "ok",
+                "log": str(logs[0]),
+                "map": str(target),
+                "gear_ratio": guess.gear_ratio,
+                "travel_per_turn_m": guess.travel_per_turn,
+                "columns": [item.to_dict() for item in guess.columns],
+            }
+        )
+    else:
+        rows = [(c.name, c.role or "?", c.unit, "; ".join(c.reasons)) for c in guess.columns]
+        print_table(("column", "role", "unit", "why"), rows, title=f"{logs[0]} -> {target}")
     return 0
 
 

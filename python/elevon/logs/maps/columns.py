@@ -10,7 +10,7 @@ from elevon.logs.formats.limits import quoted
 from elevon.logs.formats.table import RawTable
 from elevon.logs.maps.column_map import ColumnEntry, shipped_map
 
-__all__ = ["drive_columns", "find_drive_columns", "looks_like_drive"]
+__all__ = ["drive_columns", "find_drive_columns", "looks_like_drive", "parameter_key"]
 
 
 _PARAMETER = re.compile(r"(?:^|[^a-z])r0*(\d{2,4})(?:\[(\d)\]|\.\d+)?$")
@@ -46,7 +46,7 @@ def find_drive_columns(table: RawTable, given: Collection[str] = ()) -> dict[str
     """
     found: dict[str, str] = {}
     for name in table.columns:
-        key = _key(name)
+        key = parameter_key(name)
         if key is None:
             continue
         if key in found:
@@ -61,10 +61,11 @@ def find_drive_columns(table: RawTable, given: Collection[str] = ()) -> dict[str
 
 def looks_like_drive(table: RawTable) -> bool:
     """Whether at least two columns carry numbers of the drive's parameters."""
-    return sum(_key(name) not in {None, "time"} for name in table.columns) >= 2
+    return sum(parameter_key(name) not in {None, "time"} for name in table.columns) >= 2
 
 
-def _key(name: str) -> str | None:
+def parameter_key(name: str) -> str | None:
+    """Return the drive's parameter that a header carries (``r62``), ``time``, or None."""
     text = re.sub(r"\s+", "", name).lower()
     if text in _TIME:
         return "time"

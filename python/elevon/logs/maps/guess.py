@@ -1,0 +1,219 @@
+"""A first column map of a foreign log, from its headers, its units and what fits together.
+
+Every entry carries its reason, for the user to correct: a header that says so, a column that is
+the integral of another, one that leads another, a size that only one unit explains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from elevon.errors import FormatError
+from elevon.logs.formats.limits import quoted
+from elevon.logs.formats.table import FloatArray, RawTable
+from elevon.logs.maps.agreement import slope_and_fit
+from elevon.logs.maps.hints import role_hint, unit_hint
+from elevon.logs.maps.motion import Motion, find_motion
+from elevon.logs.maps.signals import known_roles
+from elevon.units import parse_unit
+
+__all__ = ["Guess", "GuessedColumn", "guess_map"]
+
+_EVEN = 0.25  # of the columns that rise, the one whose steps scatter least is the time
+_CURRENT = 0.2  # share of a column that acceleration, friction and speed must explain
+_DEFAULT_UNITS = {
+    "torque_current": "A", "current_ref": "A", "direct_current": "A", "supply_current": "A",
+    "current_a": "A", "current_b": "A", "current_c": "A", "torque_voltage": "V",
+    "supply_voltage": "V", "load_cell": "N", "temperature": "degC", "vibration": "m/s2",
+    "speed_ref": "rpm",
+}  # fmt: skip
+
+
+@dataclass(slots=True)
+class GuessedColumn:
+    """A column: its role (empty: not known), its unit, and why."""
+
+    name: str
+    role: str = ""
+    unit: str = ""
+    sign: int = 1
+    reasons: list[str] = field(default_factory=list)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return it as plain types."""
+        return {
+            "name": self.name,
+            "role": self.role or None,
+            "unit": self.unit or None,
+            "sign": self.sign,
+            "reasons": list(self.reasons),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Guess:
+    """A first map of a log.
+
+    Attributes
+    ----------
+    source : str
+        The log.
+    columns : list of GuessedColumn
+        In the file's order.
+    gear_ratio : float or None
+        Motor over output, where both angles show it.
+    travel_per_turn : float or None
+        m of the output for one turn of the motor.
+    """
+
+    source: str
+    columns: list[GuessedColumn]
+    gear_ratio: float | None = None
+    travel_per_turn: float | None = None
+
+
+def guess_map(table: RawTable) -> Guess:
+    """Guess what the columns of a table are.
+
+    Raises
+    ------
+    FormatError
+        No column that could be the time.
+    """
+    columns = {
+        name: GuessedColumn(name, unit=unit_hint(name, table.units.get(name, "")))
+        for name in table.columns
+    }
+    time = _time(table, columns)
+    _headers(columns)
+    motion = find_motion(time, _candidates(table, columns))
+    _apply(motion, columns)
+    if motion.position is not None:
+        _current(time, table, columns, motion)
+    _units(columns)
+    return Guess(table.source, list(columns.values()), motion.gear_ratio, motion.travel_per_turn)
+
+
+def _time(table: RawTable, columns: Mapping[str, GuessedColumn]) -> FloatArray:
+    """Settle the time column and return it in s."""
+    rising = {}
+    for name, values in table.columns.items():
+        steps = np.diff(values)
+        if (
+            len(steps)
+            and np.isfinite(steps).all()
+            and (steps >= 0.0).all()
+            and values[-1] > values[0]
+        ):
+            rising[name] = float(np.std(steps) / np.mean(steps))
+    if not rising:
+        raise FormatError(
+            f"{table.source}: no column rises throughout: none can be the time; columns: "
+            f"{', '.join(quoted(name) for name in list(table.columns)[:12])}"
+        )
+    named = [name for name in rising if role_hint(name) == "time"]
+    name = named[0] if named else min(rising, key=lambda n: rising[n])
+    entry = columns[name]
+    entry.role = "time"
+    entry.reasons.append("named as time" if named else "rises throughout, most evenly")
+    step = float(np.median(np.diff(table.columns[name])))
+    if not entry.unit:
+        # Logs are sampled at 1 Hz to 1 MHz: steps of 0.05 and more can only be ms.
+        entry.unit = "ms" if step >= 0.05 else "s"
+        entry.reasons.append(f"steps of {step:.4g}: {entry.unit}")
+    scale = {"ms": 1e-3, "us": 1e-6}.get(entry.unit, 1.0)
+    return np.asarray(table.columns[name] * scale, dtype=np.float64)
+
+
+def _headers(columns: Mapping[str, GuessedColumn]) -> None:
+    """Take roles from the headers; of two that suggest one role neither has it yet."""
+    hints = {name: role_hint(name) for name, item in columns.items() if not item.role}
+    for name, role in hints.items():
+        if not role or role == "time":
+            continue
+        if list(hints.values()).count(role) > 1:
+            columns[name].reasons.append(f"its header suggests {role}, and so does another's")
+            continue
+        columns[name].role = role
+        columns[name].reasons.append("by its header")
+        _drop_odd_unit(columns[name])
+
+
+def _drop_odd_unit(item: GuessedColumn) -> None:
+    """Forget a unit that no signal in this role can have: the header was misread."""
+    if not item.unit or item.role not in known_roles():
+        return
+    dimension = parse_unit(item.unit).dimension
+    units = known_roles()[item.role].units
+    if item.role == "motor_speed":
+        units = (*units, *known_roles()["output_speed"].units)
+    if all(parse_unit(unit).dimension != dimension for unit in units):
+        item.reasons.append(f"not in {item.unit}, which its header suggests")
+        item.unit = ""
+
+
+def _candidates(
+    table: RawTable, columns: Mapping[str, GuessedColumn]
+) -> dict[str, tuple[str, str, FloatArray]]:
+    """Columns that may be positions or speeds: role so far, unit so far, values without holes."""
+    moving = {"", "command", "output_position", "output_speed", "motor_position", "motor_speed",
+              "speed_ref"}  # fmt: skip
+    chosen = {}
+    for name, item in columns.items():
+        values = table.columns[name]
+        good = np.isfinite(values)
+        if item.role in moving and good.sum() > 30 and np.ptp(values[good]) > 0.0:
+            index = np.arange(len(values))
+            chosen[name] = (item.role, item.unit, np.interp(index, index[good], values[good]))
+    return chosen
+
+
+def _apply(motion: Motion, columns: Mapping[str, GuessedColumn]) -> None:
+    for name, finding in motion.findings.items():
+        item = columns[name]
+        if finding.role and finding.role != item.role:
+            clash = next((c for c in columns.values() if c.role == finding.role), None)
+            if clash is not None:
+                clash.role = ""
+            item.role = finding.role
+        item.unit = finding.unit or item.unit
+        item.sign = finding.sign
+        item.reasons.extend(finding.reasons)
+
+
+def _current(
+    time: FloatArray, table: RawTable, columns: Mapping[str, GuessedColumn], motion: Motion
+) -> None:
+    """Find the current among what is left: acceleration, friction and speed explain it."""
+    if any(item.role in {"torque_current", "current_ref"} for item in columns.values()):
+        return
+    speed = np.gradient(motion.smooth, time)
+    size = float(np.std(speed)) or 1.0
+    parts = np.column_stack((np.gradient(speed, time), np.tanh(10.0 * speed / size), speed))
+    best, most = None, _CURRENT
+    for name, item in columns.items():
+        values = table.columns[name]
+        good = np.isfinite(values)
+        if item.role or good.sum() < 100 or not np.ptp(values[good]) > 0.0:
+            continue
+        design = np.column_stack((parts[good], np.ones(good.sum())))
+        fit = design @ np.linalg.lstsq(design, values[good], rcond=None)[0]
+        explained = slope_and_fit(fit, values[good])[1]
+        if explained > most:
+            best, most = item, explained
+    if best is not None:
+        best.role = "torque_current"
+        best.reasons.append(
+            f"acceleration, direction and speed explain {100 * most:.0f} % of it, as of a current"
+        )
+
+
+def _units(columns: Mapping[str, GuessedColumn]) -> None:
+    """Give what still has no unit the usual one, and say so."""
+    for item in columns.values():
+        if item.role and not item.unit and item.role in _DEFAULT_UNITS:
+            item.unit = _DEFAULT_UNITS[item.role]
+            item.reasons.append(f"unit not stated: {item.unit} ASSUMED")

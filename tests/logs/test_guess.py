@@ -1,0 +1,122 @@
+"""A first column map: from headers or their absence, units, and what integrates to what."""
+
+import json
+import math
+import tomllib
+
+import numpy as np
+import pytest
+
+from elevon.cli import main
+from elevon.logs.formats.drive import write_drive_csv
+from elevon.logs.importing import import_log
+from elevon.logs.maps.hints import role_hint, unit_hint
+
+LEAD = 5e-3  # m for one turn
+
+
+@pytest.fixture(scope="module")
+def motion():
+    """A servo that follows a trapezoid 40 ms late, sampled every 10 ms, with noise."""
+    t = np.arange(0.0, 12.0, 0.01)
+    phase = np.mod(t, 4.0)
+    demand = 1e-3 * np.interp(phase, [0, 1, 2, 3, 4], [0, 30, 30, 0, 0])
+    position = np.interp(t - 0.04, t, demand)
+    position = np.convolve(position, np.ones(9) / 9, "same")
+    speed = np.gradient(position, t)
+    current = 2.0 * np.sign(np.round(speed, 4)) + 0.2 * np.gradient(speed, t) + 10 * speed
+    rng = np.random.default_rng(0)
+    return {
+        "t": t,
+        "demand": demand,
+        "position": position,
+        "speed": speed + rng.normal(0.0, 2e-4, len(t)),
+        "current": current + rng.normal(0.0, 0.05, len(t)),
+    }
+
+
+def written(path, motion, header, speed_scale=1e3):
+    columns = (1e3 * motion["t"], 1e3 * motion["demand"], 1e3 * motion["position"],
+               speed_scale * motion["speed"], motion["current"])  # fmt: skip
+    np.savetxt(
+        path, np.column_stack(columns), delimiter=",", header=header, comments="", fmt="%.6g"
+    )
+    return path
+
+
+def guessed(tmp_path, capsys, log):
+    target = tmp_path / "map.toml"
+    assert main(["import", str(log), "--guess", str(target), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    return answer, tomllib.loads(target.read_text())
+
+
+HEADERS = {
+    "plain": "time_ms,pos_demand_mm,pos_mm,speed_mm/s,current_A",
+    "bracketed": "t [ms],Position setpoint [mm],Position [mm],Velocity [mm/s],Motor current [A]",
+    "units left out": "ms,demand,actual,velocity,i",
+    "none": "",
+}
+
+
+@pytest.mark.parametrize("header", HEADERS.values(), ids=HEADERS.keys())
+def test_a_linear_drive_is_recognised_and_its_map_imports(tmp_path, capsys, motion, header):
+    log = written(tmp_path / "log.csv", motion, header)
+    answer, stated = guessed(tmp_path, capsys, log)
+    assert [column["role"] for column in stated["column"]] == [
+        "time", "command", "output_position", "output_speed", "torque_current",
+    ]  # fmt: skip
+    assert [column["unit"] for column in stated["column"]] == ["ms", "mm", "mm", "mm/s", "A"]
+    assert all(column["reasons"] for column in answer["columns"])
+    recording = import_log(log, column_map=tmp_path / "map.toml").recording
+    np.testing.assert_allclose(
+        recording.role("output_position").values, motion["position"], atol=1e-7
+    )
+
+
+def test_a_motors_speed_shows_the_ratio(tmp_path, capsys, motion):
+    log = written(tmp_path / "log.csv", motion, "", speed_scale=60.0 / LEAD)
+    answer, stated = guessed(tmp_path, capsys, log)
+    assert answer["travel_per_turn_m"] == pytest.approx(LEAD, rel=0.01)
+    roles = {column["role"]: column["unit"] for column in stated["column"]}
+    assert roles["motor_speed"] == "rpm"
+    assert roles["output_position"] == "mm"
+    import_log(log, column_map=tmp_path / "map.toml")
+
+
+def test_the_other_sign_is_seen(tmp_path, capsys, motion):
+    log = written(tmp_path / "log.csv", motion, HEADERS["plain"], speed_scale=-1e3)
+    _, stated = guessed(tmp_path, capsys, log)
+    assert [column.get("sign", 1) for column in stated["column"]] == [1, 1, 1, -1, 1]
+
+
+def test_the_drives_own_trace(tmp_path, capsys, truth):
+    log = write_drive_csv(tmp_path / "log.csv", truth.signals)
+    answer, stated = guessed(tmp_path, capsys, log)
+    roles = {column["name"]: column["role"] for column in stated["column"]}
+    assert roles["Drive_axis_1.r62"] == "speed_ref"
+    assert roles["C1Drive_axis_1r4820"] == "motor_position"
+    units = {column["role"]: column.get("unit") for column in stated["column"]}
+    assert units["motor_position"] == "deg"
+    assert answer["status"] == "ok"
+
+
+def test_hints():
+    assert role_hint("Motor current ref") == "current_ref"
+    assert role_hint("current_a") == "current_a"
+    assert role_hint("current_A") == "torque_current"
+    assert role_hint("DC bus voltage") == "supply_voltage"
+    assert role_hint("column_3") == ""
+    assert unit_hint("x", "nonsense") == ""
+    assert unit_hint("pos_mm", "") == "mm"
+
+
+def test_what_cannot_be_guessed_is_refused(tmp_path, capsys, motion):
+    log = tmp_path / "log.csv"
+    np.savetxt(log, np.sin(np.arange(200.0)).reshape(-1, 2), delimiter=",")
+    assert main(["import", str(log), "--guess", str(tmp_path / "m.toml")]) == 2
+    assert "none can be the time" in capsys.readouterr().err
+    assert main(["import", str(log)]) == 2
+    assert "--guess" in capsys.readouterr().err
+    assert not (tmp_path / "m.toml").exists()
+    assert math.isfinite(motion["current"].sum())
