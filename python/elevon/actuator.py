@@ -33,6 +33,8 @@ class Actuator:
         The file it was loaded from.
     validation : mapping or None
         Thresholds of `elevon validate`: ``transient`` [s] and ``limits``.
+    compare : mapping or None
+        What `elevon compare` runs: ``after`` [s], ``load`` and ``scenario``.
 
     Examples
     --------
@@ -48,6 +50,7 @@ class Actuator:
     default_scenario: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
     path: Path | None = field(default=None, compare=False, repr=False)
     validation: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
+    compare: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
 
     @classmethod
     def load(cls, reference: str | os.PathLike[str]) -> Actuator:
@@ -70,6 +73,7 @@ class Actuator:
             default_scenario=found.scenario,
             path=found.path,
             validation=found.validation,
+            compare=found.compare,
         )
 
     def with_values(

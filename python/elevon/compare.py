@@ -17,11 +17,22 @@ if TYPE_CHECKING:
     from elevon.recording import Recording
     from elevon.scenario import Scenario
 
-__all__ = ["Comparison", "compare", "default_scenario", "filtered", "run_pair"]
+__all__ = [
+    "Comparison",
+    "compare",
+    "compared_signals",
+    "default_scenario",
+    "default_start",
+    "filtered",
+    "run_pair",
+]
 
 Array = npt.NDArray[np.float64]
 
+ROLES = {"position": "output_position", "speed": "motor_speed", "q_current": "torque_current"}
+"""What is compared, and the role that shows it."""
 SIGNALS = ("user_position", "motor_speed", "current_q")
+"""What plays these roles in a servo, true values before what the sensors show."""
 RATES = {"high": "10 kHz", "low": "every"}
 """The relays' ripple (1 to 5 kHz) must not alias; the low model is kept at each of its steps."""
 GRID_HZ = 400.0
@@ -39,9 +50,11 @@ class Comparison:
     time : ndarray, shape (n,)
         Common time after `start` [s].
     high, low : mapping of str to ndarray, shape (n,)
-        Filtered user position [rad], motor speed [rad/s] and quadrature current [A].
+        By signal, filtered: output position [rad or m], motor speed [rad/s], torque current [A].
+    signals : mapping of str to str
+        Position, speed and q_current: the signal compared.
     amplitude : float
-        Half the range of the high model's position, its normaliser [rad].
+        Half the range of the high model's position, its normaliser [rad or m].
     recordings : (Recording, Recording)
         High and low, as recorded.
     start, cutoff : float
@@ -51,6 +64,7 @@ class Comparison:
     time: Array
     high: Mapping[str, Array]
     low: Mapping[str, Array]
+    signals: Mapping[str, str]
     amplitude: float
     recordings: tuple[Recording, Recording]
     start: float
@@ -63,17 +77,19 @@ class Comparison:
     @property
     def position_nrmse(self) -> float:
         """RMS position error over the amplitude of the motion."""
-        return self.rms_error("user_position") / self.amplitude
+        return self.rms_error(self.signals["position"]) / self.amplitude
 
     @property
     def speed_nrmse(self) -> float:
         """RMS speed error over the RMS speed."""
-        return self.rms_error("motor_speed") / _rms(self.high["motor_speed"])
+        name = self.signals["speed"]
+        return self.rms_error(name) / _rms(self.high[name])
 
     @property
     def q_current_nrmse(self) -> float:
         """RMS current error over the RMS current."""
-        return self.rms_error("current_q") / _rms(self.high["current_q"])
+        name = self.signals["q_current"]
+        return self.rms_error(name) / _rms(self.high[name])
 
     @property
     def speed_up(self) -> float:
@@ -84,6 +100,8 @@ class Comparison:
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object of the command."""
         high, low = self.recordings
+        position, speed, current = (self.signals[part] for part in ROLES)
+        unit = high[position].unit
         return {
             "status": "ok",
             "actuator": high.meta["actuator"],
@@ -91,11 +109,12 @@ class Comparison:
             "speed_nrmse": self.speed_nrmse,
             "q_current_nrmse": self.q_current_nrmse,
             "speed_up": self.speed_up,
-            "position_rms_error_rad": self.rms_error("user_position"),
-            "speed_rms_error_rad_per_s": self.rms_error("motor_speed"),
-            "q_current_rms_error_a": self.rms_error("current_q"),
-            "q_current_rms_a": _rms(self.high["current_q"]),
-            "amplitude_rad": self.amplitude,
+            f"position_rms_error_{unit}": self.rms_error(position),
+            "speed_rms_error_rad_per_s": self.rms_error(speed),
+            "q_current_rms_error_a": self.rms_error(current),
+            "q_current_rms_a": _rms(self.high[current]),
+            f"amplitude_{unit}": self.amplitude,
+            "signals": dict(self.signals),
             "start_s": self.start,
             "filter": f"Butterworth, 2nd order, {self.cutoff:g} Hz, forwards and backwards",
             "high_wall_s": float(high.meta["wall_s"]),
@@ -108,20 +127,45 @@ class Comparison:
         }
 
 
-def default_scenario() -> Scenario:
-    """Return the loaded campaign's motion under 1 N m of brake: 45 deg about 60 deg, 0.05 Hz."""
+def default_scenario(actuator: Actuator) -> Scenario:
+    """Return what an actuator is compared on when nothing is asked for.
+
+    Its set's ``[compare]``, else its own scenario, else the ``[compare]`` of a set that comes with
+    the package and has the same wiring.
+
+    Raises
+    ------
+    InputError
+        There is none of these.
+    """
     from elevon.scenario import Scenario
 
-    sine = {"kind": "sine", "amplitude": "45 deg", "bias": "60 deg", "frequency": "0.05 Hz"}
-    brake = {"kind": "constant", "value": "1 N m"}
-    return Scenario.from_dict(
-        {
-            "text": "loaded campaign, 1 N m of brake",
-            "duration": "30 s",
-            "command": {"mode": "position", "terms": [sine]},
-            "load": {"brake": {"terms": [brake]}},
-        }
-    )
+    data = (actuator.compare or {}).get("scenario") or actuator.default_scenario
+    if data is None:
+        data = _shipped(actuator.wiring)
+    if data is None:
+        raise InputError(f"{actuator.name} has no scenario of its own; give one with --scenario")
+    return Scenario.from_dict(data, f"{actuator.name}: compare.scenario")
+
+
+def _shipped(wiring: str) -> Mapping[str, Any] | None:
+    from elevon.actuator import Actuator
+    from elevon.parameters.find import set_names
+
+    sets = (Actuator.load(name) for name in set_names())
+    tables = (item.compare for item in sets if item.wiring == wiring)
+    return next((table["scenario"] for table in tables if table is not None), None)
+
+
+def default_start(actuator: Actuator, scenario: Scenario, *, own: bool) -> float:
+    """Return what is left out at the beginning [s].
+
+    `own`: the scenario is the actuator's, not the caller's. What the set says; else 10 s, of an
+    actuator's own scenario a third at most.
+    """
+    if actuator.compare is not None:
+        return float(actuator.compare["after"])
+    return min(START_S, scenario.seconds / 3.0) if own else START_S
 
 
 def compare(
@@ -129,7 +173,7 @@ def compare(
     scenario: Scenario | None = None,
     *,
     seed: int = 0,
-    start: float = START_S,
+    start: float | None = None,
     cutoff: float = CUTOFF_HZ,
     progress: Progress | None = None,
 ) -> Comparison:
@@ -143,8 +187,8 @@ def compare(
         By default `default_scenario`.
     seed : int
         Of the random numbers of both.
-    start : float
-        What came before is left out [s].
+    start : float, optional
+        What came before is left out [s]; default `default_start`.
     cutoff : float
         Cut-off of the one filter through which both go [Hz].
     progress : callable, optional
@@ -161,19 +205,40 @@ def compare(
     SimulationError
         One of the runs did not reach its end.
     """
-    scenario = default_scenario() if scenario is None else scenario
+    own = scenario is None
+    scenario = default_scenario(actuator) if scenario is None else scenario
+    start = default_start(actuator, scenario, own=own) if start is None else start
     if scenario.seconds <= start + 1.0 / cutoff:
         raise InputError(
             f"compare: the scenario lasts {scenario.seconds:g} s; what is compared begins at "
             f"{start:g} s (--after) and needs {1.0 / cutoff:g} s at least"
         )
     high, low = run_pair(actuator, scenario, seed=seed, progress=progress)
+    names = compared_signals(actuator.wiring)
     grid = np.arange(start, scenario.seconds, 1.0 / GRID_HZ)
-    signals = [{n: filtered(run, n, grid, cutoff) for n in SIGNALS} for run in (high, low)]
-    amplitude = float(np.ptp(signals[0]["user_position"])) / 2.0
+    signals = [
+        {name: filtered(run, name, grid, cutoff) for name in names.values()} for run in (high, low)
+    ]
+    amplitude = float(np.ptp(signals[0][names["position"]])) / 2.0
     if amplitude == 0.0:
         raise InputError(f"compare: nothing moves after {start:g} s, there is no amplitude")
-    return Comparison(grid, signals[0], signals[1], amplitude, (high, low), start, cutoff)
+    return Comparison(grid, signals[0], signals[1], names, amplitude, (high, low), start, cutoff)
+
+
+def compared_signals(wiring: str) -> dict[str, str]:
+    """Return part to signal: of those with the role, the first that both fidelities have.
+
+    The first is the true quantity; what a sensor shows of it stands behind it. A mean over the
+    control period (``..._mean``) goes first: samples of a chopped current would alias.
+    """
+    from elevon.scenario.compile import signal_records
+
+    high, low = (signal_records(wiring, fidelity) for fidelity in RATES)
+    both = sorted((name for name in high if name in low), key=lambda n: not n.endswith("_mean"))
+    playing = [(high[name]["role"], name) for name in both]
+    return {
+        part: next(n for role, n in playing if role == wanted) for part, wanted in ROLES.items()
+    }
 
 
 def run_pair(
@@ -184,7 +249,8 @@ def run_pair(
     from elevon.simulate import simulate
     from elevon.simulate.acting import together
 
-    record = {name: f"{','.join(SIGNALS)}@{rate}" for name, rate in RATES.items()}
+    names = ",".join(compared_signals(actuator.wiring).values())
+    record = {name: f"{names}@{rate}" for name, rate in RATES.items()}
     spans = {"high": part(progress, 0.0, 0.95), "low": part(progress, 0.95, 1.0)}
     with together((actuator, scenario, name) for name in RATES):
         high, low = (

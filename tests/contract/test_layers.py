@@ -22,7 +22,7 @@ ROWS = [
     ["features"],
     ["logs"],
     ["simulate"],
-    ["bench", "campaign", "calibrate", "compare"],
+    ["bench", "campaign", "calibrate", "compare", "compare_loads"],
     ["lowfit", "analysis"],
     ["diagnose"],
     ["reproduce"],

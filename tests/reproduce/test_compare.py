@@ -90,3 +90,46 @@ def test_every_line_of_the_catalogue_is_in_the_default_table():
     assert {(record.kind, record.places) for record in asked} == {
         (record.kind, record.places) for record in catalogue("rotary")
     }
+
+
+def test_every_shipped_actuator_says_what_it_is_compared_on():
+    from elevon.compare import compared_signals, default_scenario, default_start
+    from elevon.compare_loads import load_size
+    from elevon.parameters.find import set_names
+
+    for name in set_names():
+        actuator = elevon.Actuator.load(name)
+        scenario = default_scenario(actuator)
+        assert default_start(actuator, scenario, own=True) < scenario.seconds
+        assert load_size(actuator) > 0.0
+        signals = compared_signals(actuator.wiring)
+        assert list(signals) == ["position", "speed", "q_current"]
+
+
+def test_a_set_of_ones_own_is_compared_on_its_own_scenario():
+    from dataclasses import replace
+
+    from elevon.compare import default_scenario, default_start
+
+    own = replace(elevon.Actuator.load("torino-rotary"), compare=None)
+    scenario = default_scenario(own)
+    assert scenario.seconds == 10.0
+    assert default_start(own, scenario, own=True) == pytest.approx(10.0 / 3.0)
+    assert default_start(own, scenario, own=False) == 10.0
+    bare = replace(own, default_scenario=None)
+    assert default_scenario(bare).text == "loaded campaign, 1 N m of brake"
+
+
+def test_the_load_opposes_and_aids_motion_of_either_direction():
+    from elevon.compare_loads import compare_loads
+
+    actuator = elevon.Actuator.load("torino-rotary")
+    results = compare_loads(actuator, elevon.Scenario.from_dict(SHORT), load="60 N m", start=1.0)
+    assert list(results) == ["as given", "opposing", "aiding"]
+    power = {}
+    for name, result in results.items():
+        current, speed = result.low["current_q"], result.low["motor_speed"]
+        power[name] = float(np.mean(current * speed))
+    assert power["aiding"] < power["as given"] < power["opposing"]
+    with pytest.raises(InputError, match="above 0"):
+        compare_loads(actuator, elevon.Scenario.from_dict(SHORT), load="-60 N m", start=1.0)

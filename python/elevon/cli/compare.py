@@ -35,8 +35,16 @@ def compare(
     scenario: ScenarioOption = None,
     settings: SetOption = None,
     fault: FaultOption = None,
-    after: Annotated[float, typer.Option(min=0.0, help="Left out before [s].")] = 10.0,
+    after: Annotated[
+        float | None, typer.Option(min=0.0, help="Left out before [s]; default as the set says.")
+    ] = None,
     cutoff: Annotated[float, typer.Option(help="Cut-off of the one filter [Hz].")] = 10.0,
+    loads: Annotated[
+        bool, typer.Option("--loads", help="Repeat it under opposing and aiding load.")
+    ] = False,
+    load: Annotated[
+        str | None, typer.Option(help="Size of that load, such as '500 N'; default the set's.")
+    ] = None,
     faults_table: Annotated[
         bool, typer.Option("--faults-table", help="What each fault changes in either model.")
     ] = False,
@@ -47,25 +55,41 @@ def compare(
     force: ForceOption = False,
     date: Annotated[str | None, typer.Option(help="Date printed in the report.")] = None,
 ) -> int:
-    """Run one scenario at high and at low fidelity; default: 45 deg, 0.05 Hz, 1 N m of brake."""
+    """Run one scenario at high and at low fidelity; default: the one that the set says."""
     from elevon.compare import compare as run
-    from elevon.compare import default_scenario
+    from elevon.compare import default_scenario, default_start
+    from elevon.compare_loads import compare_loads
+    from elevon.errors import InputError
     from elevon.scenario import Scenario
+
+    if load is not None and not loads:
+        raise InputError("--load needs --loads")
 
     page = None if out is None else out / "report.html"
     check_outputs([page], force=force)
     model = read_actuator(actuator, settings)
-    asked = Scenario.load(scenario) if scenario is not None else default_scenario()
+    own = scenario is None
+    asked = default_scenario(model) if scenario is None else Scenario.load(scenario)
     asked = asked.with_faults(fault or [])
+    start = default_start(model, asked, own=own) if after is None else after
     if faults_table:
-        return _faults_table(model, asked, after, seed, json)
+        return _faults_table(model, asked, start, seed, json)
+    results = {}
     with progress_bar("comparing") as advance:
-        found = run(model, asked, seed=seed, start=after, cutoff=cutoff, progress=advance)
-    values = found.to_dict()
+        if loads:
+            results = compare_loads(
+                model, asked, load=load, seed=seed, start=start, cutoff=cutoff, progress=advance
+            )
+            result = results["as given"]
+        else:
+            result = run(model, asked, seed=seed, start=start, cutoff=cutoff, progress=advance)
+    values = result.to_dict()
+    if loads:
+        values["loads"] = {name: item.to_dict() for name, item in results.items()}
     if page is not None:
         from elevon.reproduce.compare_page import compare_report
 
-        say(f"report: {compare_report(found, actuator, date=date).save(page, force=force)}")
+        say(f"report: {compare_report(result, actuator, date=date).save(page, force=force)}")
     if json:
         print_json(values)
     else:
@@ -74,14 +98,21 @@ def compare(
 
 
 def _print(values: dict[str, Any]) -> None:
+    runs = values.get("loads", {"": values})
     rows = [
-        ["user position", f"{100 * values['position_nrmse']:.3f} % of the amplitude"],
-        ["motor speed", f"{100 * values['speed_nrmse']:.3f} % of its RMS"],
-        ["q current", f"{100 * values['q_current_nrmse']:.3f} % of its RMS"],
-        ["low model", f"{values['low_realtime_factor']:.0f} times real time"],
-        ["speed-up", f"{values['speed_up']:.0f} times the high model"],
+        [
+            "output position",
+            *(f"{100 * r['position_nrmse']:.3f} % of the amplitude" for r in runs.values()),
+        ],
+        ["motor speed", *(f"{100 * r['speed_nrmse']:.3f} % of its RMS" for r in runs.values())],
+        [
+            "torque current",
+            *(f"{100 * r['q_current_nrmse']:.3f} % of its RMS" for r in runs.values()),
+        ],
+        ["low model", *(f"{r['low_realtime_factor']:.0f} times real time" for r in runs.values())],
+        ["speed-up", *(f"{r['speed_up']:.0f} times the high model" for r in runs.values())],
     ]
-    print_table(["RMS of low less high", ""], rows)
+    print_table(["RMS of low less high", *runs], rows)
     say(f"after {values['start_s']:g} s; {values['filter']}")
 
 

@@ -18,7 +18,9 @@ from elevon.units import parse_quantity
 
 __all__ = ["SetFile", "load_set"]
 
-_HEADER_KEYS = ("name", "title", "wiring", "base", "references", "scenario", "validation")
+_HEADER_KEYS = (
+    "name", "title", "wiring", "base", "references", "scenario", "compare", "validation",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,8 @@ class SetFile:
         What runs when no scenario is given.
     validation : mapping or None
         ``transient`` [s] and ``limits``: signal to largest RMS error in percent of its range.
+    compare : mapping or None
+        ``after`` [s], ``load`` and ``scenario``: what `elevon compare` runs.
     """
 
     name: str
@@ -49,6 +53,7 @@ class SetFile:
     references: Mapping[str, str]
     scenario: Mapping[str, Any] | None
     validation: Mapping[str, Any] | None = None
+    compare: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -103,7 +108,8 @@ def load_set(reference: str | os.PathLike[str]) -> SetFile:
         path=path,
         references=references,
         scenario=scenario,
-        validation=_thresholds(layers),
+        validation=_table(layers, "validation"),
+        compare=_table(layers, "compare"),
     )
 
 
@@ -123,9 +129,11 @@ def _marked(
     return marked
 
 
-def _thresholds(layers: list[_Layer]) -> Mapping[str, Any] | None:
-    found = next((layer.header.validation for layer in layers if layer.header.validation), None)
-    return None if found is None else found.model_dump()
+def _table(layers: list[_Layer], name: str) -> Mapping[str, Any] | None:
+    """Return a table of the header, the nearest one down the bases."""
+    tables = (getattr(layer.header, name) for layer in layers)
+    table = next((item for item in tables if item is not None), None)
+    return None if table is None else table.model_dump()
 
 
 def _chain(path: Path) -> Iterator[_Layer]:

@@ -14,7 +14,7 @@ from pydantic import (
     field_validator,
 )
 
-__all__ = ["Entry", "Header", "Reference", "Thresholds"]
+__all__ = ["Compare", "Entry", "Header", "Reference", "Thresholds"]
 
 Number = StrictInt | StrictFloat
 
@@ -65,6 +65,16 @@ class Thresholds(_Strict):
     )
 
 
+class Compare(_Strict):
+    """What `elevon compare` runs when it is given nothing else."""
+
+    after: Number = Field(0.0, ge=0.0, description="Seconds left out at the beginning")
+    load: Number | StrictStr | None = Field(
+        None, description="Size of the opposing and aiding load at the output [N or N m]"
+    )
+    scenario: dict[str, Any] = Field(description="In the form of a scenario file")
+
+
 class Header(_Strict):
     """The keys of a set file that are not parameters."""
 
@@ -76,4 +86,7 @@ class Header(_Strict):
     base: StrictStr | None = Field(None, description="Set name or file this one overrides")
     references: tuple[Reference, ...] = ()
     scenario: dict[str, Any] | None = Field(None, description="What runs when none is given")
+    compare: Compare | None = Field(
+        None, description="What `elevon compare` runs; without it, the scenario above"
+    )
     validation: Thresholds | None = Field(None, description="Thresholds of `elevon validate`")

@@ -27,7 +27,7 @@ def compare_report(found: Comparison, actuator: str, *, date: str | None = None)
     )
     report.fact("Position", f"{100 * found.position_nrmse:.3f} %", "RMS error over amplitude")
     report.fact("Speed", f"{100 * found.speed_nrmse:.2f} %", "RMS error over RMS")
-    report.fact("q current", f"{100 * found.q_current_nrmse:.2f} %", "RMS error over RMS")
+    report.fact("Torque current", f"{100 * found.q_current_nrmse:.2f} %", "RMS error over RMS")
     report.fact("Speed-up", f"{found.speed_up:.0f}", f"low at {values['low_realtime_factor']:.0f} "
                 "times real time")  # fmt: skip
     _draw(report, found)
@@ -43,13 +43,21 @@ def compare_report(found: Comparison, actuator: str, *, date: str | None = None)
     return report
 
 
+_SHOWN = {"rad": ("deg", 180.0 / np.pi), "m": ("mm", 1e3), "rad/s": ("rpm", 30.0 / np.pi)}
+_NAMES = {"position": "Output position", "speed": "Motor speed", "q_current": "Torque current"}
+
+
+def _panel(found: Comparison, part: str) -> tuple[str, str, float]:
+    """Signal, label and scale of one panel."""
+    name = found.signals[part]
+    unit = found.recordings[0][name].unit
+    shown, scale = _SHOWN.get(unit, (unit, 1.0))
+    return name, f"{_NAMES[part]} [{shown}]", scale
+
+
 def _draw(report: Report, found: Comparison) -> None:
     section = report.section("Side by side")
-    panels = [
-        ("user_position", "User position [deg]", 180.0 / np.pi),
-        ("motor_speed", "Motor speed [rpm]", 30.0 / np.pi),
-        ("current_q", "q current [A]", 1.0),
-    ]
+    panels = [_panel(found, part) for part in found.signals]
     for name, label, scale in panels:
         ratios = {"height_ratios": [3, 1]}
         with new_figure(2, 1, width=8.0, height=3.8, sharex=True, **ratios) as (figure, axes):

@@ -118,7 +118,7 @@ def reproduce_low_fidelity(
     for number, (name, (drive, braked, floored)) in enumerate(CASES.items()):
         start, stop = number / 4.0, (number + 1) / 4.0
         model = actuator.with_values({"drive.kind": drive})
-        scenario = _scenario(braked)
+        scenario = _scenario(actuator, braked)
         found = compare(model, scenario, seed=seed, progress=part(progress, start, stop))
         span = part(progress, stop, 1.0)
         floor = _floor(model, scenario, found, seed, span) if floored else None
@@ -126,8 +126,8 @@ def reproduce_low_fidelity(
     return LowFidelityResult(actuator.name, tuple(rows))
 
 
-def _scenario(braked: bool) -> Scenario:
-    whole = default_scenario()
+def _scenario(actuator: Actuator, braked: bool) -> Scenario:
+    whole = default_scenario(actuator)
     if braked:
         return whole
     data = whole.to_dict()
