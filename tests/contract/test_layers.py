@@ -23,7 +23,7 @@ ROWS = [
     ["logs"],
     ["simulate"],
     ["bench", "campaign", "calibrate", "compare", "compare_loads"],
-    ["lowfit", "analysis"],
+    ["lowfit", "analysis", "benchmark"],
     ["diagnose"],
     ["reproduce"],
     ["demo"],

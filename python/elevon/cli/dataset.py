@@ -7,10 +7,12 @@ from typing import Annotated, Any
 
 import typer
 
+from elevon.cli import dataset_make
 from elevon.cli.common import ForceOption, JsonOption
 from elevon.cli.output import print_json, print_table, progress_bar
 
 app = typer.Typer(rich_markup_mode=None, no_args_is_help=True)
+dataset_make.add_to(app)
 
 FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="The campaign's folder.")]
 

@@ -1,0 +1,108 @@
+"""``elevon dataset make benchmark`` and ``elevon dataset score``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from elevon.cli.common import JsonOption
+from elevon.cli.output import print_json, print_table, progress_bar
+
+__all__ = ["add_to"]
+
+_make = typer.Typer(rich_markup_mode=None, no_args_is_help=True)
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the commands to ``elevon dataset``."""
+    app.add_typer(_make, name="make", help="Make a documented data set.")
+    app.command()(score)
+
+
+@_make.callback()
+def make() -> None:
+    """Make a documented data set."""
+
+
+@_make.command()
+def benchmark(
+    *,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder of the set; resumed if begun.")
+    ],
+    size: Annotated[str, typer.Option(help="small or full.")] = "small",
+    runs: Annotated[
+        int | None, typer.Option(min=1, help="About so many runs, in place of --size.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of everything drawn.")] = 0,
+    threads: Annotated[int | None, typer.Option(min=1, help="Threads; default one a core.")] = None,
+    scores: Annotated[bool, typer.Option(help="Compute the baseline scores too.")] = True,
+    json: JsonOption = False,
+) -> int:
+    """Make the benchmark set: three actuators, faults that grow, a bench that does not match."""
+    from elevon.benchmark import make_benchmark, score_benchmark
+
+    with progress_bar("making the benchmark set") as advance:
+        made = make_benchmark(
+            out, size=size, runs=runs, seed=seed, threads=threads, progress=advance
+        )
+    rows = []
+    if scores:
+        with progress_bar("baseline scores") as advance:
+            rows = [vars(row) for row in score_benchmark(out, progress=advance)]
+    total = sum(item["runs"] for item in made.about["campaigns"])
+    if json:
+        status = "failed" if made.failed else "ok"
+        print_json(
+            {"status": status, "runs": total, "failed": made.failed, **made.about, "scores": rows}
+        )
+    else:
+        typer.echo(f"{total} runs in {out}, {made.failed} failed")
+        _print(rows)
+    return 1 if made.failed else 0
+
+
+def score(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A benchmark set.")],
+    *,
+    seed: Annotated[int, typer.Option(min=0, help="Of the forests.")] = 0,
+    json: JsonOption = False,
+) -> int:
+    """Score the baseline on a benchmark set: a random forest on the features, nothing tuned."""
+    from elevon.benchmark import score_benchmark
+
+    with progress_bar("baseline scores") as advance:
+        rows = [vars(row) for row in score_benchmark(folder, seed=seed, progress=advance)]
+    if json:
+        print_json({"status": "ok", "scores": rows})
+    else:
+        _print(rows)
+    return 0
+
+
+def _print(rows: list[dict[str, Any]]) -> None:
+    if not rows:
+        return
+    cells = [
+        [
+            row["actuator"],
+            row["part"],
+            row["fault"],
+            f"{row['present']}/{row['runs']}",
+            _number(row["auc"], row["auc_interval"]),
+            _number(row["null"], None),
+            _number(row["age"], None),
+            _number(row["error"], row["error_interval"]),
+        ]
+        for row in rows
+    ]
+    titles = ("actuator", "part", "fault", "present", "AUC", "shuffled", "age", "severity error")
+    print_table(titles, cells)
+
+
+def _number(value: float | None, interval: list[float] | None) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.2f}" + (f" ({interval[0]:.2f} to {interval[1]:.2f})" if interval else "")
