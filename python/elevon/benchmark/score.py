@@ -118,13 +118,14 @@ def score_benchmark(
 def _scored(root: Path, name: str, seed: int) -> Iterator[Score]:
     faults, ends, parts = _read(root / name)
     parts["shifted"] = _read(root / f"{name}-shifted", faults, ends)[2]["shifted"]
-    train = parts.pop("train")
+    train = parts["train"]
     able = np.isfinite(train.features).mean(axis=0) >= 0.9
     middle = np.nanmedian(train.features[:, able], axis=0)
     generator = np.random.default_rng(seed)
     models = _models(train, able, middle, seed, generator)
     typical = train.severity.mean(axis=0)
-    for part, data in parts.items():
+    for part in ("validation", "test", "shifted"):
+        data = parts[part]
         inputs = _filled(data.features[:, able], middle)
         chance, null = (_chances(model, inputs) for model in models[:2])
         guess = np.asarray(models[2].predict(inputs)).reshape(len(inputs), -1)
