@@ -63,6 +63,7 @@ def test_there_are_commands_and_an_example():
 def test_command(page, command, tmp_path):
     words = shlex.split(command)
     assert words[0] in (".venv/bin/elevon", "elevon")
+    words = [str(ROOT / word) if word.startswith("examples/") else word for word in words]
     done = subprocess.run(
         [sys.executable, "-m", "elevon.cli", *words[1:]],
         cwd=tmp_path,
