@@ -263,6 +263,7 @@ def test_a_plan_that_does_not_fit_says_how_much(write, tmp_path, capsys, monkeyp
 
 REFUSED = {
     "no runs": (HEAD + "seeds = []\n" + SCENARIO, "the plan is empty"),
+    "seed": (HEAD + "seeds = [1, -1]\n" + SCENARIO, "seeds.*greater than or equal to 0"),
     "no draws": (HEAD + SCENARIO + RANDOM.replace("count = 8", "count = 0"), "plan is empty"),
     "no cases": (HEAD + "case = []\n" + SCENARIO, "the plan is empty"),
     "no values": (HEAD + SCENARIO + '[[vary]]\nparameter = "gear.ratio"\nvalues = []\n', "empty"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 from pydantic import Field, StrictBool, StrictInt, StrictStr, model_validator
 
@@ -42,7 +42,7 @@ class Plan(Strict):
     record: StrictStr | tuple[StrictStr, ...] | None = None
     features: StrictStr | tuple[StrictStr, ...] = ()
     responses: tuple[StrictStr, ...] = ()
-    seeds: tuple[StrictInt, ...] = (0,)
+    seeds: tuple[Annotated[StrictInt, Field(ge=0, lt=2**63)], ...] = (0,)
     population: Population | None = None
     case: tuple[Case, ...] | None = None
     vary: tuple[Axis, ...] = ()
