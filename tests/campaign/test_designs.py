@@ -96,7 +96,7 @@ def test_power_is_how_often_the_effect_is_seen():
     assert [row["term"] for row in rows] == ["A", "AB"]
     ab = coded[:, 0] * coded[:, 1]
     model = np.column_stack([np.ones(16), blocks, coded, ab])
-    trials = 4000
+    trials = 1500
     response = 0.75 * coded[:, [0]] + 0.75 * ab[:, None] + generator.normal(size=(16, trials))
     estimate, residual, _, _ = np.linalg.lstsq(model, response, rcond=None)
     freedom = 16 - model.shape[1]
