@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from importlib import import_module
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -59,12 +60,12 @@ def in_cluster(work: Work, address: str, progress: Callable[[float], Any] | None
     waiting = iter(work.missing)
     with _client(address) as client:
         slots = _AHEAD * max(len(client.scheduler_info()["workers"]), 1)
-        futures = [_submitted(client, work, block) for block in _some(waiting, slots)]
+        futures = [_submitted(client, work, block) for block in islice(waiting, slots)]
         queue = import_module("distributed").as_completed(futures, loop=client.loop)
         for future in queue:
             check_there(work.folder)
             work.log.add(future.result())
-            queue.update([_submitted(client, work, block) for block in _some(waiting, 1)])
+            queue.update([_submitted(client, work, block) for block in islice(waiting, 1)])
             if progress is not None and progress(_fraction(work)) is False:
                 raise Interrupted("interrupted between two blocks")
 
@@ -92,10 +93,6 @@ def _submitted(client: Client, work: Work, block: int) -> Any:
     folder = str(work.folder.absolute())
     arguments = (folder, work.manifest.core, block, numbers.start, numbers.stop)
     return client.submit(worker_block, *arguments, pure=False)
-
-
-def _some(blocks: Iterator[int], count: int) -> list[int]:
-    return [block for block, _ in zip(blocks, range(count), strict=False)]
 
 
 def _fraction(work: Work) -> float:
