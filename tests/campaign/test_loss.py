@@ -230,6 +230,16 @@ def test_damage_to_what_a_folder_says_of_itself(plan, cli, tmp_path, name):
         elevon.load_campaign(out).resolved()
 
 
+@pytest.mark.parametrize("name", ["resolved.json", "runs.parquet", "plan.toml"])
+def test_a_damaged_table_of_a_finished_campaign_is_mended(plan, cli, tmp_path, name):
+    path, out = plan(4, head=""), tmp_path / "out"
+    cli("campaign", "run", path, "--out", out)
+    flip(out / name, (out / name).stat().st_size // 2)
+    assert cli("dataset", "verify", out)[0] == 1
+    assert cli("campaign", "run", path, "--out", out)[0] == 0
+    assert cli("dataset", "verify", out)[0] == 0
+
+
 def test_sigterm_is_told_and_leaves_no_parts(plan, tmp_path):
     path, out = plan(400, head="runs_per_file = 1"), tmp_path / "out"
     path.write_text(path.read_text().replace('"10 ms"', '"60 s"'))

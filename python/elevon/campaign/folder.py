@@ -107,6 +107,9 @@ def begin(folder: Path, resolved: Resolved, text: str | None, need: Estimate | N
     if (folder / MANIFEST).is_file():
         manifest = read_manifest(folder)
         _check_same(folder, manifest, resolved)
+        if text is not None and PLAN in Item("tables", manifest.files, {}).damaged(folder):
+            write_text(folder / PLAN, text, force=True)
+            manifest.files[PLAN] = digest(folder / PLAN)
         return _found(folder, resolved, manifest)
     if need is None or text is None:
         raise OutputError(f"{folder}: its {MANIFEST} has gone meanwhile")
@@ -123,6 +126,8 @@ def finished(work: Work) -> dict[str, list[Any]] | None:
     """Return how every run ended where the campaign is finished and nothing is to be done."""
     files = Item("tables", work.manifest.files, {})
     if work.manifest.status == "running" or work.missing or not files.intact(work.folder):
+        return None
+    if read_manifest(work.folder) != work.manifest:
         return None
     return read_outcome(work.folder)
 
@@ -145,8 +150,9 @@ def finish(work: Work) -> dict[str, list[Any]]:
             block.pop(key, None)
     failed = {"diverged", "refused"} & set(outcome["status"])
     manifest.status = "failed" if failed else "ok"
-    paths = (runs, work.folder / RESOLVED, work.folder / PLAN)
-    manifest.files = {path.name: digest(path) for path in paths}
+    whole = write_text(work.folder / RESOLVED, resolved_text(work.resolved), force=True)
+    plan = manifest.files.get(PLAN) or digest(work.folder / PLAN)
+    manifest.files = {PLAN: plan, **{path.name: digest(path) for path in (runs, whole)}}
     write_cards(Dataset(work.folder, manifest))
     manifest.write(work.folder)
     (work.folder / LOG).unlink(missing_ok=True)
@@ -175,8 +181,9 @@ def _found(folder: Path, resolved: Resolved, manifest: Manifest) -> Work:
 
 def _finished(folder: Path, manifest: Manifest) -> dict[str, Item]:
     """Return the items of a finished manifest, with how their runs ended."""
-    if not manifest.blocks:
-        return {}
+    tables = Item("tables", manifest.files, {})
+    if not manifest.blocks or RUNS in tables.damaged(folder):
+        return {}  # how the runs ended nobody knows any more: they are simulated again
     outcome = read_outcome(folder)
     items = {}
     for block in manifest.blocks:
