@@ -1,6 +1,8 @@
 """Calibration in closed loop, on a linear actuator that is not in the project."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from elevon.calibrate.closed_loop.free import free_list, inner
 from elevon.calibrate.closed_loop.held_out import held_out_errors
 from elevon.calibrate.closed_loop.intervals import known
 from elevon.calibrate.closed_loop.result import agreement
+from elevon.cli.runner import run as elevon
 from elevon.errors import InputError, UnknownNameError
 from tests.calibrate.linear import Linear, Logger, draw, log, square, sweep
 from tests.calibrate.linear_set import datasheet, loop, truth
@@ -189,3 +192,30 @@ def test_twelve_benches_and_their_intervals():
                 hits.append(low <= value <= high)
     assert {path: np.median(e) for path, e in off.items() if np.median(e) > 0.05} == {}
     assert 0.7 <= np.mean(hits) <= 0.99
+
+
+def write_csv(path, columns):
+    names = list(columns)
+    table = np.column_stack([columns[name] for name in names])
+    np.savetxt(path, table, delimiter=",", header=",".join(names), comments="", fmt="%.6g")
+
+
+@pytest.mark.long
+def test_the_command_line_from_a_logger_file_to_a_validated_set(tmp_path, capsys):
+    """Map, calibrate, validate another log; then a machine that has changed fails."""
+    folder = Path(__file__).resolve().parents[2] / "examples" / "linear-drive"
+    worn = replace(PID, dry=2.5 * PID.dry)
+    trials = {"squares": (PID, square), "sweep": (PID, sweep), "again": (PID, square)}
+    for seed, (name, (bench, demand)) in enumerate({**trials, "worn": (worn, square)}.items()):
+        write_csv(tmp_path / f"{name}.csv", log(bench, demand, 20.0, seed=seed))
+    out, given = str(tmp_path / "fitted.toml"), ["--map", str(folder / "map.toml"), "--json"]
+    logs = [str(tmp_path / f"{name}.csv") for name in ("squares", "sweep")]
+    start = ["--actuator", str(folder / "drive.toml"), "--out", out]
+    assert elevon(["calibrate", *logs, *start, *given]) == 0
+    document = json.loads(capsys.readouterr().out)
+    entry = document["parameters"]["control.pid_gain"]
+    assert entry["low"] <= entry["value"] <= entry["high"]
+    for name, code in (("again", 0), ("worn", 1)):
+        checked = elevon(["validate", str(tmp_path / f"{name}.csv"), "--actuator", out, *given])
+        assert checked == code, name
+        assert json.loads(capsys.readouterr().out)["status"] == ("fail" if code else "pass")

@@ -167,7 +167,7 @@ def final_fit(
     logs: Sequence[LoopLog],
     chosen: Searched,
     *,
-    rounds: int = 6,
+    rounds: int = 10,
     free: Sequence[Free] | None = None,
     check: Check = lambda: True,
     advance: Callable[[float], object] = lambda _f: None,

@@ -136,7 +136,7 @@ def _controller(actuator: Actuator, structure: str) -> list[Free]:
 
 
 def _limits(channels: set[str]) -> list[Free]:
-    rows = [_row("inverter.supply_voltage", "V", "plant", 0.7, (1e-1, 1e5))]
+    rows = [_row("inverter.supply_voltage", "V", "plant", 0.2, (1e-1, 1e5))]
     if "current" in channels:
         rows.insert(0, _row("control.current_limit", "A", "controller", 0.7, (1e-3, 1e5)))
         rows.append(_row("sensor.filter_cutoff", "Hz", "sensor", 1.0, (0.5, 1e5)))

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from elevon.calibrate.blocks import block_length
 from elevon.calibrate.closed_loop.fit import Fitted
 from elevon.calibrate.closed_loop.free import Free
+from elevon.calibrate.closed_loop.model import LoopModel
 from elevon.calibrate.closed_loop.objective import SOFT, Objective
 from elevon.calibrate.closed_loop.solve import Point, jacobian
 
@@ -21,6 +22,7 @@ _SHARE = 0.2  # of a logarithm: a deviation above which a number is not determin
 _TENTH = 0.5  # of its meaningful size, for an offset or a delay
 _SILENT = 1.0  # deviations of all residuals together that a whole spread moves
 _TOGETHER = 0.7  # correlation that is named
+_FALL = 0.02  # of the highest speed, over which friction may fall from rest to motion
 _WEIGHTS = (0.25, 4.0)  # of a channel or log against the others: what a misfit would change
 #: Reasons of numbers that the logs do not feel: they stay as given.
 SILENT = ("changes nothing that the logs show", "the logs do not reach this limit")
@@ -78,6 +80,7 @@ def known(fitted: Fitted) -> tuple[list[Known], float]:
     degrees = float(max(len(sums) - len(x), 1))
     colour = sums.T @ sums * (len(sums) / degrees)
     covariance = bread @ (colour + belief) @ bread + _misfit(objective, point, jac, weight)
+    covariance = covariance + _choices(objective, point, bread @ (jac.T * weight))
     strength = np.sqrt(np.einsum("np,n,np->p", jac, weight, jac))
     return [
         Known(f, float(x[k]), float(np.sqrt(covariance[k, k])), reason)
@@ -136,6 +139,31 @@ def _misfit(objective: Objective, point: Point, jac: Floats, weight: Floats) -> 
             total += np.outer(moved, moved)
             count += 1
     return total / max(count, 1)
+
+
+def _choices(objective: Objective, point: Point, gain: Floats) -> Floats:
+    """What choices of the model that no slow log settles would change, by one step of Newton each.
+
+    The friction may fall with speed or grow with the torque, and a drive acts some time after it
+    has read: each alternative is run once at the same values.
+    """
+    model = objective.model
+    speed = max(float(np.nanmax(np.abs(log.motion(model.per_output)[0]))) for log in model.logs)
+    step = model.actuator.parameters.value("low.step")
+    alternatives: tuple[dict[str, str | float], ...] = (
+        {"friction.law": "stribeck", "friction.stribeck_speed": _FALL * speed},
+        {"friction.law": "load_dependent", "friction.stribeck_speed": _FALL * speed},
+        {"low.step": 2.0 * step},
+    )
+    total = np.zeros((gain.shape[0], gain.shape[0]))
+    for changes in alternatives:
+        other = model.actuator.with_values(changes, source="calibration")
+        beside = LoopModel(other, model.logs, model.structure, model.check)
+        run = Objective(beside, objective.free)
+        run.scales = objective.scales
+        moved = gain @ (run.residual(point.x[None, :])[0] - point.residual)
+        total += np.outer(moved, moved)
+    return total
 
 
 def _reasons(objective: Objective, x: Floats, covariance: Floats, strength: Floats) -> list[str]:

@@ -13,7 +13,7 @@ from elevon.calibrate.closed_loop.objective import SOFT, Objective
 __all__ = ["Point", "jacobian", "solve"]
 
 Floats = npt.NDArray[np.float64]
-_LADDER = (0.1, 1.0, 10.0, 100.0)  # damping tried in each step, over the last one
+_LADDER = (0.03, 0.5, 10.0, 300.0)  # damping tried in each step, over the last one
 _STEP = 0.03  # of a logarithm, or of an offset's tenth of a spread: over the switching instants
 _SETTLED = 1e-4  # relative fall of the cost below which a start rests
 
@@ -26,6 +26,7 @@ class Point:
     residual: Floats
     cost: float
     damping: float = 1.0
+    slow: bool = False
     settled: bool = False
 
 
@@ -106,10 +107,13 @@ def _round(objective: Objective, points: list[Point], central: bool) -> None:
         best = int(np.argmin(costs))
         if not costs[best] < point.cost:
             point.settled = point.damping >= 1e6
-            point.damping = min(point.damping * 1e3, 1e6)
+            point.damping = min(point.damping * 100.0, 1e6)
             continue
-        point.settled = point.cost - costs[best] < _SETTLED * point.cost
-        point.damping = min(max(point.damping * _LADDER[best], 1e-6), 1e6)
+        # One small step is a narrow valley, two are the end.
+        small = point.cost - costs[best] < _SETTLED * point.cost
+        point.settled = small and point.slow
+        point.slow = small
+        point.damping = min(max(point.damping * _LADDER[best] * 0.3, 1e-8), 1e6)
         point.x, point.residual = trials[part][best], found[part][best]
         point.cost = costs[best]
 
