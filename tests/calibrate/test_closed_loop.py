@@ -1,6 +1,7 @@
 """Calibration in closed loop, on a linear actuator that is not in the project."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -201,21 +202,21 @@ def write_csv(path, columns):
 
 
 @pytest.mark.long
-def test_the_command_line_from_a_logger_file_to_a_validated_set(tmp_path, capsys):
-    """Map, calibrate, validate another log; then a machine that has changed fails."""
-    folder = Path(__file__).resolve().parents[2] / "examples" / "linear-drive"
+def test_the_four_documented_commands(tmp_path, monkeypatch, capsys):
+    """From a logger's file to a validated set; then a machine that has changed fails."""
+    root = Path(__file__).resolve().parents[2]
+    section = (root / "docs" / "calibration.md").read_text().split("## Logs with few channels")[1]
+    commands = [line[4:] for line in section.splitlines() if line.startswith("    elevon ")]
+    assert len(commands) == 4
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(root / "examples" / "linear-drive" / "drive.toml", tmp_path)
     worn = replace(PID, dry=2.5 * PID.dry)
-    trials = {"squares": (PID, square), "sweep": (PID, sweep), "again": (PID, square)}
+    trials = {"squares": (PID, square), "sweep": (PID, sweep), "another": (PID, square)}
     for seed, (name, (bench, demand)) in enumerate({**trials, "worn": (worn, square)}.items()):
         write_csv(tmp_path / f"{name}.csv", log(bench, demand, 20.0, seed=seed))
-    out, given = str(tmp_path / "fitted.toml"), ["--map", str(folder / "map.toml"), "--json"]
-    logs = [str(tmp_path / f"{name}.csv") for name in ("squares", "sweep")]
-    start = ["--actuator", str(folder / "drive.toml"), "--out", out]
-    assert elevon(["calibrate", *logs, *start, *given]) == 0
-    document = json.loads(capsys.readouterr().out)
-    entry = document["parameters"]["control.pid_gain"]
-    assert entry["low"] <= entry["value"] <= entry["high"]
-    for name, code in (("again", 0), ("worn", 1)):
-        checked = elevon(["validate", str(tmp_path / f"{name}.csv"), "--actuator", out, *given])
-        assert checked == code, name
-        assert json.loads(capsys.readouterr().out)["status"] == ("fail" if code else "pass")
+    for command in commands:
+        assert elevon([*command.split()[1:], "--json"]) == 0, command
+        document = json.loads(capsys.readouterr().out)
+    assert document["status"] == "pass"
+    checked = commands[-1].replace("another", "worn").split()[1:]
+    assert elevon([*checked, "--json"]) == 1
