@@ -172,13 +172,15 @@ def features(
 def _own_features(reference: str, fidelity: str) -> list[dict[str, Any]]:
     from elevon.actuator import Actuator
     from elevon.features import assign_roles, comparable, feature_records
-    from elevon.scenario.compile import signal_units
+    from elevon.scenario.compile import signal_records, signal_units
     from elevon.simulate import check_fidelity
 
     wiring = Actuator.load(reference).wiring
     check_fidelity(wiring, fidelity)
     units = {name: unit or "1" for name, unit in signal_units(wiring, fidelity).items()}
-    roles = comparable(assign_roles(units), units)
+    records = signal_records(wiring, fidelity)
+    stated = {item["role"]: name for name, item in records.items() if item.get("role")}
+    roles = comparable(assign_roles(units, stated=stated), units)
     by_role = {role: units[name] for role, name in roles.items()}
     return [
         {

@@ -80,7 +80,7 @@ def recording_features(
     base = _clock(recording, clock, roles)
     rate = _rate(base)
     units = {channel.name: channel.unit for channel in recording.on_clock(base.name)}
-    served = comparable(assign_roles(units, roles), units)
+    served = comparable(assign_roles(units, roles, recording.roles), units)
     names = [features] if isinstance(features, str) else list(features)
     names = [part.strip() for name in names for part in name.split(",") if part.strip()]
     records, lacking = wanted_records(names, served, rate, "features")
@@ -128,7 +128,9 @@ def _clock(recording: Recording, name: str | None, roles: Mapping[str, str] | No
 
     def served(clock: Clock) -> int:
         names = [channel.name for channel in recording.on_clock(clock.name)]
-        return 100 * len(given.intersection(names)) + len(assign_roles(names))
+        return 100 * len(given.intersection(names)) + len(
+            assign_roles(names, stated=recording.roles)
+        )
 
     return max(recording.clocks.values(), key=served)
 

@@ -11,7 +11,7 @@ from elevon.errors import InputError
 from elevon.features.records import feature_records, wanted_records
 from elevon.features.roles import assign_roles, comparable
 from elevon.record_plan import period_of
-from elevon.scenario.compile import signal_units
+from elevon.scenario.compile import signal_records, signal_units
 
 __all__ = ["MOVING_SPEED", "FeaturePlan", "core_plan", "feature_plans"]
 
@@ -138,6 +138,10 @@ class _Model(NamedTuple):
         units = {name: unit or "1" for name, unit in known.items()}
         return {**units, "command": self.command_unit or units["command"]}
 
+    def roles(self) -> dict[str, str]:
+        known = signal_records(self.wiring, self.fidelity)
+        return {item["role"]: name for name, item in known.items() if item.get("role")}
+
 
 @lru_cache(maxsize=64)
 def _plans(texts: tuple[str, ...], model: _Model) -> tuple[FeaturePlan, ...]:
@@ -162,7 +166,7 @@ def _plan(clock: str, text: str, model: _Model) -> FeaturePlan:
     period = period_of(rate.strip(), model.step, _PLACE)
     hertz = 1.0 / (period * model.step)
     units = model.units()
-    roles = comparable(assign_roles(units), units)
+    roles = comparable(assign_roles(units, stated=model.roles()), units)
     records, lacking = wanted_records(wanted, roles, hertz, _PLACE)
     if lacking:
         raise InputError(f"{_PLACE}: {lacking_text(lacking[0], roles, hertz)}")

@@ -8,7 +8,8 @@ from elevon.errors import unknown
 
 __all__ = ["ROLES", "assign_roles", "comparable"]
 
-#: Signals that serve each role, the first that is there: what a sensor shows before what is true.
+#: Signals that serve each role where the wiring or the log's column map does not say it: the first
+#: that is there, what a sensor shows before what is true.
 ROLES: Mapping[str, tuple[str, ...]] = {
     "command": ("command",),
     "output_position": ("encoder_position", "user_position"),
@@ -25,7 +26,9 @@ ROLES: Mapping[str, tuple[str, ...]] = {
 
 
 def assign_roles(
-    names: Iterable[str], given: Mapping[str, str] | None = None, place: str = "roles"
+    names: Iterable[str],
+    given: Mapping[str, str] | None = None,
+    stated: Mapping[str, str] | None = None,
 ) -> dict[str, str]:
     """Return the signal that serves each role, for the roles that have one.
 
@@ -34,9 +37,9 @@ def assign_roles(
     names : iterable of str
         Signals that are there.
     given : mapping of str to str, optional
-        Role to signal, where it is not the first of `ROLES` that is there.
-    place : str
-        For errors.
+        Role to signal, as the caller says.
+    stated : mapping of str to str, optional
+        Role to signal, as the wiring or the log's column map says: else the first of `ROLES`.
 
     Raises
     ------
@@ -45,15 +48,16 @@ def assign_roles(
     """
     there = list(names)
     roles = {}
-    for role, candidates in ROLES.items():
+    for role, usual in ROLES.items():
+        candidates = [(stated or {}).get(role), *usual]
         chosen = next((name for name in candidates if name in there), None)
         if chosen is not None:
             roles[role] = chosen
     for role, name in (given or {}).items():
         if role not in ROLES:
-            raise unknown("role", role, ROLES, place)
+            raise unknown("role", role, ROLES, "roles")
         if name not in there:
-            raise unknown("signal", name, there, f"{place}: {role}")
+            raise unknown("signal", name, there, f"roles: {role}")
         roles[role] = name
     return roles
 
