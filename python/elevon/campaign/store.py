@@ -7,6 +7,7 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -374,6 +375,7 @@ def _index(table: Any, variants: Sequence[Variant]) -> Index:
     )
 
 
+@lru_cache(maxsize=1)
 def core_hash() -> str:
     """Return the SHA-256 of the compiled core: with the plan it decides every bit."""
     from elevon import _core
