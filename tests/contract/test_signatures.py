@@ -1,5 +1,6 @@
-"""Every fault of the servos has a test of its signature, which says so itself: it carries the mark
-`signature(kind, place)`.
+"""Every fault of every actuator has a test of its signature, which says so itself: it carries the
+mark `signature(kind, place)`. A machine of its own kind has them in files that bear its name, the
+servos, whose shaft and drives are the same, in the others.
 """
 
 import ast
@@ -28,9 +29,21 @@ def asked(wiring: str) -> set[tuple[str, str]]:
     }
 
 
-def marked() -> Iterator[tuple[str, ...]]:
-    """Yield what the marks of the physics tests name."""
-    for path in sorted(PHYSICS.glob("test_*.py")):
+def machines() -> list[str]:
+    """Wirings that are no servo: they follow no position."""
+    return [each["name"] for each in _core.wirings() if "position" not in each["modes"]]
+
+
+def files(wiring: str) -> list[Path]:
+    """Physics tests that speak of a wiring."""
+    own = {path: name for name in machines() for path in PHYSICS.glob(f"test_{name}*.py")}
+    wanted = wiring if wiring in machines() else None
+    return [path for path in sorted(PHYSICS.glob("test_*.py")) if own.get(path) == wanted]
+
+
+def marked(wiring: str) -> Iterator[tuple[str, ...]]:
+    """Yield what the marks of a wiring's physics tests name."""
+    for path in files(wiring):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
                 yield from (named for mark in node.decorator_list if (named := _signature(mark)))
@@ -42,13 +55,16 @@ def _signature(mark: ast.expr) -> tuple[str, ...]:
     return ()
 
 
-@pytest.mark.parametrize("wiring", ["rotary", "ballscrew"])
-def test_every_fault_of_a_servo_has_a_signature_test(wiring: str) -> None:
+@pytest.mark.parametrize("wiring", [each["name"] for each in _core.wirings()])
+def test_every_fault_has_a_signature_test(wiring: str) -> None:
     """A fault whose mark no test carries fails here."""
-    assert asked(wiring) - set(marked()) == set()
+    assert asked(wiring) - set(marked(wiring)) == set()
 
 
 def test_every_signature_test_names_a_fault() -> None:
     """A mark that no catalogue knows is misspelt or left behind."""
-    known = {fault for wiring in _core.wirings() for fault in asked(wiring["name"])}
-    assert set(marked()) - known == set()
+    names = [each["name"] for each in _core.wirings()]
+    servos = {fault for name in names if name not in machines() for fault in asked(name)}
+    for name in names:
+        known = asked(name) if name in machines() else servos
+        assert set(marked(name)) - known == set()

@@ -160,6 +160,7 @@ def test_a_leg_that_moves_at_rest_is_a_fault(start: str | None, phase: int) -> N
     assert "at rest" in rec.meta["message"]
 
 
+@pytest.mark.signature("shorted_switch", "inverter")
 @pytest.mark.parametrize("action", ["extend", "retract"])
 def test_a_trip_of_the_bridge_sets_the_brake(action: str) -> None:
     """A shorted switch trips the drive: the unit knows, the brake is set, the demand is zero."""
@@ -211,6 +212,7 @@ def test_the_software_brake_holds_the_overrun(fidelity: str) -> None:
     assert peaks[1] > 1.15
 
 
+@pytest.mark.signature("motor_shorted", "motor")
 @pytest.mark.parametrize("fidelity", ["low", "high"])
 def test_shorted_windings_brake_by_the_closed_form(fidelity: str) -> None:
     """3/2 k_1^2 w R/(R^2 + (p w L)^2) at low speed, k_1 = 1.216 k."""
