@@ -23,7 +23,7 @@ _TENTH = 0.5  # of its meaningful size, for an offset or a delay
 _SILENT = 1.0  # deviations of all residuals together that a whole spread moves
 _TOGETHER = 0.7  # correlation that is named
 _FALL = 0.02  # of the highest speed, over which friction may fall from rest to motion
-_SLOWER = 0.5  # of the current loop's gain
+_LATE = 1.5e-3  # s between reading and acting of a drive with a tick of a millisecond
 _WEIGHTS = (0.25, 4.0)  # of a channel or log against the others: what a misfit would change
 #: Reasons of numbers that the logs do not feel: they stay as given.
 SILENT = ("changes nothing that the logs show", "the logs do not reach this limit")
@@ -146,17 +146,16 @@ def _choices(objective: Objective, point: Point, gain: Floats) -> Floats:
     """What choices of the model that no slow log settles would change, by one step of Newton each.
 
     The friction may fall with speed or grow with the torque, and a drive acts some time after it
-    has read, by a current loop that no datasheet states: each alternative is run once at the same values.
+    has read. Each alternative is run once at the same values; the late drive as one that is late by
+    a step of the model more, its effect scaled to `_LATE`.
     """
     model = objective.model
     speed = max(float(np.nanmax(np.abs(log.motion(model.per_output)[0]))) for log in model.logs)
-    value = model.actuator.parameters.value
-    step = value("low.step")
+    step = model.actuator.parameters.value("low.step")
     alternatives: tuple[dict[str, str | float], ...] = (
         {"friction.law": "stribeck", "friction.stribeck_speed": _FALL * speed},
         {"friction.law": "load_dependent", "friction.stribeck_speed": _FALL * speed},
         {"low.step": 2.0 * step},
-        {"pwm.proportional_gain": _SLOWER * value("pwm.proportional_gain")},
     )
     total = np.zeros((gain.shape[0], gain.shape[0]))
     for changes in alternatives:
@@ -165,6 +164,7 @@ def _choices(objective: Objective, point: Point, gain: Floats) -> Floats:
         run = Objective(beside, objective.free)
         run.scales = objective.scales
         moved = gain @ (run.residual(point.x[None, :])[0] - point.residual)
+        moved = moved * (_LATE / step if "low.step" in changes else 1.0)
         total += np.outer(moved, moved)
     return total
 
