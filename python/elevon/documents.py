@@ -200,7 +200,7 @@ def _tagged(annotation: Any, tag: str | int) -> Any:
         literals = (get_args(field.annotation) for field in annotation.model_fields.values())
         return annotation if any(tag in values for values in literals) else None
     inner = (_tagged(argument, tag) for argument in get_args(annotation))
-    return next((found for found in inner if found is not None), None)
+    return next((model for model in inner if model is not None), None)
 
 
 def _inner_model(annotation: Any) -> Any:
@@ -211,9 +211,9 @@ def _inner_model(annotation: Any) -> Any:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     for argument in get_args(annotation):
-        found = _inner_model(argument)
-        if found is not None:
-            return found
+        inner = _inner_model(argument)
+        if inner is not None:
+            return inner
     return None
 
 

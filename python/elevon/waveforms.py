@@ -213,15 +213,15 @@ def _corners(record: WaveRecord, values: Mapping[str, float]) -> list[tuple[floa
     levels = (values["high"], values["high"], values["low"], values["low"])
     spans = [values[name] for name in ("rise", "hold_high", "fall", "hold_low")]
     cycle = sum(spans)
-    found, time = [(0.0, values["low"])], 0.0
+    corners, time = [(0.0, values["low"])], 0.0
     cycles = 3 if values["repeat"] else 1
     for _ in range(cycles):
         for span, level in zip(spans, levels, strict=True):
             time += span
             if span > 0.0:
-                found.append((time, level))
+                corners.append((time, level))
     entered = entered % cycle if values["repeat"] else min(entered, cycle)
-    behind = next((i for i, corner in enumerate(found) if corner[0] > entered), len(found) - 1)
-    (t0, v0), (t1, v1) = found[behind - 1], found[behind]
+    behind = next((i for i, corner in enumerate(corners) if corner[0] > entered), len(corners) - 1)
+    (t0, v0), (t1, v1) = corners[behind - 1], corners[behind]
     here = (entered, v0 + (v1 - v0) * (entered - t0) / (t1 - t0))
-    return [(time - entered, value) for time, value in (here, *found[behind:])]
+    return [(time - entered, value) for time, value in (here, *corners[behind:])]

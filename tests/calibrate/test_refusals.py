@@ -78,7 +78,7 @@ def test_another_wiring_is_refused(logs):
 
 
 def test_missing_columns_are_named(tmp_path, logs):
-    with pytest.raises(InputError, match="motor_speed is missing"):
+    with pytest.raises(InputError, match="no channel plays motor_speed"):
         read_logs([still(tmp_path / "a", motor_speed=None)])
     with pytest.raises(InputError, match="no torque current"):
         read_logs([still(tmp_path / "b", current_ref=None, current_q_meas=None)])

@@ -38,12 +38,16 @@ def list_procedures(*, json: JsonOption = False) -> None:
     """List the procedures that come with the package."""
     from elevon.bench.procedure import load_procedure, procedure_names
 
-    found = [load_procedure(name) for name in procedure_names()]
+    procedures = [load_procedure(name) for name in procedure_names()]
     if json:
-        rows = [{"name": p.name, "text": p.text, "logs": [t.name for t in p.traces]} for p in found]
+        rows = [
+            {"name": p.name, "text": p.text, "logs": [t.name for t in p.traces]} for p in procedures
+        ]
         print_json({"procedures": rows})
         return
-    print_table(("procedure", "logs", "what for"), [(p.name, len(p.traces), p.text) for p in found])
+    print_table(
+        ("procedure", "logs", "what for"), [(p.name, len(p.traces), p.text) for p in procedures]
+    )
 
 
 @app.command()

@@ -186,22 +186,22 @@ def _clocks(report: Report, demo: Demo) -> None:
     )
     rows = []
     for log, item in zip(demo.bench_truth["logs"], demo.imported, strict=True):
-        found = item.report.synchronisation
-        if not found or found.get("offset_s") is None:
+        synchronisation = item.report.synchronisation
+        if not synchronisation or synchronisation.get("offset_s") is None:
             continue
         true = log["conditions"]
         told = all(finding.code != "drift-unknown" for finding in item.report.findings)
-        told = told and found["drift_std"] is not None
+        told = told and synchronisation["drift_std"] is not None
         rows.append(
             [
                 log["name"].replace("-", "\N{NON-BREAKING HYPHEN}"),
-                found["method"],
+                synchronisation["method"],
                 true["trigger"],
-                found["offset_s"],
-                1e3 * found["offset_std_s"],
+                synchronisation["offset_s"],
+                1e3 * synchronisation["offset_std_s"],
                 1e6 * true["cell"]["clock_drift"],
-                1e6 * found["drift"] if told else None,
-                1e6 * found["drift_std"] if told else None,
+                1e6 * synchronisation["drift"] if told else None,
+                1e6 * synchronisation["drift_std"] if told else None,
             ]
         )
     columns = [

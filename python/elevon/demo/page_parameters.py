@@ -177,10 +177,10 @@ def _fixed(value: float, places: int, sign: str = "") -> str:
 
 def _notes(demo: Demo, rows: Sequence[dict[str, Any]]) -> list[str]:
     """Say what the estimates are that have no place in a set."""
-    found: dict[str, str] = {}
+    notes: dict[str, str] = {}
     for row in rows:
         item = demo.calibration[row["path"]]
         if not item.in_set and item.note:
             name = item.path.partition("[")[0]
-            found.setdefault(name, f"{name}: {item.note}")
-    return list(found.values())
+            notes.setdefault(name, f"{name}: {item.note}")
+    return list(notes.values())

@@ -92,9 +92,9 @@ class Demo:
     def resumed(self, name: str, work: _Work[Result]) -> Result:
         """Take a step's result from an interrupted run, or do it and keep its result."""
         begin = clock.perf_counter()
-        found = self.kept.load(work.piece, work.inputs, work.read)
-        if found is not None:
-            result, before = found
+        stored = self.kept.load(work.piece, work.inputs, work.read)
+        if stored is not None:
+            result, before = stored
             text = f"kept from the interrupted run, which took {before:.1f} s for it"
             self.steps.append(Step(name, clock.perf_counter() - begin, text))
             return result
@@ -111,7 +111,7 @@ class Demo:
     @property
     def checks(self) -> list[Check]:
         """What must hold: the published table, the hidden values, the held-out log."""
-        found = [
+        results = [
             replace(check, name=f"backlash table, {check.name}") for check in self.backlash.checks
         ]
         count = encoder_count(self.base)
@@ -120,8 +120,8 @@ class Demo:
             name = f"{path}: estimate against the hidden truth"
             allowed = limit * abs(true) + (count if path == "play.total" else 0.0)
             error = abs(self.calibration[path].value - true)
-            found.append(Check(name, 100.0 * error / abs(true), 100.0 * allowed / abs(true), "%"))
-        return [*found, *self._held_out()]
+            results.append(Check(name, 100.0 * error / abs(true), 100.0 * allowed / abs(true), "%"))
+        return [*results, *self._held_out()]
 
     def _held_out(self) -> list[Check]:
         old = {e.signal: e.rms for e in self.before.errors if e.log == f"{HELD_OUT}.csv"}

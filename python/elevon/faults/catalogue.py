@@ -115,13 +115,13 @@ def find_record(kind: str, place: str, wiring: str, where: str = "") -> FaultRec
         No such kind, with the nearest; or no such place, with all the places of the kind.
     """
     known = catalogue(wiring)
-    found = [record for record in known if record.kind == kind]
-    if not found:
+    matches = [record for record in known if record.kind == kind]
+    if not matches:
         raise _unknown_kind(kind, known, where)
-    for record in found:
+    for record in matches:
         if place in record.places:
             return record
-    places = [name for record in found for name in record.places]
+    places = [name for record in matches for name in record.places]
     start = f"{where}: " if where else ""
     raise UnknownNameError(
         f"{start}{kind}: the actuator has no place {place!r}; places: {', '.join(places)}",

@@ -11,15 +11,15 @@ __all__ = ["numbers", "pairs"]
 
 def pairs(text: str, place: str) -> dict[str, str]:
     """Read ``name=value,name=value``; raise `InputError` naming the part that is not so."""
-    found: dict[str, str] = {}
+    values: dict[str, str] = {}
     for part in filter(None, (part.strip() for part in text.split(","))):
         name, equals, value = part.partition("=")
         if not equals or not name.strip() or not value.strip():
             raise InputError(f"{place}: {part!r} is not of the form name=value")
-        if name.strip() in found:
+        if name.strip() in values:
             raise InputError(f"{place}: {name.strip()!r} is given twice")
-        found[name.strip()] = value.strip()
-    return found
+        values[name.strip()] = value.strip()
+    return values
 
 
 def numbers(given: Any, place: str) -> tuple[float, ...]:

@@ -166,9 +166,9 @@ class _Problem:
     ) -> tuple[Mapping[str, float], ...]:
         """Return RMS of low less high over the size of high, by case and signal."""
         chosen = range(len(self.cases)) if rows is None else rows
-        found = zip(self.low(values, chosen), (self.high[row] for row in chosen), strict=True)
+        pairs = zip(self.low(values, chosen), (self.high[row] for row in chosen), strict=True)
         return tuple({n: _rms(low[n] - high[n]) / _size(n, high[n]) for n in SIGNALS}
-                     for low, high in found)  # fmt: skip
+                     for low, high in pairs)  # fmt: skip
 
     def moved(self, path: str, value: float) -> float:
         """Return the largest change of a signal, over its size, that another value makes."""
@@ -204,10 +204,10 @@ class _Problem:
                     errors = self.errors({**values, path: x}, rows)
                     return float(sum(value**2 for row in errors for value in row.values()))
 
-                found = minimize_scalar(
+                best = minimize_scalar(
                     cost, bounds=FREE[path], method="bounded", options={"xatol": 1e-4}
                 )
-                values[path] = float(found.x) if found.fun < cost(values[path]) else values[path]
+                values[path] = float(best.x) if best.fun < cost(values[path]) else values[path]
         return values
 
     def jackknife(
@@ -217,13 +217,15 @@ class _Problem:
         count = len(self.cases)
         if count < 2:
             return dict.fromkeys(paths, float("nan"))
-        found = []
+        solutions = []
         for left in range(count):
             if progress is not None:
                 progress(0.9 + 0.1 * left / count)
-            found.append(self.solve(paths, [row for row in range(count) if row != left]))
+            solutions.append(self.solve(paths, [row for row in range(count) if row != left]))
         return {
-            path: math.sqrt((count - 1) / count * sum((x[path] - best[path]) ** 2 for x in found))
+            path: math.sqrt(
+                (count - 1) / count * sum((x[path] - best[path]) ** 2 for x in solutions)
+            )
             for path in paths
         }
 

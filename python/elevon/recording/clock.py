@@ -58,8 +58,8 @@ class Clock:
             rate = float(rate)
             if not (math.isfinite(rate) and rate > 0):
                 raise InputError(f"clock {name!r}: the rate {rate} Hz is not a positive number")
-        found = _find_gaps(instants, rate) if gaps is None else _check_gaps(name, instants, gaps)
-        for key, value in (("name", name), ("time", instants), ("rate", rate), ("gaps", found)):
+        missing = _find_gaps(instants, rate) if gaps is None else _check_gaps(name, instants, gaps)
+        for key, value in (("name", name), ("time", instants), ("rate", rate), ("gaps", missing)):
             object.__setattr__(self, key, value)
 
     def __len__(self) -> int:
@@ -119,7 +119,7 @@ def _find_gaps(time: Floats, rate: float | None) -> tuple[int, ...]:
 
 
 def _check_gaps(name: str, time: Floats, gaps: Sequence[int]) -> tuple[int, ...]:
-    found = tuple(sorted({int(gap) for gap in gaps}))
-    if found and not 0 <= found[0] <= found[-1] < time.size - 1:
-        raise InputError(f"clock {name!r}: gap indices {found} outside 0..{time.size - 2}")
-    return found
+    indices = tuple(sorted({int(gap) for gap in gaps}))
+    if indices and not 0 <= indices[0] <= indices[-1] < time.size - 1:
+        raise InputError(f"clock {name!r}: gap indices {indices} outside 0..{time.size - 2}")
+    return indices

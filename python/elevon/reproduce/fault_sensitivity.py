@@ -212,12 +212,12 @@ def _rows(
     return [
         _strongest(
             str(fault),
-            (healthy, found),
+            (healthy, features_broken),
             (healthy_low, low.get(str(fault))),
             floors,
             find_record(fault.kind, fault.place, run.actuator.wiring).declined.get("low", ""),
         )
-        for fault, found in zip(parsed, broken, strict=True)
+        for fault, features_broken in zip(parsed, broken, strict=True)
     ]
 
 
@@ -277,22 +277,22 @@ def features(recording: Recording, ratio: float, start: float) -> dict[str, floa
     def value(name: str) -> Array:
         return np.asarray(np.interp(grid, recording[name].time, recording[name].values))
 
-    found = {}
+    values = {}
     for name, label, unit in (
         ("current_q", "q current", "A"),
         ("voltage_q_meas", "q voltage", "V"),
         ("motor_speed", "speed", "rad/s"),
     ):
         slow, fast = (filtered(recording, name, grid, hertz) for hertz in (SLOW_HZ, FAST_HZ))
-        found[f"{label}, mean size [{unit}]"] = float(np.mean(np.abs(slow)))
-        found[f"{label}, ripple [{unit}]"] = float(np.std(fast - slow))
+        values[f"{label}, mean size [{unit}]"] = float(np.mean(np.abs(slow)))
+        values[f"{label}, ripple [{unit}]"] = float(np.std(fast - slow))
     error = np.degrees(value("command") - value("encoder_position"))
-    found["position error, RMS [deg]"] = float(np.sqrt(np.mean(error**2)))
+    values["position error, RMS [deg]"] = float(np.sqrt(np.mean(error**2)))
     lost = np.degrees(value("motor_position") / ratio - value("encoder_position"))
-    found["lost motion [deg]"] = float(np.ptp(lost))
+    values["lost motion [deg]"] = float(np.ptp(lost))
     if tripped:
-        found = dict.fromkeys(found, math.nan)
-    return found | {"drive tripped [1]": float(tripped)}
+        values = dict.fromkeys(values, math.nan)
+    return values | {"drive tripped [1]": float(tripped)}
 
 
 def _low_has(wiring: str, fault: Fault) -> bool:

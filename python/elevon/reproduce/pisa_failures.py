@@ -300,12 +300,12 @@ def judge(
 def _lasting(false: npt.NDArray[np.bool_], time: npt.NDArray[np.float64]) -> npt.NDArray[np.intp]:
     """Return the first sample of each false indication at which it outlasts the response."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], false.astype(int), [0]])))
-    found = [
+    spans = [
         int(np.searchsorted(time, time[first] + RESPONSE))
         for first, last in zip(edges[::2], edges[1::2], strict=True)
         if time[last - 1] - time[first] > RESPONSE
     ]
-    return np.array(found, dtype=np.intp)
+    return np.array(spans, dtype=np.intp)
 
 
 def _true_state(locked: bool, ram: float, speed: float) -> str:

@@ -16,11 +16,11 @@ def summary(result: FailuresResult) -> tuple[list[str], list[list[str]]]:
     rows = []
     for phase in PHASES:
         mine = [row for row in result.rows if row.phase == phase.name]
-        found = sum(row.detected_by.startswith("fault") for row in mine)
+        detected = sum(row.detected_by.startswith("fault") for row in mine)
         warned = sum(row.detected_by.startswith("warning") for row in mine)
         unsafe = sum(not row.safe for row in mine)
-        silent = len(mine) - found - warned
-        rows.append([phase.name, *map(str, (len(mine), found, warned, silent, unsafe))])
+        silent = len(mine) - detected - warned
+        rows.append([phase.name, *map(str, (len(mine), detected, warned, silent, unsafe))])
     return ["phase", "faults", "fault shown", "warning shown", "silent", "unsafe"], rows
 
 

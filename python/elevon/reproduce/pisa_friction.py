@@ -258,9 +258,9 @@ def _friction_rows(
     name = "harmonic" if test.released else "harmonic_ffm"
     for order in range(1, HARMONICS + 1):
         wave = np.exp(2j * math.pi * order * position / lead)
-        found = float(np.abs(2.0 * np.mean(ripple * wave)))
+        recovered = float(np.abs(2.0 * np.mean(ripple * wave)))
         put = _table(actuator, f"harmonic_{order}", test.speed)
-        rows.append(FrictionRow(f"{name}_{order}", test.way, speed, None, put, found, "N"))
+        rows.append(FrictionRow(f"{name}_{order}", test.way, speed, None, put, recovered, "N"))
     if not test.released:
         return rows
     preload = 2.0 * actuator.parameters.value("screw.preload")
@@ -302,10 +302,10 @@ def _efficiency_rows(actuator: Actuator, seed: int, progress: Progress | None) -
     )
     rows = []
     for torque, (_, speed, load) in zip(torques[1:], means[1:], strict=True):
-        found = load * travel / (torque - free) / gear
+        recovered = load * travel / (torque - free) / gear
         put = loaded + (knot - loaded) * math.exp(-load / scale)
         working = 1e3 * abs(speed) * travel
-        rows.append(FrictionRow("efficiency", "retraction", working, load, put, found, "1"))
+        rows.append(FrictionRow("efficiency", "retraction", working, load, put, recovered, "1"))
     return rows
 
 

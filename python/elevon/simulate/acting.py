@@ -58,10 +58,10 @@ def check_values(actuator: Actuator, fidelity: str) -> list[Doubt]:
 
 def not_acting(actuator: Actuator, compiled: CompiledScenario, fidelity: str) -> list[Doubt]:
     """Return what the caller set away from neutral where it cannot act in this run."""
-    found = _asked(actuator, compiled, fidelity)
+    doubts = _asked(actuator, compiled, fidelity)
     return [
         Doubt(NotActingWarning, f"{name} does not act: {reason}")
-        for name, reason in found.items()
+        for name, reason in doubts.items()
         if reason
     ]
 

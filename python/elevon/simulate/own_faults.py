@@ -24,13 +24,13 @@ def own_faults(actuator: Actuator) -> list[FaultRecord]:
     actuator : Actuator
         With the drive, control mode and sensors of its own scenario.
     """
-    found = []
+    records = []
     for record in catalogue(actuator.wiring):
         places = tuple(place for place in record.places if _acts(actuator, record, place))
         if places:
             maximum = _largest(actuator, record)
-            found.append(dataclasses.replace(record, places=places, maximum=maximum))
-    return found
+            records.append(dataclasses.replace(record, places=places, maximum=maximum))
+    return records
 
 
 def _acts(actuator: Actuator, record: FaultRecord, place: str) -> bool:

@@ -55,8 +55,8 @@ def code_names(wiring: str, signal: str) -> dict[int, str]:
     from elevon import _core
 
     texts = {item["name"]: item["text"] for item in _core.signals(wiring, "high")}
-    found = re.findall(r"(\d+) ([^,;:]+)", texts.get(signal, ""))
-    return {int(code): word.strip() for code, word in found}
+    codes = re.findall(r"(\d+) ([^,;:]+)", texts.get(signal, ""))
+    return {int(code): word.strip() for code, word in codes}
 
 
 def has_states(wiring: str) -> bool:

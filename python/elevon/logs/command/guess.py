@@ -220,11 +220,11 @@ def _trapezoid(t: FloatArray, y: FloatArray, known: Mapping[str, float]) -> list
 
 def _crossings(t: FloatArray, y: FloatArray, level: float) -> list[tuple[float, bool]]:
     above = (y > level).astype(np.int8)
-    found = []
+    crossings = []
     for k in np.flatnonzero(np.diff(above)).tolist():
         part = (level - y[k]) / (y[k + 1] - y[k])
-        found.append((float(t[k] + part * (t[k + 1] - t[k])), bool(above[k + 1])))
-    return found
+        crossings.append((float(t[k] + part * (t[k + 1] - t[k])), bool(above[k + 1])))
+    return crossings
 
 
 def _edge(marks: Mapping[float, list[tuple[float, bool]]], *, rising: bool) -> float:

@@ -39,8 +39,8 @@ def read_matlab(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> RawTabl
 def has_variable(path: Path, name: str, limits: Limits) -> bool:
     """Whether a version 5 file holds a variable of a name at its top; False for any other file."""
     try:
-        with closing(_bounded(path, limits)) as found:
-            return any(variable.name == name for variable in found)
+        with closing(_bounded(path, limits)) as listed:
+            return any(variable.name == name for variable in listed)
     except FormatError:
         return False
 
@@ -54,19 +54,19 @@ def _vectors(path: Path, limits: Limits, notes: list[str]) -> dict[str, FloatArr
 
     What is passed over is added to the notes: matrices, cells, objects, text, complex numbers.
     """
-    found: dict[str, FloatArray] = {}
+    vectors: dict[str, FloatArray] = {}
     total = 0
     for variable in _bounded(path, limits):
         for label, item in _members(path, variable):
             vector = _vector(label, item, notes)
             if vector is None:
                 continue
-            if label in found:
+            if label in vectors:
                 raise FormatError(f"{path}: two variables are named {quoted(label)}")
             total += len(vector)
             limits.check_shape(str(path), total, 1)
-            found[label] = vector
-    return found
+            vectors[label] = vector
+    return vectors
 
 
 def _members(path: Path, variable: Variable) -> Iterator[tuple[str, Variable]]:

@@ -258,7 +258,7 @@ class _Reader:
         labels = short if len(set(short)) == len(short) else names
         columns = {label: data[:, k].copy() for k, label in enumerate(labels)}
         units = {label: unit for label, (_, unit) in zip(labels, pairs, strict=True) if unit}
-        words = {names[k]: "\n".join(found) for k, found in self.words.items()}
+        words = {names[k]: "\n".join(values) for k, values in self.words.items()}
         return RawTable(self.source, columns, units, tuple(self.notes), "csv", words)
 
 

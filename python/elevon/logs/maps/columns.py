@@ -44,19 +44,19 @@ def find_drive_columns(table: RawTable, given: Collection[str] = ()) -> dict[str
     FormatError
         No time column, no position column, or two columns of one parameter.
     """
-    found: dict[str, str] = {}
+    recognised: dict[str, str] = {}
     for name in table.columns:
         key = parameter_key(name)
         if key is None:
             continue
-        if key in found:
+        if key in recognised:
             raise FormatError(
-                f"{table.source}: columns {quoted(found[key])} and {quoted(name)} are both "
+                f"{table.source}: columns {quoted(recognised[key])} and {quoted(name)} are both "
                 f"{key}; name one of them in a column map"
             )
-        found[key] = name
-    _check_found(table, {*found, *given})
-    return found
+        recognised[key] = name
+    _check_found(table, {*recognised, *given})
+    return recognised
 
 
 def looks_like_drive(table: RawTable) -> bool:
@@ -76,14 +76,14 @@ def parameter_key(name: str) -> str | None:
     return f"r{number}" if f"r{number}" in drive_columns() else None
 
 
-def _check_found(table: RawTable, found: Collection[str]) -> None:
+def _check_found(table: RawTable, recognised: Collection[str]) -> None:
     names = ", ".join(quoted(name) for name in list(table.columns)[:12])
-    if "time" not in found:
+    if "time" not in recognised:
         raise FormatError(
             f"{table.source}: no time column (Xms){did_you_mean('Xms', table.columns)}; "
             f"columns: {names}"
         )
-    if "r4820" not in found and "r4821" not in found:
+    if "r4820" not in recognised and "r4821" not in recognised:
         raise FormatError(
             f"{table.source}: neither the motor's position (r4820) nor the user's (r4821); "
             f"columns: {names}"

@@ -89,8 +89,8 @@ def settle_motor(
             f"{report.source}: {what} has the wrong sign: the motor's position falls while its "
             "speed is positive; give sign = -1 in a column map"
         )
-    found = match(slope, motor_candidates())
-    if found is None:
+    candidate = match(slope, motor_candidates())
+    if candidate is None:
         raise InputError(
             f"{report.source}: {statement.column} moves {slope:.5g} per rad of the integrated "
             f"motor speed, which is no known unit ({_listed(motor_candidates())}); give unit and "
@@ -99,10 +99,10 @@ def settle_motor(
     report.note(
         name,
         "unit-confirmed",
-        f"{statement.column} is in {found.unit}: it moves {slope / found.scale:.4f} of the "
+        f"{statement.column} is in {candidate.unit}: it moves {slope / candidate.scale:.4f} of the "
         "integrated speed",
     )
-    return 1.0 / found.scale, True
+    return 1.0 / candidate.scale, True
 
 
 def settle_encoder(
@@ -152,20 +152,20 @@ def settle_encoder(
             f"{report.source}: {statement.column} (encoder) has the wrong sign: it falls while "
             "the motor's position rises; give sign = -1 in a column map"
         )
-    found = match(fit.slope, encoder_candidates(ratio))
-    _refuse_shaft(statement, fit, found, ratio, report)
-    assert found is not None
-    seen = ratio * found.scale / fit.slope
+    candidate = match(fit.slope, encoder_candidates(ratio))
+    _refuse_shaft(statement, fit, candidate, ratio, report)
+    assert candidate is not None
+    seen = ratio * candidate.scale / fit.slope
     follows = f"gear ratio seen {seen:.3f}, expected {ratio:g}"
-    if found.shaft == "fast":  # the drive has multiplied by its own ratio: it cannot be seen
-        follows = f"it moves {fit.slope / found.scale:.4f} of the motor"
+    if candidate.shaft == "fast":  # the drive has multiplied by its own ratio: it cannot be seen
+        follows = f"it moves {fit.slope / candidate.scale:.4f} of the motor"
     report.note(
         name,
         "shaft-confirmed",
-        f"{statement.column} is on the {found.shaft} shaft in {found.unit}: {follows}; play about "
-        f"{play:.3f} deg at the user",
+        f"{statement.column} is on the {candidate.shaft} shaft in {candidate.unit}: {follows}; "
+        f"play about {play:.3f} deg at the user",
     )
-    return 1.0 / (found.scale * ratio), True
+    return 1.0 / (candidate.scale * ratio), True
 
 
 def _against(reference: FloatArray, position: FloatArray) -> Fit:
@@ -189,23 +189,23 @@ def _against(reference: FloatArray, position: FloatArray) -> Fit:
 def _refuse_shaft(
     statement: PositionStatement,
     fit: Fit,
-    found: UnitCandidate | None,
+    candidate: UnitCandidate | None,
     ratio: float,
     report: ImportReport,
 ) -> None:
-    if found is None:
+    if candidate is None:
         raise InputError(
             f"{report.source}: {statement.column} (encoder) moves {fit.slope:.5g} per rad of the "
             f"motor, which fits no unit on any shaft for a gear ratio of {ratio:g} "
             f"({_listed(encoder_candidates(ratio))}); check the gear ratio, or give unit, scale "
             "and shaft in a column map"
         )
-    if found.shaft == "wheel":
+    if candidate.shaft == "wheel":
         raise InputError(
             f"{report.source}: {statement.column} (encoder) is on the wrong shaft: it turns "
-            f"{fit.slope / found.scale:.3f} x 4 times the user shaft, as the encoder's own "
-            f"22-tooth wheel does; give shaft = 'slow', scale = 0.25, unit = '{found.unit}' in a "
-            "column map"
+            f"{fit.slope / candidate.scale:.3f} x 4 times the user shaft, as the encoder's own "
+            f"22-tooth wheel does; give shaft = 'slow', scale = 0.25, "
+            f"unit = '{candidate.unit}' in a column map"
         )
 
 

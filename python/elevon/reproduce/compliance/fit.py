@@ -184,13 +184,13 @@ def bootstrap_interval(
     groups = np.zeros(len(load), dtype=int) if group is None else np.asarray(group)
     members = [np.flatnonzero(labels == label) for label in np.unique(labels)]
     random = np.random.default_rng(seed)
-    found = []
+    slopes = []
     for _ in range(resamples):
         drawn = np.concatenate([members[k] for k in random.integers(0, len(members), len(members))])
         if np.ptp(load[drawn]) > 0.0:  # the same weight drawn each time determines no slope
-            found.append(fit_compliance(load[drawn], loss[drawn], groups[drawn]).stiffness)
+            slopes.append(fit_compliance(load[drawn], loss[drawn], groups[drawn]).stiffness)
     tail = 50.0 * (1.0 - level)
-    low, high = np.percentile(found, [tail, 100.0 - tail])
+    low, high = np.percentile(slopes, [tail, 100.0 - tail])
     return float(low), float(high)
 
 

@@ -94,10 +94,10 @@ def find_slips(drops: Sequence[Drop]) -> tuple[list[Drop], list[Slip]]:
     downwards = sum(_motor(drop, ends) < 0 for drop in drops) * 2 > len(drops)
     repaired, slips = [], []
     for drop in drops:
-        fixed, found = _positions(drop, ends, downwards)
-        fixed, wrong = _loss(drop, fixed, bool(found), drops)
+        fixed, slips_found = _positions(drop, ends, downwards)
+        fixed, wrong = _loss(drop, fixed, bool(slips_found), drops)
         repaired.append(fixed)
-        slips += found + wrong
+        slips += slips_found + wrong
     return repaired, slips
 
 
