@@ -86,7 +86,7 @@ def test_what_was_seen_is_in_the_report(trials, tmp_path, capsys):
     text = json.dumps(report)
     assert "byte-order mark" in text
     assert "decimal comma" in text
-    assert "is not known; kept as it stands" in text
+    assert "is not known; left as it stands" in text
     assert "slow shaft in deg" in text
     assert report["clocks"]["drive"]["rate_hz"] == pytest.approx(400.0)
 

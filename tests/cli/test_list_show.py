@@ -107,7 +107,7 @@ def test_version(elevon_cli):
 
 
 def test_the_faults_of_an_actuator_are_its_own(elevon_cli):
-    """Circuits end at the nut's four; namesakes are told apart."""
+    """Circuits end at the nut's four; namesakes are distinguished."""
     rows = elevon_cli("list", "faults", "nasa-ballscrew", "--json").json["faults"]
     kinds = {row["kind"]: row for row in rows}
     assert kinds["return_jam"]["range"] == "[0, 4]"

@@ -16,7 +16,7 @@ PATH = re.compile(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)+")
 
 
 def unique(names: list[str]) -> None:
-    """No name twice, and none told apart by case alone."""
+    """No name twice, and none distinguished by case alone."""
     assert len({name.lower() for name in names}) == len(names)
 
 

@@ -98,7 +98,7 @@ class Setup:
     brake: BrakeRun | None
 
     def truth(self) -> dict[str, Any]:
-        """Return what the log's reader is not told."""
+        """Return what the log's reader does not know."""
         parameters = self.actuator.parameters
         return {
             "name": self.trace.name,

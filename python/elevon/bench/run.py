@@ -62,7 +62,7 @@ class BenchResult:
     sim_s, wall_s : float
         Simulated time of the logs made now, and the time it took.
     hidden : mapping
-        What the logs' reader is not told.
+        What the logs' reader does not know.
     """
 
     procedure: str
@@ -143,7 +143,7 @@ def run_procedure(
     layout : DriveFormat, optional
         How the trace is written; default: degrees, encoder on the fast shaft, rms.
     truth : path, optional
-        File (JSON) for what the logs' reader is not told.
+        File (JSON) for what the logs' reader does not know.
     force : bool
         Whether logs that are there may be replaced. Without it, logs of the very same work are
         kept, with the status of their runs, and the missing ones are made; logs of other work are

@@ -138,8 +138,8 @@ def without_companions(logs: list[Path]) -> list[Path]:
     from elevon.logs.importing import find_sidecars
 
     beside = {path for log in logs for path in find_sidecars(log) if path is not None}
-    kept = [log for log in logs if log.expanduser() not in beside]
+    remaining = [log for log in logs if log.expanduser() not in beside]
     for log in logs:
-        if log not in kept:
+        if log not in remaining:
             say(f"{log}: read with its log, not as one")
-    return kept
+    return remaining

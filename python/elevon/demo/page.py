@@ -37,7 +37,7 @@ def demo_report(demo: Demo) -> Report:
     passed = [check.passed for check in demo.checks]
     report = Report(
         "A bench with hidden values, recovered from its logs",
-        "A published table is recomputed; then an actuator whose values nobody told the "
+        "A published table is recomputed; then an actuator whose values nobody gave the "
         "calibration writes the logs a bench would write, and is recovered from them.",
     )
     report.fact("Checks passed", f"{sum(passed)} of {len(passed)}")
@@ -96,7 +96,7 @@ def _bench(report: Report, demo: Demo) -> None:
     columns = ["Log", "Brake", "Trigger at [s]", "Command begins at [s]", "Motor in the play [%]"]
     formats = ["", "", ".3f", ".3f", "+.0f"]
     caption = (
-        "What chance set; the calibration was told none of it. Where the motor stands in the play "
+        "What chance set; the calibration was given none of it. Where the motor stands in the play "
         "at first: 0 is the middle, \N{PLUS-MINUS SIGN}50 its ends."
     )
     section.table(Table(columns, rows, caption, formats=formats))
@@ -134,16 +134,16 @@ def _agreement(report: Report, demo: Demo) -> None:
             f"{trace.log}: log and calibrated model on the left; on the right model less log, "
             "with the published values before and the calibrated ones after.",
         )
-    kept = demo.after.traces[-1]
+    held_out = demo.after.traces[-1]
     for name in ("motor_speed", "current_q_meas"):
         label, factor, unit = _SHOWN[name]
         section.chart(
-            f"{kept.log}, the log kept back: {label}",
-            kept.time[kept.used],
+            f"{held_out.log}, the log kept back: {label}",
+            held_out.time[held_out.used],
             {
-                "log": factor * kept.measured[name][kept.used],
-                "after": factor * kept.simulated[name][kept.used],
-                "before": factor * earlier[kept.log].simulated[name][kept.used],
+                "log": factor * held_out.measured[name][held_out.used],
+                "after": factor * held_out.simulated[name][held_out.used],
+                "before": factor * earlier[held_out.log].simulated[name][held_out.used],
             },
             y_label=f"{label} [{unit}]",
             note="Point at it for numbers, drag to zoom, double click to go back.",
@@ -190,8 +190,8 @@ def _clocks(report: Report, demo: Demo) -> None:
         if not synchronisation or synchronisation.get("offset_s") is None:
             continue
         true = log["conditions"]
-        told = all(finding.code != "drift-unknown" for finding in item.report.findings)
-        told = told and synchronisation["drift_std"] is not None
+        determined = all(finding.code != "drift-unknown" for finding in item.report.findings)
+        determined = determined and synchronisation["drift_std"] is not None
         rows.append(
             [
                 log["name"].replace("-", "\N{NON-BREAKING HYPHEN}"),
@@ -200,8 +200,8 @@ def _clocks(report: Report, demo: Demo) -> None:
                 synchronisation["offset_s"],
                 1e3 * synchronisation["offset_std_s"],
                 1e6 * true["cell"]["clock_drift"],
-                1e6 * synchronisation["drift"] if told else None,
-                1e6 * synchronisation["drift_std"] if told else None,
+                1e6 * synchronisation["drift"] if determined else None,
+                1e6 * synchronisation["drift_std"] if determined else None,
             ]
         )
     columns = [

@@ -4,7 +4,7 @@ A file is a chain of elements: a tag (type, length) and as many bytes, padded to
 may be compressed with zlib. SciPy's reader believes the tags, and a damaged file brings it to read
 outside its memory; this one checks every length and count before it uses them. Only numbers, texts
 and the fields of plain structs are ever decoded: cells, objects, function handles and sparse
-matrices are told by their kind, and their content is not looked at.
+matrices are recognised by their kind, and their content is not looked at.
 """
 
 import struct

@@ -127,8 +127,8 @@ def _draw(axis: Axes, panel: _Panel, name_clock: bool) -> None:
             after = np.asarray(panel.clock.gaps, dtype=np.intp) + 1
             time, line = np.insert(time, after, np.nan), np.insert(line, after, np.nan)
         elif time.size > _MOST_POINTS:
-            time, kept = thinned(time, {name: line}, _MOST_POINTS)
-            line = kept[name]
+            time, thin_lines = thinned(time, {name: line}, _MOST_POINTS)
+            line = thin_lines[name]
         axis.plot(time, line, label=name, linewidth=1.1, color=COLOURS[k % len(COLOURS)])
     clock = f" ({panel.clock.name})" if name_clock else ""
     axis.set_ylabel(("" if panel.unit == "1" else f"[{panel.unit}]") + clock)

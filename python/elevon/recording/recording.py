@@ -37,7 +37,7 @@ class Recording:
     channels : iterable of Channel
         Channels; two of them on one clock must hold the same `Clock`.
     clocks : iterable of Clock, optional
-        Clocks that carry no channel, kept as well.
+        Clocks that carry no channel.
     meta : mapping, optional
         What is known about the run: status, message, actuator, fidelity, seed, parameter hash,
         version, steps... Text, numbers, sequences and mappings only.
@@ -217,7 +217,7 @@ class Recording:
         Parameters
         ----------
         names : iterable of str, optional
-            Channels kept, in this order; default all.
+            Channels chosen, in this order; default all.
         clock : str, optional
             Only the channels of this clock.
 
@@ -226,14 +226,14 @@ class Recording:
         UnknownNameError
             No such channel or clock, with the nearest names.
         """
-        kept = self.channels if names is None else [self[name] for name in names]
+        chosen = self.channels if names is None else [self[name] for name in names]
         clocks: list[Clock] = []
         if clock is not None:
             base = self.clock(clock)
-            kept, clocks = [channel for channel in kept if channel.clock is base], [base]
+            chosen, clocks = [channel for channel in chosen if channel.clock is base], [base]
         elif names is None:
             clocks = list(self.clocks.values())
-        return self._with(kept, clocks)
+        return self._with(chosen, clocks)
 
     def window(self, start: float = -np.inf, stop: float = np.inf) -> "Recording":
         """Return the part with start <= time <= stop (s), on every clock, sharing the values."""

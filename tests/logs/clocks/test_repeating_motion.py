@@ -37,7 +37,7 @@ def test_a_repeating_sine_without_a_trigger_is_refused_or_right(tmp_path, seed, 
     sync = found.synchronisation
     if sync["method"] == "none":
         (said,) = (f.text for f in found.findings if f.code == "not-synchronised")
-        assert "cannot be told apart" in said
+        assert "cannot be distinguished" in said
         assert "independent samples" in said
     else:
         assert abs(sync["offset_s"] - trigger) < 3.0 * sync["offset_std_s"]

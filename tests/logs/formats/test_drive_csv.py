@@ -269,7 +269,7 @@ def test_writer_refuses(tmp_path, truth):
         write_drive_csv(path, {"time": [0.0, 1.0], "trigger": [0.0]})
     with pytest.raises(InputError, match="finite"):
         write_drive_csv(path, {"time": [0.0], "trigger": [math.nan]})
-    with pytest.raises(InputError, match="told apart"):
+    with pytest.raises(InputError, match="distinguished"):
         DriveFormat(decimal_comma=True)
     write_drive_csv(path, {"time": [0.0], "trigger": [0.0]})
     with pytest.raises(OutputExistsError):

@@ -319,9 +319,9 @@ def _range(basis: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray
     size = np.linalg.norm(basis, axis=0)
     size = np.where(size > 0.0, size, 1.0)
     left, singular, right = np.linalg.svd(basis / size, full_matrices=False)
-    kept = singular > _RANK * singular[0]
-    left = left[:, kept]
-    weights = right[kept].T @ ((left.T @ value) / singular[kept]) / size
+    significant = singular > _RANK * singular[0]
+    left = left[:, significant]
+    weights = right[significant].T @ ((left.T @ value) / singular[significant]) / size
     return left, weights
 
 

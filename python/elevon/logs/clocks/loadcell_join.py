@@ -153,7 +153,7 @@ def _fit_findings(fit: ClockFit, report: ImportReport) -> None:
             "load_cell",
             "offset-assumed",
             f"no trigger: {fit.offset:.3f} s has the load cell begin within the drive's trace; "
-            f"{fit.set_aside:.3f} s, before it, cannot be told from it by what both saw",
+            f"{fit.set_aside:.3f} s, before it, cannot be distinguished from it by what both saw",
         )
 
 

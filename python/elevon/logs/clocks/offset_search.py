@@ -70,8 +70,8 @@ def search_offset(choices: Sequence[SharedLogs]) -> Guess | None:
     Raises
     ------
     InputError
-        Another offset cannot be told from the best one: the motion repeats, sets of signals
-        disagree, or the logs are too short.
+        Another offset cannot be distinguished from the best one: the motion repeats, sets of
+        signals disagree, or the logs are too short.
     """
     logs = choices[0]
     span = float(np.ptp(logs.time)), float(np.ptp(logs.second))
@@ -115,7 +115,7 @@ class _Search:
         return self.choices[int(np.argmax(self.table[:, place]))]
 
     def rivals(self, best: int) -> npt.NDArray[np.intp]:
-        """Return the peaks, neighbours left out, that cannot be told from the best.
+        """Return the peaks, neighbours left out, that cannot be distinguished from the best.
 
         None where nothing explains enough to be taken anyway.
         """
@@ -134,17 +134,17 @@ class _Search:
         why = "the motion repeats" if same else "two sets of signals disagree"
         return (
             f"{why}: offsets of {self.offsets[best]:.3f} s and {self.offsets[other]:.3f} s cannot "
-            f"be told apart (where both overlap, {100 * left:.2g} % and {100 * most:.2g} % of the "
-            f"load cell stay unexplained, over what is worth {worth:.2g} independent samples for "
-            f"{unknowns} unknowns)"
+            f"be distinguished (where both overlap, {100 * left:.2g} % and {100 * most:.2g} % of "
+            f"the load cell stay unexplained, over what is worth {worth:.2g} independent samples "
+            f"for {unknowns} unknowns)"
         )
 
     def _alike(self, best: int, other: int) -> bool:
         left, most, worth, unknowns = self._against(best, other)
         if most < _RIVAL * left or most < left + _LEAST_MORE:
             return True
-        told = 0.5 * max(worth - unknowns, 0.0) * math.log(most / max(left, _FLOOR))
-        return told < math.log(_ODDS)
+        evidence = 0.5 * max(worth - unknowns, 0.0) * math.log(most / max(left, _FLOOR))
+        return evidence < math.log(_ODDS)
 
     def _against(self, best: int, other: int) -> tuple[float, float, float, int]:
         """Compare two offsets over the samples that both of them place inside the first log.

@@ -24,7 +24,7 @@ class ClockQuality:
     Attributes
     ----------
     samples : int
-        Rows kept.
+        Rows used.
     duration : float
         Seconds from first to last.
     period : float
@@ -36,9 +36,9 @@ class ClockQuality:
     gaps : tuple of (float, float, int)
         Start [s], end [s] and samples missing of each gap.
     duplicates : int
-        Time stamps that repeat the one before; the first of each is kept.
+        Time stamps that repeat the one before; the first of each is used.
     keep : ndarray of int, shape (samples,)
-        Rows kept.
+        Rows used.
     """
 
     samples: int
@@ -72,33 +72,33 @@ def clock_quality(source: str, time: FloatArray) -> ClockQuality:
             f"to {time[row]:.6g} s"
         )
     keep = np.concatenate(([0], np.flatnonzero(steps > 0.0) + 1)).astype(np.intp)
-    kept = time[keep]
-    if len(kept) < 2:
+    instants = time[keep]
+    if len(instants) < 2:
         raise FormatError(f"{source}: a single instant; a log needs two or more")
-    return _examine(kept, keep, len(time) - len(kept))
+    return _examine(instants, keep, len(time) - len(instants))
 
 
-def _examine(kept: FloatArray, keep: IntArray, duplicates: int) -> ClockQuality:
-    steps = np.diff(kept)
+def _examine(instants: FloatArray, keep: IntArray, duplicates: int) -> ClockQuality:
+    steps = np.diff(instants)
     period = float(np.median(steps))
     # Whole periods between samples: time stamps rounded to 1 ms alternate 2 and 3 ms at 400 Hz, so
     # the median is refined by the slope until the count of periods no longer changes.
     for _ in range(5):
         ticks = np.concatenate(([0.0], np.cumsum(np.maximum(1.0, np.rint(steps / period)))))
-        slope = float(np.polyfit(ticks - ticks.mean(), kept - kept.mean(), 1)[0])
+        slope = float(np.polyfit(ticks - ticks.mean(), instants - instants.mean(), 1)[0])
         if abs(slope - period) <= 1e-12 * period:
             break
         period = slope
-    off = kept - kept.mean() - period * (ticks - ticks.mean())
+    off = instants - instants.mean() - period * (ticks - ticks.mean())
     long = np.flatnonzero(steps > _GAP * period)
     gaps = tuple(
-        (float(kept[k]), float(kept[k + 1]), int(np.rint(steps[k] / period)) - 1)
+        (float(instants[k]), float(instants[k + 1]), int(np.rint(steps[k] / period)) - 1)
         for k in long
         if np.rint(steps[k] / period) >= 2
     )
     return ClockQuality(
-        samples=len(kept),
-        duration=float(kept[-1] - kept[0]),
+        samples=len(instants),
+        duration=float(instants[-1] - instants[0]),
         period=period,
         rate=1.0 / period,
         jitter_rms=float(np.sqrt(np.mean(off**2))),

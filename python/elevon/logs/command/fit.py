@@ -76,8 +76,8 @@ class WaveformFit:
 
     def as_term(self) -> dict[str, float | str]:
         """Return the command as a scenario's term: SI numbers, infinite ends left out."""
-        kept = {name: v for name, v in self.values.items() if math.isfinite(v)}
-        return {"kind": self.kind, **kept}
+        finite = {name: v for name, v in self.values.items() if math.isfinite(v)}
+        return {"kind": self.kind, **finite}
 
 
 def fit_waveform(

@@ -131,7 +131,7 @@ def _plain(command: Command) -> dict[str, Any]:
 
 
 def read_command_note(path: str | Path) -> CommandNote:
-    """Read a command note from TOML or JSON, told apart by the ending or the first character.
+    """Read a command note from TOML or JSON, distinguished by the ending or the first character.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Which reader a file needs, told by its first bytes before its name."""
+"""Which reader a file needs, seen from its first bytes before its name."""
 
 from __future__ import annotations
 

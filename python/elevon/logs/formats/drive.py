@@ -67,7 +67,9 @@ class DriveFormat:
         _choice("encoding", self.encoding, ("utf-8", "utf-8-sig", "latin-1"))
         _choice("line_end", self.line_end, ("\n", "\r\n"))
         if self.decimal_comma and self.delimiter == ",":
-            raise InputError("drive format: decimal comma and comma delimiter cannot be told apart")
+            raise InputError(
+                "drive format: decimal comma and comma delimiter cannot be distinguished"
+            )
 
 
 def write_drive_csv(

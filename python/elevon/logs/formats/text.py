@@ -1,4 +1,4 @@
-"""Text tables, read line by line: delimiter, decimal comma, encoding and line ends are told apart.
+"""Text tables, read line by line: delimiter, decimal comma, encoding and line ends are seen.
 
 Nothing is guessed cell by cell: what cannot be read as one consistent table is refused, with the
 line and the column.
@@ -215,7 +215,7 @@ class _Reader:
         cut = "" if self.ended else "; the file is cut off there"
         hint = ""
         if self.delimiter == "," and len(cells) == 2 * columns:
-            hint = "; decimal commas between commas cannot be told apart: separate by semicolons"
+            hint = "; decimal commas between commas cannot be distinguished: separate by semicolons"
         raise FormatError(
             f"{self.source}, line {number}: {len(cells)} cells where the header has {columns}"
             f"{cut}{hint}"
@@ -232,7 +232,7 @@ class _Reader:
         if self.decimal_comma_line and self.decimal_point_line:
             raise FormatError(
                 f"{self.source}: decimal comma on line {self.decimal_comma_line} and decimal point "
-                f"on line {self.decimal_point_line}; thousands separators cannot be told apart"
+                f"on line {self.decimal_point_line}; thousands separators cannot be distinguished"
             )
         return [cell.replace(",", ".") for cell in cells] if self.decimal_comma_line else cells
 

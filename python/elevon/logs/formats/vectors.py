@@ -38,16 +38,17 @@ def table_of_vectors(
     length = _length(vectors)
     if length == 0:
         raise FormatError(f"{source}: the vectors are empty")
-    kept = {name: quiet(values) for name, values in vectors.items() if len(values) == length}
-    for name in vectors.keys() - kept.keys():
+    aligned = {name: quiet(values) for name, values in vectors.items() if len(values) == length}
+    for name in vectors.keys() - aligned.keys():
         notes.append(f"{quoted(name)} passed over: {len(vectors[name])} values, not {length}")
-    limits.check_shape(source, length, len(kept))
-    last = [name.rpartition("/")[2] for name in kept]
+    limits.check_shape(source, length, len(aligned))
+    last = [name.rpartition("/")[2] for name in aligned]
     short = {
-        name: tail if last.count(tail) == 1 else name for name, tail in zip(kept, last, strict=True)
+        name: tail if last.count(tail) == 1 else name
+        for name, tail in zip(aligned, last, strict=True)
     }
-    columns = {short[name]: values for name, values in kept.items()}
-    stated = {short[name]: unit for name, unit in units.items() if name in kept}
+    columns = {short[name]: values for name, values in aligned.items()}
+    stated = {short[name]: unit for name, unit in units.items() if name in aligned}
     return RawTable(source, columns, stated, tuple(notes), file_format)
 
 

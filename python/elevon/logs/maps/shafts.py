@@ -169,7 +169,7 @@ def settle_encoder(
 
 
 def _against(reference: FloatArray, position: FloatArray) -> Fit:
-    """Fit without play; a slow drift of the integrated speed is taken out where it can be told."""
+    """Fit without play; a slow drift of the integrated speed is taken out where it can be seen."""
     good = np.isfinite(reference) & np.isfinite(position)
     x, y = reference[good], position[good]
     travel = float(np.ptp(x)) if x.size else 0.0
