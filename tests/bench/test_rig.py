@@ -45,7 +45,7 @@ def brake_step(value):
 
 
 def test_every_procedure_of_the_package_can_be_set_up(actuator):
-    for name in procedure_names():
+    for name in procedure_names("rotary-bench"):
         found = setups(load_procedure(name), actuator)
         assert len(found) == len(load_procedure(name).traces)
 

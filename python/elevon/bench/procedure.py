@@ -7,6 +7,8 @@ stands.
 
 from __future__ import annotations
 
+import itertools
+import math
 import os
 import re
 from collections.abc import Mapping
@@ -32,8 +34,10 @@ from elevon.units import parse_quantity
 
 __all__ = [
     "BrakeStep",
+    "ForceStep",
     "PlayStep",
     "Procedure",
+    "RigStep",
     "SettingsStep",
     "SpringStep",
     "Step",
@@ -207,6 +211,46 @@ class WeightsStep(_Frozen):
         return self
 
 
+class ForceStep(_Frozen):
+    """Set what the load actuator is asked for; parts add up, positive opposes positive motion.
+
+    Attributes
+    ----------
+    terms : tuple of Term
+        Sum of waveforms, N, counted from the command's start.
+    opposing : quantity
+        Against motion of either direction, N; negative: along it.
+    stiffness : quantity
+        Of a spring at rest at zero, N/m.
+    positions, forces : tuple of float
+        Force [N] against the output's position [m]; linear between, held outside.
+    """
+
+    kind: Literal["force"]
+    terms: tuple[Term, ...] = ()
+    opposing: Quantity = 0.0
+    stiffness: Quantity = 0.0
+    positions: tuple[StrictInt | StrictFloat, ...] = ()
+    forces: tuple[StrictInt | StrictFloat, ...] = ()
+
+    @model_validator(mode="after")
+    def _readable(self) -> Self:
+        _checked(self.opposing, "N", -math.inf, "opposing")
+        _checked(self.stiffness, "N/m", 0.0, "stiffness")
+        if len(self.positions) != len(self.forces):
+            raise ValueError("'positions' and 'forces' must be of one length")
+        if any(b <= a for a, b in itertools.pairwise(self.positions)):
+            raise ValueError("'positions' must rise")
+        return self
+
+
+class RigStep(_Frozen):
+    """Move the output by the rig, m/s (a friction test); no terms: the actuator moves itself."""
+
+    kind: Literal["rig"]
+    terms: tuple[Term, ...] = ()
+
+
 class SettingsStep(_Frozen):
     """Change parameters of the actuator for the logs that follow, such as the drive's gains."""
 
@@ -225,12 +269,23 @@ class TraceStep(_Frozen):
         Length of the log, s.
     command : Command
         As in a scenario, counted from the command's start.
+    rate : quantity, optional
+        Samples a second; default the stand's. The rotary's drive has a rate of its own.
+    initial : dict
+        Where the output stands at first, as in a scenario.
     """
 
     kind: Literal["trace"]
     name: StrictStr
     duration: Quantity
     command: Command = Command()
+    rate: Quantity | None = None
+    initial: dict[str, Quantity] = Field(default_factory=dict)
+
+    @field_validator("rate")
+    @classmethod
+    def _fast(cls, value: Quantity | None) -> Quantity | None:
+        return None if value is None else _checked(value, "Hz", 1.0, "rate")
 
     @field_validator("name")
     @classmethod
@@ -246,8 +301,9 @@ class TraceStep(_Frozen):
         return value
 
 
+_Load = PlayStep | BrakeStep | SpringStep | WeightsStep | ForceStep | RigStep
 Step = Annotated[
-    PlayStep | BrakeStep | SpringStep | WeightsStep | SettingsStep | TraceStep,
+    _Load | SettingsStep | TraceStep,
     Field(discriminator="kind"),
 ]
 
@@ -259,12 +315,15 @@ class Procedure(_Frozen):
     ----------
     name, text : str
         What it is called and what it is for.
+    stand : str, optional
+        The stand it is written for (`elevon.bench.stand.stand_names`); default: any.
     step : tuple of Step
         In order; at least one of them a trace, each trace with a name of its own.
     """
 
     name: StrictStr
     text: StrictStr = ""
+    stand: StrictStr | None = None
     step: tuple[Step, ...]
 
     @field_validator("name")
@@ -288,12 +347,15 @@ class Procedure(_Frozen):
         return tuple(item for item in self.step if isinstance(item, TraceStep))
 
 
-def procedure_names() -> list[str]:
-    """Return the names of the package's own procedures."""
+def procedure_names(stand: str | None = None) -> list[str]:
+    """Return the names of the package's own procedures, of one stand or all."""
     folder = files("elevon.bench") / "procedures"
-    return sorted(
+    names = sorted(
         item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml")
     )
+    if stand is None:
+        return names
+    return [name for name in names if load_procedure(name).stand in (None, stand)]
 
 
 def load_procedure(reference: str | os.PathLike[str]) -> Procedure:

@@ -13,8 +13,10 @@ from elevon.bench.brake_rig import BrakeRig, BrakeRun, CellState, brake_loop
 from elevon.bench.load_module import Springs, Weights, springs_of, weights_of
 from elevon.bench.procedure import (
     BrakeStep,
+    ForceStep,
     PlayStep,
     Procedure,
+    RigStep,
     SettingsStep,
     SpringStep,
     TraceStep,
@@ -29,7 +31,7 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.faults import Fault
 
-__all__ = ["Conditions", "Rig", "Setup", "draw_conditions", "setups"]
+__all__ = ["Conditions", "Rig", "Setup", "draw_conditions", "moved", "setups"]
 
 RATE = 400.0  # Hz of the drive's trace (T1)
 _LONGEST_WAIT = 1.0  # s from the trace's start to the trigger, and from there to the command
@@ -153,6 +155,8 @@ def setups(
         if isinstance(step, TraceStep):
             conditions = draw_conditions(seed, len(found))
             found.append(_setup(step, rig, actuator, conditions, faults))
+        elif isinstance(step, ForceStep | RigStep):
+            raise InputError(f"{procedure.name}: the rotary bench has no {step.kind!r}")
         else:
             rig = _changed(rig, step)
     return found
@@ -243,11 +247,12 @@ def _loads(
 def _command(step: TraceStep, start: float) -> dict[str, Any]:
     """Return the step's command, moved to its start."""
     data = step.command.model_dump(exclude_unset=True, mode="json")
-    data["terms"] = [_moved(term, start) for term in data.get("terms", [])]
+    data["terms"] = [moved(term, start) for term in data.get("terms", [])]
     return data
 
 
-def _moved(term: dict[str, Any], start: float) -> dict[str, Any]:
+def moved(term: dict[str, Any], start: float) -> dict[str, Any]:
+    """Return a term of a command with its instants moved to the command's start."""
     from elevon.waveforms import wave_records
 
     known = {p.name: p.default for p in wave_records()[term["kind"]].parameters}

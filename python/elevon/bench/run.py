@@ -10,9 +10,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from elevon.bench.loaded import LoadedSetup, loaded_setups, run_loaded, write_loaded
 from elevon.bench.rig import Setup, setups
+from elevon.bench.stand import stand_of
 from elevon.bench.state import BenchState
 from elevon.bench.traces import recorded, write_traces
+from elevon.errors import InputError
 from elevon.files import check_output, write_text
 from elevon.logs.formats.drive import DriveFormat
 from elevon.progress import Progress, part
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.bench.procedure import Procedure
     from elevon.faults import Fault
+    from elevon.recording import Recording
 
 __all__ = ["BenchLogFiles", "BenchResult", "claim_bench", "run_procedure", "state_file"]
 
@@ -84,6 +88,36 @@ class BenchResult:
         }
 
 
+AnySetup = Setup | LoadedSetup
+
+
+def stand_setups(
+    procedure: Procedure,
+    actuator: Actuator,
+    *,
+    faults: Sequence[Fault | str] = (),
+    seed: int = 0,
+) -> Sequence[AnySetup]:
+    """Return the logs of a procedure on the stand that suits the actuator, ready to be run.
+
+    Raises
+    ------
+    InputError
+        No stand, a procedure of another stand, and what the stand refuses.
+    """
+    from elevon.bench.procedure import procedure_names
+
+    stand = stand_of(actuator.wiring)
+    if procedure.stand not in (None, stand.name):
+        raise InputError(
+            f"{procedure.name}: is written for the stand {procedure.stand}; {actuator.name} stands "
+            f"on {stand.name}: {', '.join(procedure_names(stand.name))}"
+        )
+    if stand.equipment == "rotary":
+        return setups(procedure, actuator, faults=faults, seed=seed)
+    return loaded_setups(procedure, actuator, stand, faults=faults, seed=seed)
+
+
 def state_file(folder: Path, procedure: str) -> Path:
     """Return the file beside a procedure's logs that holds how each of them ended."""
     return folder / f"bench-{procedure}.log"
@@ -106,8 +140,8 @@ def claim_bench(
     `force` makes them anew. Without it, finished logs of the very same work keep counting.
     """
     layout = layout or _layout(actuator)
-    found = setups(procedure, actuator, faults=faults, seed=seed)
-    _claim(procedure, Path(out).expanduser(), found, fidelity, layout, force=force)
+    logs_asked = stand_setups(procedure, actuator, faults=faults, seed=seed)
+    _claim(procedure, Path(out).expanduser(), logs_asked, fidelity, layout, force=force)
 
 
 def run_procedure(
@@ -130,10 +164,10 @@ def run_procedure(
     procedure : Procedure
         From `elevon.bench.procedure.load_procedure`.
     actuator : Actuator
-        On the bench; its wiring must be ``rotary``.
+        On the stand that its wiring's ports choose.
     out : path
-        Folder. For each log NAME.csv, NAME_command.json, and NAME_loadcell.csv where a load cell
-        has something to measure.
+        Folder. For each log NAME.csv; on the rotary bench NAME_command.json beside it, and
+        NAME_loadcell.csv where a load cell has something to measure.
     faults : sequence of Fault or str
         In every log.
     seed : int
@@ -164,9 +198,9 @@ def run_procedure(
     """
     begin = clock.perf_counter()
     layout = layout or _layout(actuator)
-    found = setups(procedure, actuator, faults=faults, seed=seed)
+    logs_asked = stand_setups(procedure, actuator, faults=faults, seed=seed)
     folder = Path(out).expanduser()
-    hidden = _hidden(procedure, actuator, found, fidelity)
+    hidden = _hidden(procedure, actuator, logs_asked, fidelity)
     text = json.dumps(hidden, indent=1, default=str) + "\n"
     same = truth is not None and _holds(Path(truth).expanduser(), text)
     if truth is not None and not same:
@@ -174,9 +208,9 @@ def run_procedure(
     logs, simulated = [], 0.0
     with locked(folder):
         sweep(folder)
-        state = _claim(procedure, folder, found, fidelity, layout, force=force)
-        for number, setup in enumerate(found):
-            share = part(progress, number / len(found), (number + 1) / len(found))
+        state = _claim(procedure, folder, logs_asked, fidelity, layout, force=force)
+        for number, setup in enumerate(logs_asked):
+            share = part(progress, number / len(logs_asked), (number + 1) / len(logs_asked))
             log, seconds = _one(setup, state, layout, fidelity, share, force=force)
             logs.append(log)
             simulated += seconds
@@ -186,34 +220,37 @@ def run_procedure(
 
 
 def _layout(actuator: Actuator) -> DriveFormat:
-    return DriveFormat(gear_ratio=actuator.parameters.value("gear.ratio"))
+    parameters = actuator.parameters
+    return DriveFormat(
+        gear_ratio=parameters.value("gear.ratio") if "gear.ratio" in parameters else 1.0
+    )
 
 
 def _claim(
     procedure: Procedure,
     folder: Path,
-    found: Sequence[Setup],
+    logs: Sequence[AnySetup],
     fidelity: str,
     layout: DriveFormat,
     *,
     force: bool,
 ) -> BenchState:
-    names = [setup.trace.name for setup in found]
-    key = _key(found, fidelity, layout)
+    names = [setup.trace.name for setup in logs]
+    key = _key(logs, fidelity, layout)
     return BenchState.claim(state_file(folder, procedure.name), key, names, force=force)
 
 
-def _key(found: Sequence[Setup], fidelity: str, layout: DriveFormat) -> str:
+def _key(logs: Sequence[AnySetup], fidelity: str, layout: DriveFormat) -> str:
     """Digits that tell this work from any other, and nothing about it."""
     from elevon import __version__
 
-    work = [[setup.truth(), setup.scenario.to_dict()] for setup in found]
+    work = [[setup.truth(), setup.scenario.to_dict()] for setup in logs]
     text = json.dumps([__version__, fidelity, repr(layout), work], sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def _one(
-    setup: Setup,
+    setup: AnySetup,
     state: BenchState,
     layout: DriveFormat,
     fidelity: str,
@@ -221,16 +258,30 @@ def _one(
     *,
     force: bool,
 ) -> tuple[BenchLogFiles, float]:
-    from elevon.scenario.compile import signal_records
-    from elevon.simulate import simulate
-
     name, folder = setup.trace.name, state.path.parent
     kept = state.kept(name)
     if kept is not None:
         files = tuple(folder / file for file in kept.files)
         return BenchLogFiles(name, kept.status, files, True, kept.message), 0.0
+    again = force or state.resumed
+    if isinstance(setup, LoadedSetup):
+        log, recording = run_loaded(setup, fidelity, progress)
+        written = [write_loaded(folder, name, log, force=again)]
+    else:
+        recording = _drive_run(setup, fidelity, progress)
+        written = write_traces(folder, setup, recording, layout, force=again)
+    status, message = str(recording.meta["status"]), str(recording.meta["message"])
+    files = tuple(written)
+    state.note(name, status, message, files)
+    return BenchLogFiles(name, status, files, False, message), float(recording.meta["sim_s"])
+
+
+def _drive_run(setup: Setup, fidelity: str, progress: Progress | None) -> Recording:
+    from elevon.scenario.compile import signal_records
+    from elevon.simulate import simulate
+
     known = list(signal_records(setup.actuator.wiring, fidelity))
-    recording = simulate(
+    return simulate(
         setup.actuator,
         setup.scenario,
         fidelity=fidelity,
@@ -238,20 +289,16 @@ def _one(
         seed=setup.conditions.seed,
         progress=progress,
     )
-    files = tuple(write_traces(folder, setup, recording, layout, force=force or state.resumed))
-    status, message = str(recording.meta["status"]), str(recording.meta["message"])
-    state.note(name, status, message, files)
-    return BenchLogFiles(name, status, files, False, message), float(recording.meta["sim_s"])
 
 
 def _hidden(
-    procedure: Procedure, actuator: Actuator, found: Sequence[Setup], fidelity: str
+    procedure: Procedure, actuator: Actuator, logs: Sequence[AnySetup], fidelity: str
 ) -> dict[str, Any]:
     return {
         "procedure": procedure.name,
         "actuator": actuator.name,
         "fidelity": fidelity,
-        "logs": [setup.truth() for setup in found],
+        "logs": [setup.truth() for setup in logs],
     }
 
 

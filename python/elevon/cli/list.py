@@ -28,6 +28,28 @@ def actuators(*, json: JsonOption = False) -> None:
 
 
 @app.command()
+def procedures(
+    *,
+    actuator: Annotated[
+        str | None, typer.Option("--actuator", help="Only those of the stand it stands on.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """List the virtual bench's procedures, with the stand each is written for."""
+    from elevon.actuator import Actuator
+    from elevon.bench.procedure import load_procedure, procedure_names
+    from elevon.bench.stand import stand_of
+
+    stand = None if actuator is None else stand_of(Actuator.load(actuator).wiring).name
+    read = [load_procedure(name) for name in procedure_names(stand)]
+    rows = [
+        {"name": p.name, "stand": p.stand, "text": p.text, "logs": [t.name for t in p.traces]}
+        for p in read
+    ]
+    _print("procedures", rows, json, ("name", "stand", "text"))
+
+
+@app.command()
 def signals(
     actuator: ActuatorArgument, *, fidelity: FidelityOption = "high", json: JsonOption = False
 ) -> None:

@@ -14,7 +14,13 @@ from elevon.scenario.scenario import Action, Scenario, Term, Terms
 from elevon.units import check_kind, parse_quantity, to_si
 from elevon.waveforms import TABLE, check_values, unit_of, wave_records
 
-__all__ = ["CompiledScenario", "compile_scenario", "compile_term", "signal_records", "signal_units"]
+__all__ = [
+    "CompiledScenario",
+    "compile_scenario",
+    "compile_term",
+    "signal_records",
+    "signal_units",
+]
 
 
 @dataclass(frozen=True)
@@ -172,6 +178,7 @@ def _sequence(steps: Sequence[Action], wiring: str) -> dict[str, Any]:
 
 
 def compile_term(term: Term, own: str, place: str) -> dict[str, Any]:
+    """Return one term in the core's form; `own` is the unit of the port it drives."""
     """Return one waveform as the core takes it, for a quantity in the SI unit `own`."""
     record = wave_records()[term.kind]
     values: dict[str, float] = {}

@@ -120,6 +120,8 @@ def _errors(trace: Trace, limits: Mapping[str, float], wiring: str) -> list[Sign
     found = []
     for name, simulated in trace.simulated.items():
         mask = trace.used & np.isfinite(trace.measured[name])
+        if not mask.any():
+            continue  # a stretch shorter than what settles shows nothing
         data = trace.measured[name][mask]
         off = simulated[mask] - data
         rms, most = float(np.sqrt(np.mean(off**2))), float(np.abs(off).max())

@@ -1,0 +1,146 @@
+"""The stand's recorder: channels by role, at any rate, behind an anti-alias filter."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.errors import InputError
+from elevon.units import parse_quantity
+
+if TYPE_CHECKING:
+    from elevon.bench.stand import ChannelSpec, Stand
+    from elevon.recording import Recording
+
+__all__ = ["LOAD_CHANNEL", "acquire", "acquired_signals", "internal_steps"]
+
+Floats = npt.NDArray[np.float64]
+LOAD_CHANNEL = "rig_force"
+"""Channel of the role ``load``: force of the stand on the rod, positive opposes positive motion."""
+_LEAST = 25e3  # Hz of the simulated channels before the filter, so that relays' ripple is filtered
+_OVER = 4.0  # ... and this many times the log's rate
+_CUTOFF = 0.4  # of the log's rate
+_ORDER = 4
+_DIGITAL = ("command", "_ref")
+
+
+def acquired_signals(wiring: str, fidelity: str, stand: Stand) -> dict[str, str]:
+    """Return role to signal, of the stand's channels that the model has; the sensor's, if any."""
+    from elevon.scenario.compile import signal_records
+
+    played = {item["role"]: name for name, item in signal_records(wiring, fidelity).items()}
+    roles = [role for role in stand.channels if role != "load"]
+    return {role: played[role] for role in roles if role in played}
+
+
+def internal_steps(rate: float, step: float) -> int:
+    """Return the solver steps between the samples that the filter is given.
+
+    Raises
+    ------
+    InputError
+        The model's steps are too far apart for the rate.
+    """
+    steps = max(1, math.floor(1.0 / (max(_OVER * rate, _LEAST) * step)))
+    if 1.0 / (steps * step) < 2.0 * rate:
+        raise InputError(
+            f"rate of {rate:g} Hz: the model's steps of {step:g} s give {0.5 / step:g} Hz at most"
+        )
+    return steps
+
+
+def acquire(
+    run: Recording,
+    roles: dict[str, str],
+    load: tuple[Floats, Floats],
+    stand: Stand,
+    *,
+    rate: float,
+    seed: int,
+) -> Recording:
+    """Return what the recorder keeps of a run.
+
+    Parameters
+    ----------
+    run : Recording
+        On one clock, faster than the log.
+    roles : dict of str to str
+        From `acquired_signals`.
+    load : tuple of ndarray
+        Times [s] and force of the load actuator [N].
+    stand : Stand
+        Its channels.
+    rate : float
+        Hz; need be no whole number of steps.
+    seed : int
+        Of the channels' noise.
+    """
+    from elevon.recording import Recording
+
+    clock = np.asarray(run.clock().time, dtype=np.float64)
+    time = np.arange(math.floor(clock[-1] * rate + 1e-9) + 1, dtype=np.float64) / rate
+    rng = np.random.default_rng([seed, 2])
+    values, units = {}, {}
+    for role, name in roles.items():
+        channel = run[name]
+        digital = channel.unit == "1" or role.endswith(_DIGITAL)
+        raw = np.asarray(channel.values, dtype=np.float64)
+        shown = _held(clock, raw, time) if digital else _filtered(clock, raw, time, rate)
+        values[name] = _sensed(shown, stand.channels[role], channel.unit, rate, rng)
+        units[name] = channel.unit
+    said = dict(roles)
+    if "load" in stand.channels:
+        force = np.interp(time, *load)
+        values[LOAD_CHANNEL] = _sensed(force, stand.channels["load"], "N", rate, rng)
+        units[LOAD_CHANNEL] = "N"
+        said["load"] = LOAD_CHANNEL
+    meta = {"roles": said, "acquisition": _said(clock, rate)}
+    return Recording.build(time, values, units, clock="stand", rate=rate, meta=meta)
+
+
+def _said(clock: Floats, rate: float) -> dict[str, Any]:
+    """What a reader must know of how the log came about."""
+    internal = float(1.0 / np.median(np.diff(clock)))
+    whole = abs(internal / rate - round(internal / rate)) < 1e-6
+    return {
+        "rate_hz": rate,
+        "simulated_hz": internal,
+        "resampled": not whole,
+        "anti_alias": f"Butterworth, order {_ORDER}, both ways, {_CUTOFF * rate:.6g} Hz; "
+        "commands, set points, states and switches as they stood",
+    }
+
+
+def _held(clock: Floats, values: Floats, time: Floats) -> Floats:
+    """What was written last: digital channels are not filtered."""
+    at = np.searchsorted(clock, time + 1e-9, side="right") - 1
+    return np.asarray(values[at.clip(0, len(values) - 1)], dtype=np.float64)
+
+
+def _filtered(clock: Floats, values: Floats, time: Floats, rate: float) -> Floats:
+    from scipy.signal import butter, sosfiltfilt
+
+    fast = float(1.0 / np.median(np.diff(clock)))
+    cutoff = _CUTOFF * rate
+    if cutoff < 0.5 * fast and len(values) > 64:
+        sections = butter(_ORDER, cutoff, fs=fast, output="sos")
+        values = np.asarray(sosfiltfilt(sections, values), dtype=np.float64)
+    return np.interp(time, clock, values)
+
+
+def _sensed(
+    values: Floats, spec: ChannelSpec, unit: str, rate: float, rng: np.random.Generator
+) -> Floats:
+    """Add the channel's lag, then its noise."""
+    lag = parse_quantity(spec.lag, "s", "lag")
+    if lag > 0.0:
+        from scipy.signal import lfilter
+
+        share = 1.0 - math.exp(-1.0 / (rate * lag))
+        start = [(1.0 - share) * values[0]]
+        values = np.asarray(lfilter([share], [1.0, share - 1.0], values, zi=start)[0])
+    noise = parse_quantity(spec.noise, unit, "noise")
+    return values + noise * rng.standard_normal(len(values)) if noise > 0.0 else values

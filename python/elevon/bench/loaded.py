@@ -1,0 +1,246 @@
+"""Logs of a stand with a load actuator: each run set up, carried out and recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.bench.acquisition import acquire, acquired_signals, internal_steps
+from elevon.bench.force_control import ForceLoop, asked_force
+from elevon.bench.procedure import ForceStep, Procedure, RigStep, SettingsStep, TraceStep
+from elevon.bench.rig import Conditions, draw_conditions, moved
+from elevon.errors import InputError
+from elevon.units import parse_quantity
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.bench.stand import Stand
+    from elevon.faults import Fault
+    from elevon.progress import Progress
+    from elevon.recording import Recording
+    from elevon.scenario import Scenario
+    from elevon.scenario.scenario import Term
+
+__all__ = ["LoadedSetup", "loaded_setups", "run_loaded", "write_loaded"]
+
+Floats = npt.NDArray[np.float64]
+_GRID = 1e-3  # s of the force table
+_PASSES = 2  # runs of the low model from which the force is computed
+
+
+@dataclass(frozen=True)
+class LoadedSetup:
+    """One log about to be recorded.
+
+    Attributes
+    ----------
+    trace : TraceStep
+        The step.
+    actuator : Actuator
+        With the stand's and the operator's settings.
+    scenario : Scenario
+        Command and faults; the load is added when it is known.
+    conditions : Conditions
+        What chance set.
+    stand : Stand
+        Where it stands.
+    force : ForceStep or None
+        What the load actuator is asked for; None: nothing, or the rig moves the output.
+    settings : dict
+        What the operator set, by parameter.
+    """
+
+    trace: TraceStep
+    actuator: Actuator
+    scenario: Scenario
+    conditions: Conditions
+    stand: Stand
+    force: ForceStep | None
+    settings: dict[str, Any]
+
+    def truth(self) -> dict[str, Any]:
+        """Return what the log's reader is not told."""
+        parameters = self.actuator.parameters
+        return {
+            "name": self.trace.name,
+            "stand": self.stand.name,
+            "parameter_hash": self.actuator.hash,
+            "parameters": {path: entry.value for path, entry in parameters.items()},
+            "conditions": asdict(self.conditions),
+            "faults": [fault.to_dict() for fault in self.scenario.fault],
+            "force": None if self.force is None else self.force.model_dump(mode="json"),
+            "rate": self.stand.hertz(self.trace.rate),
+        }
+
+
+def loaded_setups(
+    procedure: Procedure,
+    actuator: Actuator,
+    stand: Stand,
+    *,
+    faults: Sequence[Fault | str] = (),
+    seed: int = 0,
+) -> list[LoadedSetup]:
+    """Go through a procedure's steps and return its logs, ready to be run.
+
+    Raises
+    ------
+    InputError
+        A step that the stand has no equipment for; a setting that does not exist.
+    """
+    settings: dict[str, Any] = dict(stand.settings)
+    force: ForceStep | None = None
+    rig: tuple[Term, ...] = ()
+    logs: list[LoadedSetup] = []
+    for step in procedure.step:
+        if isinstance(step, ForceStep):
+            force = step
+        elif isinstance(step, RigStep):
+            rig = step.terms
+        elif isinstance(step, SettingsStep):
+            settings = {**settings, **step.parameters}
+        elif isinstance(step, TraceStep):
+            conditions = draw_conditions(seed, len(logs))
+            ready = actuator.with_values(settings, source="set on the bench", place=step.name)
+            scenario = _scenario(step, rig, conditions, faults)
+            asked = None if rig else force
+            logs.append(
+                LoadedSetup(step, ready, scenario, conditions, stand, asked, dict(settings))
+            )
+        else:
+            raise InputError(
+                f"{procedure.name}: the stand {stand.name} has no {step.kind!r}; it has force, "
+                f"{'rig, ' if 'rig_speed' in stand.ports else ''}settings, trace"
+            )
+    return logs
+
+
+def _scenario(
+    step: TraceStep,
+    rig: tuple[Term, ...],
+    conditions: Conditions,
+    faults: Sequence[Fault | str],
+) -> Scenario:
+    from elevon.scenario import Scenario
+
+    data: dict[str, Any] = {
+        "duration": parse_quantity(step.duration, "s", "duration"),
+        "command": _command(step, conditions.start),
+        "initial": dict(step.initial),
+    }
+    if rig:
+        terms = [term.model_dump(exclude_unset=True, mode="json") for term in rig]
+        data["load"] = {"rig_speed": {"terms": terms}}
+    scenario = Scenario.from_dict(data, f"trace {step.name}")
+    return scenario.with_faults(list(faults)) if faults else scenario
+
+
+def _command(step: TraceStep, start: float) -> dict[str, Any]:
+    """Return the step's command, moved to its start."""
+    data: dict[str, Any] = step.command.model_dump(exclude_unset=True, mode="json")
+    if "terms" in data:
+        data["terms"] = [moved(term, start) for term in data["terms"]]
+    for action in data.get("steps", []):
+        action["time"] = parse_quantity(action["time"], "s", "time") + start
+    return data
+
+
+def run_loaded(
+    setup: LoadedSetup, fidelity: str, progress: Progress | None = None
+) -> tuple[Recording, Recording]:
+    """Carry out one log.
+
+    Returns
+    -------
+    (Recording, Recording)
+        What the recorder kept, with its roles, and the run itself.
+    """
+    from elevon.simulate import simulate, solver_step
+
+    rate = setup.stand.hertz(setup.trace.rate)
+    step = solver_step(setup.actuator, fidelity)
+    steps = internal_steps(rate, step)
+    roles = acquired_signals(setup.actuator.wiring, fidelity, setup.stand)
+    times, force, loaded = _force(setup)
+    run = simulate(
+        setup.actuator,
+        loaded,
+        fidelity=fidelity,
+        record=f"{','.join(dict.fromkeys(roles.values()))}@{1.0 / (steps * step):.12g} Hz",
+        seed=setup.conditions.seed,
+        progress=progress,
+    )
+    log = acquire(run, roles, (times, force), setup.stand, rate=rate, seed=setup.conditions.seed)
+    return log.with_meta(**_meta(setup, run)), run
+
+
+def _meta(setup: LoadedSetup, run: Recording) -> dict[str, Any]:
+    """What the operator knows."""
+    return {
+        "status": "measured",
+        "ended": str(run.meta["status"]),
+        "log": setup.trace.name,
+        "stand": {
+            "name": setup.stand.name,
+            "text": setup.stand.text,
+            "parameters": setup.settings,
+            "initial": dict(setup.trace.initial),
+            "rig_moves": bool(setup.scenario.loads.rig_speed.terms),
+        },
+    }
+
+
+def _force(setup: LoadedSetup) -> tuple[Floats, Floats, Scenario]:
+    """Force on the rod over time and the scenario with it: motion and force in turn."""
+    from elevon.simulate import simulate
+
+    seconds = setup.scenario.seconds
+    times = np.arange(0.0, seconds + _GRID, _GRID)
+    if setup.force is None or setup.stand.force is None:
+        return times, np.zeros_like(times), setup.scenario
+    loop = ForceLoop.of(setup.stand.force)
+    terms = _values(setup.force.terms, times, setup.conditions.start)
+    scenario = setup.scenario
+    force = np.zeros_like(times)
+    for _ in range(_PASSES):
+        run = simulate(
+            setup.actuator, scenario, fidelity="low", record="user_position,user_speed@every",
+            seed=setup.conditions.seed,
+        )  # fmt: skip
+        clock = run.clock().time
+        position, speed = (
+            np.interp(times, clock, run[name].values) for name in ("user_position", "user_speed")
+        )
+        asked = asked_force(setup.force, terms, position, speed)
+        force = loop.achieved(times, asked, speed)
+        table = {"kind": "table", "times": times.tolist(), "values": force.tolist()}
+        scenario = setup.scenario.replaced(load={"user": {"terms": [table]}})
+    return times, force, scenario
+
+
+def _values(terms: Sequence[Term], times: Floats, start: float) -> Floats:
+    """Return the sum of waveforms at instants."""
+    from elevon import _core
+    from elevon.scenario.compile import compile_term
+
+    total = np.zeros_like(times)
+    for term in terms:
+        data = moved(term.model_dump(exclude_unset=True, mode="json"), start)
+        core = compile_term(type(term).model_validate(data), "N", "force")
+        if core["kind"] == "table":
+            total += np.interp(times, core["times"], core["values"])
+        else:
+            total += np.asarray(_core.waveform(core["kind"], core["parameters"], times))
+    return total
+
+
+def write_loaded(folder: Path, name: str, log: Recording, *, force: bool) -> Path:
+    """Write one log as a recording in text, with its roles."""
+    path = folder / f"{name}.csv"
+    log.save(path, force=force)
+    return path
