@@ -392,12 +392,6 @@ class Recording:
 
         held = load(path, max_bytes=max_bytes)
         try:
-            return cls(
-                held.channels,
-                clocks=held.clocks,
-                meta=held.meta,
-                labels=held.labels,
-                final=held.final,
-            )
+            return cls(**vars(held))
         except InputError as error:
             raise FormatError(f"{path}: {error}") from error
