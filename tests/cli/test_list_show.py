@@ -134,3 +134,42 @@ def test_places_that_nothing_reads_are_not_listed(elevon_cli):
         shown = {(row["kind"], place) for row in own for place in row["places"]}
         assert shown <= whole
         assert ("short", "motor.phase_a") in shown
+
+
+@pytest.mark.parametrize("what", ["faults", "parameters"])
+def test_what_a_fidelity_carries_and_declines_are_the_whole(elevon_cli, what):
+    """Split by --fidelity and --declined, nothing is lost; every refusal has its reason."""
+    whole = elevon_cli("list", what, "torino-rotary", "--json").json[what]
+    asked = ("list", what, "torino-rotary", "--fidelity", "low")
+    carried = elevon_cli(*asked, "--json").json[what]
+    declined = elevon_cli(*asked, "--declined", "--json").json[what]
+    assert carried
+    assert declined
+    assert all("low" in row["fidelities"] for row in carried)
+    assert all(row["declined"]["low"] for row in declined)
+    assert len(carried) + len(declined) == len(whole)
+    reason = declined[0]["declined"]["low"]
+    assert reason in elevon_cli(*asked, "--declined").out
+
+
+def test_faults_say_under_which_drives_they_act(elevon_cli):
+    """At each fidelity that carries them; the places at rest with their reasons."""
+    rows = elevon_cli("list", "faults", "torino-rotary", "--json").json["faults"]
+    kinds = {row["kind"]: row for row in rows}
+    assert set(kinds["short"]["drives"]) == {"high", "low"}
+    assert {"hysteresis", "pwm"} <= set(kinds["short"]["drives"]["low"])
+    idle = kinds["open_switch"]["resting"]
+    assert {row["fidelity"] for row in idle} == {"low"}
+    assert all(row["reason"] == kinds["open_switch"]["declined"]["low"] for row in idle)
+    assert "high (hysteresis pwm" in elevon_cli("list", "faults", "torino-rotary").out
+
+
+def test_show_says_where_parameters_act(elevon_cli):
+    """With which choice, at which fidelity and why not at the other."""
+    text = elevon_cli("show", "torino-rotary").out
+    assert "drive.kind = pwm" in text
+    asked = ("show", "torino-rotary", "--fidelity", "low", "--declined")
+    rows = elevon_cli(*asked, "--json").json["parameters"]
+    assert "solver.step" in [row["path"] for row in rows]
+    assert all(row["declined"]["low"] in elevon_cli(*asked).out for row in rows[:1])
+    assert elevon_cli("show", "torino-rotary", "--fidelity", "lo").code == 2

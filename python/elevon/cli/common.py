@@ -44,6 +44,13 @@ FaultOption = Annotated[
     typer.Option("--fault", metavar="SPEC", help="'KIND@PLACE=VALUE[unit]...'; repeatable."),
 ]
 FidelityOption = Annotated[str, typer.Option(help="high or low.")]
+OnlyFidelityOption = Annotated[
+    str | None, typer.Option("--fidelity", help="Only what acts at this fidelity: high or low.")
+]
+DeclinedOption = Annotated[
+    bool,
+    typer.Option("--declined", help="Only what a fidelity (--fidelity: this one) does not carry."),
+]
 RecordOption = Annotated[
     list[str] | None,
     typer.Option(

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from elevon.cli.common import ActuatorArgument, FidelityOption, JsonOption
+from elevon.cli.acting import by_drive, check, chosen
+from elevon.cli.common import (
+    ActuatorArgument,
+    DeclinedOption,
+    FidelityOption,
+    JsonOption,
+    OnlyFidelityOption,
+)
 from elevon.cli.output import print_json, print_table
+
+if TYPE_CHECKING:
+    from elevon.faults import FaultRecord
 
 app = typer.Typer(
     no_args_is_help=True, rich_markup_mode=None, help="List what there is, with units and sources."
@@ -65,11 +75,19 @@ def signals(
 
 
 @app.command()
-def parameters(actuator: ActuatorArgument, *, json: JsonOption = False) -> None:
+def parameters(
+    actuator: ActuatorArgument,
+    *,
+    fidelity: OnlyFidelityOption = None,
+    declined: DeclinedOption = False,
+    json: JsonOption = False,
+) -> None:
     """List the parameters an actuator's model has: unit, range, meaning, where each acts."""
     from elevon.actuator import Actuator
     from elevon.parameters import records
 
+    wiring = Actuator.load(actuator).wiring
+    check(fidelity, [wiring])
     rows = [
         {
             "path": record.path,
@@ -84,7 +102,8 @@ def parameters(actuator: ActuatorArgument, *, json: JsonOption = False) -> None:
             "acts": record.acts_text,
             "text": record.text,
         }
-        for record in records(Actuator.load(actuator).wiring).values()
+        for record in records(wiring).values()
+        if chosen(record, fidelity, declined)
     ]
     _print("parameters", rows, json, ("path", "unit", "range", "text", "acts"))
 
@@ -95,41 +114,52 @@ def faults(
         str | None, typer.Argument(metavar="[ACTUATOR]", help="Only the faults of this actuator.")
     ] = None,
     *,
+    fidelity: OnlyFidelityOption = None,
+    declined: DeclinedOption = False,
     json: JsonOption = False,
 ) -> None:
-    """List the fault catalogue: kind, places, unit, range, fidelities, effect, source.
+    """List the fault catalogue: kind, places, unit, range, where each acts, effect, source.
 
-    With an actuator: only what acts in it, in its own ranges.
+    With an actuator: only what acts in it, in its own ranges, with the drives under which it acts
+    at each fidelity.
     """
+    rows = [row for row in _faults(actuator, fidelity) if chosen(row[1], fidelity, declined)]
+    shown = [{"wiring": wiring, **_fault(record), **acts} for wiring, record, acts in rows]
+    first, where = (("wiring",), "fidelities") if actuator is None else ((), "acts")
+    columns = ("kind", "places", "unit", "range", where, "effect", "source", "declined")
+    _print("faults", shown, json, (*first, *columns))
+
+
+def _faults(
+    reference: str | None, fidelity: str | None
+) -> list[tuple[str, FaultRecord, dict[str, Any]]]:
+    """Return wiring, record and what is known of its drives."""
     from elevon.actuator import Actuator
     from elevon.faults import catalogue
     from elevon.parameters.records import wiring_names
+    from elevon.simulate.own_faults import own_faults
 
-    if actuator is None:
-        records = [(wiring, record) for wiring in wiring_names() for record in catalogue(wiring)]
-    else:
-        from elevon.simulate.own_faults import own_faults
+    if reference is None:
+        names = wiring_names()
+        check(fidelity, names)
+        return [(wiring, record, {}) for wiring in names for record in catalogue(wiring)]
+    actuator = Actuator.load(reference)
+    check(fidelity, [actuator.wiring])
+    return [(actuator.wiring, it, by_drive(actuator, it)) for it in own_faults(actuator)]
 
-        model = Actuator.load(actuator)
-        records = [(model.wiring, record) for record in own_faults(model)]
-    rows = [
-        {
-            "wiring": wiring,
-            "kind": record.kind,
-            "places": list(record.places),
-            "unit": record.unit,
-            "range": record.range_text,
-            "attributes": [dict(item) for item in record.attributes],
-            "fidelities": list(record.fidelities),
-            "declined": dict(record.declined),
-            "effect": record.effect,
-            "source": record.source,
-        }
-        for wiring, record in records
-    ]
-    first = ("wiring",) if actuator is None else ()
-    columns = ("kind", "places", "unit", "range", "fidelities", "effect", "source", "declined")
-    _print("faults", rows, json, (*first, *columns))
+
+def _fault(record: FaultRecord) -> dict[str, Any]:
+    return {
+        "kind": record.kind,
+        "places": list(record.places),
+        "unit": record.unit,
+        "range": record.range_text,
+        "attributes": [dict(item) for item in record.attributes],
+        "fidelities": list(record.fidelities),
+        "declined": dict(record.declined),
+        "effect": record.effect,
+        "source": record.source,
+    }
 
 
 @app.command()

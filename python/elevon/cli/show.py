@@ -7,10 +7,13 @@ from typing import Annotated, Any
 
 import typer
 
+from elevon.cli.acting import check, chosen
 from elevon.cli.common import (
     ActuatorArgument,
+    DeclinedOption,
     ForceOption,
     JsonOption,
+    OnlyFidelityOption,
     SetOption,
     check_outputs,
     read_actuator,
@@ -32,14 +35,21 @@ def show(
         Path | None, typer.Option(metavar="FILE", help="Write the JSON Schema of its set files.")
     ] = None,
     notes: Annotated[bool, typer.Option("--notes", help="Show the notes as well.")] = False,
+    fidelity: OnlyFidelityOption = None,
+    declined: DeclinedOption = False,
     force: ForceOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Show an actuator: block diagram, parameters with units and sources, references."""
+    """Show an actuator: block diagram, parameters with units, sources, where they act; references.
+
+    --fidelity and --declined choose among the parameters.
+    """
     from elevon.diagram import diagram_svg, diagram_text, diagrams
 
     check_outputs([svg, schema], force=force)
     loaded = read_actuator(actuator, settings)
+    check(fidelity, [loaded.wiring])
+    parameters = _chosen(loaded, fidelity, declined)
     if svg is not None:
         from elevon.files import write_text
 
@@ -48,36 +58,38 @@ def show(
     if schema is not None:
         _write_schema(schema, loaded.wiring, force=force)
     if json:
-        print_json(_as_json(loaded, svg))
+        print_json(_as_json(loaded, svg, parameters))
         return
     typer.echo(f"{loaded.name}: {loaded.title}\n")
     if loaded.wiring in diagrams():
         typer.echo(diagram_text(loaded.wiring) + "\n")
-    _print_parameters(loaded, notes)
+    _print_parameters(loaded, parameters, notes)
     if loaded.references:
         typer.echo("")
         for key, text in loaded.references.items():
             typer.echo(f"{key}: {text}")
 
 
-def _print_parameters(loaded: Any, notes: bool) -> None:
+def _chosen(loaded: Any, fidelity: str | None, declined: bool) -> list[Any]:
     from elevon.parameters import records
 
     known = records(loaded.wiring)
-    columns = ["parameter", "value", "confidence", "fidelities", "source"]
+    every = loaded.parameters.values()
+    return [each for each in every if chosen(known[each.path], fidelity, declined)]
+
+
+def _print_parameters(loaded: Any, parameters: list[Any], notes: bool) -> None:
+    from elevon.parameters import records
+
+    known = records(loaded.wiring)
+    columns = ["parameter", "value", "confidence", "acts", "source"]
     rows = [
-        [p.path, p.text, p.confidence, _carried(known[p.path]), p.source]
+        [p.path, p.text, p.confidence, known[p.path].acts_text or "always", p.source]
         + ([p.note] if notes else [])
-        for p in loaded.parameters.values()
+        for p in parameters
     ]
     columns += ["note"] if notes else []
     print_table(columns, rows)
-
-
-def _carried(record: Any) -> str:
-    """The fidelities that carry a parameter, and why the others do not."""
-    reasons = "; ".join(f"not {name}: {reason}" for name, reason in record.declined.items())
-    return " ".join(record.fidelities) + (f" ({reasons})" if reasons else "")
 
 
 def _write_schema(path: Path, wiring: str, *, force: bool) -> None:
@@ -91,7 +103,7 @@ def _write_schema(path: Path, wiring: str, *, force: bool) -> None:
     say(f"wrote {path}")
 
 
-def _as_json(loaded: Any, svg: Path | None) -> dict[str, Any]:
+def _as_json(loaded: Any, svg: Path | None, parameters: list[Any]) -> dict[str, Any]:
     from elevon.parameters import records
 
     known = records(loaded.wiring)
@@ -119,6 +131,6 @@ def _as_json(loaded: Any, svg: Path | None) -> dict[str, Any]:
                 "declined": dict(known[p.path].declined),
                 "when": list(known[p.path].when),
             }
-            for p in loaded.parameters.values()
+            for p in parameters
         ],
     }

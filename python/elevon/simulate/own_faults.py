@@ -3,13 +3,35 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
+from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 
 from elevon.actuator import Actuator
 from elevon.faults import FaultRecord, catalogue
+from elevon.parameters import records
+from elevon.parameters.records import positions, wirings
 
-__all__ = ["own_faults"]
+__all__ = ["Resting", "own_faults", "resting", "shown_drives"]
+
+DRIVE = "drive.kind"
+
+
+@dataclass(frozen=True)
+class Resting:
+    """A place of a fault, a fidelity and a drive ("" where there is no choice) in which it rests.
+
+    `reason` is the record's own where the fidelity declines the fault.
+    """
+
+    place: str
+    fidelity: str
+    drive: str
+    reason: str
 
 
 def own_faults(actuator: Actuator) -> list[FaultRecord]:
@@ -33,8 +55,60 @@ def own_faults(actuator: Actuator) -> list[FaultRecord]:
     return records
 
 
+def shown_drives(actuator: Actuator) -> tuple[str, ...]:
+    """Return the drives that an actuator can choose between; one without a name if none."""
+    record = records(actuator.wiring).get(DRIVE)
+    return (record.choices if record else None) or ("",)
+
+
+def resting(actuator: Actuator, record: FaultRecord) -> list[Resting]:
+    """Return where a fault cannot act in an actuator: fidelities and drives, each with its reason.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        With its own choices of everything but the drive.
+    record : FaultRecord
+        One of its own (`own_faults`).
+    """
+    cells = itertools.product(record.places, shown_drives(actuator))
+    found = []
+    for place, drive in cells:
+        vector = _with_drive(actuator, drive)
+        for fidelity in wirings()[actuator.wiring]["fidelities"]:
+            reason = record.declined.get(fidelity) or _idle(
+                actuator.wiring, fidelity, vector, record, place
+            )
+            if reason:
+                found.append(Resting(place, fidelity, drive, reason))
+    return found
+
+
+def _with_drive(actuator: Actuator, drive: str) -> npt.NDArray[np.float64]:
+    vector = actuator.parameters.vector().copy()
+    if drive:
+        record = records(actuator.wiring)[DRIVE]
+        vector[positions(actuator.wiring)[DRIVE]] = record.number(drive)
+    return vector
+
+
 def _acts(actuator: Actuator, record: FaultRecord, place: str) -> bool:
     """Whether a fault moves anything at its place, at any fidelity that carries it."""
+    vector = actuator.parameters.vector()
+    return any(
+        not _idle(actuator.wiring, fidelity, vector, record, place)
+        for fidelity in record.fidelities
+    )
+
+
+def _idle(
+    wiring: str,
+    fidelity: str,
+    vector: npt.NDArray[np.float64],
+    record: FaultRecord,
+    place: str,
+) -> str:
+    """Why a fault moves nothing at its place; empty when it does."""
     from elevon import _core
 
     severity = record.maximum if math.isfinite(record.maximum) else 1.0
@@ -46,11 +120,9 @@ def _acts(actuator: Actuator, record: FaultRecord, place: str) -> bool:
         "profile": {"kind": "constant", "parameters": [], "times": [], "values": []},
     }
     targets = record.targets[place]
-    for fidelity in record.fidelities:
-        rows = _core.not_acting(actuator.wiring, fidelity, actuator.parameters.vector(), [given])
-        if not all(path in {row["path"] for row in rows} for path in targets):
-            return True
-    return False
+    rows = _core.not_acting(wiring, fidelity, vector, [given], list(targets))
+    reasons = {row["path"]: row["reason"] for row in rows}
+    return reasons[targets[0]] if all(path in reasons for path in targets) else ""
 
 
 def _largest(actuator: Actuator, record: FaultRecord) -> float:
