@@ -115,6 +115,7 @@ def test_a_log_that_fits_badly_does_not_widen_the_thresholds():
     assert thresholds(judged([0.5, 0.6, 3.9])) == {"motor_speed": 1.2}
     assert outliers(judged([0.5, 0.6, 3.9])) == ["c"]
     assert outliers(judged([0.5, 3.9])) == []
+    assert outliers(judged([0.01, 0.02, 0.3])) == []
     assert thresholds(judged([0.5, 1.0, 1.2])) == {"motor_speed": 2.4}
 
 

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 __all__ = ["held_out_agreement", "outliers", "thresholds"]
 
 _MARGIN = 2.0  # a threshold over the largest error seen on held-out data
-_APART = 3.0  # times the median over the logs: a log that is not like the others
+_APART = 5.0  # times the median over the logs: a log that is not like the others ...
+_BAD = 2.0  # ... and percent of the range: kinds of tests differ as much at small errors
 
 
 def held_out_agreement(
@@ -76,7 +77,7 @@ def outliers(validation: Validation) -> list[str]:
     for rows in _by_signal(validation).values():
         middle = float(np.median([row.of_range for row in rows]))
         if len(rows) > 2:
-            found |= {row.log for row in rows if row.of_range > _APART * middle}
+            found |= {row.log for row in rows if row.of_range > max(_APART * middle, _BAD)}
     return sorted(found)
 
 
