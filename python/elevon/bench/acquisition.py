@@ -109,6 +109,7 @@ def _said(clock: Floats, rate: float) -> dict[str, Any]:
         "rate_hz": rate,
         "simulated_hz": internal,
         "resampled": not whole,
+        "cutoff_hz": _CUTOFF * rate,
         "anti_alias": f"Butterworth, order {_ORDER}, both ways, {_CUTOFF * rate:.6g} Hz; "
         "commands, set points, states and switches as they stood",
     }

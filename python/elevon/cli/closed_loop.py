@@ -15,17 +15,18 @@ if TYPE_CHECKING:
     from elevon.calibrate.validation import Validation
     from elevon.recording import Recording
 
-__all__ = ["calibrate_closed_loop", "read_loop_logs", "validate_closed_loop"]
+__all__ = ["calibrate_closed_loop", "read_loop_logs", "read_recording", "validate_closed_loop"]
 
 
 def read_loop_logs(paths: Sequence[Path], column_map: Path | None) -> list[LoopLog]:
     """Read recordings, or logs through a column map, by the roles of their channels."""
     from elevon.calibrate.closed_loop import loop_log
 
-    return [loop_log(_recording(path, column_map), path.name) for path in paths]
+    return [loop_log(read_recording(path, column_map), path.name) for path in paths]
 
 
-def _recording(path: Path, column_map: Path | None) -> Recording:
+def read_recording(path: Path, column_map: Path | None) -> Recording:
+    """Read one recording, or a log through a column map."""
     from elevon.logs.importing import import_log
     from elevon.recording import Recording
 

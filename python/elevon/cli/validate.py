@@ -17,7 +17,7 @@ from elevon.cli.calibrate import (
     _provenance,
     direct_logs,
 )
-from elevon.cli.closed_loop import read_loop_logs, validate_closed_loop
+from elevon.cli.closed_loop import read_loop_logs, read_recording, validate_closed_loop
 from elevon.cli.common import (
     ForceOption,
     JsonOption,
@@ -49,13 +49,21 @@ def validate(
     date: DateOption = None,
 ) -> int:
     """Compare the model with logs, signal by signal; exit 1 where a threshold of the set fails."""
+    from elevon.calibrate.replay import validate_replay
     from elevon.calibrate.report import validation_report
     from elevon.calibrate.validation import validate as run
+    from elevon.parameters.records import wirings
 
     check_outputs([report], force=force)
     model = read_actuator(actuator, settings)
     data = direct_logs(model, logs, loadcell, command, column_map)
-    if data is None:
+    if data is None and "position" not in wirings()[model.wiring]["modes"]:
+        with progress_bar("validating") as advance:
+            named = [(path.name, read_recording(path, column_map)) for path in logs]
+            result = validate_replay(
+                named, model, fidelity=fidelity, transient=transient, progress=advance
+            )
+    elif data is None:
         result = validate_closed_loop(read_loop_logs(logs, column_map), model, transient)
     else:
         with progress_bar("validating") as advance:
@@ -86,6 +94,10 @@ def validate(
         )
         for name, offset in result.offsets.items():
             say(f"{name}: the sensor's offset of {offset:.4g} is taken off the logs")
+        say(
+            "% of RMS: RMS error over the logged signal's RMS about its mean; "
+            "% of range: over its range"
+        )
         say(f"after {result.transient:g} s; {result.status}")
     for name, text in result.notes.items():
         say(f"{name}: {text}")
