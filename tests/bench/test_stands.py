@@ -133,7 +133,7 @@ def test_a_log_of_the_rig_carries_roles_and_the_stand_but_nothing_hidden(tmp_pat
     log = Recording.load(tmp_path / "one.csv")
     assert {"command", "state", "output_position", "load", "supply_current"} <= log.roles.keys()
     assert log.meta["stand"]["parameters"]["supply.current_limit"] == "50 A"
-    text = (tmp_path / "one.csv").read_text()
+    text = (tmp_path / "one.csv").read_text() + (tmp_path / "one.csv.json").read_text()
     assert "demagnetisation" not in text
     assert log["rig_force"].values[:10].mean() == pytest.approx(-1994.2, abs=20.0)
     again = run_procedure(

@@ -286,6 +286,10 @@ def test_export_in_other_forms(made, cli, tmp_path, form):
     assert cli("dataset", "export", made, *arguments)[0] == 0
     assert (tmp_path / form / f"runs.{form}").stat().st_size > 0
     loaded = elevon.Recording.load(tmp_path / form / f"run_000003.{form}")
+    if form == "csv":
+        assert (tmp_path / form / "run_000003.csv.json").is_file()
+        heads = (tmp_path / form / "runs.csv").read_text().splitlines()[0]
+        assert '"sim_s [s]"' in heads
     alone = elevon.load_campaign(made).recording(3)
     assert loaded["user_position"].values.tobytes() == alone["user_position"].values.tobytes()
 

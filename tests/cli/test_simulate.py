@@ -60,6 +60,20 @@ def test_out(elevon_cli, tmp_path, ending):
     assert elevon.Recording.load(out).final["user_position"] == data["final"]["user_position"]
 
 
+def test_csv_of_several_clocks_is_checked_before_simulating(elevon_cli, tmp_path, monkeypatch):
+    arguments = (*RUN, "--record", "motor_speed@400 Hz", "--record", "current_q@1 kHz")
+    result = elevon_cli(*arguments, "--out", tmp_path / "run.csv")
+    assert result.code == 0
+    assert "run.at_400_hz.csv" in result.err
+    assert set(elevon.Recording.load(tmp_path / "run.csv").names) == {"motor_speed", "current_q"}
+    for path in tmp_path.glob("run.at_400_hz*"):
+        path.unlink()
+    monkeypatch.setattr(sys.modules["elevon.simulate"], "simulate", None)  # calling it fails
+    result = elevon_cli(*arguments, "--out", tmp_path / "run.csv")
+    assert result.code == 2
+    assert "run.at_1_khz.csv: exists already" in result.err
+
+
 @pytest.mark.parametrize("ending", [".png", ".html"])
 def test_plot(elevon_cli, tmp_path, ending):
     plot = tmp_path / f"run{ending}"

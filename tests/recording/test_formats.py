@@ -13,6 +13,7 @@ import zlib
 
 import h5py
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -22,6 +23,7 @@ from hypothesis import strategies as st
 
 from elevon import Clock, Recording
 from elevon.errors import (
+    DamageError,
     FormatError,
     InputError,
     OutputError,
@@ -29,18 +31,18 @@ from elevon.errors import (
     UncheckedWarning,
     UnknownNameError,
 )
-from elevon.recording import mat
+from elevon.recording import csv, mat
 from tests.recording.make import ordinary, plain_doubles, recordings
 
 ALL = [".parquet", ".nc", ".mat", ".csv"]
-MANY_CLOCKS = [".parquet", ".nc", ".mat"]
+MANY_CLOCKS = [".parquet", ".nc", ".mat"]  # of any numbers; .csv but for what a NaN can hide
 
 
 def _one_clock():
     return ordinary().select(clock="cell")
 
 
-@pytest.mark.parametrize("ending", MANY_CLOCKS)
+@pytest.mark.parametrize("ending", ALL)
 def test_several_clocks_come_back_to_the_bit(tmp_path, ending):
     recording = ordinary()
     assert Recording.load(recording.save(tmp_path / f"a{ending}")).equals(recording)
@@ -95,10 +97,36 @@ def test_nothing_to_save_is_saved(tmp_path):
         assert Recording.load(empty.save(tmp_path / f"a{ending}")).equals(empty)
 
 
-def test_csv_holds_one_clock(tmp_path):
-    with pytest.raises(InputError, match=r"one clock, the recording has 2 \('drive', 'cell'\)"):
+def test_csv_of_several_clocks_is_one_table_a_clock(tmp_path):
+    ordinary().save(tmp_path / "a.csv")
+    names = ["a.cell.csv", "a.cell.csv.json", "a.drive.csv", "a.drive.csv.json"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == names
+    cell = Recording.load(tmp_path / "a.cell.csv")
+    assert cell.equals(ordinary().select(clock="cell"))
+    with pytest.raises(OutputExistsError, match=r"a\.drive\.csv"):
         ordinary().save(tmp_path / "a.csv")
-    assert list(tmp_path.iterdir()) == []
+    ordinary().with_meta(seed=4).save(tmp_path / "b.csv")
+    for ending in (".csv", ".csv.json"):
+        (tmp_path / f"b.cell{ending}").write_bytes((tmp_path / f"a.cell{ending}").read_bytes())
+    b = json.loads((tmp_path / "b.cell.csv.json").read_text())
+    (tmp_path / "b.cell.csv.json").write_text(
+        json.dumps({**b, "files": ["b.drive.csv", "b.cell.csv"]})
+    )
+    with pytest.raises(DamageError, match="not of one recording"):
+        Recording.load(tmp_path / "b.csv")
+    (tmp_path / "a.cell.csv").unlink()
+    with pytest.raises(DamageError, match=r"a\.cell\.csv is missing"):
+        Recording.load(tmp_path / "a.csv")
+
+
+def test_csv_of_one_clock_replaced_by_several(tmp_path):
+    path = _one_clock().save(tmp_path / "a.csv")
+    assert Recording.load(ordinary().save(path, force=True)).equals(ordinary())
+
+
+def test_csv_without_a_clock(tmp_path):
+    with pytest.raises(InputError, match="the recording has none"):
+        Recording([]).save(tmp_path / "a.csv")
 
 
 @pytest.mark.parametrize("name", ["a.hdf5", "a", "a.parquett", "a.xlsx"])
@@ -184,7 +212,9 @@ def test_a_full_disk_leaves_the_old_file(tmp_path, ending):
     )
     assert subprocess.run([sys.executable, "-c", program, str(path)], check=False).returncode == 42
     assert path.read_bytes() == before
-    assert [entry.name for entry in tmp_path.iterdir()] == [path.name]
+    left = {entry.name for entry in tmp_path.iterdir()}
+    assert left == {path.name, *([f"{path.name}.json"] if ending == ".csv" else [])}
+    assert Recording.load(path).equals(_one_clock())
 
 
 @pytest.mark.parametrize("ending", ALL)
@@ -226,18 +256,33 @@ def test_damaged_files_are_a_clear_error_or_the_same_recording(tmp_path_factory,
     except FormatError as error:
         assert str(path) in str(error)  # noqa: PT017
         return
-    # What loads without a word is what was saved; a CSV that lost its first line says so.
-    if not (ending == ".csv" and not path.read_bytes().startswith(b"# elevon ")):
-        assert loaded.equals(whole)
+    assert loaded.equals(whole)
+
+
+@given(data=st.data())
+@settings(max_examples=60)
+def test_a_damaged_file_beside_is_a_clear_error_or_the_same(tmp_path_factory, data):
+    path = _one_clock().save(tmp_path_factory.mktemp("damaged") / "a.csv")
+    near = path.with_name("a.csv.json")
+    content = bytearray(near.read_bytes())
+    for _ in range(data.draw(st.integers(1, 4))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    near.write_bytes(content[: data.draw(st.integers(0, len(content)))])
+    try:
+        loaded = Recording.load(path)
+    except FormatError as error:
+        assert str(path) in str(error)  # noqa: PT017
+        return
+    assert loaded.equals(_one_clock())
 
 
 def _header(path):
-    return json.loads(path.read_text().splitlines()[0].removeprefix("# elevon "))
+    return json.loads(path.with_name(f"{path.name}.json").read_text())["recording"]
 
 
 def _with_header(path, header):
-    lines = path.read_text().splitlines(keepends=True)
-    path.write_text("# elevon " + json.dumps(header) + "\n" + "".join(lines[1:]))
+    near = path.with_name(f"{path.name}.json")
+    near.write_text(json.dumps({**json.loads(near.read_text()), "recording": header}))
 
 
 @pytest.mark.parametrize(
@@ -271,22 +316,90 @@ def test_a_description_that_lies_is_found_out(tmp_path, change, message):
 
 def test_deeply_nested_descriptions_are_refused(tmp_path):
     path = tmp_path / "a.csv"
-    path.write_text("# elevon " + "[" * 1_000_000 + "\ntime [s]\n")
+    _one_clock().save(path)
+    path.with_name("a.csv.json").write_text("[" * 1_000_000)
     with pytest.raises(FormatError, match="damaged"):
         Recording.load(path)
 
 
 def test_csv_is_plain_text_with_units(tmp_path):
     lines = _one_clock().save(tmp_path / "a.csv").read_text().splitlines()
-    assert lines[1] == "time [s],force [N]"
-    assert lines[2] == "0,1"
-    assert len(lines) == 7
+    assert lines[0] == "time [s],force [N]"
+    assert lines[1] == "0,1"
+    assert len(lines) == 6
+    table = pd.read_csv(tmp_path / "a.csv")
+    assert list(table.columns) == ["time [s]", "force [N]"]
+    written = np.column_stack([_one_clock().clock().time, _one_clock()["force"].values])
+    np.testing.assert_allclose(table.to_numpy(), written, rtol=1e-15, atol=1e-300)
+
+
+def test_csv_without_the_file_beside_it_says_so(tmp_path):
+    path = _one_clock().save(tmp_path / "a.csv")
+    path.with_name("a.csv.json").unlink()
+    with pytest.warns(UncheckedWarning, match=r"no a\.csv\.json beside it") as told:
+        recording = Recording.load(path)
+    assert told[0].filename == __file__
+    assert recording["force"].values.tobytes() == _one_clock()["force"].values.tobytes()
+    assert recording.meta == {}
+
+
+def test_csv_changed_since_is_an_error(tmp_path):
+    path = _one_clock().save(tmp_path / "a.csv")
+    path.write_text(path.read_text().replace("0,1\n", "0,2\n"))
+    with pytest.raises(DamageError, match=r"not the bytes that a\.csv\.json describes"):
+        Recording.load(path)
+
+
+def test_csv_of_an_earlier_version_says_what_to_do(tmp_path):
+    (tmp_path / "a.csv").write_text('# elevon {"schema":2}\ntime [s],x [rad]\n0,1\n')
+    with pytest.raises(FormatError, match="description in the first line"):
+        Recording.load(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize("step", ["description", "table"])
+def test_a_replacement_cut_short_leaves_one_whole_recording(tmp_path, monkeypatch, step):
+    """The process ends right after the description, or right after the table, has its name."""
+    path = _one_clock().save(tmp_path / "a.csv")
+    new = _one_clock().with_meta(seed=9)
+    changed = Recording.build([0, 1], {"x": [1, 2]}, {"x": "rad"}, meta={"seed": 9})
+    saved = csv.write_beside
+
+    class Killed(BaseException):
+        pass
+
+    def killed(table, about, *, keep_old):
+        if step == "table" and not keep_old:
+            raise Killed
+        saved(table, about, keep_old=keep_old)
+        if step == "description":
+            raise Killed
+
+    # A table of the very same bytes is whole with the new description at once.
+    old = _one_clock() if step == "description" else changed
+    for later, expected in ((changed, old), (new, new)):
+        with monkeypatch.context() as patch:
+            patch.setattr(csv, "write_beside", killed)
+            with pytest.raises(Killed):
+                later.save(path, force=True)
+        assert Recording.load(path).equals(expected)
+        _one_clock().save(path, force=True)
+
+
+def test_a_description_without_its_table_stands_in_nobodys_way(tmp_path):
+    path = _one_clock().save(tmp_path / "a.csv")
+    path.unlink()
+    with pytest.raises(InputError, match="no such file"):
+        Recording.load(path)
+    assert Recording.load(_one_clock().save(path)).equals(_one_clock())
+    (tmp_path / "b.csv.json").write_text('{"mine": 1}')
+    with pytest.raises(OutputExistsError, match=r"b\.csv\.json"):
+        _one_clock().save(tmp_path / "b.csv")
 
 
 def test_csv_of_others_is_read_with_its_units(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("\ufefftime [ms],speed [rpm], angle [deg]\r\n0,60,0\r\n2.5,nan,180\r\n")
-    with pytest.warns(UncheckedWarning, match="a.csv: carries no checksum"):
+    with pytest.warns(UncheckedWarning, match="a.csv: no a.csv.json beside it"):
         recording = Recording.load(path)
     assert recording.clock().time.tolist() == [0.0, 0.0025]
     assert recording["angle"].values[1] == pytest.approx(np.pi)

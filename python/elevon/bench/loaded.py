@@ -15,6 +15,7 @@ from elevon.bench.force_control import ForceLoop, asked_force
 from elevon.bench.procedure import ForceStep, Procedure, RigStep, SettingsStep, TraceStep
 from elevon.bench.rig import Conditions, draw_conditions, moved
 from elevon.errors import InputError
+from elevon.recording.formats import files_of
 from elevon.units import parse_quantity
 
 if TYPE_CHECKING:
@@ -239,8 +240,8 @@ def _values(terms: Sequence[Term], times: Floats, start: float) -> Floats:
     return total
 
 
-def write_loaded(folder: Path, name: str, log: Recording, *, force: bool) -> Path:
-    """Write one log as a recording in text, with its roles."""
+def write_loaded(folder: Path, name: str, log: Recording, *, force: bool) -> list[Path]:
+    """Write one log as a recording in text, its roles in the file beside it; return both."""
     path = folder / f"{name}.csv"
     log.save(path, force=force)
-    return path
+    return files_of(path)

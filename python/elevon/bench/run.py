@@ -166,8 +166,8 @@ def run_procedure(
     actuator : Actuator
         On the stand that its wiring's ports choose.
     out : path
-        Folder. For each log NAME.csv; on the rotary bench NAME_command.json beside it, and
-        NAME_loadcell.csv where a load cell has something to measure.
+        Folder. For each log NAME.csv, on a loaded stand NAME.csv.json beside it; on the rotary
+        bench NAME_command.json, and NAME_loadcell.csv where a load cell has something to measure.
     faults : sequence of Fault or str
         In every log.
     seed : int
@@ -266,7 +266,7 @@ def _one(
     again = force or state.resumed
     if isinstance(setup, LoadedSetup):
         log, recording = run_loaded(setup, fidelity, progress)
-        written = [write_loaded(folder, name, log, force=again)]
+        written = write_loaded(folder, name, log, force=again)
     else:
         recording = _drive_run(setup, fidelity, progress)
         written = write_traces(folder, setup, recording, layout, force=again)

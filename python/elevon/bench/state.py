@@ -9,6 +9,7 @@ from pathlib import Path
 from elevon.bench.traces import trace_files
 from elevon.errors import FormatError, InputError, OutputExistsError
 from elevon.files import check_output
+from elevon.recording.beside import beside
 from elevon.worklog import Item, WorkLog
 
 __all__ = ["BenchState", "LogRecord", "finished_logs"]
@@ -74,7 +75,8 @@ class BenchState:
                     f"{path}: belongs to other work; use force (--force) to replace them"
                 )
             for name in names:
-                for file in trace_files(folder, name, cell=True):
+                traces = trace_files(folder, name, cell=True)
+                for file in (*traces, beside(traces[-1])):
                     check_output(file)
         return cls(WorkLog.begin(path, key))
 

@@ -13,7 +13,7 @@ from elevon.campaign.dataset import Dataset
 from elevon.errors import InputError, Interrupted
 from elevon.files import atomic_path, check_output
 from elevon.recording import Channel, Recording
-from elevon.recording.formats import check_ending
+from elevon.recording.formats import check_ending, files_of
 from elevon.recording.names import LONGEST_NAME
 
 __all__ = ["export", "identifiers", "run_numbers"]
@@ -34,7 +34,7 @@ def export(
 
     Faults are channels ``friction_at_transmission``, 0 where absent, in every run. ``runs`` holds
     the table of the runs: MATLAB gets a struct of columns and one of their units; CSV, Parquet and
-    NetCDF a table of their own kind.
+    NetCDF a table of their own kind (in CSV the units stand behind the names, ``age [1]``).
 
     Parameters
     ----------
@@ -69,10 +69,11 @@ def export(
     numbers = list(range(len(ds))) if runs is None else list(runs)
     table = out / f"runs{suffix}"
     check_output(table, force=force)
-    written = []
+    written: list[Path] = []
     for done, number in enumerate(numbers):
         recording = with_named_faults(ds.recording(number), ds)
-        written.append(recording.save(out / f"run_{number:06d}{suffix}", force=force))
+        saved = recording.save(out / f"run_{number:06d}{suffix}", force=force)
+        written.extend(files_of(saved))
         if progress is not None and progress((done + 1) / (len(numbers) + 1)) is False:
             raise Interrupted(f"interrupted after run {number}")
     _write_table(ds, table, numbers, force=force)
@@ -142,7 +143,9 @@ def _write_table(ds: Dataset, path: Path, numbers: Sequence[int], *, force: bool
         elif path.suffix == ".csv":
             from pyarrow.csv import write_csv
 
-            write_csv(table, temporary)
+            units = ds.runs.units
+            heads = [f"{c} [{units[c]}]" if units.get(c) else c for c in table.column_names]
+            write_csv(table.rename_columns(heads), temporary)
         elif path.suffix == ".nc":
             ds.runs.to_xarray(runs=numbers).to_netcdf(temporary, engine="h5netcdf")
         else:

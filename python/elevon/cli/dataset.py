@@ -80,7 +80,14 @@ def export(
     with progress_bar("writing") as advance:
         files = exported(ds, out.expanduser(), form, numbers, force=force, progress=advance)
     if json:
-        print_json({"status": "ok", "runs": len(files) - 1, "files": files, "out": out})
+        print_json(
+            {
+                "status": "ok",
+                "runs": len(ds) if numbers is None else len(numbers),
+                "files": files,
+                "out": out,
+            }
+        )
     else:
         typer.echo(f"{len(files)} files in {out}")
     return 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -24,6 +24,9 @@ from elevon.cli.common import (
     read_scenario,
 )
 from elevon.cli.output import print_json, print_table, progress_bar, say
+
+if TYPE_CHECKING:
+    from elevon.simulate import Run
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -53,18 +56,22 @@ def simulate(
     json: JsonOption = False,
 ) -> None:
     """Simulate one actuator and keep what it did."""
+    from elevon.recording.formats import files_of
+    from elevon.simulate import Run
     from elevon.simulate import simulate as run
 
     _check_files(out, plot, force=force)
     loaded = read_actuator(actuator, settings)
     asked = read_scenario(loaded, scenario, duration, fault)
+    if out is not None:
+        _check_clocks(out, Run(loaded, asked, seed), fidelity, record, force=force)
     with progress_bar(f"simulating {loaded.name}") as advance:
         recording = run(
             loaded, asked, fidelity=fidelity, record=record, seed=seed, progress=advance
         )
     if out is not None:
         recording.save(out, force=force)
-        say(f"wrote {out}")
+        say(f"wrote {', '.join(str(file) for file in files_of(out))}")
     if plot is not None:
         recording.plot(path=plot, force=force)
         say(f"wrote {plot}")
@@ -86,6 +93,17 @@ def _check_files(out: Path | None, plot: Path | None, *, force: bool) -> None:
     if out is not None and plot is not None and out.absolute() == plot.absolute():
         raise InputError(f"{out}: --out and --plot name the same file")
     check_outputs([out, plot], force=force)
+
+
+def _check_clocks(
+    out: Path, run: Run, fidelity: str, record: list[str] | None, *, force: bool
+) -> None:
+    """Check before simulating that what will be recorded can be saved: a CSV has a file a clock."""
+    from elevon.recording.formats import check_target
+    from elevon.simulate.prepare import prepare
+
+    plan = prepare(run, fidelity, record, doubts=False).plan
+    check_target(out, [clock.name for clock in plan], force=force)
 
 
 def _result(recording: Any, wiring: str, out: Path | None, plot: Path | None) -> dict[str, Any]:

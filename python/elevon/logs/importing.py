@@ -26,6 +26,8 @@ from elevon.logs.maps.column_map import ColumnMap, find_map, shipped_map
 from elevon.logs.maps.columns import looks_like_drive
 from elevon.logs.report import ImportReport
 from elevon.recording import Recording
+from elevon.recording.beside import beside, describes
+from elevon.recording.csv import joined_tables
 from elevon.scenario import Scenario
 
 __all__ = ["ImportedLog", "find_sidecars", "import_log", "same_rate"]
@@ -191,9 +193,11 @@ def _scenario(recording: Recording, source: str) -> Scenario | None:
 
 def _is_saved(file: Path) -> bool:
     try:
+        if file.suffix.lower() == ".csv" and (describes(beside(file)) or joined_tables(file)):
+            return True
         with file.open("rb") as stream:
             if stream.read(9) == b"# elevon ":
-                return True
+                return True  # of an earlier version: its reader says what to do
         if file.suffix.lower() == ".mat" and not has_variable(file, "elevon", DEFAULT_LIMITS):
             return False
         if file.suffix.lower() in {".parquet", ".nc", ".mat"}:

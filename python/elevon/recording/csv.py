@@ -1,54 +1,113 @@
 """Recordings as comma-separated text, for eyes, spreadsheets and other programs.
 
-The first line is ``# elevon {...}``, the description (`Header`); the second names the columns with
-their units: ``time [s],user_position [rad]``. Numbers have the digits that give back every
-bit (a NaN comes back as the plain one).
-A file holds ONE clock; a recording of several is refused (Parquet, NetCDF and MAT hold them).
+The table is plain: a line of names with units (``time [s],user_position [rad]``), then numbers
+with the digits that give back every bit (a NaN comes back as the plain one). Everything else, and
+the SHA-256 of the table's bytes, stands in a file beside it (`elevon.recording.beside`).
 
-A table without the first line is read as well, in any units, as a recording without meta.
+A table holds ONE clock. A recording of several becomes one table a clock: ``run.csv`` is written as
+``run.drive.csv`` and ``run.load_cell.csv``, each a recording of its own, and loading ``run.csv``
+joins them.
+
+A table without the file beside it is read as well, in any units, with a warning, without meta.
 """
 
 from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Iterable
+from dataclasses import replace
+from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from elevon.errors import FormatError, InputError, UncheckedWarning
+from elevon.errors import DamageError, FormatError, InputError, UncheckedWarning
+from elevon.files import atomic_path, check_output
+from elevon.recording.beside import (
+    Beside,
+    beside,
+    describes,
+    read_beside,
+    sha256_of,
+    write_beside,
+)
 from elevon.recording.channel import in_si
 from elevon.recording.clock import Clock
 from elevon.recording.contents import Contents, check_size, header_bytes, rebuild
 from elevon.recording.header import Header
+from elevon.units import check_kind, to_si
 
 if TYPE_CHECKING:
     from elevon.recording.recording import Recording
-from elevon.units import check_kind, to_si
 
-__all__ = ["check", "read", "write"]
+__all__ = ["check", "joined_tables", "load", "save", "tables"]
 
-_MARK = "# elevon "
+OLD_MARK = "# elevon "
+"""How a table began that had its description in the first line."""
 _COLUMN = re.compile(r'\s*"?\s*([A-Za-z][A-Za-z0-9_]*)\s*\[\s*([^\[\],"]*?)\s*\]\s*"?\s*')
 _LONGEST_LINE = 64 * 2**20
 _EXPANSION = 4
 """A number of two characters, with its comma, takes eight bytes in memory."""
 
 
-def check(recording: Recording) -> None:
-    """Refuse a recording of several clocks."""
-    if len(recording.clocks) != 1:
-        names = ", ".join(map(repr, recording.clocks)) or "none"
-        raise InputError(
-            f"a .csv file holds one clock, the recording has {len(recording.clocks)} ({names}); "
-            "choose one with select(clock=...), or save as .parquet, .nc or .mat"
-        )
+def tables(path: Path, clocks: Iterable[str]) -> list[Path]:
+    """Return the table of each clock: `path` for one, ``run.CLOCK.csv`` for each of several."""
+    names = list(clocks)
+    if len(names) == 1:
+        return [path]
+    return [path.with_name(f"{path.stem}.{name}{path.suffix}") for name in names]
 
 
-def write(recording: Recording, path: Path) -> None:
-    """Write the two first lines and the numbers."""
+def check(path: Path, clocks: Iterable[str], *, force: bool) -> None:
+    """Refuse, before any work, outputs that cannot be written; errors as `check_output`.
+
+    A description without a table, left by a save that was killed, stands in nobody's way.
+    """
+    names = list(clocks)
+    if not names:
+        raise InputError(f"{path}: a .csv file holds a clock, the recording has none")
+    check_output(path, force=force)
+    for table in tables(path, names):
+        check_output(table, force=force)
+        left_over = not table.exists() and describes(beside(table))
+        check_output(beside(table), force=force or left_over)
+
+
+def save(recording: Recording, path: Path, *, force: bool) -> None:
+    """Write the tables and the file beside each."""
+    check(path, recording.clocks, force=force)
+    whole = Header.sealed(recording).sha256
+    paths = tables(path, recording.clocks)
+    files = [table.name for table in paths]
+    for table, clock in zip(paths, recording.clocks, strict=True):
+        part = recording if len(paths) == 1 else recording.select(clock=clock)
+        _save_one(part, table, whole, files, force=force)
+    if len(paths) > 1:  # replaced with leave: the tables of the clocks stand for it now
+        for old in (path, beside(path)):
+            old.unlink(missing_ok=True)
+
+
+def _save_one(
+    recording: Recording, table: Path, whole: str, files: list[str], *, force: bool
+) -> None:
+    replaced = table.exists()
+    try:
+        with atomic_path(table, force=force) as temporary:
+            _write(recording, temporary)
+            about = Beside(sha256_of(temporary), Header.sealed(recording), whole, files)
+            write_beside(table, about, keep_old=replaced)
+    except BaseException:
+        if not table.exists():
+            beside(table).unlink(missing_ok=True)
+        raise
+    if replaced:
+        write_beside(table, about, keep_old=False)
+
+
+def _write(recording: Recording, path: Path) -> None:
     import pyarrow as pa
     from pyarrow import csv
 
@@ -57,34 +116,85 @@ def write(recording: Recording, path: Path) -> None:
     arrays = [pa.array(recording.clock().time), *(pa.array(c.values) for c in channels)]
     options = csv.WriteOptions(include_header=False, quoting_style="none")
     with path.open("wb") as stream:
-        stream.write(f"{_MARK}{Header.sealed(recording).to_json()}\n{','.join(heads)}\n".encode())
+        stream.write(f"{','.join(heads)}\n".encode())
         csv.write_csv(pa.Table.from_arrays(arrays, heads), stream, options)
 
 
-def read(path: Path, max_bytes: int) -> Contents:
-    """Read the first lines, then the numbers."""
+def joined_tables(path: Path) -> list[Path]:
+    """Return the tables, one a clock, of a recording saved as `path`; none where there are none.
+
+    Raises
+    ------
+    DamageError
+        One of them is missing.
+    """
+    if path.exists():
+        return []
+    for near in sorted(path.parent.glob(f"{escape(path.stem)}.*{path.suffix}.json")):
+        table = near.with_suffix("")
+        about = read_beside(table) if table.is_file() and describes(near) else None
+        if about is None or len(about.files) < 2 or table.name not in about.files:
+            continue
+        present = [path.with_name(Path(name).name) for name in about.files]
+        clocks = [
+            name.removeprefix(f"{path.stem}.").removesuffix(path.suffix) for name in about.files
+        ]
+        if present != tables(path, clocks):
+            continue
+        for table in present:
+            if not table.is_file():
+                raise DamageError(
+                    f"{path}: {table.name} is missing, the table of one of its clocks"
+                )
+        return present
+    return []
+
+
+def load(path: Path, max_bytes: int) -> Contents:
+    """Read a table, or the tables of the clocks that were saved as `path`."""
+    parts = joined_tables(path)
+    if not parts:
+        return _read(path, max_bytes)[0]
+    read = [_read(part, max_bytes) for part in parts]
+    if len({whole for _, whole in read}) != 1:
+        raise DamageError(f"{path}: its tables are not of one recording: a save was cut short")
+    first = read[0][0]
+    return replace(
+        first,
+        channels=[channel for contents, _ in read for channel in contents.channels],
+        clocks=[clock for contents, _ in read for clock in contents.clocks],
+    )
+
+
+def _read(path: Path, max_bytes: int) -> tuple[Contents, str]:
+    """Return what a table holds and the recording it is of."""
     check_size(str(path), path.stat().st_size, max_bytes)
     with path.open("rb") as stream:
         first = _line(path, stream)
-        header = None
-        if first.startswith(_MARK):
-            header = Header.from_json(first.removeprefix(_MARK), str(path))
-            check_size(str(path), header_bytes(header), max_bytes)
-            first = _line(path, stream)
-        else:
-            check_size(str(path), _EXPANSION * path.stat().st_size, max_bytes)
+        if first.startswith(OLD_MARK):
+            raise FormatError(
+                f"{path}: has its description in the first line, as earlier versions wrote it; "
+                "without that line it is read as a plain table (or save it anew from its source)"
+            )
+        about = read_beside(path)
+        needed = _EXPANSION * path.stat().st_size if about is None else header_bytes(about.header)
+        check_size(str(path), needed, max_bytes)
         columns = _heads(path, first)
         arrays = _numbers(path, stream, list(columns))
-    if header is None:
-        contents = _without_header(path, columns, arrays)
-        warnings.warn(f"{path}: carries no checksum: damage cannot be seen", UncheckedWarning, 4)
-        return contents
-    if len(header.clocks) != 1:
-        raise FormatError(f"{path}: describes {len(header.clocks)} clocks, a .csv holds one")
-    described = {name: unit for name, (unit, _) in header.clocks[0].channels.items()}
+    if about is None:
+        contents = _undescribed(path, columns, arrays)
+        warnings.warn(
+            f"{path}: no {beside(path).name} beside it, so no checksum: damage cannot be seen",
+            UncheckedWarning,
+            6,
+        )
+        return contents, ""
+    if len(about.header.clocks) != 1:
+        raise FormatError(f"{path}: describes {len(about.header.clocks)} clocks, a .csv holds one")
+    described = {name: unit for name, (unit, _) in about.header.clocks[0].channels.items()}
     if columns != {"time": "s", **described}:
-        raise FormatError(f"{path}: the column names do not agree with the first line")
-    return rebuild(header, lambda _: arrays, str(path))
+        raise FormatError(f"{path}: the column names do not agree with {beside(path).name}")
+    return rebuild(about.header, lambda _: arrays, str(path)), about.of
 
 
 def _line(path: Path, stream: Any) -> str:
@@ -131,7 +241,7 @@ def _numbers(path: Path, stream: Any, names: list[str]) -> dict[str, npt.NDArray
     return {name: table.column(name).to_numpy() for name in names}
 
 
-def _without_header(
+def _undescribed(
     path: Path, columns: dict[str, str], arrays: dict[str, npt.NDArray[np.float64]]
 ) -> Contents:
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -13,7 +14,7 @@ from elevon.recording.contents import Contents
 if TYPE_CHECKING:
     from elevon.recording.recording import Recording
 
-__all__ = ["ENDINGS", "check_ending", "load", "save"]
+__all__ = ["ENDINGS", "check_ending", "check_target", "files_of", "load", "save"]
 
 ENDINGS = (".parquet", ".nc", ".csv", ".mat")
 
@@ -32,6 +33,11 @@ class _Format(Protocol):
 def save(recording: Recording, path: str | os.PathLike[str], *, force: bool) -> Path:
     """Write a recording; see `Recording.save`."""
     target = Path(path).expanduser()
+    if check_ending(target) == ".csv":
+        from elevon.recording import csv
+
+        csv.save(recording, target, force=force)
+        return target
     handler = _handler(target)
     check_output(target, force=force)
     handler.check(recording)
@@ -43,16 +49,51 @@ def save(recording: Recording, path: str | os.PathLike[str], *, force: bool) -> 
 def load(path: str | os.PathLike[str], *, max_bytes: int) -> Contents:
     """Read what a file holds; see `Recording.load`."""
     source = Path(path).expanduser()
-    handler = _handler(source)
-    if not source.is_file():
-        near = _neighbours(source)
-        raise InputError(f"{source}: no such file{near}")
+    check_ending(source)
     try:
-        with source.open("rb"):
-            pass
-        return handler.read(source, max_bytes)
+        if not files_of(source):
+            near = _neighbours(source)
+            raise InputError(f"{source}: no such file{near}")
+        return _read(source, max_bytes)
     except OSError as error:
         raise FormatError(f"{source}: cannot be read: {error}") from error
+
+
+def _read(source: Path, max_bytes: int) -> Contents:
+    if source.suffix.lower() == ".csv":
+        from elevon.recording import csv
+
+        return csv.load(source, max_bytes)
+    return _handler(source).read(source, max_bytes)
+
+
+def files_of(path: Path) -> list[Path]:
+    """Return the files of a saved recording: a CSV has a description beside each table."""
+    if path.suffix.lower() != ".csv":
+        return [path] if path.is_file() else []
+    from elevon.recording import csv
+    from elevon.recording.beside import beside
+
+    parts = [path] if path.is_file() else csv.joined_tables(path)
+    return [file for table in parts for file in (table, beside(table)) if file.is_file()]
+
+
+def check_target(path: Path, clocks: Iterable[str], *, force: bool) -> None:
+    """Check, before the work, that a recording of these clocks could be saved as `path`.
+
+    Raises
+    ------
+    UnknownNameError
+        The ending is no format.
+    OutputError
+        A file exists already (a CSV has one a clock, each with a description), or cannot be made.
+    """
+    if check_ending(path) == ".csv":
+        from elevon.recording import csv
+
+        csv.check(path, clocks, force=force)
+    else:
+        check_output(path, force=force)
 
 
 def check_ending(path: str | os.PathLike[str]) -> str:
@@ -79,10 +120,6 @@ def _handler(path: Path) -> _Format:
         from elevon.recording import netcdf
 
         return netcdf
-    if suffix == ".csv":
-        from elevon.recording import csv
-
-        return csv
     from elevon.recording import mat
 
     return mat

@@ -347,8 +347,9 @@ class Recording:
         Parameters
         ----------
         path : path
-            The ending chooses the format: ``.parquet``, ``.nc``, ``.csv`` (one clock only),
-            ``.mat`` (version 5, at most 2 GB). All give back every bit on load.
+            The ending chooses the format: ``.parquet``, ``.nc``, ``.mat`` (version 5, at most
+            2 GB), ``.csv`` (a plain table with ``NAME.csv.json`` beside it; several clocks: one
+            table ``NAME.CLOCK.csv`` each). All give back every bit on load.
         force : bool
             Whether an existing file may be replaced.
 
