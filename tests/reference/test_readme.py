@@ -13,7 +13,7 @@ PAGES = ["README.md", "docs/reproduce.md"]
 LONG = (
     "reproduce torino-backlash",
     "reproduce torino-compliance",
-    "compare torino-rotary",
+    "compare ",
     "--faults-table",
     "reproduce nasa-",
     "reproduce pisa-",

@@ -101,13 +101,45 @@ def _separation(options: Options, progress: Advance) -> Any:
     )
 
 
+def _current(options: Options, progress: Advance) -> Any:
+    from elevon.reproduce.nasa.current import reproduce_current
+
+    return reproduce_current(fidelity=options["fidelity"], seed=options["seed"], progress=progress)
+
+
+def _current_page(result: Any, options: Options) -> Report:
+    from elevon.reproduce.nasa.page_current import current_report
+
+    return current_report(result, date=options["date"])
+
+
+def _show_current(values: Values, _result: Any) -> None:
+    rows = [
+        [state, source, *(f"{item[source][key]:.2f}" for key in ("average", "maximum", "minimum"))]
+        for state, item in values["summary"].items()
+        for source in ("published", "here")
+    ]
+    print_table(["runs", "source", "average %", "maximum %", "minimum %"], rows)
+
+
 def _show_separation(values: Values, _result: Any) -> None:
     columns = ("fault", "profile", "load_n", "effect_size", "interval", "winner",
                "draws_needed")  # fmt: skip
     print_columns(values["rows"], columns)
 
 
+_FIDELITY = Annotated[str, typer.Option("--fidelity", help="Of the virtual stand: high or low.")]
+
 CASES = (
+    Case(
+        "nasa-current",
+        "Predict the motor current of 32 nominal and ten jammed runs of a mismatched stand.",
+        "running and predicting 42 experiments",
+        _current,
+        _show_current,
+        _current_page,
+        options={"fidelity": (_FIDELITY, "high")},
+    ),
     Case(
         "nasa-thermal",
         "Heat the ballscrew actuator's motor for an hour, held to closed forms.",

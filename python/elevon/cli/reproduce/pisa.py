@@ -68,6 +68,20 @@ def _failures_page(result: Any, options: Options) -> Report:
     return failures_report(result, date=options["date"])
 
 
+def _validation(options: Options, progress: Advance) -> Any:
+    from elevon.reproduce.pisa_validation import reproduce_validation
+
+    return reproduce_validation(
+        fidelity=options["fidelity"], seed=options["seed"], progress=progress
+    )
+
+
+def _validation_page(result: Any, options: Options) -> Report:
+    from elevon.reproduce.pisa_validation_page import validation_page
+
+    return validation_page(result, date=options["date"])
+
+
 def _table(columns: tuple[str, ...], title: str) -> Callable[[Values, Any], None]:
     return lambda values, _result: print_columns(values["rows"], columns, title)
 
@@ -119,6 +133,18 @@ CASES = (
         ),
         _hydraulic_page,
         seeded=False,
+    ),
+    Case(
+        "pisa-validation",
+        "Predict position, speed and current of both strokes of a mismatched rig, percent errors.",
+        "ten strokes on the virtual rig",
+        _validation,
+        _table(
+            ("stroke", "signal", "rms", "unit", "percent_of_rms", "percent_of_range", "published"),
+            "model less virtual rig; the thesis prints no error",
+        ),
+        _validation_page,
+        options={"fidelity": (_FIDELITY, "high")},
     ),
     Case(
         "pisa-failures",

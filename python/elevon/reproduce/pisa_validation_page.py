@@ -1,0 +1,50 @@
+"""The report of the landing gear's validation."""
+
+from __future__ import annotations
+
+from elevon.report import Report, Table
+from elevon.report.figures import COLOURS, new_figure
+from elevon.reproduce.pisa_validation import SHOWN, ValidationResult
+from elevon.reproduce.provenance import provenance
+
+__all__ = ["validation_page"]
+
+_AXES = {
+    "output_position": ("Position [mm]", 1e3),
+    "motor_speed": ("Motor speed [rad/s]", 1.0),
+    "torque_current": ("Current [A]", 1.0),
+}
+
+
+def validation_page(result: ValidationResult, *, date: str | None = None) -> Report:
+    """Return the report of `elevon reproduce pisa-validation`."""
+    report = Report(
+        "Predicted and measured strokes of the Pisa landing gear",
+        "The thesis draws measured and simulated position, speed and current and prints no error; "
+        "its signals were not published. Measured here means our virtual rig with a mismatch that "
+        "the model does not know (friction, temperature, EMF constant, efficiency, load control, "
+        "sensors). It shows the way, not how good the thesis's model is.",
+        date=date,
+    )
+    rows = [
+        [r["stroke"], r["signal"], r["rms"], r["unit"], r["percent_of_rms"], r["percent_of_range"],
+         "none printed"]
+        for r in result.rows
+    ]  # fmt: skip
+    columns = ["Stroke", "Signal", "RMS error", "Unit", "% of RMS", "% of range", "Published"]
+    caption = "Percent of the measured signal's RMS about its mean, and of its range."
+    report.section("Errors").table(Table(columns, rows, caption))
+    for trace in result.traces:
+        section = report.section(trace.log[0].upper() + trace.log[1:])
+        with new_figure(3, 1, width=8.0, height=5.4, sharex=True) as (figure, axes):
+            for axis, role in zip(axes, SHOWN, strict=True):
+                label, scale = _AXES[role]
+                axis.plot(trace.time, scale * trace.measured[role], color=COLOURS["grey"], lw=1.4)
+                axis.plot(trace.time, scale * trace.simulated[role], color=COLOURS["orange"], lw=1)
+                axis.set_ylabel(label)
+            axes[-1].set_xlabel("Time [s]")
+        section.figure(figure, "Virtual rig (grey) and model (orange).")
+    report.section("Checks").checks(result.checks)
+    command = f"elevon reproduce pisa-validation --seed {result.seed} --out DIR"
+    report.provenance(provenance(command, **{"Parameter hash": result.parameter_hash}))
+    return report
