@@ -92,6 +92,7 @@ def test_64_khz_is_resampled_behind_a_filter_and_says_so():
     none = (np.array([0.0, 1.0]), np.zeros(2))
     roles = {"vibration": "vibration"}
     assert internal_steps(64e3, 2e-6) == 1
+    assert internal_steps(10.0, 2e-6, 600.0) == 100  # three million samples in ten minutes
     keep = {}
     for hertz in (2e3, 60e3):
         run = fast(lambda t, f=hertz: np.sin(2 * np.pi * f * t))

@@ -21,6 +21,7 @@ Floats = npt.NDArray[np.float64]
 LOAD_CHANNEL = "rig_force"
 """Channel of the role ``load``: force of the stand on the rod, positive opposes positive motion."""
 _LEAST = 25e3  # Hz of the simulated channels before the filter, so that relays' ripple is filtered
+_MOST = 3e6  # samples of a channel
 _OVER = 4.0  # ... and this many times the log's rate
 _CUTOFF = 0.4  # of the log's rate
 _ORDER = 4
@@ -36,15 +37,17 @@ def acquired_signals(wiring: str, fidelity: str, stand: Stand) -> dict[str, str]
     return {role: played[role] for role in roles if role in played}
 
 
-def internal_steps(rate: float, step: float) -> int:
+def internal_steps(rate: float, step: float, duration: float = 1.0) -> int:
     """Return the solver steps between the samples that the filter is given.
+
+    A long run is sampled at less than 25 kHz, so that it stays within three million samples.
 
     Raises
     ------
     InputError
         The model's steps are too far apart for the rate.
     """
-    steps = max(1, math.floor(1.0 / (max(_OVER * rate, _LEAST) * step)))
+    steps = max(1, math.floor(1.0 / (max(_OVER * rate, min(_LEAST, _MOST / duration)) * step)))
     if 1.0 / (steps * step) < 2.0 * rate:
         raise InputError(
             f"rate of {rate:g} Hz: the model's steps of {step:g} s give {0.5 / step:g} Hz at most"

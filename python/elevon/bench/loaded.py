@@ -165,7 +165,7 @@ def run_loaded(
 
     rate = setup.stand.hertz(setup.trace.rate)
     step = solver_step(setup.actuator, fidelity)
-    steps = internal_steps(rate, step)
+    steps = internal_steps(rate, step, setup.scenario.seconds)
     roles = acquired_signals(setup.actuator.wiring, fidelity, setup.stand)
     times, force, loaded = _force(setup)
     run = simulate(
