@@ -38,6 +38,7 @@ COMMANDS: dict[str, Command] = {
     "validate": Command(
         "elevon.cli.validate", "Check an actuator against logs it was not fitted to."
     ),
+    "diagnose": Command("elevon.cli.diagnose", "Say what is wrong, where, how bad, how sure."),
     "demo": Command("elevon.cli.demo", "Find a bench's hidden values from its logs; one report."),
     "reproduce": Command("elevon.cli.reproduce", "Recompute a published table or figure."),
 }

@@ -1,0 +1,111 @@
+"""`elevon diagnose`: what is wrong, where, how bad, how sure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from elevon.cli.calibrate import (
+    ActuatorOption,
+    CommandOption,
+    LoadcellOption,
+    LogsArgument,
+    MapOption,
+    one_each,
+)
+from elevon.cli.common import (
+    ForceOption,
+    JsonOption,
+    SetOption,
+    StrictOption,
+    check_outputs,
+    read_actuator,
+    without_companions,
+)
+from elevon.cli.output import print_json, print_table, say
+from elevon.errors import InputError, unknown
+
+if TYPE_CHECKING:
+    from elevon.diagnose.bymodel.diagnosis import Diagnosis
+
+app = typer.Typer(rich_markup_mode=None)
+
+
+@app.command()
+def diagnose(
+    logs: LogsArgument,
+    *,
+    actuator: ActuatorOption,
+    loadcell: LoadcellOption = None,
+    command: CommandOption = None,
+    column_map: MapOption = None,
+    baseline: Annotated[
+        list[Path] | None,
+        typer.Option("--baseline", metavar="LOG", help="Log of the healthy unit; repeatable."),
+    ] = None,
+    method: Annotated[str, typer.Option(help="model.")] = "model",
+    fault: Annotated[
+        list[str] | None,
+        typer.Option("--fault", metavar="KIND@PLACE", help="Candidate; repeatable. Default: all."),
+    ] = None,
+    false_alarm: Annotated[
+        float, typer.Option("--false-alarm", help="Rate of healthy logs called faulty.")
+    ] = 0.05,
+    settings: SetOption = None,
+    report: Annotated[Path | None, typer.Option("--report", help="HTML page to write.")] = None,
+    strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
+    json: JsonOption = False,
+    force: ForceOption = False,
+) -> int:
+    """Diagnose the unit that wrote the logs, all in one condition."""
+    from elevon.diagnose.bymodel import diagnose as run
+    from elevon.diagnose.bymodel import read_test_logs
+
+    check_outputs([report], force=force)
+    if method != "model":
+        raise unknown("method", method, ["model"], "--method")
+    if not 0.0 < false_alarm < 1.0:
+        raise InputError(f"--false-alarm {false_alarm:g}: must be between 0 and 1")
+    model = read_actuator(actuator, settings)
+    logs = without_companions(logs)
+    data = read_test_logs(
+        logs,
+        loadcells=one_each("--loadcell", loadcell, len(logs)),
+        commands=one_each("--command", command, len(logs), shared=True),
+        column_map=column_map,
+    )
+    healthy = read_test_logs(without_companions(baseline or []), column_map=column_map)
+    result = run(data, model, baselines=healthy, faults=fault, false_alarm=false_alarm)
+    if report is not None:
+        from elevon.diagnose.bymodel.page import diagnosis_page
+
+        say(f"report: {diagnosis_page(result, model.name).save(report, force=force)}")
+    if json:
+        print_json(result.to_dict())
+        return 0
+    _print(result)
+    return 0
+
+
+def _print(result: Diagnosis) -> None:
+    from elevon.diagnose.bymodel.words import sentence, severity_text
+
+    say(sentence(result))
+    rows = [
+        (
+            f"{c.kind}@{c.place}",
+            f"{c.probability:.3f}",
+            severity_text(c.severity, c.unit),
+            severity_text(c.interval[0], c.unit),
+            severity_text(c.interval[1], c.unit),
+            ", ".join(f"{kind}@{place}" for kind, place in c.equivalents),
+        )
+        for c in result.faults
+    ]
+    print_table(("cause", "probability", "severity", "low", "high", "not separable from"), rows)
+    for item in result.unobservable:
+        say(f"not observable: {item['kind']}@{item['place']}: {item['reason']}")
+    for text in result.findings:
+        say(text)

@@ -1,0 +1,91 @@
+"""Faults that are weighed against each other, how often they come, and how far they go."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from elevon.errors import InputError, unknown
+
+__all__ = ["CANDIDATES", "Candidate", "chosen"]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A fault of the catalogue.
+
+    Attributes
+    ----------
+    kind, place : str
+        Of the catalogue.
+    unit : str
+        Of the severity.
+    low, high : float
+        Severities considered.
+    rate : float
+        Failures per hour: the prior weight.
+    same : tuple of str
+        Places of the same kind that no log without the electrical zero tells from this one.
+    """
+
+    kind: str
+    place: str
+    unit: str
+    low: float
+    high: float
+    rate: float
+    same: tuple[str, ...] = ()
+
+    @property
+    def key(self) -> str:
+        """``KIND@PLACE``."""
+        return f"{self.kind}@{self.place}"
+
+    def text(self, severity: float) -> str:
+        """Return the fault in the grammar of faults."""
+        return f"{self.key}={severity!r}"
+
+
+# Reference: T3 Table 1.1, per hour: bearings 1.78e-5 (friction), position sensor 1.70e-5, motor
+# 1.03e-5, power connector 6.64e-7. An item's rate is shared evenly by its kinds (ASSUMED). The
+# table has no gear and no drive: play like the bearings, drift of a gain like the position
+# sensor (ASSUMED).
+_BEARING, _SENSOR, _MOTOR, _CONNECTOR = 1.78e-5, 1.70e-5, 1.03e-5, 6.64e-7
+_PHASES = tuple(f"motor.phase_{p}" for p in "abc")
+
+CANDIDATES: tuple[Candidate, ...] = (
+    Candidate("play", "transmission", "rad", 0.0, 0.03, _BEARING),
+    Candidate("friction", "transmission", "1", 0.0, 2.0, _BEARING / 2),
+    Candidate("lubrication", "transmission", "1", -0.7, 5.0, _BEARING / 2),
+    Candidate("short", _PHASES[0], "1", 0.0, 0.6, _MOTOR / 3, _PHASES[1:]),
+    Candidate("eccentricity_static", "motor", "1", 0.0, 0.6, _MOTOR / 3),
+    Candidate("demagnetisation", "motor", "1", 0.0, 0.4, _MOTOR / 3),
+    Candidate("gain_drift", "control.position", "1", -0.4, 0.6, _SENSOR / 2),
+    Candidate("gain_drift", "control.speed", "1", -0.5, 1.0, _SENSOR / 2),
+    Candidate("gain", "sensor.encoder", "1", -0.04, 0.04, _SENSOR),
+)
+
+
+def chosen(texts: Sequence[str] | None) -> tuple[Candidate, ...]:
+    """Return the candidates, or those named as ``KIND@PLACE`` (any of equivalent places).
+
+    Raises
+    ------
+    UnknownNameError
+        None of that name is weighed by the model.
+    InputError
+        One is named twice.
+    """
+    if not texts:
+        return CANDIDATES
+    out: list[Candidate] = []
+    names = [f"{c.kind}@{p}" for c in CANDIDATES for p in (c.place, *c.same)]
+    for text in texts:
+        key = text.strip()
+        if key not in names:
+            raise unknown("fault", key, names, "--fault")
+        item = next(c for c in CANDIDATES if key in {f"{c.kind}@{p}" for p in (c.place, *c.same)})
+        if item in out:
+            raise InputError(f"--fault {key}: {item.key} is already among the candidates")
+        out.append(item)
+    return tuple(out)

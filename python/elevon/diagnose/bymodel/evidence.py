@@ -1,0 +1,246 @@
+"""Evidence of one log: a dozen numbers by linear regression, alike for logs and for model runs.
+
+None is physics of its own: each is what a linear regression of one logged signal on others says.
+What a fault does to them comes from model runs that pass through the same regressions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["UNITS", "Evidence", "Signals", "evidence"]
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+#: Name to unit and text.
+UNITS: dict[str, tuple[str, str]] = {
+    "lost_motion": ("rad", "difference of the two positions between the directions"),
+    "position_scale": ("1", "motor's position over the user's, by the gear ratio, less one"),
+    "dry_current": ("A", "current that changes sign with the motion"),
+    "viscous_current": ("A s/rad", "current by speed"),
+    "inertia_current": ("A s2/rad", "current by acceleration"),
+    "brake_current": ("A/(N m)", "current by brake torque"),
+    "current_order_1": ("1", "share of the current that turns with the electrical angle"),
+    "current_order_2": ("1", "share of the current at twice the electrical angle"),
+    "voltage_per_speed": ("V s/rad", "voltage by speed"),
+    "voltage_per_current": ("ohm", "voltage by current"),
+    "voltage_order_1": ("1", "share of the EMF that turns with the electrical angle"),
+    "voltage_order_2": ("1", "share of the EMF at twice the electrical angle"),
+    "speed_gain": ("A s/rad", "current set point by speed error"),
+    "following_gain": ("s", "following error over speed set point: 1/position gain"),
+}
+_BLOCKS = 16  # stretches of a log whose scores give the deviations
+_LEAST = 100  # samples of a regression
+_SLOW = 0.1  # of the highest speed
+_SMOOTH = 0.02  # s of the difference that gives the acceleration
+
+
+@dataclass(frozen=True)
+class Signals:
+    """What a log or a model run shows, shape (n,) each, SI; currents peak, positions as logged.
+
+    Attributes
+    ----------
+    brake, voltage : ndarray or None
+        None where they are not measured.
+    command : ndarray or None
+        Of a model run: what it was given. A log's is not known to the last bit.
+    gain : (float, float) or None
+        Of a log: position gain and deviation [1/s], fitted along with the command's waveform.
+    good : ndarray of bool
+        Samples that may be used.
+    """
+
+    time: Floats
+    user: Floats
+    motor: Floats
+    speed_ref: Floats
+    speed: Floats
+    current_ref: Floats
+    current: Floats
+    voltage: Floats | None
+    brake: Floats | None
+    command: Floats | None
+    gain: tuple[float, float] | None
+    good: Bools
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Numbers of one log.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Keys of `UNITS`.
+    values, std : ndarray, shape (k,)
+        With the deviation that the noise within the log gives them.
+    """
+
+    names: tuple[str, ...]
+    values: Floats
+    std: Floats
+
+    def only(self, names: Sequence[str]) -> Evidence:
+        """Return some of it, in the order given."""
+        at = [self.names.index(name) for name in names]
+        return Evidence(tuple(names), self.values[at], self.std[at])
+
+
+def evidence(signals: Signals, *, ratio: float, pole_pairs: float) -> Evidence:
+    """Regress.
+
+    Parameters
+    ----------
+    signals : Signals
+        Of a log or a run.
+    ratio : float
+        Gear ratio.
+    pole_pairs : float
+        Electrical angle over shaft angle.
+    """
+    rows: dict[str, tuple[float, float]] = {}
+    width = float(np.median(np.diff(signals.time)))
+    moving = signals.good & (np.abs(signals.speed) > _SLOW * np.abs(signals.speed).max())
+    rows |= _positions(signals, moving, ratio)
+    cosine, sine = np.cos(pole_pairs * signals.motor), np.sin(pole_pairs * signals.motor)
+    waves = (cosine, sine, cosine**2 - sine**2, 2.0 * cosine * sine)
+    rows |= _currents(signals, moving, waves, width)
+    if signals.voltage is not None:
+        rows |= _voltages(signals, moving, waves)
+    rows |= _control(signals, width)
+    names = tuple(name for name in UNITS if name in rows)
+    return Evidence(
+        names,
+        np.array([rows[name][0] for name in names]),
+        np.array([rows[name][1] for name in names]),
+    )
+
+
+def _fit(columns: Sequence[Floats], target: Floats, keep: Bools) -> tuple[Floats, Floats]:
+    """Least squares; covariance from the scores of stretches, since residuals are coloured."""
+    rows, data = np.stack([column[keep] for column in columns]), target[keep]
+    scale = np.sqrt(np.mean(rows**2, axis=1))
+    scale[scale == 0.0] = 1.0
+    rows /= scale[:, None]
+    inverse = np.linalg.pinv(rows @ rows.T, rcond=1e-10, hermitian=True)
+    beta = inverse @ (rows @ data)
+    score = rows * (data - beta @ rows)
+    parts = np.add.reduceat(score, _edges(score.shape[1]), axis=1)
+    covariance = inverse @ (parts @ parts.T) @ inverse * _BLOCKS / (_BLOCKS - 1)
+    return beta / scale, covariance / np.outer(scale, scale)
+
+
+def _edges(count: int) -> npt.NDArray[np.intp]:
+    return np.linspace(0, count, _BLOCKS, endpoint=False).astype(np.intp)
+
+
+def _one(beta: Floats, covariance: Floats, at: int, factor: float = 1.0) -> tuple[float, float]:
+    return factor * float(beta[at]), abs(factor) * float(np.sqrt(max(covariance[at, at], 0.0)))
+
+
+def _size(beta: Floats, covariance: Floats, at: int, over: float = 1.0) -> tuple[float, float]:
+    """Amplitude of a cosine and a sine; its phase depends on where the angle has its zero."""
+    size = float(np.hypot(beta[at], beta[at + 1]))
+    variance = 0.5 * float(covariance[at, at] + covariance[at + 1, at + 1])
+    return size / abs(over), float(np.sqrt(max(variance, 0.0))) / abs(over)
+
+
+def _positions(signals: Signals, moving: Bools, ratio: float) -> dict[str, tuple[float, float]]:
+    gap = signals.motor / ratio - signals.user
+    keep = moving & _dragged(signals.motor / ratio, float(np.ptp(gap[moving])))
+    if keep.sum() < _LEAST:
+        keep = moving
+    centred = signals.user - float(np.mean(signals.user[keep]))
+    beta, cov = _fit([np.sign(signals.speed), centred, np.ones_like(gap)], gap, keep)
+    return {"lost_motion": _one(beta, cov, 0, 2.0), "position_scale": _one(beta, cov, 1)}
+
+
+def _dragged(driver: Floats, width: float) -> Bools:
+    """Samples after the driver has passed the whole gap since it turned."""
+    way = np.sign(np.gradient(driver))
+    turns = np.flatnonzero(np.diff(way) != 0) + 1
+    edges = np.concatenate(([0], turns, [len(driver)]))
+    out = np.zeros(len(driver), dtype=np.bool_)
+    for first, last in pairwise(edges.tolist()):
+        out[first:last] = np.abs(driver[first:last] - driver[first]) > 1.5 * width
+    return out
+
+
+def _currents(
+    signals: Signals, moving: Bools, waves: Sequence[Floats], width: float
+) -> dict[str, tuple[float, float]]:
+    half = max(1, round(0.5 * _SMOOTH / width))
+    rate = _slope(signals.speed, half) / width
+    way = np.sign(signals.speed)
+    level = _mean(signals.current, 8 * half)
+    columns = [way, signals.speed, rate, np.ones_like(way)]
+    columns += [level * wave for wave in waves]
+    braked = signals.brake is not None and float(np.ptp(signals.brake[moving])) > 0.0
+    if braked:
+        assert signals.brake is not None
+        columns.append(way * signals.brake)
+    beta, cov = _fit(columns, signals.current, moving)
+    names = ("dry_current", "viscous_current", "inertia_current")
+    rows = {name: _one(beta, cov, k) for k, name in enumerate(names)}
+    if braked:
+        rows["brake_current"] = _one(beta, cov, 8)
+    rows["current_order_1"] = _size(beta, cov, 4)
+    rows["current_order_2"] = _size(beta, cov, 6)
+    return rows
+
+
+def _slope(values: Floats, half: int) -> Floats:
+    """Mean slope over `half` samples either way, per sample."""
+    padded = np.pad(values, half, mode="edge")
+    return np.asarray((padded[2 * half :] - padded[: -2 * half]) / (2.0 * half), dtype=np.float64)
+
+
+def _mean(values: Floats, half: int) -> Floats:
+    """Mean over `half` samples either way."""
+    total = np.concatenate(([0.0], np.cumsum(np.pad(values, half, mode="edge"))))
+    width = 2 * half + 1
+    return np.asarray((total[width:] - total[:-width]) / width, dtype=np.float64)
+
+
+def _voltages(
+    signals: Signals, moving: Bools, waves: Sequence[Floats]
+) -> dict[str, tuple[float, float]]:
+    assert signals.voltage is not None
+    keep = moving & np.isfinite(signals.voltage)
+    columns = [signals.speed, signals.current, np.ones_like(signals.speed)]
+    columns += [signals.speed * wave for wave in waves]
+    if keep.sum() < 200:
+        return {}
+    beta, cov = _fit(columns, signals.voltage, keep)
+    emf = float(beta[0])
+    return {
+        "voltage_per_speed": _one(beta, cov, 0),
+        "voltage_per_current": _one(beta, cov, 1),
+        "voltage_order_1": _size(beta, cov, 3, emf),
+        "voltage_order_2": _size(beta, cov, 5, emf),
+    }
+
+
+def _control(signals: Signals, width: float) -> dict[str, tuple[float, float]]:
+    error = signals.speed_ref - signals.speed
+    top = float(np.abs(signals.speed_ref).max())
+    inside = signals.good & (np.abs(signals.speed_ref) < 0.999 * top)
+    integral = np.cumsum(error) * width
+    columns = [error, integral, np.gradient(error, width), np.ones_like(error)]
+    beta, cov = _fit(columns, signals.current_ref, inside)
+    rows = {"speed_gain": _one(beta, cov, 0)}
+    if signals.gain is not None:
+        gain, std = signals.gain
+        rows["following_gain"] = (1.0 / gain, std / gain**2)
+    elif signals.command is not None:
+        columns = [signals.speed_ref, signals.command, np.ones_like(error)]
+        beta, cov = _fit(columns, signals.user, inside)
+        rows["following_gain"] = _one(beta, cov, 0, -1.0)
+    return rows

@@ -1,0 +1,119 @@
+"""What a healthy unit's evidence is in one test: the model's, moved and scaled by baselines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.diagnose.bymodel.evidence import Evidence
+from elevon.diagnose.bymodel.replay import Replay
+
+__all__ = ["DEGREES", "FLOOR", "MISMATCH", "Healthy", "healthy"]
+
+Floats = npt.NDArray[np.float64]
+DEGREES = 10.0  # ASSUMED: worth of the stated spread, in runs
+
+#: How far a calibrated low model may stand off a healthy unit: share of the value, and SI. ASSUMED,
+#: from logs of benches with another drive and friction law; baselines of the same test replace it.
+MISMATCH: Mapping[str, tuple[float, float]] = {
+    "lost_motion": (0.03, 1e-4),
+    "position_scale": (0.0, 1e-3),
+    "dry_current": (0.05, 0.0),
+    "viscous_current": (0.20, 0.0),
+    "inertia_current": (0.05, 0.0),
+    "brake_current": (0.03, 0.0),
+    "current_order_1": (0.0, 0.006),
+    "current_order_2": (0.0, 0.006),
+    "voltage_per_speed": (0.02, 0.0),
+    "voltage_per_current": (0.5, 0.0),
+    "voltage_order_1": (0.0, 0.006),
+    "voltage_order_2": (0.0, 0.006),
+    "speed_gain": (0.05, 0.0),
+    "following_gain": (0.004, 0.0),
+}
+#: Least deviation from run to run, beside what the draws of the model show: another start, counts,
+#: clocks, what the model has not. ASSUMED.
+FLOOR: Mapping[str, tuple[float, float]] = {
+    "lost_motion": (0.01, 2e-5),
+    "position_scale": (0.0, 2e-4),
+    "dry_current": (0.01, 0.0),
+    "viscous_current": (0.05, 0.0),
+    "inertia_current": (0.01, 0.0),
+    "brake_current": (0.01, 0.0),
+    "current_order_1": (0.0, 0.003),
+    "current_order_2": (0.0, 0.003),
+    "voltage_per_speed": (0.005, 0.0),
+    "voltage_per_current": (0.05, 0.0),
+    "voltage_order_1": (0.0, 0.002),
+    "voltage_order_2": (0.0, 0.002),
+    "speed_gain": (0.02, 0.0),
+    "following_gain": (0.001, 0.0),
+}
+
+
+@dataclass(frozen=True)
+class Healthy:
+    """A healthy unit in one test.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The evidence.
+    mean : ndarray, shape (k,)
+        Expected.
+    covariance : ndarray, shape (k, k)
+        Of a new log, without the noise within it.
+    degrees : float
+        Of freedom of Student's distribution.
+    baselines : int
+        Healthy logs of the same test it stands on.
+    scale : ndarray, shape (k,)
+        Spread over the stated one: what baselines made of it.
+    """
+
+    names: tuple[str, ...]
+    mean: Floats
+    covariance: Floats
+    degrees: float
+    baselines: int
+    scale: Floats
+
+
+def healthy(model: Replay, names: Sequence[str], baselines: Sequence[Evidence]) -> Healthy:
+    """Join the model's spread with baselines of the same test.
+
+    The offset of a unit from the model is Gaussian with `MISMATCH`; the baselines' mean narrows
+    it. The spread's scale is that stated, worth `DEGREES` runs, and the baselines' scatter.
+    """
+    at = [model.healthy.names.index(name) for name in names]
+    draws = model.draws[:, at]
+    mean = draws.mean(axis=0)
+    own = np.cov(draws.T).reshape(len(at), len(at)) + np.diag(_sizes(FLOOR, names, mean) ** 2)
+    off = np.diag(_sizes(MISMATCH, names, mean) ** 2)
+    count = len(baselines)
+    if not count:
+        return Healthy(tuple(names), mean, own + off, DEGREES, 0, np.ones(len(at)))
+    rest = np.array([b.only(names).values for b in baselines]) - mean
+    noise = np.array([b.only(names).std ** 2 for b in baselines]).mean(axis=0)
+    centre = rest.mean(axis=0)
+    scatter = np.sum((rest - centre) ** 2, axis=0) / (np.diag(own) + noise)
+    scale = (DEGREES + scatter) / (DEGREES + count - 1)
+    own *= np.sqrt(np.outer(scale, scale))
+    gain = off @ np.linalg.inv(off + (own + np.diag(noise)) / count)
+    left = off - gain @ off
+    return Healthy(
+        tuple(names),
+        mean + gain @ centre,
+        own + 0.5 * (left + left.T),
+        DEGREES + count - 1,
+        count,
+        np.sqrt(scale),
+    )
+
+
+def _sizes(table: Mapping[str, tuple[float, float]], names: Sequence[str], mean: Floats) -> Floats:
+    parts = [(table[n][0] * abs(float(m)), table[n][1]) for n, m in zip(names, mean, strict=True)]
+    return np.array([float(np.hypot(*part)) for part in parts])

@@ -1,0 +1,143 @@
+"""A log as diagnosis by the model sees it: what calibration reads, the voltage, the command."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.calibrate.kinematics import command_fit
+from elevon.calibrate.log import BenchLog, bench_log
+from elevon.errors import InputError
+from elevon.logs.command.reconstruct import reconstruct
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["TestLog", "prepared", "read_test_logs"]
+
+Floats = npt.NDArray[np.float64]
+RUN_IN = 1.0  # s left out: the start of the motion
+_RATIO = 0.05  # relative: a gear ratio seen in the log this far off is another actuator's
+_LEAST_TIME = 4.0  # s of log
+_MOVING = 0.1  # of the highest speed
+
+
+@dataclass(frozen=True)
+class TestLog:
+    """A log and what stands beside it.
+
+    Attributes
+    ----------
+    log : BenchLog
+        Positions, speeds, currents, brake.
+    voltage : ndarray, shape (n,), or None
+        Voltage of the torque axis, as logged [V]; NaN where it is missing.
+    gain : (float, float) or None
+        Position gain and its deviation [1/s], fitted with the command's waveform; None where no
+        waveform explains the command.
+    replay : ndarray, shape (n,)
+        The command the model is given: the waveform, else rebuilt from set point and position.
+    good : ndarray of bool, shape (n,)
+        Samples that may be used.
+    """
+
+    __test__ = False  # not a test, whatever pytest thinks of the name
+
+    log: BenchLog
+    voltage: Floats | None
+    gain: tuple[float, float] | None = None
+    replay: Floats | None = None
+    good: npt.NDArray[np.bool_] | None = None
+
+    @property
+    def name(self) -> str:
+        """File name."""
+        return self.log.name
+
+    @property
+    def braked(self) -> bool:
+        """Whether a brake of known torque acted."""
+        return self.log.brake.measured
+
+
+def read_test_logs(
+    paths: Sequence[str | Path],
+    *,
+    loadcells: Sequence[str | Path | None] = (),
+    commands: Sequence[str | Path | None] = (),
+    column_map: str | Path | None = None,
+) -> list[TestLog]:
+    """Read logs and what stands beside them; errors as `elevon.calibrate.read_logs`."""
+    from elevon.logs.importing import import_log
+
+    out = []
+    for k, path in enumerate(paths):
+        imported = import_log(
+            path,
+            column_map=column_map,
+            loadcell=loadcells[k] if k < len(loadcells) else None,
+            command=commands[k] if k < len(commands) else None,
+        )
+        log = bench_log(imported)
+        voltage = None
+        if "voltage_q_ref" in imported.recording:
+            values = np.array(imported.recording["voltage_q_ref"].values, dtype=np.float64)
+            if len(values) == len(log.time) and np.isfinite(values).sum() > len(values) // 2:
+                voltage = values
+        out.append(TestLog(log, voltage))
+    return out
+
+
+def prepared(item: TestLog, actuator: Actuator) -> TestLog:
+    """Check that a log can be diagnosed, and rebuild its command.
+
+    Raises
+    ------
+    InputError
+        Too short, no motion, motion one way only, no position, or of another actuator.
+    """
+    log = item.log
+    if log.user is None or log.motor is None:
+        raise InputError(f"{log.name}: diagnosis by the model needs both positions (r4820, r4821)")
+    if log.duration < _LEAST_TIME:
+        raise InputError(f"{log.name}: lasts {log.duration:.3g} s; {_LEAST_TIME:g} s are needed")
+    good = log.good & (log.time >= RUN_IN) & np.isfinite(log.motor) & np.isfinite(log.user)
+    _check_motion(log, good, actuator)
+    value = actuator.parameters.value
+    gain, limit = value("control.position_gain"), value("control.speed_limit")
+    trace = reconstruct(log.time, log.speed_ref, log.user, gain=gain, limit=limit)
+    if trace.coverage < 0.05:
+        raise InputError(f"{log.name}: the speed set point is at its limit; no command is seen")
+    rebuilt = np.interp(log.time, log.time[trace.valid], trace.position[trace.valid])
+    fit = command_fit(log, gain, limit)
+    if fit is None:
+        return TestLog(log, item.voltage, None, rebuilt, good)
+    wave = fit.waveform.at(log.time)
+    first, last = fit.waveform.window
+    inside = (log.time >= first) & (log.time <= last)
+    replay = np.where(inside | (~trace.valid & (log.time <= last)), wave, rebuilt)
+    return TestLog(log, item.voltage, (fit.gain, fit.gain_std), replay, good)
+
+
+def _check_motion(log: BenchLog, good: npt.NDArray[np.bool_], actuator: Actuator) -> None:
+    assert log.motor is not None
+    assert log.user is not None
+    top = float(np.abs(log.speed[good]).max()) if good.any() else 0.0
+    count = actuator.parameters.value("gear.ratio") * 1e-3
+    if top < 1.0 or float(np.ptp(log.motor[good])) < count:
+        raise InputError(f"{log.name}: nothing moves (motor up to {top:.3g} rad/s)")
+    for way, text in ((1.0, "forwards"), (-1.0, "backwards")):
+        if (good & (way * log.speed > _MOVING * top)).sum() < 100:
+            raise InputError(f"{log.name}: hardly any motion {text}; friction and play need both")
+    slope = float(np.polyfit(log.user[good], log.motor[good], 1)[0])
+    ratio = actuator.parameters.value("gear.ratio")
+    if not abs(slope / ratio - 1.0) < _RATIO:
+        raise InputError(
+            f"{log.name}: the motor turns {slope:.4g} times as far as the user, {actuator.name} "
+            f"has a gear ratio of {ratio:.4g}: a log of another actuator, or another shaft"
+        )

@@ -1,0 +1,85 @@
+"""The page of a diagnosis: one sentence, then what it stands on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from elevon.diagnose.bymodel.words import sentence, severity_text
+from elevon.report import Report, Table
+
+if TYPE_CHECKING:
+    from elevon.diagnose.bymodel.diagnosis import Diagnosis
+
+__all__ = ["diagnosis_page"]
+
+
+def diagnosis_page(result: Diagnosis, actuator: str, date: str | None = None) -> Report:
+    """Return the report of a diagnosis.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        The answer.
+    actuator : str
+        Name of the set.
+    date : str, optional
+        Printed on the page.
+    """
+    report = Report(f"Diagnosis of {actuator}", sentence(result), date=date)
+    rows = [
+        (
+            f"{c.kind}@{c.place}",
+            c.probability,
+            severity_text(c.severity, c.unit),
+            f"{severity_text(c.interval[0], c.unit)} to {severity_text(c.interval[1], c.unit)}",
+            ", ".join(f"{kind}@{place}" for kind, place in c.equivalents),
+        )
+        for c in result.faults
+    ]
+    causes = report.section("Causes")
+    causes.table(
+        Table(
+            ("cause", "probability", "severity", "90 % interval", "not separable from"),
+            rows,
+            f"Logs: {', '.join(result.logs)}. A cause that is not listed has less than 2 %.",
+            digits=3,
+        )
+    )
+    _evidence(report, result)
+    limits = report.section("What these logs can tell")
+    seen = [(key, severity_text(value, _unit(key))) for key, value in result.detectable.items()]
+    blind = [(f"{i['kind']}@{i['place']}", i["reason"]) for i in result.unobservable]
+    limits.table(
+        Table(
+            ("fault", "least severity seen"),
+            seen + blind,
+            "Least severity that moves the evidence by three deviations of a healthy unit.",
+        )
+    )
+    for text in result.findings:
+        limits.text(text)
+    return report
+
+
+def _unit(key: str) -> str:
+    from elevon.diagnose.bymodel.candidates import CANDIDATES
+
+    return next(c.unit for c in CANDIDATES if c.key == key)
+
+
+def _evidence(report: Report, result: Diagnosis) -> None:
+    ranked = sorted(result.moved, key=lambda item: -abs(item.score))
+    rows = [
+        (m.log, m.name, m.unit, m.value, m.expected, m.score, m.explained / m.deviation)
+        for m in ranked
+    ]
+    report.section("Evidence").table(
+        Table(
+            ("log", "evidence", "unit", "value", "healthy", "off by", "explained"),
+            rows,
+            "Off by: in deviations of a healthy unit from run to run. Explained: what the most "
+            "probable cause accounts for, in the same measure.",
+            digits=4,
+            formats=("", "", "", "", "", "+.2f", "+.2f"),
+        )
+    )

@@ -1,0 +1,225 @@
+"""Model runs of a log's test: what the healthy unit and each fault would show, and the spread."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.diagnose.bymodel.candidates import Candidate
+from elevon.diagnose.bymodel.evidence import Evidence, Signals, evidence
+from elevon.diagnose.bymodel.log import TestLog
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["SPREAD", "Replay", "logged_evidence", "replay"]
+
+Floats = npt.NDArray[np.float64]
+_SIGNALS = (
+    "encoder_position,motor_position,speed_ref,motor_speed,current_ref,current_q_meas,voltage_q_ref"
+)
+_RATE = 400.0  # Hz of the model's signals
+_DRAWS = 40
+_POINTS = 6  # severities of each candidate
+
+#: Deviation of what changes from run to run of a healthy unit. ASSUMED, all: 15 K of winding and
+#: 10 K of magnets (-0.1 %/K), friction that depends on temperature and running-in, sensors of
+#: ordinary class, a supply within its regulation.
+SPREAD: Mapping[str, tuple[float, str]] = {
+    "motor.winding_temperature": (15.0, "add"),
+    "motor.emf_constant": (0.01, "scale"),
+    "friction.dynamic": (0.05, "scale"),
+    "friction.viscous": (0.10, "scale"),
+    "inverter.supply_voltage": (0.02, "scale"),
+    "gain@sensor.current_a": (0.005, "fault"),
+    "gain@sensor.current_b": (0.005, "fault"),
+    "gain@sensor.current_c": (0.005, "fault"),
+    "load.brake": (0.02, "brake"),
+}
+
+
+class Replay:
+    """Evidence of the model in one test.
+
+    Attributes
+    ----------
+    healthy : Evidence
+        Of the set as it is.
+    severities : mapping of str to ndarray, shape (m,)
+        Key of the candidate to the severities that were run.
+    shifts : mapping of str to ndarray, shape (m, k)
+        What they do to the evidence.
+    draws : ndarray, shape (d, k)
+        Evidence of healthy units as they differ from run to run.
+    """
+
+    def __init__(
+        self,
+        healthy: Evidence,
+        severities: Mapping[str, Floats],
+        shifts: Mapping[str, Floats],
+        draws: Floats,
+    ) -> None:
+        self.healthy = healthy
+        self.severities = severities
+        self.shifts = shifts
+        self.draws = draws
+
+    def shift(self, key: str, severity: Floats) -> Floats:
+        """Return what severities of shape (m,) do to the evidence, shape (m, k)."""
+        at, table = self.severities[key], self.shifts[key]
+        columns = [np.interp(severity, at, table[:, k]) for k in range(table.shape[1])]
+        return np.column_stack(columns)
+
+
+def logged_evidence(item: TestLog, actuator: Actuator) -> Evidence:
+    """Return the evidence of a log."""
+    log = item.log
+    assert log.user is not None
+    assert log.motor is not None
+    assert item.good is not None
+    brake = np.interp(log.time, log.brake.time, log.brake.level) if item.braked else None
+    signals = Signals(
+        log.time, log.user, log.motor, log.speed_ref, log.speed, log.current_target,
+        log.current, item.voltage, brake, None, item.gain, item.good,
+    )  # fmt: skip
+    return evidence(signals, **_geometry(actuator))
+
+
+def replay(item: TestLog, actuator: Actuator, candidates: Sequence[Candidate]) -> Replay:
+    """Run the test on the model: healthy, each candidate at several severities, and the spread."""
+    severities = {c.key: _severities(c) for c in candidates}
+    units = [_Unit(actuator)]
+    for c in candidates:
+        units += [_Unit(actuator, (c.text(float(s)),)) for s in severities[c.key] if s != 0.0]
+    units += [_drawn(actuator, np.random.default_rng([15, k])) for k in range(_DRAWS)]
+    shown = [evidence(signals, **_geometry(actuator)) for signals in _runs(item, units)]
+    names = tuple(n for n in shown[0].names if all(n in s.names for s in shown))
+    rows = np.array([s.only(names).values for s in shown])
+    shifts, at = {}, 1
+    for c in candidates:
+        zero = severities[c.key] == 0.0
+        table = np.zeros((len(zero), len(names)))
+        count = int((~zero).sum())
+        table[~zero] = rows[at : at + count] - rows[0]
+        shifts[c.key] = table
+        at += count
+    return Replay(shown[0].only(names), severities, shifts, rows[at:])
+
+
+def _geometry(actuator: Actuator) -> dict[str, float]:
+    value = actuator.parameters.value
+    return {"ratio": value("gear.ratio"), "pole_pairs": value("motor.pole_pairs")}
+
+
+def _severities(candidate: Candidate) -> Floats:
+    """Zero, and severities that grow by squares from it to each end of the range."""
+    steps = np.linspace(0.0, 1.0, _POINTS) ** 2
+    low = candidate.low * steps[:0:-1] if candidate.low < 0.0 else np.zeros(0)
+    return np.concatenate((low, candidate.high * steps))
+
+
+@dataclass(frozen=True)
+class _Unit:
+    """A unit of the replay: values, faults, brake over the logged one, where its motor starts."""
+
+    actuator: Actuator
+    faults: tuple[str, ...] = ()
+    brake: float = 1.0
+    turn: float = 0.0
+
+
+def _runs(item: TestLog, units: Sequence[_Unit]) -> Iterator[Signals]:
+    """Run all units through the log's test, on the log's instants.
+
+    Names and units are the scenario's; the arrays are exchanged in what goes to the core, since
+    checking a long table a hundred times would take longer than the runs.
+    """
+    from elevon.faults import Fault
+    from elevon.scenario import Scenario
+    from elevon.simulate import Run
+    from elevon.simulate.batch import simulate_prepared
+    from elevon.simulate.prepare import prepare
+
+    start = {"motor_position": 0.0, "motor_speed": 0.0, "user_position": 0.0}
+    empty = Scenario.from_dict(
+        {
+            "duration": item.log.duration,
+            "command": {"mode": "position", "terms": [_EMPTY]},
+            "load": {"brake": {"terms": [_EMPTY]}},
+            "initial": start,
+        }
+    )
+    ready = []
+    for unit in units:
+        scenario = empty.with_faults([Fault.parse(text) for text in unit.faults])
+        run = prepare(Run(unit.actuator, scenario), "low", f"{_SIGNALS}@{_RATE:g} Hz")
+        ready.append(replace(run, core=_with_arrays(run.core, item, unit)))
+    plan = ready[0].plan[0]
+    for result in simulate_prepared(ready, fidelity="low"):
+        kept = result["clocks"][plan.name]
+        yield _shown(kept["time"], dict(zip(plan.signals, kept["values"].T, strict=False)), item)
+
+
+def _with_arrays(core: Mapping[str, Any], item: TestLog, unit: _Unit) -> dict[str, Any]:
+    log = item.log
+    assert log.user is not None
+    assert item.replay is not None
+    inputs = dict(core["inputs"])
+    inputs["command"] = [_table(inputs["command"][0], log.time, item.replay)]
+    if item.braked:
+        level = unit.brake * log.brake.level
+        inputs["brake"] = [_table(inputs["brake"][0], log.brake.time, level)]
+    user = float(log.user[0])
+    initial = {
+        "motor_position": user * unit.actuator.parameters.value("gear.ratio") + unit.turn,
+        "motor_speed": float(log.speed[0]),
+        "user_position": user,
+    }
+    return {**core, "inputs": inputs, "initial": {**core["initial"], **initial}}
+
+
+_EMPTY: Mapping[str, Any] = {"kind": "table", "times": [0.0, 1.0], "values": [0.0, 0.0]}
+
+
+def _table(term: Mapping[str, Any], times: Floats, values: Floats) -> dict[str, Any]:
+    return {**term, "times": np.ascontiguousarray(times), "values": np.ascontiguousarray(values)}
+
+
+def _drawn(actuator: Actuator, rng: np.random.Generator) -> _Unit:
+    """Return a healthy unit of another day; `turn` moves its motor: no log tells the zero."""
+    values: dict[str, float | str] = {}
+    faults, brake = [], 1.0
+    for path, (spread, way) in SPREAD.items():
+        step = spread * float(rng.standard_normal())
+        if way == "fault":
+            faults.append(f"{path}={step!r}")
+        elif way == "brake":
+            brake += step
+        else:
+            old = actuator.parameters.value(path)
+            values[path] = old + step if way == "add" else old * max(1.0 + step, 0.05)
+            if path == "friction.dynamic":
+                still = actuator.parameters.value("friction.static")
+                values["friction.static"] = still * max(1.0 + step, 0.05)
+    turn = float(rng.uniform(0.0, 2.0 * math.pi / actuator.parameters.value("motor.pole_pairs")))
+    unit = actuator.with_values(values, source="run-to-run spread")
+    return _Unit(unit, tuple(faults), brake, turn)
+
+
+def _shown(clock: Floats, values: Mapping[str, Floats], item: TestLog) -> Signals:
+    log = item.log
+    assert item.good is not None
+    kept = {name: np.interp(log.time, clock, values[name]) for name in _SIGNALS.split(",")}
+    brake = np.interp(log.time, log.brake.time, log.brake.level) if item.braked else None
+    voltage = None if item.voltage is None else kept["voltage_q_ref"]
+    return Signals(
+        log.time, kept["encoder_position"], kept["motor_position"], kept["speed_ref"],
+        kept["motor_speed"], kept["current_ref"], kept[log.current_signal], voltage, brake,
+        item.replay, None, item.good,
+    )  # fmt: skip

@@ -1,0 +1,59 @@
+"""A diagnosis in words."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from elevon.diagnose.bymodel.diagnosis import Cause, Diagnosis
+
+__all__ = ["sentence", "severity_text"]
+
+_NAMES = {
+    "play@transmission": "Play has grown by",
+    "friction@transmission": "Dry friction has changed by",
+    "lubrication@transmission": "Viscous friction has changed by",
+    "short@motor.phase_a": "One phase has lost turns to a short:",
+    "eccentricity_static@motor": "The rotor stands out of centre (static) by",
+    "demagnetisation@motor": "The magnets have lost",
+    "gain_drift@control.position": "The position gain has drifted by",
+    "gain_drift@control.speed": "The speed gain has drifted by",
+    "gain@sensor.encoder": "The encoder's gain is off by",
+}
+
+
+def severity_text(value: float, unit: str) -> str:
+    """Return a severity as a person says it: angles in degrees, shares in percent."""
+    if unit == "rad":
+        return f"{math.degrees(value):.3g} deg"
+    if unit == "1":
+        return f"{100.0 * value:.3g} %"
+    return f"{value:.4g} {unit}"
+
+
+def sentence(result: Diagnosis) -> str:
+    """Return the answer in one sentence or two."""
+    if result.status == "healthy":
+        return (
+            f"Nothing here is beyond a healthy unit: it deviates as much in "
+            f"{100 * result.chance:.2g} % of logs (called faulty below "
+            f"{100 * result.false_alarm:g} %); a fault has a probability of {result.p_fault:.2g}."
+        )
+    causes = {f"{c.kind}@{c.place}": c for c in result.faults}
+    parts = [_clause(key, causes[key]) for key in result.best if key in causes]
+    rest = (
+        "nothing else is needed to explain the logs"
+        if not any("does not explain" in text for text in result.findings)
+        else "but that does not explain all of the logs"
+    )
+    return f"{' and '.join(parts)}; {rest} (probability {result.p_best:.3g})."
+
+
+def _clause(key: str, cause: Cause) -> str:
+    low, high = (severity_text(v, cause.unit) for v in cause.interval)
+    text = f"{_NAMES.get(key, key)} {severity_text(cause.severity, cause.unit)} ({low} to {high})"
+    if not cause.equivalents:
+        return text
+    names = ", ".join(f"{kind}@{place}" for kind, place in cause.equivalents)
+    return f"{text}, not to be told from {names}"

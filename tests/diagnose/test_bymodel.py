@@ -1,0 +1,200 @@
+"""Diagnosis by the model on logs of the virtual bench."""
+
+import json
+
+import numpy as np
+import pytest
+
+from elevon import Actuator
+from elevon.diagnose.bymodel import diagnose, read_test_logs
+from elevon.diagnose.bymodel.candidates import CANDIDATES
+from elevon.diagnose.bymodel.detection import Detector
+from elevon.diagnose.bymodel.posterior import marginals, posterior, quantiles
+from elevon.errors import InputError, UnknownNameError
+from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
+
+pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
+NAME = "backlash.csv"
+FEW = ["play@transmission", "friction@transmission"]
+
+
+def bench(folder, seed, *faults, fidelity="low", settings=(), procedure="backlash"):
+    from elevon.cli import main
+
+    options = [x for f in faults for x in ("--fault", f)] + [
+        x for s in settings for x in ("--set", s)
+    ]
+    code = main(["bench", "run", procedure, "--actuator", "torino-rotary", "--out", str(folder),
+                 "--seed", str(seed), "--fidelity", fidelity, *options])  # fmt: skip
+    assert code == 0
+    return folder / NAME
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    root = tmp_path_factory.mktemp("logs")
+    return {
+        "base": bench(root / "base", 1),
+        "healthy": bench(root / "healthy", 2),
+        "play": bench(root / "play", 3, "play@transmission=0.13 deg"),
+        "short": bench(root / "short", 4, "short@motor.phase_b=0.2"),
+    }
+
+
+@pytest.fixture(scope="module")
+def unit():
+    return Actuator.load("torino-rotary")
+
+
+def answer(unit, path, *baselines, **options):
+    return diagnose(read_test_logs([path]), unit, baselines=read_test_logs(baselines), **options)
+
+
+def test_a_healthy_log_is_healthy(unit, logs):
+    result = answer(unit, logs["healthy"], logs["base"])
+    assert result.status == "healthy"
+    assert result.best == ()
+    assert result.p_fault < 0.1
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "severity"),
+    [("play", "play@transmission", np.radians(0.13)), ("short", "short@motor.phase_a", 0.2)],
+)
+def test_a_fault_is_isolated_with_its_severity(unit, logs, name, key, severity):
+    result = answer(unit, logs[name], logs["base"])
+    assert result.status == "faulty"
+    assert result.best == (key,)
+    cause = result.faults[0]
+    assert f"{cause.kind}@{cause.place}" == key
+    assert cause.interval[0] < severity < cause.interval[1]
+    assert cause.severity == pytest.approx(severity, rel=0.1)
+    if name == "short":
+        assert set(cause.equivalents) == {("short", "motor.phase_b"), ("short", "motor.phase_c")}
+
+
+def test_a_faulty_baseline_is_named_and_left_out(unit, logs):
+    result = answer(unit, logs["healthy"], logs["base"], logs["short"])
+    assert result.status == "healthy"
+    assert any("looks faulty" in text for text in result.findings)
+
+
+def test_the_command_line(elevon_cli, logs, tmp_path):  # noqa: F811
+    page = tmp_path / "page.html"
+    result = elevon_cli("diagnose", logs["play"], "--actuator", "torino-rotary", "--baseline",
+                        logs["base"], "--fault", "play@transmission", "--fault",
+                        "friction@transmission", "--report", page, "--json")  # fmt: skip
+    assert result.code == 0
+    document = json.loads(result.out)
+    assert document["status"] == "faulty"
+    assert document["faults"][0]["kind"] == "play"
+    assert "Play has grown by" in page.read_text()
+    refused = elevon_cli("diagnose", logs["play"], "--actuator", "torino-rotary", "--fault", "rust")
+    assert refused.code == 2
+    assert (
+        elevon_cli(
+            "diagnose", logs["play"], "--actuator", "torino-rotary", "--false-alarm", "0"
+        ).code
+        == 2
+    )
+
+
+def _edited(source, target, change):
+    """Copy a log with its note; `change` is given its rows as lists of text."""
+    lines = source.read_text().splitlines()
+    rows = [line.split(",") for line in lines]
+    rows = change(rows) or rows
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text("\n".join(",".join(row) for row in rows) + "\n")
+    note = source.with_name(source.stem + "_command.json")
+    target.with_name(target.stem + "_command.json").write_text(note.read_text())
+    return target
+
+
+def test_logs_that_cannot_be_diagnosed(unit, logs, tmp_path):
+    short = _edited(logs["healthy"], tmp_path / "a" / NAME, lambda rows: rows[:801])
+    with pytest.raises(InputError, match="lasts"):
+        answer(unit, short)
+    other = unit.with_values({"gear.ratio": 60.0})
+    with pytest.raises(InputError, match="another actuator"):
+        answer(other, logs["healthy"])
+
+    def at_rest(rows):
+        first = rows[1]
+        return [rows[0], *([row[0], *first[1:3], "0", "0", *first[5:]] for row in rows[1:])]
+
+    still = _edited(logs["healthy"], tmp_path / "b" / NAME, at_rest)
+    with pytest.raises(InputError, match="nothing moves"):
+        answer(unit, still)
+    with pytest.raises(InputError, match="rotary"):
+        answer(Actuator.load("nasa-ballscrew"), logs["healthy"])
+    with pytest.raises(UnknownNameError):
+        answer(unit, logs["healthy"], faults=["play@moon"])
+
+
+def test_a_log_without_measured_current_tells_what_is_left(unit, logs, tmp_path):
+    column = logs["play"].read_text().splitlines()[0].split(",").index("Drive_axis_1.r78")
+    without = _edited(
+        logs["play"], tmp_path / NAME, lambda rows: [r[:column] + r[column + 1 :] for r in rows]
+    )
+    result = answer(unit, without, faults=FEW)
+    assert result.best == ("play@transmission",)
+    assert any("r78" in text for text in result.findings)
+
+
+def test_missing_stretches_are_left_out(unit, logs, tmp_path):
+    def blank(rows):
+        for row in rows[3000:3600]:
+            row[4] = row[6] = "nan"
+
+    result = answer(unit, _edited(logs["play"], tmp_path / NAME, blank), logs["base"], faults=FEW)
+    assert result.best == ("play@transmission",)
+    assert any("samples are missing" in text for text in result.findings)
+
+
+def test_the_threshold_keeps_its_rate():
+    """Draws that the threshold has not seen exceed it at the rate it was set for."""
+    rng = np.random.default_rng(7)
+    ways = rng.standard_normal((6, 9))
+    detector = Detector(ways, [True, False] * 3, 12.0)
+    fresh = rng.standard_normal((20_000, 9)) / np.sqrt(rng.chisquare(12.0, 20_000) / 12.0)[:, None]
+    share = float(np.mean(detector.ratio(fresh) > detector.threshold(0.05)))
+    assert share == pytest.approx(0.05, abs=4 * np.sqrt(2 * 0.05 * 0.95 / 20_000))
+
+
+def test_severities_cover_what_was_drawn():
+    """With a linear shift and Gaussian evidence the intervals hold 90 % of the true severities."""
+    item = CANDIDATES[1]
+    slope = np.array([8.0, 3.0, 0.0])
+    rng = np.random.default_rng(8)
+    inside, count = 0, 400
+    for _ in range(count):
+        true = 0.5 + rng.random()
+        error = 0.05 * true * slope * rng.standard_normal()
+        rest = true * slope + error + rng.standard_normal(3)
+        result = posterior(rest, np.eye(3), 1e4, [item], lambda _key, s: s[:, None] * slope)
+        low, high = quantiles(*marginals(result, item.key), (0.05, 0.95))
+        inside += low < true < high
+    assert inside / count == pytest.approx(0.9, abs=4 * np.sqrt(0.09 / count))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("fault", "best"),
+    [
+        (None, ()),
+        ("play@transmission=0.13 deg", ("play@transmission",)),
+        ("friction@transmission=0.25", ("friction@transmission",)),
+        ("short@motor.phase_c=0.2", ("short@motor.phase_a",)),
+        ("eccentricity_static@motor=0.1", ("eccentricity_static@motor",)),
+        ("gain_drift@control.position=0.02", ("gain_drift@control.position",)),
+        ("gain_drift@control.position=-0.02", ("gain_drift@control.position",)),
+    ],
+)
+def test_on_the_high_model_with_another_drive(unit, tmp_path, fault, best):
+    """Logs of the high model with a PWM drive, diagnosed by the low one."""
+    pwm = {"fidelity": "high", "settings": ["drive.kind=pwm"]}
+    base = bench(tmp_path / "base", 50, **pwm)
+    path = bench(tmp_path / "log", 51, *([fault] if fault else []), **pwm)
+    result = answer(unit.with_values({"drive.kind": "pwm"}), path, base)
+    assert result.best == best
