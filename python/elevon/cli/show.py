@@ -82,9 +82,9 @@ def _print_parameters(loaded: Any, parameters: list[Any], notes: bool) -> None:
     from elevon.parameters import records
 
     known = records(loaded.wiring)
-    columns = ["parameter", "value", "confidence", "acts", "source"]
+    columns = ["parameter", "value", "confidence", "source", "acts"]
     rows = [
-        [p.path, p.text, p.confidence, known[p.path].acts_text or "always", p.source]
+        [p.path, p.text, p.confidence, p.source, known[p.path].acts_text or "always"]
         + ([p.note] if notes else [])
         for p in parameters
     ]
