@@ -133,6 +133,7 @@ def test_a_batch_is_its_single_runs(write, tmp_path):
         kept = load_run(tmp_path / "out", number)
         assert kept.labels == alone.labels
         assert kept.names == alone.names
+        assert kept.final == alone.final
         for name in alone.names:
             assert kept[name].values.tobytes() == alone[name].values.tobytes()
             assert kept[name].unit == alone[name].unit

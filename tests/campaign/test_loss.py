@@ -232,11 +232,25 @@ def test_damage_to_what_a_folder_says_of_itself(plan, cli, tmp_path, name):
 
 @pytest.mark.parametrize("name", ["resolved.json", "runs.parquet", "plan.toml"])
 def test_a_damaged_table_of_a_finished_campaign_is_mended(plan, cli, tmp_path, name):
-    path, out = plan(4, head=""), tmp_path / "out"
+    path, out = plan(4, head="runs_per_file = 2"), tmp_path / "out"
     cli("campaign", "run", path, "--out", out)
+    good = (out / name).read_bytes()
     flip(out / name, (out / name).stat().st_size // 2)
     assert cli("dataset", "verify", out)[0] == 1
-    assert cli("campaign", "run", path, "--out", out)[0] == 0
+    code, told, _ = cli("campaign", "run", path, "--out", out)
+    assert (code, told["skipped"]) == (0, 4)  # nothing is simulated again
+    assert cli("dataset", "verify", out)[0] == 0
+    assert (out / name).read_bytes() == good
+
+
+def test_a_damaged_table_and_a_damaged_block(plan, cli, tmp_path):
+    """What its own table of ends does not tell is simulated, nothing else."""
+    path, out = plan(6, head="runs_per_file = 2"), tmp_path / "out"
+    cli("campaign", "run", path, "--out", out)
+    for name in ("runs.parquet", "ends/block_00001.parquet"):
+        flip(out / name, (out / name).stat().st_size // 2)
+    code, told, _ = cli("campaign", "run", path, "--out", out)
+    assert (code, told["skipped"]) == (0, 4)
     assert cli("dataset", "verify", out)[0] == 0
 
 

@@ -71,7 +71,7 @@ def test_csv_of_several_clocks_is_checked_before_simulating(elevon_cli, tmp_path
     monkeypatch.setattr(sys.modules["elevon.simulate"], "simulate", None)  # calling it fails
     result = elevon_cli(*arguments, "--out", tmp_path / "run.csv")
     assert result.code == 2
-    assert "run.at_1_khz.csv: exists already" in result.err
+    assert "run.at_1000_hz.csv: exists already" in result.err
 
 
 @pytest.mark.parametrize("ending", [".png", ".html"])

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elevon.campaign.ends import ENDS, ends_table
 from elevon.campaign.features import feature_table
 from elevon.campaign.resolved import Resolved
 from elevon.errors import InputError, OutputError
@@ -92,7 +93,7 @@ def block_tables(
     prepared: Sequence[Prepared],
     results: Sequence[Result],
 ) -> dict[str, pa.Table]:
-    """Return a block's tables by their folder: ``runs/CLOCK`` for each clock, ``features``."""
+    """Return a block's tables by folder: ``runs/CLOCK`` of each clock, ``features``, ``ends``."""
     clocks = {clock.name: clock for item in prepared for clock in item.plan}
     tables = {
         f"runs/{name}": _signals(resolved, clock, numbers, prepared, results)
@@ -100,6 +101,8 @@ def block_tables(
     }
     if resolved.features:
         tables["features"] = feature_table(resolved, numbers, prepared, results)
+    outcome = block_outcome(results)
+    tables[ENDS] = ends_table(resolved, numbers, prepared, results, outcome)
     return tables
 
 

@@ -255,6 +255,14 @@ class Dataset:
         return self._table("features", "")
 
     @property
+    def ends(self) -> Table | None:
+        """One row a run: how it ended, and the last value of every signal; None in older sets."""
+        try:
+            return self._table("ends", "")
+        except InputError:
+            return None
+
+    @property
     def clocks(self) -> list[str]:
         """Names of the clocks."""
         return [clock["name"] for clock in self.manifest.clocks]

@@ -9,6 +9,7 @@ from typing import Any
 from elevon.campaign.block import block_name
 from elevon.campaign.card import write_cards
 from elevon.campaign.dataset import Dataset
+from elevon.campaign.ends import read_ends
 from elevon.campaign.estimate import Estimate, check_disk
 from elevon.campaign.resolved import Resolved
 from elevon.campaign.store import (
@@ -181,16 +182,20 @@ def _found(folder: Path, resolved: Resolved, manifest: Manifest) -> Work:
 
 def _finished(folder: Path, manifest: Manifest) -> dict[str, Item]:
     """Return the items of a finished manifest, with how their runs ended."""
-    tables = Item("tables", manifest.files, {})
-    if not manifest.blocks or RUNS in tables.damaged(folder):
-        return {}  # how the runs ended nobody knows any more: they are simulated again
-    outcome = read_outcome(folder)
+    if not manifest.blocks:
+        return {}
+    damaged = RUNS in Item("tables", manifest.files, {}).damaged(folder)
+    outcome = None if damaged else read_outcome(folder)
     items = {}
     for block in manifest.blocks:
         first, last = block["first"], block["last"]
-        ended = {key: values[first : last + 1] for key, values in outcome.items()}
-        data = {"first": first, "last": last, **ended}
-        items[block["name"]] = Item(block["name"], block["files"], data)
+        if outcome is None:  # the table of the runs is not whole: each block says it as well
+            ended = read_ends(folder, block["files"])
+        else:
+            ended = {key: values[first : last + 1] for key, values in outcome.items()}
+        if ended is not None:
+            data = {"first": first, "last": last, **ended}
+            items[block["name"]] = Item(block["name"], block["files"], data)
     return items
 
 

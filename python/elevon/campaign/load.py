@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from elevon.campaign.ends import last_values
 from elevon.campaign.resolved import Resolved
 from elevon.errors import InputError
 from elevon.recording import Channel, Clock, Recording
@@ -34,7 +35,10 @@ def recorded(ds: Dataset, number: int) -> Recording:
         if place == 0:
             channels.extend(_severities(labels, frame, clock))
     meta = _meta(ds, resolved, number)
-    return Recording(channels, clocks=clocks, meta=meta, labels=labels)
+    ends = ds.ends
+    rows = [] if ends is None else ends.to_arrow(runs=[number]).to_pylist()
+    final = last_values(rows[0]) if rows else {}
+    return Recording(channels, clocks=clocks, meta=meta, labels=labels, final=final)
 
 
 def _severities(labels: list[dict[str, Any]], frame: Any, clock: Clock) -> list[Channel]:

@@ -290,6 +290,9 @@ def read_outcome(folder: Path) -> dict[str, list[Any]]:
     return {key: table[key].to_pylist() for key in planned(0)}
 
 
+_MEND = "elevon campaign run PLAN --out {} makes both again, and simulates nothing that is whole"
+
+
 def read_resolved(folder: Path) -> Resolved:
     """Read the resolved plan of a campaign's folder.
 
@@ -306,9 +309,13 @@ def read_resolved(folder: Path) -> Resolved:
         resolved = _resolved(content, _table(folder / RUNS))
         whole = plan_hash(resolved) == manifest.plan_hash
     except (OSError, ValueError, KeyError, TypeError, pa.ArrowException) as error:
-        raise FormatError(f"{folder}: its resolved plan is damaged: {error!r}") from error
+        raise FormatError(
+            f"{folder}: {RESOLVED} or {RUNS} is damaged ({error!r}); {_MEND.format(folder)}"
+        ) from error
     if not whole:
-        raise FormatError(f"{folder}: {RESOLVED} or {RUNS} is not as it was written")
+        raise FormatError(
+            f"{folder}: {RESOLVED} or {RUNS} is not as it was written; {_MEND.format(folder)}"
+        )
     return resolved
 
 

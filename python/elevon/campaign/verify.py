@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from elevon.campaign.dataset import Dataset, load_campaign
+from elevon.campaign.ends import ENDS
 from elevon.campaign.split import leaks
 from elevon.campaign.store import MANIFEST, read_resolved
 from elevon.errors import FormatError, InputError
@@ -86,7 +87,7 @@ def _strangers(ds: Dataset, items: list[Item]) -> tuple[int, list[str]]:
     known = {name for item in items for name in item.files}
     there = {
         path.relative_to(ds.folder).as_posix()
-        for place in ("runs", "features")
+        for place in ("runs", "features", ENDS)
         for path in (ds.folder / place).rglob("*.parquet")
     }
     strangers = sorted(there - known)

@@ -14,7 +14,7 @@ from elevon.recording import Channel, Clock, Recording
 from elevon.scenario.compile import signal_records
 from elevon.simulate.prepare import Prepared, Run
 
-__all__ = ["build_recording", "fault_labels"]
+__all__ = ["build_recording", "fault_labels", "final_values"]
 
 
 def build_recording(
@@ -44,7 +44,7 @@ def build_recording(
         clocks=clocks,
         meta=_meta(run, prepared, fidelity, result),
         labels=fault_labels(prepared),
-        final=_final(prepared, result["final"]),
+        final=final_values(prepared, result["final"]),
     )
 
 
@@ -71,7 +71,7 @@ def _severities(
         yield Channel(label["channel"], label["unit"], values[:, column], clock, text)
 
 
-def _final(prepared: Prepared, values: Mapping[str, float]) -> dict[str, float]:
+def final_values(prepared: Prepared, values: Mapping[str, float]) -> dict[str, float]:
     """Last values; the core sums energies only where they are recorded, so others are left out."""
     recorded = {name for plan in prepared.plan for name in plan.signals}
     return {
