@@ -28,7 +28,7 @@ from elevon.cli.output import print_json, print_table, say
 from elevon.errors import InputError, unknown
 
 if TYPE_CHECKING:
-    from elevon.diagnose.bymodel.diagnosis import Diagnosis
+    from elevon.diagnose.bymodel.answer import Diagnosis
 
 app = typer.Typer(rich_markup_mode=None)
 

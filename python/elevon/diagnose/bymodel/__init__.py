@@ -1,6 +1,7 @@
 """Diagnosis by the model: what moved in a log, which fault moves it so, how far, how surely."""
 
-from elevon.diagnose.bymodel.diagnosis import Cause, Diagnosis, diagnose
+from elevon.diagnose.bymodel.answer import Cause, Diagnosis
+from elevon.diagnose.bymodel.diagnosis import diagnose
 from elevon.diagnose.bymodel.log import TestLog, read_test_logs
 
 __all__ = ["Cause", "Diagnosis", "TestLog", "diagnose", "read_test_logs"]

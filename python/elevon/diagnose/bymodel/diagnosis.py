@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.diagnose.bymodel.answer import SEEN, Cause, Diagnosis, Moved
 from elevon.diagnose.bymodel.candidates import Candidate, chosen
 from elevon.diagnose.bymodel.detection import Detector
 from elevon.diagnose.bymodel.evidence import UNITS, Evidence
@@ -22,150 +23,13 @@ from elevon.errors import InputError
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["Cause", "Diagnosis", "Moved", "diagnose"]
+__all__ = ["diagnose"]
 
 Floats = npt.NDArray[np.float64]
 LISTED = 0.02  # probability below which a cause is not listed
-SEEN = 3.0  # deviations that a fault's shift must reach to be observable
 ALIKE = 1.0  # deviations between two faults' shifts below which no log separates them
 SUSPECT = 1e-3  # chance of a baseline below which it is called faulty
 _SAME = 0.2  # relative difference of two logs' motion up to which they are one test
-
-
-@dataclass(frozen=True)
-class Cause:
-    """One distinguishable cause.
-
-    Attributes
-    ----------
-    kind, place, unit : str
-        Of the catalogue.
-    probability : float
-        Marginal.
-    severity : float
-        Median.
-    interval : (float, float)
-        Of 90 %.
-    equivalents : tuple of (str, str)
-        Kinds and places that the logs do not separate from it.
-    """
-
-    kind: str
-    place: str
-    unit: str
-    probability: float
-    severity: float
-    interval: tuple[float, float]
-    equivalents: tuple[tuple[str, str], ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {
-            "kind": self.kind,
-            "place": self.place,
-            "probability": self.probability,
-            "severity": self.severity,
-            "unit": self.unit,
-            "interval": list(self.interval),
-            "equivalents": [{"kind": k, "place": p} for k, p in self.equivalents],
-        }
-
-
-@dataclass(frozen=True)
-class Moved:
-    """One number of the evidence against the healthy unit."""
-
-    log: str
-    name: str
-    unit: str
-    value: float
-    expected: float
-    deviation: float
-    explained: float
-
-    @property
-    def score(self) -> float:
-        """Deviations off the healthy unit."""
-        return (self.value - self.expected) / self.deviation
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {
-            "log": self.log,
-            "name": self.name,
-            "unit": self.unit,
-            "value": self.value,
-            "expected": self.expected,
-            "deviation": self.deviation,
-            "explained": self.explained,
-            "score": self.score,
-        }
-
-
-@dataclass(frozen=True)
-class Diagnosis:
-    """The answer.
-
-    Attributes
-    ----------
-    logs : tuple of str
-        The logs.
-    status : str
-        ``healthy`` or ``faulty``.
-    p_fault : float
-        Probability of any fault.
-    false_alarm : float
-        Rate the status was set for.
-    chance : float
-        How often a healthy unit deviates as much.
-    faults : tuple of Cause
-        Most probable first.
-    best : tuple of str
-        The most probable set of faults, ``KIND@PLACE``.
-    p_best : float
-        Its probability.
-    unobservable : tuple of dict
-        ``kind``, ``place``, ``reason``.
-    detectable : dict of str to float
-        Smallest severity of each fault that moves the evidence by `SEEN` deviations.
-    moved : tuple of Moved
-        The evidence.
-    findings : tuple of str
-        What the user should know.
-    seconds : float
-        Time it took.
-    """
-
-    logs: tuple[str, ...]
-    status: str
-    p_fault: float
-    false_alarm: float
-    chance: float
-    faults: tuple[Cause, ...]
-    best: tuple[str, ...]
-    p_best: float
-    unobservable: tuple[dict[str, str], ...]
-    detectable: dict[str, float]
-    moved: tuple[Moved, ...]
-    findings: tuple[str, ...]
-    seconds: float = field(compare=False)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {
-            "status": self.status,
-            "p_fault": self.p_fault,
-            "false_alarm": self.false_alarm,
-            "chance": self.chance,
-            "faults": [cause.to_dict() for cause in self.faults],
-            "best": {"faults": list(self.best), "probability": self.p_best},
-            "unobservable": [dict(item) for item in self.unobservable],
-            "detectable": dict(self.detectable),
-            "evidence": [item.to_dict() for item in self.moved],
-            "findings": list(self.findings),
-            "logs": list(self.logs),
-            "seconds": self.seconds,
-        }
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from elevon.diagnose.bymodel.words import sentence, severity_text
 from elevon.report import Report, Table
 
 if TYPE_CHECKING:
-    from elevon.diagnose.bymodel.diagnosis import Diagnosis
+    from elevon.diagnose.bymodel.answer import Diagnosis
 
 __all__ = ["diagnosis_page"]
 

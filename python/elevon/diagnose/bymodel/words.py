@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from elevon.diagnose.bymodel.diagnosis import Cause, Diagnosis
+    from elevon.diagnose.bymodel.answer import Cause, Diagnosis
 
 __all__ = ["sentence", "severity_text"]
 
