@@ -108,7 +108,9 @@ def atomic_path(path: str | os.PathLike[str], *, force: bool = False) -> Iterato
     except OutputError:
         raise
     except OSError as error:
-        raise OutputError(f"{target}: cannot be written: {error}") from error
+        # The system's own words: a library's for a full disk say it twice.
+        why = os.strerror(error.errno) if error.errno else str(error)
+        raise OutputError(f"{target}: cannot be written: {why}") from error
     finally:
         with suppress(FileNotFoundError):
             temporary.unlink()

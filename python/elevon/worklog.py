@@ -13,6 +13,7 @@ import json
 import os
 import re
 import socket
+import sys
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -27,6 +28,9 @@ __all__ = ["LOCK", "Item", "WorkLog", "digest", "is_locked", "locked", "sweep"]
 
 LOCK = ".elevon.lock"
 """Name of the lock in a folder. A killed process leaves the file, but holds it no more."""
+
+_FAR = 2**30
+"""Where the byte stands that is locked on Windows."""
 
 #: How `elevon.files.atomic_path` names what it writes to.
 _PART = re.compile(r"\..*\.[0-9a-f]{12}\.part(\.[A-Za-z0-9]+)?")
@@ -189,9 +193,12 @@ def locked(folder: Path) -> Iterator[None]:
         _sign(handle)
         yield
     finally:
+        if sys.platform == "win32":  # there an open file has a name that nobody can remove
+            os.close(handle)
         with suppress(OSError):
             path.unlink()
-        os.close(handle)  # the lock goes with it
+        if sys.platform != "win32":
+            os.close(handle)  # the lock goes with it
 
 
 def _taken(folder: Path, path: Path) -> int:
@@ -241,12 +248,27 @@ def sweep(folder: Path) -> list[Path]:
 
 
 def _held(handle: int) -> bool:
-    """Take the lock of an open file, or find it taken."""
+    """Take the lock of an open file, or find it taken; either goes with the process."""
+    if sys.platform == "win32":
+        return _held_on_windows(handle)
     import fcntl
 
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
+        return False
+    return True
+
+
+def _held_on_windows(handle: int) -> bool:
+    """Lock one byte far behind the signature: Windows lets nobody read a locked byte."""
+    import msvcrt
+
+    module: Any = msvcrt
+    try:
+        os.lseek(handle, _FAR, os.SEEK_SET)
+        module.locking(handle, module.LK_NBLCK, 1)
+    except OSError:
         return False
     return True
 
@@ -260,7 +282,8 @@ def _sign(handle: int) -> None:
     }
     with suppress(OSError):
         os.ftruncate(handle, 0)
-        os.pwrite(handle, json.dumps(signature).encode(), 0)
+        os.lseek(handle, 0, os.SEEK_SET)
+        os.write(handle, json.dumps(signature).encode())
 
 
 def _holder(path: Path) -> str:
