@@ -28,10 +28,12 @@ variables! {
         SineShort => "resolver.sine_short", "-", "1", Between(0.0, 0.99), Sensor, Some(0.0), "fraction of the turns of the sine winding shorted";
         CosineShort => "resolver.cosine_short", "-", "1", Between(0.0, 0.99), Sensor, Some(0.0), "fraction of the turns of the cosine winding shorted";
         ExcitationShort => "resolver.excitation_short", "-", "1", Between(0.0, 0.99), Sensor, Some(0.0), "fraction of the excitation lost by shorted turns: both channels weaken, the angle stays until too little is left";
-        SineOpen => "resolver.sine_open", "-", "1", Flag, Sensor, Some(0.0), "1: the sine winding is interrupted";
-        CosineOpen => "resolver.cosine_open", "-", "1", Flag, Sensor, Some(0.0), "1: the cosine winding is interrupted";
+        SineOpen => "resolver.sine_open", "-", "1", Flag, Sensor, Some(0.0), "1: the sine winding is interrupted",
+            high_only("the shown angle leaps by half a turn in a small part of its step");
+        CosineOpen => "resolver.cosine_open", "-", "1", Flag, Sensor, Some(0.0), "1: the cosine winding is interrupted",
+            high_only("the shown angle leaps by half a turn in a small part of its step");
         OpenResidue => "resolver.open_residue", "-", "1", Between(1e-6, 0.5), Sensor, Some(1e-3), "amplitude left in the channel of an open winding by stray coupling; ASSUMED: 0.1 %, a capacitive path of the cable",
-            when(&[Either(&[Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0)])]);
+            high_only("the shown angle leaps by half a turn in a small part of its step").when(&[Either(&[Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0)])]);
         LeastSignal => "resolver.least_signal", "-", "1", Unit, Sensor, Some(0.7), "amplitude of the stronger channel below which the converter has no signal; ASSUMED: where common converters report the loss",
             when(&[Either(&[
                 Away("sensor.resolver.excitation_short", 0.0), Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0),
@@ -113,6 +115,21 @@ impl<S: Scalar> Resolver<S> {
             speed_noise_deviation: g(P::SpeedNoiseDeviation),
             zero_when_off: S::indicator(S::mask(LossShows::read(g(P::LossShows)) == LossShows::Zero)),
         }
+    }
+
+    /// With both windings whole: what an open one shows is finer than the steps of the low fidelity.
+    pub fn without_leaps(raw: &[S]) -> Self {
+        let mut own = [S::zero(); RESOLVER.len()];
+        own.copy_from_slice(&raw[..RESOLVER.len()]);
+        own[ResolverParameter::SineOpen as usize] = S::zero();
+        own[ResolverParameter::CosineOpen as usize] = S::zero();
+        Self::derive(&own)
+    }
+
+    /// Does it ever show an angle far from the shaft's, or one that stands still?
+    pub fn misplaces(own: &Own<ResolverParameter>) -> bool {
+        use ResolverParameter as P;
+        own.any_away([P::Offset, P::PowerOff, P::Stuck, P::ExcitationShort])
     }
 
     /// Does it ever show another angle than the shaft's?

@@ -63,6 +63,11 @@ impl<S: Scalar> Sensing<S> {
         Self { encoder: Encoder::derive(Raw(raw).encoder(), turn), resolver: Resolver::derive(Raw(raw).resolver()) }
     }
 
+    /// As the low fidelity has them.
+    pub(super) fn derive_low(raw: &[S], d: &SensingDetails) -> Self {
+        Self { resolver: Resolver::without_leaps(Raw(raw).resolver()), ..Self::derive(raw, d) }
+    }
+
     pub(super) fn start(&self, s: &ShaftState<S>) -> Sensed<S> {
         let resolver = ResolverState { angle: s.motor_position, speed: s.motor_speed };
         Sensed { resolver, noise: [S::zero(); 2], encoder: self.encoder.start(s.user_position) }
@@ -78,6 +83,13 @@ impl<S: Scalar> Sensing<S> {
     #[inline(always)]
     pub(super) fn follows(&self) -> S {
         self.resolver.follows()
+    }
+
+    /// Angle that the resolver would show elsewhere.
+    #[inline(always)]
+    pub(super) fn angle(&self, position: S, speed: S, sensed: Sensed<S>) -> S {
+        let mut held = sensed.resolver;
+        self.resolver.read(position, speed, &mut held).angle
     }
 
     /// The resolver's reading.

@@ -109,11 +109,17 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             unit: "1",
             range: Range::Unit,
             attributes: &[],
-            places: places!(
-                "sensor.resolver.sine": "sensor.resolver.sine_open" Set, "sensor.resolver.cosine": "sensor.resolver.cosine_open" Set,
-                "sensor.resolver.excitation": "sensor.resolver.power_off" Set,
-            ),
-            effect: "1: the winding is interrupted; with one channel dead the shown angle leaps by half a turn, without excitation the shaft seems to rest",
+            places: places!("sensor.resolver.sine": "sensor.resolver.sine_open" Set, "sensor.resolver.cosine": "sensor.resolver.cosine_open" Set),
+            effect: "1: the winding is interrupted; with one channel dead the shown angle leaps by half a turn",
+            source: "N 4.5 (windings of the resolver)",
+        },
+        FaultKind {
+            kind: "winding_open",
+            unit: "1",
+            range: Range::Unit,
+            attributes: &[],
+            places: places!("sensor.resolver.excitation": "sensor.resolver.power_off" Set),
+            effect: "1: the winding is interrupted; without excitation the shaft seems to rest",
             source: "N 4.5 (windings of the resolver)",
         },
         FaultKind {

@@ -2,6 +2,7 @@
 //! without anti-windup and derivative filter; the shaft and its loads are those of the high fidelity.
 
 mod control;
+mod driven;
 mod jump;
 mod loops;
 mod model;

@@ -1,6 +1,7 @@
 //! Constants and state of a run at low fidelity.
 
 use super::control::Control;
+use super::driven::DrivenState;
 use super::jump::JumpState;
 use super::loops::Loops;
 use super::phase::Phase;
@@ -67,8 +68,15 @@ details! {
             || gains
             || interrupted(&parts.motor())
             || shorted;
-        /// Relays whose references the star's currents cannot have all: of an interrupted phase, of unlike sensors.
-        torn = drive == DriveKind::Hysteresis && (gains || interrupted(&parts.motor()));
+        /// The references stand far from the rotor's angle, or still.
+        turned = sensing.resolver && sensing.commutated && Resolver::<f64>::misplaces(&parts.resolver());
+        /// One current does not stand for three: references that stand apart from the rotor, relays whose references the
+        /// star's currents cannot have all, integrals that no current follows.
+        driven = match drive {
+            DriveKind::Hysteresis => gains || turned || interrupted(&parts.motor()),
+            DriveKind::Pwm => interrupted(&parts.motor()) || (sensing.resolver && sensing.commutated),
+            DriveKind::Off => false,
+        };
         heat = Network::<f64>::needed(&parts.thermal());
         link = DcLink::<f64>::needed(&parts.link());
         extra_shaft = shaft.extra;
@@ -101,6 +109,8 @@ pub struct Model<S> {
 pub struct Drive<S> {
     pub voltage_ratio: S,
     pub band: S,
+    /// Of the PWM current loop, 1/s.
+    pub bandwidth: S,
     /// Share of the current's error that a step of the PWM loop closes.
     pub tracking: S,
     pub supply_scale: S,
@@ -136,6 +146,7 @@ pub struct State<S> {
     pub phases: [S; 3],
     pub loops: [S; 3],
     pub bridge: BridgeState<S>,
+    pub driven: DrivenState<S>,
     pub command_noise: S,
     pub jumps: JumpState<S>,
     /// 1: the speed shown was zero at the last step.
@@ -169,6 +180,7 @@ impl<S: Scalar> Drive<S> {
                 DriveKind::Pwm => linear_range(at(InverterParameter::DeadTime.at()) * at(PwmParameter::Frequency.at())),
             },
             band: at(LowParameter::BandRatio.at()) * at(InverterParameter::HysteresisBand.at()),
+            bandwidth: at(PwmParameter::ProportionalGain.at()) / inductance,
             tracking: match structure.drive {
                 DriveKind::Pwm => one - (-(at(PwmParameter::ProportionalGain.at()) / inductance * dt)).exp(),
                 DriveKind::Hysteresis | DriveKind::Off => one,
@@ -226,7 +238,7 @@ impl<S: Scalar> Model<S> {
             pole: WeakPole::derive(Raw(raw).pole(), raw[MotorParameter::PolePairs.at()]),
             control,
             shaft,
-            sensing: Sensing::derive(raw, &structure.sensing),
+            sensing: Sensing::derive_low(raw, &structure.sensing),
             filter: closing(raw[CurrentSensorParameter::FilterCutoff.at()], dt.lane(0)),
             temperature: at(MotorParameter::WindingTemperature),
             network: network(raw, dt.lane(0)),
@@ -251,6 +263,7 @@ impl<S: Scalar> Model<S> {
             phases: [zero; 3],
             loops: [zero; 3],
             bridge: BridgeState::rest(),
+            driven: DrivenState::rest(),
             command_noise: zero,
             jumps: JumpState::start(shaft.motor_speed),
             rested: zero,

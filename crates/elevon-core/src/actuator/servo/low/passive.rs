@@ -35,6 +35,19 @@ struct Part<S> {
     per_winding: [S; 3],
 }
 
+/// Parts of a step in which EMFs are held.
+#[inline(always)]
+pub(super) fn parts<S: Scalar>(m: &Model<S>, speed: S) -> S {
+    let turned = (m.star.pole_pairs * speed * m.dt).abs();
+    -((turned * S::splat(-1.0 / HELD)).floor()).clamp(S::splat(-MOST), S::splat(-1.0))
+}
+
+/// (1 - exp(-R dt / L)) / R of each winding: its current per volt held over `dt`.
+#[inline(always)]
+pub(super) fn per_winding<S: Scalar>(m: &Model<S>, resistance: [S; 3], dt: S) -> [S; 3] {
+    three!(|j| (S::one() - (-(dt * resistance[j] / m.inductance[j])).exp()) / resistance[j])
+}
+
 /// The windings over a step from the phase currents `i`.
 #[inline(always)]
 pub(super) fn passive_step<S: Scalar>(
@@ -47,13 +60,11 @@ pub(super) fn passive_step<S: Scalar>(
 ) -> Passive<S> {
     let (zero, one, half) = (S::zero(), S::one(), S::splat(0.5));
     let speed = s.shaft.motor_speed;
-    let turned = (m.star.pole_pairs * speed * m.dt).abs();
-    let parts = -((turned * S::splat(-1.0 / HELD)).floor()).clamp(S::splat(-MOST), S::splat(-1.0));
+    let parts = parts(m, speed);
     let share = one / parts;
     let resistance: [S; 3] = three!(|j| m.resistance[j] * s.resistance_factor);
     let dt = share * m.dt;
-    let per_winding = three!(|j| (one - (-(dt * resistance[j] / m.inductance[j])).exp()) / resistance[j]);
-    let part = Part { dt, half_supply: half * supply, resistance, per_winding };
+    let part = Part { dt, half_supply: half * supply, resistance, per_winding: per_winding(m, resistance, dt) };
     let mut x = Passive { phases: i, torque: zero, copper: zero, drawn: zero, quadrature: zero, seen: zero };
     let mut k = zero;
     // Lanes that have all their parts wait for the others.

@@ -21,10 +21,6 @@ pub struct Phase<S> {
     pub imposed: [S; 3],
     /// Direct component of the EMF over the speed, in the frame of the references: none where they are well placed.
     pub direct: S,
-    /// How far up and down relays that cannot all have their references leave the current, over the reference's size.
-    pub torn: [S; 2],
-    /// Size of the current of a single loop.
-    pub size: S,
     /// Angle and speed of the shaft by which the references are placed.
     pub believed: [S; 2],
     /// Quadrature component of the imposed currents in the rotor's frame, and as the drive's sensors show it.
@@ -46,8 +42,6 @@ impl<S: Scalar> Phase<S> {
             coefficients: zero,
             imposed: zero,
             direct: S::zero(),
-            torn: [S::zero(); 2],
-            size: one,
             believed: [S::zero(); 2],
             quadrature: one,
             seen: one,
@@ -98,47 +92,16 @@ pub(super) fn phase<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>
     let none = e.inductance.equals(S::zero());
     let [_, healthy, inductance] = m.cold;
     let circuit = Circuit::new(S::select(none, healthy, e.resistance), S::select(none, inductance, e.inductance), m.dt);
-    let (torn, size) = if structure.torn { torn(m, reference, imposed) } else { ([S::zero(); 2], S::one()) };
     let shown = three!(|j| m.drive.gain[j] * imposed[j]);
     Phase {
         coefficients: three!(|j| k[j] * s.flux_factor),
         direct: if commutated { -(quadrature(k, cosines) * s.flux_factor) } else { S::zero() },
-        torn,
-        size,
         imposed,
         believed,
         quadrature: quadrature(imposed, rotor),
         seen: quadrature(shown, sines),
         ..Phase::new(e.torque_constant * s.flux_factor, circuit, &m.control, m.shaft.inertia)
     }
-}
-
-/// Below this part of the reference a current is none.
-const LEAST: f64 = 1e-3;
-
-/// Relays want h_j = w_j r_j each; of what these do not sum to zero, delta, each phase lacks its share s_j. Meanwhile all legs
-/// stand at one rail and the EMF drives the current, until the first phase has all that it wants. Up and down for a
-/// positive reference, over its size; and how large the current of a single loop is.
-#[inline(always)]
-fn torn<S: Scalar>(m: &Model<S>, reference: [S; 3], imposed: [S; 3]) -> ([S; 2], S) {
-    let (zero, one, half) = (S::zero(), S::one(), S::splat(0.5));
-    let w = m.drive.weight;
-    let (delta, sum) = (0..3).fold((zero, zero), |(d, sum), j| (w[j].fma(reference[j], d), sum + w[j]));
-    let shared = delta.abs() / S::select(sum.equals(zero), one, sum);
-    // Beyond any reference: that side has no phase to stop it.
-    let (mut up, mut down) = (S::splat(1.0 / LEAST), S::splat(1.0 / LEAST));
-    let mut closed = zero;
-    for j in 0..3 {
-        let carries = !w[j].equals(zero);
-        closed = closed + S::indicator(carries);
-        let way = delta.signed(imposed[j]);
-        let reach = shared * w[j].abs() / imposed[j].abs().maximum(S::splat(LEAST));
-        up = S::select(carries & zero.lt(way), up.minimum(reach), up);
-        down = S::select(carries & way.lt(zero), down.minimum(reach), down);
-    }
-    let largest = imposed[0].abs().maximum(imposed[1].abs()).maximum(imposed[2].abs());
-    let loops = closed.lt(S::splat(2.0) + half) & (one + half).lt(closed);
-    ([up, down], S::select(loops, largest.maximum(S::splat(LEAST)), one))
 }
 
 /// The healthy phase at the present temperatures.

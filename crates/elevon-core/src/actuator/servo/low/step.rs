@@ -2,6 +2,7 @@
 //! speed is solved with the acceleration (docs/theory/low-fidelity.md, "The speed derivative as inertia").
 
 use super::control::{demand, integrate};
+use super::driven::driven_step;
 use super::model::{Model, State, Structure};
 use super::passive::passive_step;
 use super::phase::{phase, Phase};
@@ -21,21 +22,9 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
     }
     let current_ref = s.torque_ref * m.control.per_torque_constant;
     let circuit = &p.circuit;
-    let mut band = [m.drive.band; 2];
-    if EXTRA && structure.torn {
-        // The loop's current stays as the references turn over it.
-        let along = three!(|j| p.imposed[j] * s.phases[j]);
-        let squares = three!(|j| p.imposed[j] * p.imposed[j]);
-        let square = (squares[0] + squares[1] + squares[2]).maximum(S::splat(1e-6));
-        s.current = S::select(p.size.equals(S::one()), s.current, (along[0] + along[1] + along[2]) / square);
-        let forward = S::zero().le(current_ref);
-        let [up, down] = p.torn;
-        let (above, below) = (S::select(forward, up, down), S::select(forward, down, up));
-        band = [above, below].map(|reach| reach.fma(current_ref.abs(), m.drive.band / p.size));
-    }
     let target = match structure.drive {
         // The relays act only at the edges of their band; inside it the EMF drives the current.
-        DriveKind::Hysteresis => circuit.current(s.current, -emf).clamp(current_ref - band[1], current_ref + band[0]),
+        DriveKind::Hysteresis => circuit.current(s.current, -emf).clamp(current_ref - m.drive.band, current_ref + m.drive.band),
         DriveKind::Pwm => s.current + m.drive.tracking * (current_ref - s.current),
         DriveKind::Off => S::zero(),
     };
@@ -71,6 +60,14 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
     let phases = s.phases;
     if EXTRA && structure.angle {
         s.phases = three!(|j| p.imposed[j] * reached);
+    }
+    if EXTRA && structure.driven {
+        s.phases = phases;
+        let x = driven_step(m, structure, supply, s, p, current_ref);
+        s.phases = x.phases;
+        (s.current, s.current_q, s.current_seen) = (x.seen, x.quadrature, x.seen);
+        (s.motor_torque, s.voltage) = (x.torque, x.voltage);
+        (loss, power) = (x.copper, x.drawn);
     }
     if EXTRA && structure.passive {
         (loss, power) = without_gates(m, structure, supply, s, p, phases, [loss, power]);
