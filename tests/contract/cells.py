@@ -152,7 +152,7 @@ def fault(
 ) -> Values:
     """A fault with its obligatory attributes at zero."""
     own = {a["name"]: 0.0 for a in record["attributes"] if a["default"] is None}
-    counted = math.ceil(severity) if record["whole"] else severity
+    counted = math.ceil(severity) if record["whole"] and math.isfinite(severity) else severity
     given = {"kind": kind, "place": place, "severity": counted, **own}
     return given | {"profile": profile} if profile else dict(given)
 

@@ -34,6 +34,7 @@ ROTARY_FAULTS = (
     "short@motor.phase_a=0.1",
     "eccentricity_static@motor=0.2",
     "eccentricity_dynamic@motor=0.2",
+    "stator_rub@motor=1",
     "resistor_short@motor.phase_a=0.25",
     "unbalance@motor.rotor=5e-4 kg m2,phase=0",
     "open_phase@motor.phase_a=1",
