@@ -22,6 +22,7 @@ use crate::fault::FaultKind;
 use crate::motor::equivalent::LowParameter;
 use crate::motor::thermal::ThermalParameter;
 use crate::scalar::Scalar;
+use crate::sensor::resolver::ResolverParameter;
 use crate::time::Steps;
 use crate::variable::{Group, Signal};
 use std::marker::PhantomData;
@@ -58,8 +59,14 @@ impl<F: Form> Wiring for Low<F> {
         raw[SolverParameter::FaultGrid.at()].max(raw[LowParameter::Step.at()])
     }
 
+    /// An open winding of the resolver is none of its details: what that shows is finer than its steps.
     fn structure(setup: &Setup) -> Structure {
-        Structure::read::<F>(Parts(setup))
+        let (mut raw, mut touched) = (setup.raw.to_vec(), setup.touched.to_vec());
+        for winding in [ResolverParameter::SineOpen, ResolverParameter::CosineOpen] {
+            raw[winding.at()] = 0.0;
+            touched[winding.at()] = false;
+        }
+        Structure::read::<F>(Parts(&Setup { raw: &raw, touched: &touched, ..*setup }))
     }
 
     fn ticks(raw: &[f64], structure: &Structure) -> Vec<Tick> {
