@@ -65,6 +65,7 @@ ROTARY_FAULTS = (
     "offset@sensor.resolver=5 deg",
     "winding_short@sensor.resolver.sine=0.2",
     "winding_open@sensor.resolver.sine=1",
+    "winding_open@sensor.resolver.excitation=1",
     "offset@sensor.encoder=1 deg",
     "gain@sensor.encoder=0.01",
     "missing_counts@sensor.encoder=0.01",

@@ -14,12 +14,12 @@ variables! {
     /// The housing on which an accelerometer sits.
     VibrationParameter, VIBRATION {
         Model => "model", "-", "1", Choice(VibrationModel::NAMES), Sensor, Some(0.0), "resonance: one mode of the structure carries the forces to the accelerometer; off: none is recorded", high_only("it has no accelerometer");
-        Mass => "mass", "m", "kg", Positive, Sensor, Some(5.0), "mass of the mode";
-        Frequency => "frequency", "f_n", "Hz", Positive, Sensor, Some(1200.0), "natural frequency of the mode";
-        Damping => "damping", "zeta", "1", Unit, Sensor, Some(0.05), "damping ratio of the mode";
-        Approach => "approach", "delta_H", "m", Positive, Sensor, Some(1e-5), "elastic approach of a loaded ball: a spall that is deeper unloads the ball altogether";
-        GearTeeth => "gear_teeth", "z", "1", NonNegative, Sensor, Some(0.0), "teeth on the motor's shaft: order of the mesh; 0: no gear";
-        GearRipple => "gear_ripple", "-", "1/m", NonNegative, Sensor, Some(0.0), "force of the mesh per motor torque";
+        Mass => "mass", "m", "kg", Positive, Sensor, Some(5.0), "mass of the mode", high_only("it has no accelerometer").when(&[Chosen("vibration.model", &["resonance"])]);
+        Frequency => "frequency", "f_n", "Hz", Positive, Sensor, Some(1200.0), "natural frequency of the mode", high_only("it has no accelerometer").when(&[Chosen("vibration.model", &["resonance"])]);
+        Damping => "damping", "zeta", "1", Unit, Sensor, Some(0.05), "damping ratio of the mode", high_only("it has no accelerometer").when(&[Chosen("vibration.model", &["resonance"])]);
+        Approach => "approach", "delta_H", "m", Positive, Sensor, Some(1e-5), "elastic approach of a loaded ball: a spall that is deeper unloads the ball altogether", high_only("it has no accelerometer").when(&[Chosen("vibration.model", &["resonance"]), Either(&[Away("screw.spall_groove", 0.0), Away("screw.spall_nut", 0.0), Away("screw.spall_ball", 0.0)])]);
+        GearTeeth => "gear_teeth", "z", "1", NonNegative, Sensor, Some(0.0), "teeth on the motor's shaft: order of the mesh; 0: no gear", high_only("it has no accelerometer").when(&[Chosen("vibration.model", &["resonance"]), Away("vibration.gear_ripple", 0.0)]);
+        GearRipple => "gear_ripple", "-", "1/m", NonNegative, Sensor, Some(0.0), "force of the mesh per motor torque", high_only("it has no accelerometer").when(&[Chosen("vibration.model", &["resonance"]), Away("vibration.gear_teeth", 0.0)]);
     }
 }
 
