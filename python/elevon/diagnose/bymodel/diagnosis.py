@@ -100,8 +100,15 @@ def diagnose(
 
 #: Evidence that only a measured torque current gives.
 _OF_THE_CURRENT = frozenset(
-    "dry_current viscous_current inertia_current brake_current current_order_1 current_order_2"
-    " voltage_per_current".split()
+    [
+        "dry_current",
+        "viscous_current",
+        "inertia_current",
+        "brake_current",
+        "current_order_1",
+        "current_order_2",
+        "voltage_per_current",
+    ]
 )
 
 
