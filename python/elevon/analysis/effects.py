@@ -228,14 +228,13 @@ def _row(
     term: Column, effect: float, margin: float | None, letters: list[str], response: Response
 ) -> Term:
     effect = float(effect)
-    known = margin is not None
     return Term(
         _word(term.factors, letters),
         " x ".join(response.factors[k].name for k in term.factors),
         effect,
         effect - margin if margin is not None else None,
         effect + margin if margin is not None else None,
-        abs(effect) > margin if margin is not None and known else None,
+        abs(effect) > margin if margin is not None else None,
         [("-" if sign < 0 else "") + _word(name, letters) for name, sign in term.aliases],
     )
 

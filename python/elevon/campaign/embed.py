@@ -63,9 +63,9 @@ class Embedder:
         if isinstance(item, Fault):
             return item.to_dict()
         if isinstance(item, str):
-            found = _FILE.sub(lambda m: m[1] + str(self.note(m[2].strip())), item)
+            text = _FILE.sub(lambda m: m[1] + str(self.note(m[2].strip())), item)
             try:
-                return Fault.parse(found).to_dict()
+                return Fault.parse(text).to_dict()
             except InputError as error:
                 raise type(error)(f"{place}: {error}") from error
         if isinstance(item, Mapping) and "profile" in item:

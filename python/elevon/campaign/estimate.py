@@ -18,7 +18,7 @@ from elevon.simulate.batch import checked_threads, simulate_prepared
 if TYPE_CHECKING:
     from elevon.campaign.folder import Work
 
-__all__ = ["Estimate", "check_disk", "estimate"]
+__all__ = ["Cost", "check_disk", "estimate"]
 
 #: Of a run, beside its solver steps: preparing it and writing its table (measured, one core).
 _RUN_SECONDS = 0.5e-3
@@ -27,7 +27,7 @@ _PILOT_RUNS, _PILOT_STEPS = 16, 20_000
 
 
 @dataclass(frozen=True)
-class Estimate:
+class Cost:
     """What a campaign will take.
 
     Attributes
@@ -51,7 +51,7 @@ class Estimate:
     checked: Checked | None = None
 
     @classmethod
-    def of(cls, work: Work) -> Estimate:
+    def of(cls, work: Work) -> Cost:
         """Return what is still to be done of a campaign."""
         about, total = work.manifest.estimate, len(work.resolved)
         runs = sum(len(work.numbers(block)) for block in work.missing)
@@ -72,7 +72,7 @@ class Estimate:
         )
 
 
-def estimate(resolved: Resolved, checked: Checked, folder: Path, threads: int) -> Estimate:
+def estimate(resolved: Resolved, checked: Checked, folder: Path, threads: int) -> Cost:
     """Return what all runs will take.
 
     Raises
@@ -85,7 +85,7 @@ def estimate(resolved: Resolved, checked: Checked, folder: Path, threads: int) -
     disk = int(checked.sizes.sum())
     check_disk(folder, disk)
     seconds = _seconds(resolved, checked, threads)
-    return Estimate(len(resolved), len(edges) - 1, edges, disk, memory, seconds, checked)
+    return Cost(len(resolved), len(edges) - 1, edges, disk, memory, seconds, checked)
 
 
 def check_disk(folder: Path, need: int) -> None:

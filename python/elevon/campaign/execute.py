@@ -12,7 +12,7 @@ from typing import Any
 
 from elevon.campaign.block import check_there, finish_block, simulate_block
 from elevon.campaign.check import check
-from elevon.campaign.estimate import Estimate, estimate
+from elevon.campaign.estimate import Cost, estimate
 from elevon.campaign.folder import Work, begin, finish, finished, open_folder
 from elevon.campaign.resolved import Resolved
 from elevon.campaign.store import Manifest, read_resolved
@@ -158,7 +158,7 @@ def _carried_out(
     if (outcome := finished(work)) is not None:
         return CampaignResult(work.manifest, outcome, skipped, time.perf_counter() - start)
     if announce is not None and work.missing:
-        announce(str(Estimate.of(work)))
+        announce(str(Cost.of(work)))
     work.check_disk()
     if cluster is None:
         _in_threads(work, threads, progress)

@@ -1,4 +1,4 @@
-"""A campaign's folder: begun, found again, gone on with, finished."""
+"""A campaign's folder: begun, recognised, gone on with, finished."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from elevon.campaign.block import block_name
 from elevon.campaign.card import write_cards
 from elevon.campaign.dataset import Dataset
 from elevon.campaign.ends import read_ends
-from elevon.campaign.estimate import Estimate, check_disk
+from elevon.campaign.estimate import Cost, check_disk
 from elevon.campaign.resolved import Resolved
 from elevon.campaign.store import (
     LOG,
@@ -62,7 +62,7 @@ class Work:
 
     def check_disk(self) -> None:
         """Raise `InputError` when the disk has no room for what is missing."""
-        check_disk(self.folder, Estimate.of(self).disk)
+        check_disk(self.folder, Cost.of(self).disk)
 
 
 def open_folder(folder: Path, resolved: Resolved, text: str) -> bool:
@@ -88,14 +88,14 @@ def open_folder(folder: Path, resolved: Resolved, text: str) -> bool:
     return False
 
 
-def begin(folder: Path, resolved: Resolved, text: str | None, need: Estimate | None) -> Work:
+def begin(folder: Path, resolved: Resolved, text: str | None, need: Cost | None) -> Work:
     """Make a folder a campaign's own, or find what is done in it; call with the lock held.
 
     Parameters
     ----------
     text : str or None
         The plan as given; None to go on with what is there.
-    need : Estimate or None
+    need : Cost or None
         What the campaign takes; None where it was begun before.
 
     Raises
@@ -247,7 +247,7 @@ def _check_build(folder: Path, manifest: Manifest) -> None:
         )
 
 
-def _manifest(resolved: Resolved, need: Estimate) -> Manifest:
+def _manifest(resolved: Resolved, need: Cost) -> Manifest:
     from elevon import _core
 
     clocks = {} if need.checked is None else need.checked.clocks

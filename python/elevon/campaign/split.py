@@ -55,8 +55,8 @@ def dealt(
 def leaks(groups: Sequence[Any], split: Sequence[str]) -> list[Any]:
     """Return the groups (units or draws) whose runs stand in more than one part."""
     first: dict[Any, str] = {}
-    found: dict[Any, None] = {}
+    distinct: dict[Any, None] = {}
     for group, part in zip(groups, split, strict=True):
         if first.setdefault(group, part) != part:
-            found[group] = None
-    return list(found)
+            distinct[group] = None
+    return list(distinct)

@@ -136,5 +136,5 @@ def _leaking(ds: Dataset, noun: str) -> tuple[int, list[str]]:
         table = ds.runs.to_arrow([noun, "split"])
     except FormatError as error:
         return 1, [str(error)]
-    found = leaks(table[noun].to_pylist(), table["split"].to_pylist())
-    return len(found), [str(item) for item in found]
+    leaking = leaks(table[noun].to_pylist(), table["split"].to_pylist())
+    return len(leaking), [str(item) for item in leaking]

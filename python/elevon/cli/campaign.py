@@ -110,7 +110,7 @@ def run(
 
     read, document = load_plan(plan)
     resolved = resolve_plan(read, document)
-    with interrupt.telling(lambda: _kept(out)), progress_bar(f"running {read.name}") as advance:
+    with interrupt.telling(lambda: _how_far(out)), progress_bar(f"running {read.name}") as advance:
         result = run_campaign(
             resolved,
             document.text,
@@ -120,7 +120,7 @@ def run(
             progress=advance,
             announce=say,
         )
-    return _told(result, out, json=json)
+    return _reported(result, out, json=json)
 
 
 @app.command()
@@ -135,7 +135,7 @@ def resume(
     """Go on with a campaign from its folder; the plan file is not needed."""
     from elevon.campaign import resume_campaign
 
-    with interrupt.telling(lambda: _kept(folder)), progress_bar("going on") as advance:
+    with interrupt.telling(lambda: _how_far(folder)), progress_bar("going on") as advance:
         result = resume_campaign(
             folder,
             threads=threads,
@@ -143,19 +143,19 @@ def resume(
             progress=advance,
             announce=say,
         )
-    return _told(result, folder, json=json)
+    return _reported(result, folder, json=json)
 
 
 @app.command()
 def status(folder: FolderArgument, *, json: JsonOption = False) -> int:
     """Say how far a campaign is."""
-    found = _status(folder)
+    state = _status(folder)
     if json:
-        print_json(found)
+        print_json(state)
     else:
         typer.echo(
-            f"{found['name']}: {found['status']}, {found['done']} of {found['runs']} runs done, "
-            f"{found['failed']} failed{', a process works on it' if found['active'] else ''}"
+            f"{state['name']}: {state['status']}, {state['done']} of {state['runs']} runs done, "
+            f"{state['failed']} failed{', a process works on it' if state['active'] else ''}"
         )
     return 0
 
@@ -193,20 +193,20 @@ def _cluster(scheduler: str | None, cluster: str | None) -> str | None:
     return scheduler or cluster
 
 
-def _kept(out: Path) -> str:
+def _how_far(out: Path) -> str:
     from elevon.errors import InputError
 
     try:
-        found = _status(out)
+        state = _status(out)
     except InputError:
         return "nothing is kept; give the same command again to start over"
     return (
-        f"{found['done']} of {found['runs']} runs are kept in {out}; give the same command "
+        f"{state['done']} of {state['runs']} runs are kept in {out}; give the same command "
         "again to go on"
     )
 
 
-def _told(result: Any, out: Path, *, json: bool) -> int:
+def _reported(result: Any, out: Path, *, json: bool) -> int:
     if json:
         print_json(_summary(result, out))
     else:

@@ -41,22 +41,23 @@ def effects(
     from elevon.campaign import load_campaign
 
     check_outputs([report], force=force)
-    found = effects_of(read_response(load_campaign(folder), response), level=level)
+    effects = effects_of(read_response(load_campaign(folder), response), level=level)
     if report is not None:
         from elevon.analysis.effects_page import effects_report
 
-        effects_report(found, str(folder)).save(report, force=force)
+        effects_report(effects, str(folder)).save(report, force=force)
     if json:
-        print_json({"status": "ok", **found.to_dict()})
+        print_json({"status": "ok", **effects.to_dict()})
         return 0
     rows = [
-        [t.term, t.name, f"{t.effect:.4g}", _interval(t), ", ".join(t.aliases)] for t in found.terms
+        [t.term, t.name, f"{t.effect:.4g}", _interval(t), ", ".join(t.aliases)]
+        for t in effects.terms
     ]
-    title = f"{found.response} [{found.unit}], {found.runs} runs, {found.method}"
+    title = f"{effects.response} [{effects.unit}], {effects.runs} runs, {effects.method}"
     print_table(("term", "factors", "effect", "interval", "aliased with"), rows, title=title)
     for text, names in (
-        ("confounded with the blocks", found.blocked),
-        ("left out, partly aliased", found.partial),
+        ("confounded with the blocks", effects.blocked),
+        ("left out, partly aliased", effects.partial),
     ):
         if names:
             typer.echo(f"{text}: {', '.join(names)}")
@@ -96,7 +97,7 @@ def surrogate(
     from elevon.campaign import load_campaign
 
     high = load_campaign(folder)
-    found = read_response(high, response)
+    measured = read_response(high, response)
     pairs = ratio = None
     if low is not None:
         below = load_campaign(low)
@@ -104,10 +105,10 @@ def surrogate(
         ratio = cost_ratio or _cost_ratio(high, below)
     with progress_bar("fitting surrogates") as advance:
         result = study(
-            samples_of(found) if pairs is None else pairs.high,
+            samples_of(measured) if pairs is None else pairs.high,
             pairs,
             response=response,
-            unit=found.unit,
+            unit=measured.unit,
             cost_ratio=ratio or 1.0,
             budget=budget,
             splits=splits,

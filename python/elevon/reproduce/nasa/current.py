@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.report.checks import Check, all_passed
+from elevon.units import to_si
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -23,7 +24,7 @@ __all__ = ["PUBLISHED", "CurrentResult", "CurrentRow", "CurrentTrace", "reproduc
 
 Floats = npt.NDArray[np.float64]
 ACTUATOR = "nasa-ballscrew"
-POUND_FORCE = 4.4482216152605
+POUND_FORCE = float(to_si(1.0, "lbf"))
 PUBLISHED = {"nominal": (7.12, 9.96, 5.82), "jam": (8.34, 9.88, 5.60)}
 """Percent RMS error of the current as printed: average, maximum, minimum."""
 REASSEMBLIES = 4

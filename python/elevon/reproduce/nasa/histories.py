@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from elevon.errors import SimulationError
 from elevon.reproduce.nasa.profiles import Profile, profile_scenario
+from elevon.units import to_si
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -25,7 +26,7 @@ Array = npt.NDArray[np.float64]
 RECORD = (
     "command,user_position,joint_force,current_ref,winding_temperature,surface_temperature@200 Hz"
 )
-POUND_FORCE = 4.4482216152605
+POUND_FORCE = float(to_si(1.0, "lbf"))
 
 
 @dataclass(frozen=True, slots=True)
