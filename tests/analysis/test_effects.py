@@ -59,6 +59,18 @@ def test_intervals_cover_the_truth_as_often_as_they_say(factors, copies, method)
     assert 0.85 <= np.mean(inside) <= 0.97
 
 
+def test_equal_repeats_count_as_one_run():
+    coded = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1], [0, 0]])
+    values = 5.0 + coded[:, 0] + 0.3 * coded[:, 0] ** 2
+    once = effects_of(_response(coded, values))
+    twice = effects_of(_response(np.tile(coded, (2, 1)), np.tile(values, 2)))
+    assert (once.method, twice.method) == ("residual", "residual")
+    assert (once.equal_repeats, twice.equal_repeats) == (False, True)
+    for one, two in zip(once.terms, twice.terms, strict=True):
+        assert (two.low, two.effect, two.high) == pytest.approx((one.low, one.effect, one.high))
+        assert two.low < two.effect < two.high
+
+
 def test_aliases_of_a_fraction_are_named():
     coded = _full(3)
     coded = np.column_stack([coded, coded.prod(axis=1)])  # D = ABC

@@ -174,7 +174,7 @@ DAMAGE = {
         lambda d: shutil.copy(
             d / "runs/at_400_hz/block_00000.parquet", d / "runs/at_400_hz/block_00009.parquet"
         ),
-        "nothing tells of",
+        "manifest does not list",
     ),
     "a leak": (_other_split, "in more than one part"),
 }

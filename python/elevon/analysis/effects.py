@@ -15,6 +15,10 @@ from elevon.errors import InputError
 __all__ = ["Effects", "Term", "effects_of"]
 
 Floats = npt.NDArray[np.float64]
+EQUAL_REPEATS = (
+    "the repeats of each point are equal: nothing random was simulated (sensor noise, spread of "
+    "units); they count as one run"
+)
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,8 @@ class Effects:
         Largest first.
     blocked, partial : list of str
         Terms confounded with the blocks; interactions partly aliased and left out.
+    equal_repeats : bool
+        The repeats of every point are equal: nothing random was simulated, they count as one run.
     """
 
     response: str
@@ -78,6 +84,7 @@ class Effects:
     with_blocks: list[str]
     blocked: list[str]
     partial: list[str]
+    equal_repeats: bool
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
@@ -89,9 +96,10 @@ def effects_of(response: Response, *, level: float = 0.95) -> Effects:
 
     The model has the mean, the blocks and every term that can be told apart; an effect is twice its
     coefficient with factors coded -1 to +1. Intervals: of a design with repeated points Student's t
-    with the pure error of the repeats; of an unreplicated orthogonal two-level design Lenth's
-    pseudo standard error (R. V. Lenth, Technometrics 31(4), 1989); of others t with the model's
-    residual, which then holds what the model lacks.
+    with the pure error of the repeats, unless these are equal (a simulation without noise); of an
+    unreplicated orthogonal two-level design Lenth's pseudo standard error (R. V. Lenth,
+    Technometrics 31(4), 1989); of others t with the model's residual, which then holds what the
+    model lacks.
 
     Parameters
     ----------
@@ -140,6 +148,7 @@ def effects_of(response: Response, *, level: float = 0.95) -> Effects:
         with_blocks=response.with_blocks,
         blocked=[_word(name, letters) for name in blocked],
         partial=[_word(name, letters) for name in partial],
+        equal_repeats=_equal_repeats(*_pure_error(response, coded), response),
     )
 
 
@@ -172,19 +181,33 @@ def _fit(matrix: Floats, head: int, response: Response) -> _Fit:
 def _judged(fit: _Fit, response: Response, coded: list[Floats], level: float) -> _Judged:
     """Judge the effects by repeats, by Lenth's method or by the residual."""
     spread, df = _pure_error(response, coded)
-    if df >= 1:
+    if df >= 1 and not _equal_repeats(spread, df, response):
         return _by_t("replicates", spread, df, fit, level)
     if _orthogonal(fit, coded):
         return _by_lenth(fit, response, coded, level)
-    df = len(fit.residual) - fit.matrix.shape[1]
+    df = len(_points(coded)[0]) - fit.matrix.shape[1]
     if df >= 1:
         return _by_t("residual", float(np.sqrt(fit.residual @ fit.residual / df)), df, fit, level)
     return _Judged("none", None, None, [None] * len(fit.effects))
 
 
+def _points(coded: list[Floats]) -> tuple[Floats, npt.NDArray[np.int64]]:
+    """Return the different points, and which of them each run has."""
+    points, number = np.unique(np.column_stack(coded).round(12), axis=0, return_inverse=True)
+    return points, number.reshape(-1)
+
+
+def _equal_repeats(spread: float, df: int, response: Response) -> bool:
+    """Tell whether the runs of a point are equal to rounding: nothing random was simulated.
+
+    Such repeats say nothing of how far an effect can be trusted; they count as one run.
+    """
+    return df >= 1 and spread <= 1e-9 * float(np.abs(response.values).max())
+
+
 def _pure_error(response: Response, coded: list[Floats]) -> tuple[float, int]:
     """Return the deviation of runs of one point, less the blocks, and its degrees of freedom."""
-    points = np.unique(np.column_stack(coded).round(12), axis=0, return_inverse=True)[1]
+    points = _points(coded)[1]
     own = (points[:, None] == np.arange(points.max() + 1)).astype(np.float64)
     matrix = np.column_stack([blocks_matrix(response.block), own])
     df = len(points) - int(np.linalg.matrix_rank(matrix))

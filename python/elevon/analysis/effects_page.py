@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elevon.analysis.effects import Effects
+from elevon.analysis.effects import EQUAL_REPEATS, Effects
 from elevon.report import Report, Table
 
 if TYPE_CHECKING:
@@ -68,6 +68,8 @@ def _confounded(effects: Effects) -> list[str]:
     texts = []
     if effects.blocked:
         texts.append(f"Confounded with the blocks: {', '.join(effects.blocked)}.")
+    if effects.equal_repeats:
+        texts.append(f"Note: {EQUAL_REPEATS}.")
     if effects.partial:
         texts.append(f"Left out, partly aliased with other terms: {', '.join(effects.partial)}.")
     if effects.with_blocks:

@@ -120,6 +120,11 @@ def study(
     held = max(round(_HELD_OUT * count), 1)
     budget = (count - held) // 2 if budget is None else budget
     least = 2 * (high.points.shape[1] + 1)
+    if count - held < least:
+        raise InputError(
+            f"{count} points are too few, {held} of them held out: {high.points.shape[1]} varied "
+            f"quantities need at least {least} to learn from"
+        )
     if not least <= budget <= count - held:
         raise InputError(
             f"budget = {budget} high runs of {count} points, {held} of them held out: give "

@@ -55,7 +55,7 @@ def _of(ds: Dataset, progress: Callable[[float], Any] | None) -> Iterator[Check]
     done = sum(item.data["last"] - item.data["first"] + 1 for item in items)
     yield _count("runs that are not done", len(ds) - done)
     yield _count("files missing or not as they were written", *_damaged(ds, items, progress))
-    yield _count("files that nothing tells of", *_strangers(ds, items))
+    yield _count("files that the manifest does not list", *_strangers(ds, items))
     yield _count("runs of the table missing, twice or out of order", *_rows(ds))
     yield _count("runs whose samples are missing or twice", *_samples(ds, items))
     try:

@@ -38,6 +38,7 @@ def effects(
 ) -> int:
     """Say which factors move a response, and by how much: main effects and interactions."""
     from elevon.analysis import effects_of, read_response
+    from elevon.analysis.effects import EQUAL_REPEATS
     from elevon.campaign import load_campaign
 
     check_outputs([report], force=force)
@@ -61,6 +62,8 @@ def effects(
     ):
         if names:
             typer.echo(f"{text}: {', '.join(names)}")
+    if effects.equal_repeats:
+        typer.echo(EQUAL_REPEATS)
     return 0
 
 
