@@ -11,7 +11,6 @@ PACKAGE = Path(__file__).resolve().parents[2] / "python" / "elevon"
 # thought: what it may know of is everything left of it, and nothing else.
 ROWS = [
     ["errors", "_core"],
-    ["_unit_table"],
     ["units", "files", "progress", "memory", "data"],
     ["documents", "series", "report", "worklog"],
     ["recording"],

@@ -1,15 +1,4 @@
-"""Quantities at the door: text with a unit in, SI floats inside, and back for display.
-
-A unit is a product of symbols: ``kg cm2``, ``N m s/rad``, ``W/(m K)``. Exponents follow the symbol
-(``m2``, ``s-1``, ``m^2``). The common symbols are in a table (`elevon._unit_table`); any other
-symbol is looked up in pint, imported only then.
-
-The angle counts as a dimension of its own. So Hz is never taken for rad/s, nor a stiffness in
-N m/rad for a torque in N m, which the SI alone cannot tell apart. A temperature in ``degC`` or
-``degF`` has an offset when it stands alone, and is an interval inside a product (``W/degC``).
-
-Decimal text and decimal units are combined exactly: ``"7.7 kg cm2"`` is the float ``7.7e-4``.
-"""
+"""Reading, converting and showing quantities."""
 
 import math
 import re
@@ -19,18 +8,17 @@ from typing import overload
 import numpy as np
 import numpy.typing as npt
 
-from elevon._unit_table import KINDS, Unit, parse_unit, unit_names
 from elevon.errors import InputError, RangeError, UnitError
+from elevon.units.table import KINDS
+from elevon.units.unit import Unit, parse_unit, unit_names
 
 __all__ = [
-    "Unit",
     "check_kind",
     "convert",
     "format_quantity",
     "kind_name",
     "known_units",
     "parse_quantity",
-    "parse_unit",
     "si_unit",
     "to_display",
     "to_si",
