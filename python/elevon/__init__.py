@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator as Actuator
+    from elevon.actuator import list_actuators as list_actuators
     from elevon.campaign import load_campaign as load_campaign
     from elevon.errors import ElevonError as ElevonError
     from elevon.errors import ElevonWarning as ElevonWarning
@@ -37,6 +38,7 @@ _PUBLIC = {
     "Recording": "elevon.recording",
     "Run": "elevon.simulate",
     "Scenario": "elevon.scenario",
+    "list_actuators": "elevon.actuator",
     "load_campaign": "elevon.campaign",
     "simulate": "elevon.simulate",
     "simulate_batch": "elevon.simulate",
@@ -75,7 +77,7 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted(__all__)
 
 
 def _version() -> str:

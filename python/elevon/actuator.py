@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from elevon.parameters import ParameterSet, load_set
+from elevon.parameters import ParameterSet, load_set, set_names
 
-__all__ = ["Actuator"]
+__all__ = ["Actuator", "list_actuators"]
 
 
 @dataclass(frozen=True)
@@ -109,6 +109,13 @@ class Actuator:
             parameters=self.parameters.replaced(values, source=source, place=place, asked=asked),
         )
 
+    def _repr_html_(self) -> str:
+        from elevon.report.cards import Html, card
+
+        facts = [("", self.title), ("wiring", self.wiring), ("hash", self.hash)]
+        shown = Html(self.parameters._repr_html_())
+        return card(self.name, facts, shown, folded=f"{len(self.parameters)} parameters")
+
     @property
     def hash(self) -> str:
         """Sixteen hexadecimal digits over the wiring and every value."""
@@ -124,3 +131,8 @@ class Actuator:
         from elevon import _core
 
         return list(_core.check(self.wiring, fidelity, self.parameters.vector()))
+
+
+def list_actuators() -> list[str]:
+    """Return the names that `Actuator.load` knows: shipped sets and those in ``ELEVON_SETS``."""
+    return list(set_names())

@@ -9,6 +9,7 @@ from difflib import get_close_matches
 from typing import ClassVar
 
 __all__ = [
+    "ArgumentTypeError",
     "BusyError",
     "DamageError",
     "DivergedError",
@@ -66,6 +67,10 @@ class UnknownNameError(InputError, LookupError):
         super().__init__(message)
         self.name = name
         self.nearest = list(near)
+
+
+class ArgumentTypeError(InputError, TypeError):
+    """An argument of another kind than the function takes; the message says what it expects."""
 
 
 class NotActingError(InputError):

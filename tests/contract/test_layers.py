@@ -27,6 +27,7 @@ ROWS = [
     ["reproduce"],
     ["demo"],
     ["cli"],
+    ["__main__"],
 ]
 RANK = {room: rank for rank, row in enumerate(ROWS) for room in row}
 

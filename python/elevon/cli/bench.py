@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from elevon.cli import interrupt
+from elevon.cli import completion, interrupt
 from elevon.cli.common import (
+    ActuatorOption,
     FaultOption,
     FidelityOption,
     ForceOption,
@@ -53,12 +54,15 @@ def list_procedures(*, json: JsonOption = False) -> None:
 @app.command()
 def run(
     procedure: Annotated[
-        str, typer.Argument(metavar="PROCEDURE", help="A name (elevon bench list) or a TOML file.")
+        str,
+        typer.Argument(
+            metavar="PROCEDURE",
+            help="A name (elevon bench list) or a TOML file.",
+            autocompletion=completion.procedures,
+        ),
     ],
     *,
-    actuator: Annotated[
-        str, typer.Option("--actuator", metavar="ACTUATOR", help="Name of a set, or a file.")
-    ],
+    actuator: ActuatorOption,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the logs.")],
     fault: FaultOption = None,
     settings: SetOption = None,

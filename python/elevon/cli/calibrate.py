@@ -11,6 +11,7 @@ import typer
 from elevon.cli.calibrate_drops import is_drop_table, run_drops
 from elevon.cli.closed_loop import calibrate_closed_loop, read_loop_logs
 from elevon.cli.common import (
+    ActuatorOption,
     ForceOption,
     JsonOption,
     SetOption,
@@ -31,9 +32,6 @@ if TYPE_CHECKING:
 app = typer.Typer(rich_markup_mode=None)
 
 LogsArgument = Annotated[list[Path], typer.Argument(metavar="LOG...", help="Drive logs.")]
-ActuatorOption = Annotated[
-    str, typer.Option("--actuator", metavar="ACTUATOR", help="Name of a set, or a file.")
-]
 LoadcellOption = Annotated[
     list[Path] | None,
     typer.Option(

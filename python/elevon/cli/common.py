@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from elevon.cli import completion
 from elevon.cli.output import say
 from elevon.errors import ElevonWarning, InputError
 from elevon.files import check_output
@@ -26,7 +27,21 @@ def _strict(value: bool) -> bool:
 
 
 ActuatorArgument = Annotated[
-    str, typer.Argument(metavar="ACTUATOR", help="Name of a set (elevon list actuators) or a file.")
+    str,
+    typer.Argument(
+        metavar="ACTUATOR",
+        help="Name of a set (elevon list actuators) or a file.",
+        autocompletion=completion.actuators,
+    ),
+]
+ActuatorOption = Annotated[
+    str,
+    typer.Option(
+        "--actuator",
+        metavar="ACTUATOR",
+        help="Name of a set, or a file.",
+        autocompletion=completion.actuators,
+    ),
 ]
 ScenarioOption = Annotated[
     Path | None, typer.Option("--scenario", metavar="FILE", help="Scenario file (TOML).")
@@ -37,15 +52,32 @@ DurationOption = Annotated[
 ]
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="PATH=VALUE[unit]", help="Change a parameter; repeatable."),
+    typer.Option(
+        "--set",
+        metavar="PATH=VALUE[unit]",
+        help="Change a parameter; repeatable.",
+        autocompletion=completion.parameters,
+    ),
 ]
 FaultOption = Annotated[
     list[str] | None,
-    typer.Option("--fault", metavar="SPEC", help="'KIND@PLACE=VALUE[unit]...'; repeatable."),
+    typer.Option(
+        "--fault",
+        metavar="SPEC",
+        help="'KIND@PLACE=VALUE[unit]...'; repeatable.",
+        autocompletion=completion.faults,
+    ),
 ]
-FidelityOption = Annotated[str, typer.Option(help="high or low.")]
+FidelityOption = Annotated[
+    str, typer.Option(help="high or low.", autocompletion=completion.fidelities)
+]
 OnlyFidelityOption = Annotated[
-    str | None, typer.Option("--fidelity", help="Only what acts at this fidelity: high or low.")
+    str | None,
+    typer.Option(
+        "--fidelity",
+        help="Only what acts at this fidelity: high or low.",
+        autocompletion=completion.fidelities,
+    ),
 ]
 DeclinedOption = Annotated[
     bool,
@@ -57,6 +89,7 @@ RecordOption = Annotated[
         "--record",
         metavar="SIGNALS@RATE",
         help="Such as 'user_position,motor_speed@400 Hz' or 'current_a@every'; repeatable.",
+        autocompletion=completion.signals,
     ),
 ]
 SeedOption = Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")]
@@ -108,14 +141,9 @@ def read_scenario(
 ) -> Scenario:
     """Read a scenario file, or the actuator's own, and apply ``--duration`` and ``--fault``."""
     from elevon.faults import Fault
-    from elevon.scenario import Scenario
+    from elevon.simulate.arguments import as_scenario
 
-    if path is not None:
-        scenario = Scenario.load(path)
-    elif actuator.default_scenario is not None:
-        scenario = Scenario.from_dict(actuator.default_scenario, f"{actuator.name}: scenario")
-    else:
-        raise InputError(f"{actuator.name} has no scenario of its own; give one with --scenario")
+    scenario = as_scenario(path, actuator)
     if duration is not None:
         scenario = scenario.replaced(duration=_number(duration))
     if faults:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from elevon.cli.calibrate import (
-    ActuatorOption,
     CommandOption,
     LoadcellOption,
     LogsArgument,
@@ -16,6 +15,7 @@ from elevon.cli.calibrate import (
     one_each,
 )
 from elevon.cli.common import (
+    ActuatorOption,
     ForceOption,
     JsonOption,
     SetOption,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from elevon.cli import completion
 from elevon.cli.acting import by_drive, check, chosen
 from elevon.cli.common import (
     ActuatorArgument,
@@ -41,7 +42,12 @@ def actuators(*, json: JsonOption = False) -> None:
 def procedures(
     *,
     actuator: Annotated[
-        str | None, typer.Option("--actuator", help="Only those of the stand it stands on.")
+        str | None,
+        typer.Option(
+            "--actuator",
+            help="Only those of the stand it stands on.",
+            autocompletion=completion.actuators,
+        ),
     ] = None,
     json: JsonOption = False,
 ) -> None:
@@ -111,7 +117,12 @@ def parameters(
 @app.command()
 def faults(
     actuator: Annotated[
-        str | None, typer.Argument(metavar="[ACTUATOR]", help="Only the faults of this actuator.")
+        str | None,
+        typer.Argument(
+            metavar="[ACTUATOR]",
+            help="Only the faults of this actuator.",
+            autocompletion=completion.actuators,
+        ),
     ] = None,
     *,
     fidelity: OnlyFidelityOption = None,
@@ -191,7 +202,11 @@ def waveforms(*, json: JsonOption = False) -> None:
 def features(
     actuator: Annotated[
         str | None,
-        typer.Argument(metavar="[ACTUATOR]", help="Only what this actuator's signals allow."),
+        typer.Argument(
+            metavar="[ACTUATOR]",
+            help="Only what this actuator's signals allow.",
+            autocompletion=completion.actuators,
+        ),
     ] = None,
     *,
     fidelity: FidelityOption = "high",

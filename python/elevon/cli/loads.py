@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from elevon.cli.common import ForceOption, JsonOption
+from elevon.cli.common import ActuatorOption, ForceOption, JsonOption
 from elevon.cli.output import print_json, print_table, progress_bar, say
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def loads(
         typer.Argument(metavar="FLIGHT.csv", help="Columns with units; see docs/loads.md."),
     ],
     *,
-    actuator: Annotated[str, typer.Option(metavar="ACTUATOR", help="Name of a set or a file.")],
+    actuator: ActuatorOption,
     out: Annotated[
         Path,
         typer.Option(metavar="FILE", help=".csv: the table; .toml: a scenario that flies it."),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
@@ -13,7 +14,7 @@ from typing import Any
 import typer
 import typer.core
 
-from elevon.cli import interrupt
+from elevon.cli import completion, interrupt
 from elevon.cli.registry import COMMANDS
 from elevon.errors import ElevonError, ElevonWarning, Interrupted, nearest
 from elevon.files import journal
@@ -23,6 +24,9 @@ FAILED = 1
 
 # The root of the argument errors (bad option, missing argument, ...) of whichever click typer uses.
 _UsageError: Any = typer.BadParameter.__mro__[1]
+
+
+_ROOT_ONLY = ("install_completion", "show_completion")
 
 
 class LazyGroup(typer.core.TyperGroup):
@@ -40,6 +44,8 @@ class LazyGroup(typer.core.TyperGroup):
         app = importlib.import_module(command.module).app
         loaded = typer.main.get_command(app)
         loaded.name = cmd_name
+        # Completion is installed for the program, not for one of its commands.
+        loaded.params = [item for item in loaded.params if item.name not in _ROOT_ONLY]
         return loaded
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
@@ -64,7 +70,7 @@ app = typer.Typer(
     name="elevon",
     cls=LazyGroup,
     rich_markup_mode=None,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
     help="Models, faults, virtual bench and diagnosis of electromechanical actuators.",
 )
 
@@ -107,6 +113,8 @@ def run(argv: Sequence[str] | None = None) -> int:
 
 
 def _code(arguments: list[str]) -> int:
+    if os.environ.get("_ELEVON_COMPLETE") == "complete_bash":
+        completion.join_words()
     try:
         outcome = typer.main.get_command(app).main(
             args=arguments, prog_name="elevon", standalone_mode=False
@@ -183,7 +191,5 @@ def _fail(message: str, code: int) -> int:
 def _closed_pipe() -> int:
     # The reader (head, less) left: point stdout elsewhere so that the interpreter's last flush
     # does not complain.
-    import os
-
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return FAILED

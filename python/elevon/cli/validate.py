@@ -5,7 +5,6 @@ from __future__ import annotations
 import typer
 
 from elevon.cli.calibrate import (
-    ActuatorOption,
     CommandOption,
     DateOption,
     FidelityOption,
@@ -19,6 +18,7 @@ from elevon.cli.calibrate import (
 )
 from elevon.cli.closed_loop import read_loop_logs, read_recording, validate_closed_loop
 from elevon.cli.common import (
+    ActuatorOption,
     ForceOption,
     JsonOption,
     SetOption,

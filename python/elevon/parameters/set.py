@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
+    from elevon.report.cards import Html
+
 __all__ = ["ParameterSet"]
 
 
@@ -79,6 +81,15 @@ class ParameterSet(Mapping[str, Parameter]):
 
     def __repr__(self) -> str:
         return f"ParameterSet(wiring={self.wiring!r}, {len(self)} parameters, hash={self.hash})"
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self)
+
+    def _repr_html_(self) -> str:
+        from elevon.report.cards import card
+
+        facts = [("wiring", self.wiring), ("hash", self.hash)]
+        return card(f"{len(self)} parameters", facts, _table(self.values()))
 
     def __reduce__(self) -> tuple[type[ParameterSet], tuple[str, dict[str, Parameter]]]:
         return ParameterSet, (self.wiring, dict(self._items))
@@ -167,6 +178,13 @@ class ParameterSet(Mapping[str, Parameter]):
             lines = [self.wiring, *(f"{path}={item.value!r}" for path, item in self._items.items())]
             self._hash = hashlib.sha256("\n".join(lines).encode()).hexdigest()[:16]
         return self._hash
+
+
+def _table(parameters: Iterable[Parameter]) -> Html:
+    from elevon.report.cards import table
+
+    rows = [[p.path, p.text, p.confidence, p.source, p.note] for p in parameters]
+    return table(["parameter", "value", "confidence", "source", "note"], rows)
 
 
 def _default(wiring: str, path: str) -> Parameter:

@@ -15,6 +15,7 @@ from elevon.errors import InputError, unknown
 from elevon.files import atomic_path, check_output, write_text
 from elevon.recording.channel import Channel
 from elevon.recording.clock import Clock
+from elevon.recording.shown import shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 __all__ = ["plot"]
 
 PICTURES = (".png", ".svg", ".pdf")
-_SHOWN = {"rad": "deg", "rad/s": "rpm", "rad/s2": "deg/s2", "K": "degC"}
 _MOST_POINTS = 100_000
 """On a picture of some thousand pixels the extremes of this many slices look like all samples."""
 
@@ -73,7 +73,7 @@ def _panels(channels: list[Channel], units: Mapping[str, str]) -> list[_Panel]:
     """Group channels that share a clock and a unit."""
     panels: dict[tuple[str, str], _Panel] = {}
     for channel in channels:
-        unit = units.get(channel.name) or _SHOWN.get(channel.unit, channel.unit)
+        unit = units.get(channel.name) or shown_unit(channel.unit)
         key = (channel.clock.name, unit)
         panel = panels.setdefault(key, _Panel(unit, channel.clock, {}))
         panel.lines[channel.name] = channel.to(unit)

@@ -185,6 +185,14 @@ class Recording:
         clocks = ", ".join(repr(clock) for clock in self.clocks.values())
         return f"<Recording {self.status}: {len(self)} channels on [{clocks}]>"
 
+    def _repr_html_(self) -> str:
+        from elevon.recording.shown import recording_card
+
+        return recording_card(self)
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return self.names
+
     def clock(self, name: str | None = None) -> Clock:
         """Return a clock by name, or the only one.
 

@@ -285,6 +285,11 @@ class Scenario(_Frozen):
             data["fault"] = [fault.to_dict() for fault in self.fault]
         return data
 
+    def _repr_html_(self) -> str:
+        from elevon.scenario.shown import scenario_card
+
+        return scenario_card(self)
+
     @property
     def seconds(self) -> float:
         """The duration in s."""

@@ -6,12 +6,11 @@ import os
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from elevon.actuator import Actuator
-from elevon.errors import DivergedError, InputError, Interrupted
+from elevon.errors import ArgumentTypeError, DivergedError, InputError, Interrupted
 from elevon.memory import check_memory
 from elevon.recording import Clock, Recording
-from elevon.scenario import Scenario
 from elevon.simulate.acting import report
+from elevon.simulate.arguments import ActuatorLike, ScenarioLike
 from elevon.simulate.prepare import Features, Prepared, Record, Run, prepare, prepare_named
 from elevon.simulate.result import build_recording
 
@@ -28,8 +27,8 @@ Progress = Callable[[float], Any]
 
 
 def simulate(
-    actuator: Actuator,
-    scenario: Scenario,
+    actuator: ActuatorLike,
+    scenario: ScenarioLike = None,
     *,
     fidelity: str = "high",
     record: Record = None,
@@ -44,10 +43,11 @@ def simulate(
 
     Parameters
     ----------
-    actuator : Actuator
-        What moves.
-    scenario : Scenario
-        What it is asked, what acts on it, what breaks, for how long.
+    actuator : Actuator, str or path
+        What moves; a name or a path is loaded.
+    scenario : Scenario, mapping, path or None
+        What it is asked, what acts on it, what breaks, for how long: a `Scenario`, a mapping of the
+        same form as the file, or a file. None: the actuator's own default scenario.
     fidelity : str
         ``high`` or ``low``.
     record : str or sequence of str, optional
@@ -144,6 +144,12 @@ def simulate_batch(
     """
     if not runs:
         raise InputError("a batch needs at least one run")
+    for index, run in enumerate(runs):
+        if not isinstance(run, Run):
+            raise ArgumentTypeError(
+                f"runs[{index}]: a {type(run).__name__} is no run; expected elevon.Run(actuator, "
+                "scenario)"
+            )
     checked_threads(threads)
     prepared = [prepare_named(run, fidelity, record, len(runs) > 1, features) for run in runs]
     report([item.doubts for item in prepared], strict=strict)

@@ -17,6 +17,7 @@ from elevon.record_plan import MOST_STEPS, ClockPlan, record_plan
 from elevon.scenario import Scenario, compile_scenario
 from elevon.scenario.compile import signal_records
 from elevon.simulate.acting import Doubt, check_values, not_acting
+from elevon.simulate.arguments import ActuatorLike, ScenarioLike, as_actuator, as_scenario
 from elevon.simulate.stroke import check_stroke
 
 __all__ = [
@@ -34,16 +35,16 @@ Record = str | Sequence[str] | None
 Features = str | Sequence[str] | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Run:
     """One run of a batch.
 
     Attributes
     ----------
     actuator : Actuator
-        What moves.
+        What moves; the name of a set or a path is loaded.
     scenario : Scenario
-        What it is asked and what breaks.
+        What it is asked and what breaks; a dict or a path is read, None is the actuator's own.
     seed : int
         Of the random numbers.
     label : str
@@ -58,6 +59,20 @@ class Run:
     seed: int = 0
     label: str = ""
     number: int = 0
+
+    def __init__(
+        self,
+        actuator: ActuatorLike,
+        scenario: ScenarioLike = None,
+        seed: int = 0,
+        label: str = "",
+        number: int = 0,
+    ) -> None:
+        loaded = as_actuator(actuator)
+        asked = as_scenario(scenario, loaded)
+        pairs = {"actuator": loaded, "scenario": asked, "seed": seed, "label": label}
+        for name, value in {**pairs, "number": number}.items():
+            object.__setattr__(self, name, value)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,52 @@
+"""What a notebook shows of a recording, and the units a person reads."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elevon.report.cards import Html, badge, card, sparkline, table
+
+if TYPE_CHECKING:
+    from elevon.recording.channel import Channel
+    from elevon.recording.recording import Recording
+
+__all__ = ["recording_card", "shown_unit"]
+
+_SHOWN = {"rad": "deg", "rad/s": "rpm", "rad/s2": "deg/s2", "K": "degC"}
+
+
+def shown_unit(unit: str) -> str:
+    """Return the unit in which a person reads an SI quantity."""
+    return _SHOWN.get(unit, unit)
+
+
+def recording_card(recording: Recording) -> Html:
+    """Return the HTML view of a recording: status, clocks, a line and a curve a channel."""
+    meta = recording.meta
+    facts: list[tuple[str, object]] = [("", badge(recording.status))]
+    facts += [("", meta[name]) for name in ("message", "actuator", "fidelity") if meta.get(name)]
+    facts += [("clock", _clock(clock)) for clock in recording.clocks.values()]
+    rows = [_row(channel, len(recording.clocks) > 1) for channel in recording.channels]
+    head = ["channel", "unit", "least", "greatest", "last", "", "what it is"]
+    return card("Recording", facts, table(head, rows))
+
+
+def _clock(clock: object) -> str:
+    return repr(clock).removeprefix("Clock(").removesuffix(")")
+
+
+def _row(channel: Channel, name_clock: bool) -> list[object]:
+    unit = shown_unit(channel.unit)
+    values = channel.to(unit)
+    good = values[np.isfinite(values)]
+    numbers = (good.min(), good.max(), values[-1]) if good.size else ("", "", "")
+    text = f"{channel.text} [{channel.clock.name}]" if name_clock else channel.text
+    return [
+        channel.name,
+        "" if unit == "1" else unit,
+        *(number if isinstance(number, str) else f"{number:.5g}" for number in numbers),
+        sparkline(values),
+        text,
+    ]

@@ -1,0 +1,73 @@
+"""What a caller may give as an actuator and as a scenario, brought into one form."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+from elevon.actuator import Actuator
+from elevon.errors import ArgumentTypeError, InputError
+from elevon.scenario import Scenario
+
+__all__ = ["ActuatorLike", "ScenarioLike", "as_actuator", "as_scenario"]
+
+ActuatorLike = Actuator | str | os.PathLike[str]
+ScenarioLike = Scenario | Mapping[str, Any] | str | os.PathLike[str] | None
+
+
+def as_actuator(given: ActuatorLike, place: str = "actuator") -> Actuator:
+    """Return an actuator: as given, or loaded by its name or from its file.
+
+    Raises
+    ------
+    ArgumentTypeError
+        Something else was given; the message says what is expected.
+    InputError
+        No such set, or a wrong file.
+    """
+    if isinstance(given, Actuator):
+        return given
+    if isinstance(given, (str, os.PathLike)):
+        return Actuator.load(given)
+    raise ArgumentTypeError(
+        f"{place}: {_kind(given)} is no actuator; expected an Actuator, the name of a set "
+        "('torino-rotary') or the path of a TOML file"
+    )
+
+
+def as_scenario(given: ScenarioLike, actuator: Actuator, place: str = "scenario") -> Scenario:
+    """Return a scenario: as given, of a mapping, from a file; None means the actuator's own.
+
+    Raises
+    ------
+    ArgumentTypeError
+        Something else was given; the message says what is expected.
+    InputError
+        The mapping or the file is wrong, or the actuator has no scenario of its own.
+    """
+    if isinstance(given, Scenario):
+        return given
+    if given is None:
+        return _own(actuator)
+    if isinstance(given, Mapping):
+        return Scenario.from_dict(given, place)
+    if isinstance(given, (str, os.PathLike)):
+        return Scenario.load(given)
+    raise ArgumentTypeError(
+        f"{place}: {_kind(given)} is no scenario; expected a Scenario, a dict of a scenario file's "
+        "form, the path of a TOML file, or None for the actuator's own"
+    )
+
+
+def _own(actuator: Actuator) -> Scenario:
+    if actuator.default_scenario is None:
+        raise InputError(
+            f"{actuator.name} has no scenario of its own; give one (command line: --scenario FILE)"
+        )
+    return Scenario.from_dict(actuator.default_scenario, f"{actuator.name}: scenario")
+
+
+def _kind(given: object) -> str:
+    name = type(given).__name__
+    return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
