@@ -24,6 +24,7 @@ ROWS = [
     ["bench", "campaign", "calibrate", "compare"],
     ["lowfit", "analysis", "benchmark", "compare_loads"],
     ["diagnose"],
+    ["prognose"],
     ["reproduce"],
     ["demo"],
     ["cli"],

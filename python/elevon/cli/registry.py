@@ -39,6 +39,7 @@ COMMANDS: dict[str, Command] = {
         "elevon.cli.validate", "Check an actuator against logs it was not fitted to."
     ),
     "diagnose": Command("elevon.cli.diagnose", "Say what is wrong, where, how bad, how sure."),
+    "predict": Command("elevon.cli.predict", "Say how long a unit will do what it must."),
     "demo": Command("elevon.cli.demo", "Find a bench's hidden values from its logs; one report."),
     "reproduce": Command("elevon.cli.reproduce", "Recompute a published table or figure."),
 }

@@ -27,7 +27,7 @@ from elevon.series import check_series, read_series
 from elevon.units import parse_quantity
 from elevon.waveforms import TABLE, wave_records
 
-__all__ = ["Action", "Command", "Load", "Scenario", "Term", "Terms"]
+__all__ = ["Action", "Command", "Load", "Scenario", "Term", "Terms", "located"]
 
 Quantity = StrictInt | StrictFloat | StrictStr
 
@@ -265,7 +265,7 @@ class Scenario(_Frozen):
             The message lists every finding with file, line, key, limit and the nearest names.
         """
         document = read_toml(Path(path))
-        return validated(cls, _located(document.data, document.folder), document)
+        return validated(cls, located(document.data, document.folder), document)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], place: str = "scenario") -> Scenario:
@@ -304,15 +304,15 @@ class Scenario(_Frozen):
         return self.replaced(fault=[*self.fault, *faults])
 
 
-def _located(data: Any, folder: Path | None) -> Any:
+def located(data: Any, folder: Path | None) -> Any:
     """Make the files named in tables relative to the scenario's folder."""
     if isinstance(data, list):
-        return [_located(item, folder) for item in data]
+        return [located(item, folder) for item in data]
     if not isinstance(data, dict):
         return data
     return {
         key: str((folder / item).resolve())
         if key == "file" and isinstance(item, str) and folder is not None
-        else _located(item, folder)
+        else located(item, folder)
         for key, item in data.items()
     }

@@ -1,0 +1,35 @@
+"""Prognosis: growth of faults with use, and how long an actuator will do what it must.
+
+>>> from elevon.prognose import Mission, predict
+>>> mission = Mission.load("mission.toml")  # doctest: +SKIP
+>>> result = predict(inspections, actuator, mission)  # doctest: +SKIP
+>>> result.median, result.interval  # doctest: +SKIP
+"""
+
+from elevon.prognose.answer import Prognosis
+from elevon.prognose.law import Coefficient, Law
+from elevon.prognose.laws import LAWS
+from elevon.prognose.mission import Mission
+from elevon.prognose.observation import Inspection, Seen, inspection
+from elevon.prognose.particle import ParticleFilter
+from elevon.prognose.predict import predict
+from elevon.prognose.process import Process
+from elevon.prognose.response import Response, respond
+from elevon.prognose.unscented import UnscentedFilter
+
+__all__ = [
+    "LAWS",
+    "Coefficient",
+    "Inspection",
+    "Law",
+    "Mission",
+    "ParticleFilter",
+    "Process",
+    "Prognosis",
+    "Response",
+    "Seen",
+    "UnscentedFilter",
+    "inspection",
+    "predict",
+    "respond",
+]

@@ -1,0 +1,124 @@
+"""Monte Carlo of what is to come: when each possible unit fails, and which requirement first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.prognose.mission import Usage
+from elevon.prognose.process import Population, Process
+
+__all__ = ["Future", "look_ahead"]
+
+Floats = npt.NDArray[np.float64]
+_STEP = 0.01  # of the way to the greatest severity, for the fastest tenth of the units alive
+_MOST_STEPS = 1500
+_FARTHEST = 1e7  # repetitions: beyond, no end of life is in sight
+_QUANTILES = (0.05, 0.5, 0.95)
+
+
+@dataclass(frozen=True)
+class Future:
+    """Ends of life.
+
+    Attributes
+    ----------
+    usage : float
+        Use at which the prediction was made.
+    end : ndarray, shape (n,)
+        Use at the end of life; infinite where none is in sight.
+    first : ndarray of int, shape (n,)
+        Requirement that failed first; -1 where none did.
+    at : ndarray, shape (s,)
+        Uses at which the severities' course is kept.
+    course : ndarray, shape (s, k, 3)
+        5, 50, 95 % of the severities, of units that failed as they were then.
+    """
+
+    usage: float
+    end: Floats
+    first: npt.NDArray[np.intp]
+    at: Floats
+    course: Floats
+
+    @property
+    def remaining(self) -> Floats:
+        """Remaining useful life of each sample, 0 or more."""
+        return np.maximum(self.end - self.usage, 0.0)
+
+
+def look_ahead(
+    process: Process, units: Population, usage: Usage, rng: np.random.Generator
+) -> Future:
+    """Let units of equal weight be used until they fail.
+
+    Parameters
+    ----------
+    process : Process
+        How they grow.
+    units : Population
+        Now; weights are not used.
+    usage : Usage
+        Of the future: the factor on the loads is drawn once a unit.
+    rng : Generator
+        Of chance.
+    """
+    count = len(units.weight)
+    load = usage.load * np.exp(usage.load_spread * rng.standard_normal(count))
+    end, first = np.full(count, np.inf), np.full(count, -1, dtype=np.intp)
+    damage = units.damage.copy()
+    alive = np.arange(count)
+    reserve = process.response.reserve(process.severity(units.damage))
+    dead = reserve.min(axis=0) < 0.0
+    end[dead], first[dead] = units.usage, reserve[:, dead].argmin(axis=0)
+    alive, reserve = alive[~dead], reserve[:, ~dead]
+    now = _part(units, ~dead)
+    at, course = [units.usage], [_quantiles(process, damage)]
+    for _ in range(_MOST_STEPS):
+        if not len(alive) or now.usage - units.usage > _FARTHEST:
+            break
+        step = _step(process, now, load[alive])
+        later = process.advance(now, step, rng, load[alive])
+        after = process.response.reserve(process.severity(later.damage))
+        failed = after.min(axis=0) < 0.0
+        if failed.any():
+            share, which = _crossing(reserve[:, failed], after[:, failed])
+            end[alive[failed]], first[alive[failed]] = now.usage + share * step, which
+        damage[alive] = later.damage
+        at.append(later.usage)
+        course.append(_quantiles(process, damage))
+        alive, reserve, now = alive[~failed], after[:, ~failed], _part(later, ~failed)
+    return Future(units.usage, end, first, np.array(at), np.array(course))
+
+
+def _part(units: Population, keep: npt.NDArray[np.bool_]) -> Population:
+    return replace(
+        units,
+        damage=units.damage[keep],
+        growth=units.growth[keep],
+        bias=units.bias[keep],
+        weight=units.weight[keep],
+    )
+
+
+def _step(process: Process, units: Population, load: Floats) -> float:
+    """Repetitions in which the fastest units go a hundredth of the way to the greatest severity."""
+    rate = np.quantile(process.rate(units.damage, units.growth, load), 0.9, axis=0)
+    way = np.array([law.damage(np.array([law.highest]))[0] - law.start for law in process.laws])
+    with np.errstate(divide="ignore"):
+        return float(min(np.min(_STEP * way / rate), 0.1 * _FARTHEST))
+
+
+def _crossing(before: Floats, after: Floats) -> tuple[Floats, npt.NDArray[np.intp]]:
+    """Return the share of the step at which the first reserve is gone, and which it is."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(after < 0.0, before / (before - after), np.inf)
+    which = share.argmin(axis=0)
+    return np.clip(share.min(axis=0), 0.0, 1.0), which
+
+
+def _quantiles(process: Process, damage: Floats) -> Floats:
+    severity = process.severity(damage)
+    return np.asarray(np.quantile(severity, _QUANTILES, axis=0)).T

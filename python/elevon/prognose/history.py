@@ -1,0 +1,262 @@
+"""A folder of dated logs or diagnoses of one unit.
+
+Each inspection is a JSON file with the stamp ``usage`` (how much the unit had been used) and
+``unit`` (flights, landings, cycles, hours), and optionally ``date`` (ISO), ``serial``, ``reset``
+(list of ``KIND@PLACE`` whose part was made new after it). Either it is the JSON object of
+``elevon diagnose`` with the stamp added, or it names the logs to be diagnosed: ``logs`` (list of
+files in the folder). ``healthy: true`` marks logs that serve as baseline.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date as calendar
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from elevon.errors import FormatError, InputError
+from elevon.prognose.mission import UNITS_OF_USE
+from elevon.prognose.observation import Inspection, inspection
+from elevon.prognose.predict import check_order
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.prognose.law import Law
+
+__all__ = ["Entry", "History", "diagnosed", "read_history", "write_stamp"]
+
+_KEYS = frozenset({"usage", "unit", "date", "serial", "reset", "logs", "healthy"})
+_OF_DIAGNOSIS = frozenset(
+    {
+        "status", "p_fault", "false_alarm", "chance", "faults", "best", "unobservable",
+        "detectable", "evidence", "findings", "seconds", "method",
+    }
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One file of a history.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    usage : float
+        Use at it.
+    date, serial : str
+        Empty where not said.
+    reset : tuple of str
+        Parts made new after it.
+    diagnosis : mapping or None
+        None where logs are to be diagnosed.
+    logs : tuple of Path
+        Those logs.
+    healthy : bool
+        Whether they serve as baseline.
+    """
+
+    path: Path
+    usage: float
+    date: str
+    serial: str
+    reset: tuple[str, ...]
+    diagnosis: Mapping[str, Any] | None
+    logs: tuple[Path, ...]
+    healthy: bool
+
+
+@dataclass(frozen=True)
+class History:
+    """Inspections of one unit in the order of use; ``unit`` is that of use."""
+
+    entries: tuple[Entry, ...]
+    unit: str
+    serial: str
+
+    def inspections(self, laws: Sequence[Law]) -> list[Inspection]:
+        """Return what the filters take; every entry must have its diagnosis."""
+        out = []
+        for entry in self.entries:
+            if entry.diagnosis is None:
+                raise InputError(f"{entry.path.name}: its logs have not been diagnosed")
+            out.append(
+                inspection(
+                    entry.diagnosis,
+                    laws,
+                    usage=entry.usage,
+                    name=entry.path.name,
+                    date=entry.date,
+                    reset=entry.reset,
+                )
+            )
+        return out
+
+
+def read_history(folder: str | Path, *, unit: str) -> History:
+    """Read a folder.
+
+    Parameters
+    ----------
+    folder : path
+        Its ``*.json`` with a key ``usage`` are the inspections; other files are left alone.
+    unit : str
+        Of use, as the mission counts it.
+
+    Raises
+    ------
+    InputError
+        No inspections, two units of use or two serial numbers, another unit of use than the
+        mission's, an order of dates against that of use, a log that is missing.
+    FormatError
+        A file that is not JSON, or a stamp that is not one.
+    """
+    place = Path(folder).expanduser()
+    if not place.is_dir():
+        raise InputError(f"{place}: is not a folder")
+    entries = [e for path in sorted(place.glob("*.json")) if (e := _entry(path)) is not None]
+    if not entries:
+        raise InputError(
+            f"{place}: no inspections: no *.json in it has the key 'usage' "
+            "(the JSON of `elevon diagnose` with `usage` and `unit` added)"
+        )
+    read = [entry for entry, _ in entries]
+    _one(place, "unit of use", {e.path.name: u for e, u in entries}, "histories are not mixed")
+    used = entries[0][1]
+    if used != unit:
+        raise InputError(f"{place}: is counted in {used}, the mission in {unit}")
+    serials = {e.path.name: e.serial for e in read if e.serial}
+    _one(place, "unit", serials, "a history is that of one unit")
+    dated = sorted(
+        read, key=lambda e: (e.date, e.usage) if all(x.date for x in read) else ("", e.usage)
+    )
+    check_order([Inspection(e.usage, {}, (), e.path.name, e.date) for e in dated])
+    return History(tuple(dated), unit, next(iter(serials.values()), ""))
+
+
+def _one(place: Path, what: str, names: Mapping[str, str], why: str) -> None:
+    values = list(dict.fromkeys(names.values()))
+    if len(values) > 1:
+        first = next(name for name, v in names.items() if v == values[0])
+        other = next(name for name, v in names.items() if v == values[1])
+        raise InputError(
+            f"{place}: more than one {what}: {values[0]} ({first}) and {values[1]} ({other}); {why}"
+        )
+
+
+def _entry(path: Path) -> tuple[Entry, str] | None:
+    try:
+        data = json.loads(path.read_text("utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise FormatError(f"{path}: is not JSON: {error}") from error
+    if not isinstance(data, dict) or "usage" not in data:
+        return None
+    usage = data["usage"]
+    if isinstance(usage, bool) or not isinstance(usage, (int, float)) or not 0 <= usage < 1e15:
+        raise FormatError(f"{path}: usage = {usage!r} is not a number, 0 or more")
+    unit = data.get("unit")
+    if unit not in UNITS_OF_USE:
+        raise FormatError(f"{path}: unit = {unit!r} is none of {', '.join(UNITS_OF_USE)}")
+    logs = tuple(path.parent / str(name) for name in _texts(path, data, "logs"))
+    diagnosis = None if logs else data
+    if diagnosis is not None and "faults" not in data:
+        raise FormatError(f"{path}: has neither 'faults' (a diagnosis) nor 'logs' to be diagnosed")
+    _check_keys(path, data)
+    missing = next((log for log in logs if not log.is_file()), None)
+    if missing is not None:
+        raise InputError(f"{path}: the log {missing.name} is not there")
+    entry = Entry(
+        path,
+        float(usage),
+        _date(path, data.get("date", "")),
+        str(data.get("serial", "")),
+        tuple(_texts(path, data, "reset")),
+        diagnosis,
+        logs,
+        bool(data.get("healthy", False)),
+    )
+    return entry, str(unit)
+
+
+def _check_keys(path: Path, data: Mapping[str, Any]) -> None:
+    from elevon.errors import did_you_mean
+
+    known = _KEYS | _OF_DIAGNOSIS
+    for key in data:
+        if key not in known:
+            hint = did_you_mean(key, sorted(_KEYS))
+            raise FormatError(f"{path}: unknown key {key!r}{hint}")
+
+
+def _texts(path: Path, data: Mapping[str, Any], key: str) -> list[str]:
+    given = data.get(key, [])
+    # The JSON of a diagnosis lists its own logs; they are only to be diagnosed where it has none.
+    if key == "logs" and "faults" in data:
+        return []
+    if not isinstance(given, list) or not all(isinstance(item, str) for item in given):
+        raise FormatError(f"{path}: {key} = {given!r} is not a list of texts")
+    return given
+
+
+def _date(path: Path, given: Any) -> str:
+    if not given:
+        return ""
+    try:
+        return calendar.fromisoformat(str(given)).isoformat()
+    except ValueError as error:
+        raise FormatError(f"{path}: date = {given!r} is not of the form 2026-11-22") from error
+
+
+def diagnosed(
+    history: History,
+    actuator: Actuator,
+    *,
+    progress: Callable[[float], Any] | None = None,
+) -> History:
+    """Diagnose the logs of a history that stand there without their diagnosis.
+
+    Logs marked healthy serve as baseline for all.
+    """
+    from dataclasses import replace
+
+    from elevon.diagnose.bymodel import diagnose, read_test_logs
+
+    if all(entry.diagnosis is not None for entry in history.entries):
+        return history
+    healthy = [log for entry in history.entries if entry.healthy for log in entry.logs]
+    baselines = read_test_logs(healthy) if healthy else []
+    out = []
+    for k, entry in enumerate(history.entries):
+        if entry.diagnosis is None:
+            logs = read_test_logs(entry.logs)
+            answer = diagnose(logs, actuator, baselines=baselines)
+            entry = replace(entry, diagnosis=answer.to_dict())  # noqa: PLW2901
+        out.append(entry)
+        if progress is not None:
+            progress((k + 1) / len(history.entries))
+    return replace(history, entries=tuple(out))
+
+
+def write_stamp(
+    path: str | Path,
+    data: Mapping[str, Any],
+    *,
+    usage: float,
+    unit: str,
+    serial: str = "",
+    date: str = "",
+    force: bool = False,
+) -> Path:
+    """Write an inspection: a diagnosis or ``{"logs": [...]}``, with its stamp."""
+    from elevon.files import write_text
+
+    stamp: dict[str, Any] = {"usage": usage, "unit": unit}
+    if serial:
+        stamp["serial"] = serial
+    if date:
+        stamp["date"] = date
+    return write_text(path, json.dumps({**stamp, **data}, indent=1) + "\n", force=force)

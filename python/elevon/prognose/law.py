@@ -1,0 +1,149 @@
+"""A degradation law: how fast a fault's severity grows with use, and how evenly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.errors import RangeError, unknown
+
+__all__ = ["DRIVERS", "Coefficient", "Law"]
+
+Floats = npt.NDArray[np.float64]
+Rate = Callable[[Floats, Mapping[str, Floats], Mapping[str, float]], Floats]
+
+#: What one repetition of a mission does to the actuator: name to unit and text.
+DRIVERS: dict[str, tuple[str, str]] = {
+    "hours": ("h", "time in use"),
+    "friction_work": ("J", "work that friction turned into heat"),
+    "shaft_travel": ("rad", "way of the motor's shaft"),
+    "torque_cubic_mean": ("N m", "cubic mean of the motor torque over the shaft's way"),
+    "winding_temperature": ("K", "winding temperature that ages as the whole mission does"),
+    "surface_temperature": ("K", "mean temperature of the motor's surface"),
+}
+
+
+def _same(values: Floats) -> Floats:
+    return values
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """A number of a law.
+
+    Attributes
+    ----------
+    value : float
+        In `unit`.
+    unit : str
+        SI, but for hours.
+    source : str
+        Where it comes from; ``ASSUMED:`` and the reason where nowhere.
+    """
+
+    value: float
+    unit: str
+    source: str
+
+
+@dataclass(frozen=True)
+class Law:
+    """Growth of one fault.
+
+    A law has one state, the *damage*. Its mean growth in one repetition of the mission is ``rate``
+    times a factor that belongs to the unit and that histories tell; about the mean it grows as a
+    gamma process, which never heals. `severity` turns damage into the fault's severity.
+
+    Attributes
+    ----------
+    name, text, source : str
+        Name, meaning, and who found the law.
+    kind, place, unit : str
+        The fault it drives, of the catalogue; the severity's unit.
+    rate : callable
+        Damage, shape (n,), drivers of the mission by name, shape (n,) each, and coefficients by
+        name, to damage a repetition, shape (n,), never negative.
+    drivers : tuple of str
+        Keys of `DRIVERS` that it reads.
+    coefficients : mapping of str to Coefficient
+        Its numbers.
+    spread : float
+        Deviation of the logarithm of the unit's own factor before anything is known of it.
+    grain : float
+        Scale of the gamma process [damage]: growth by D has the variance D times `grain`.
+    start : float
+        Damage of a new unit. What a unit starts from spreads about it by `start_spread`.
+    start_spread : float
+        Deviation of the damage at the start (never below zero damage).
+    severity, damage : callable
+        Damage to severity and back, shape (n,) to (n,), both rising.
+    highest : float
+        Greatest severity that predictions look at [unit].
+    """
+
+    name: str
+    text: str
+    source: str
+    kind: str
+    place: str
+    unit: str
+    rate: Rate
+    drivers: tuple[str, ...]
+    coefficients: Mapping[str, Coefficient]
+    highest: float
+    spread: float = 0.8
+    grain: float = 0.0
+    start: float = 0.0
+    start_spread: float = 0.0
+    severity: Callable[[Floats], Floats] = field(default=_same)
+    damage: Callable[[Floats], Floats] = field(default=_same)
+
+    def __post_init__(self) -> None:
+        for name in self.drivers:
+            if name not in DRIVERS:
+                raise unknown("driver", name, DRIVERS, f"law {self.name}")
+        for name in ("spread", "grain", "start", "start_spread"):
+            _not_negative(f"law {self.name}: {name}", getattr(self, name))
+        if not self.highest > 0.0:
+            raise RangeError(f"law {self.name}: highest = {self.highest:g} must be above 0")
+
+    @property
+    def key(self) -> str:
+        """``KIND@PLACE`` of its fault."""
+        return f"{self.kind}@{self.place}"
+
+    def growth(self, damage: Floats, drivers: Mapping[str, Floats]) -> Floats:
+        """Return the mean growth of the damage in one repetition, shape (n,)."""
+        values = {name: item.value for name, item in self.coefficients.items()}
+        return np.maximum(self.rate(damage, drivers, values), 0.0)
+
+    def with_values(
+        self,
+        values: Mapping[str, float],
+        *,
+        place: str | None = None,
+        source: str = "given",
+        **fields: Any,
+    ) -> Law:
+        """Return the law with other coefficients, place, spread, grain, start, ...
+
+        Raises
+        ------
+        UnknownNameError
+            It has no coefficient of that name.
+        """
+        numbers = dict(self.coefficients)
+        for name, value in values.items():
+            if name not in numbers:
+                raise unknown("coefficient", name, numbers, f"law {self.name}")
+            numbers[name] = replace(numbers[name], value=float(value), source=source)
+        return replace(self, coefficients=numbers, place=place or self.place, **fields)
+
+
+def _not_negative(name: str, value: float) -> None:
+    if not (np.isfinite(value) and value >= 0.0):
+        raise RangeError(f"{name} = {value:g} must be a finite number, 0 or more")

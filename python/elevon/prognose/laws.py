@@ -1,0 +1,202 @@
+"""The degradation laws that come with the package.
+
+Forms are those of the literature; where the numbers of a law come from is said beside each of
+them. Most are ASSUMED, since no published set of an actuator's growth rates exists: they set the
+scale of a life, the diagnoses of the unit then say its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.errors import unknown
+from elevon.prognose.law import Coefficient, Law
+
+__all__ = ["LAWS", "find_law"]
+
+Floats = npt.NDArray[np.float64]
+Drivers = Mapping[str, Floats]
+Values = Mapping[str, float]
+
+
+def _archard(_damage: Floats, drivers: Drivers, c: Values) -> Floats:
+    return c["wear"] * drivers["friction_work"]
+
+
+def _lubricant(_damage: Floats, drivers: Drivers, c: Values) -> Floats:
+    hot = np.maximum(drivers["surface_temperature"] - c["threshold"], 0.0)
+    return c["loss"] * drivers["friction_work"] * 2.0 ** (hot / c["halving"])
+
+
+def _insulation(damage: Floats, drivers: Drivers, c: Values) -> Floats:
+    own = c["own_heat"] * _shorted(damage)
+    hot = np.maximum(drivers["winding_temperature"] + own, 1.0)
+    ageing = np.exp(c["activation"] * (1.0 / c["index_temperature"] - 1.0 / hot))
+    pace = np.where(damage < 1.0, 1.0, c["after_contact"])
+    return pace * ageing * drivers["hours"] / c["index_life"]
+
+
+_FIRST_TURN = 0.01  # share of a phase's turns; ASSUMED: one turn of a winding of about a hundred
+
+
+def _shorted(damage: Floats) -> Floats:
+    """Damage 1 is the first contact; from there each e-fold of turns is one more."""
+    grown = _FIRST_TURN * np.exp(np.minimum(damage - 1.0, 50.0))
+    return np.where(damage < 1.0, 0.0, grown)
+
+
+def _short_damage(severity: Floats) -> Floats:
+    with np.errstate(divide="ignore"):
+        grown = 1.0 + np.log(np.maximum(severity, 1e-300) / _FIRST_TURN)
+    return np.where(severity < _FIRST_TURN, 0.0, grown)
+
+
+def _magnets(damage: Floats, drivers: Drivers, c: Values) -> Floats:
+    temperature = np.maximum(drivers["winding_temperature"], 1.0)
+    pace = np.exp(c["activation"] * (1.0 / c["reference_temperature"] - 1.0 / temperature))
+    return c["loss"] * drivers["hours"] * pace * np.maximum(1.0 - damage, 0.0)
+
+
+def _bearing(damage: Floats, drivers: Drivers, c: Values) -> Floats:
+    return c["wear"] * drivers["shaft_travel"] * (1.0 + c["pull"] * damage)
+
+
+def _spall(damage: Floats, drivers: Drivers, c: Values) -> Floats:
+    turns = drivers["shaft_travel"] / (2.0 * np.pi)
+    load = (drivers["torque_cubic_mean"] / c["reference_torque"]) ** 3
+    size = np.maximum(damage, c["seed"]) / c["seed"]
+    return c["growth"] * turns * load * size ** (0.5 * c["exponent"])
+
+
+_WEAR = Law(
+    name="gear_wear",
+    text="play of the gear from the friction work done in it",
+    source="Archard 1953: worn volume is proportional to load times sliding way, hence to "
+           "friction work",
+    kind="play", place="transmission", unit="rad",
+    rate=_archard, drivers=("friction_work",), highest=0.03,
+    coefficients={
+        "wear": Coefficient(
+            2e-10, "rad/J",
+            "ASSUMED: 5e-16 m3/(N m) of a lubricated steel pair (Archard, Rabinowicz: 1e-16 to "
+            "1e-14), friction 0.1, flanks of 6 cm2 at 44 mm from the axis",
+        )
+    },
+    grain=4e-5,
+)  # fmt: skip
+
+LAWS: dict[str, Law] = {
+    "gear_wear": _WEAR,
+    "screw_wear": Law(
+        name="screw_wear",
+        text="play of the screw and its nut from the friction work done in them",
+        source=_WEAR.source,
+        kind="play", place="transmission", unit="m",
+        rate=_archard, drivers=("friction_work",), highest=1e-3,
+        coefficients={
+            "wear": Coefficient(
+                2e-11, "m/J",
+                "ASSUMED: 1e-15 m3/(N m), friction 0.05, balls and grooves of 10 cm2",
+            )
+        },
+        grain=1.5e-6,
+    ),
+    "lubricant_loss": Law(
+        name="lubricant_loss",
+        text="dry friction that grows as the lubricant is worked out and ages",
+        source="loss by work: ASSUMED (friction work shears and drives out the grease); ageing: "
+               "grease life halves for each 15 K above 70 C (bearing makers' rule)",
+        kind="friction", place="transmission", unit="1",
+        rate=_lubricant, drivers=("friction_work", "surface_temperature"), highest=6.0,
+        coefficients={
+            "loss": Coefficient(2e-8, "1/J", "ASSUMED: friction doubles in 35 MJ of friction work"),
+            "threshold": Coefficient(343.15, "K", "bearing makers' rule: 70 C"),
+            "halving": Coefficient(15.0, "K", "bearing makers' rule"),
+        },
+        grain=4e-3,
+    ),
+    "insulation": Law(
+        name="insulation",
+        text="insulation ages with the winding's temperature (damage 0 to 1); from the first "
+             "turn-to-turn contact on the short grows, faster by its own heat",
+        source="Dakin 1948 (Arrhenius), Montsinger 1930 (10 K rule); growth after contact ASSUMED "
+               "exponential in the shorted turns",
+        kind="short", place="motor.phase_a", unit="1",
+        rate=_insulation, drivers=("hours", "winding_temperature"), highest=0.6,
+        coefficients={
+            "index_life": Coefficient(20000.0, "h", "IEC 60216: the thermal index is at 20 000 h"),
+            "index_temperature": Coefficient(428.15, "K", "IEC 60085: class F, 155 C"),
+            "activation": Coefficient(
+                12700.0, "K", "life halves for 10 K at 155 C: ln 2 (428 K)2 / 10 K (1.09 eV)"
+            ),
+            "after_contact": Coefficient(
+                20.0, "1", "ASSUMED: a short of a low-voltage winding that takes weeks, not minutes"
+            ),
+            "own_heat": Coefficient(
+                80.0, "K", "ASSUMED: rise of the spot's temperature per unit of shorted share"
+            ),
+        },
+        grain=0.01, start=0.0, start_spread=0.3,
+        severity=_shorted, damage=_short_damage,
+    ),
+    "demagnetisation": Law(
+        name="demagnetisation",
+        text="magnets lose flux by heat",
+        source="thermally activated, irreversible loss (Street and Woolley 1949), as a constant "
+               "rate at a temperature: ASSUMED",
+        kind="demagnetisation", place="motor", unit="1",
+        rate=_magnets, drivers=("hours", "winding_temperature"), highest=0.4,
+        coefficients={
+            "loss": Coefficient(1e-6, "1/h", "ASSUMED: 2 % in 20 000 h at 120 C"),
+            "reference_temperature": Coefficient(393.15, "K", "ASSUMED: 120 C"),
+            "activation": Coefficient(11600.0, "K", "ASSUMED: 1 eV"),
+        },
+        grain=3e-4,
+    ),
+    "bearing_wear": Law(
+        name="bearing_wear",
+        text="clearance of the bearings, and the rotor out of centre in it",
+        source="Archard 1953, with the way of the shaft at constant load; the magnets' pull adds "
+               "to the load in proportion to the eccentricity",
+        kind="eccentricity_static", place="motor", unit="1",
+        rate=_bearing, drivers=("shaft_travel",), highest=0.6,
+        coefficients={
+            "wear": Coefficient(1e-9, "1/rad", "ASSUMED: a tenth of the air gap in 1e8 rad"),
+            "pull": Coefficient(3.0, "1", "ASSUMED: the pull at contact is three times the weight"),
+        },
+        grain=5e-4,
+    ),
+    "spall": Law(
+        name="spall",
+        text="spall of the outer ring, from a seed",
+        source="Paris and Erdogan 1963: growth a cycle as a power of the stress intensity, which "
+               "goes with load and root of length; load cubed as in the life of ball bearings "
+               "(Lundberg and Palmgren 1947)",
+        kind="bearing", place="bearing.outer", unit="m",
+        rate=_spall, drivers=("shaft_travel", "torque_cubic_mean"), highest=4e-3,
+        coefficients={
+            "growth": Coefficient(2e-11, "m", "ASSUMED: a seed doubles in 2.5 million turns"),
+            "reference_torque": Coefficient(1.0, "N m", "ASSUMED: where `growth` is given"),
+            "seed": Coefficient(5e-5, "m", "ASSUMED: smallest spall that is not closed again"),
+            "exponent": Coefficient(2.0, "1", "ASSUMED: Paris exponents of steel are 2 to 4"),
+        },
+        start=5e-5, start_spread=2e-5, grain=4e-6,
+    ),
+}  # fmt: skip
+"""Name to law."""
+
+
+def find_law(name: str, place: str = "law") -> Law:
+    """Return a law of the package.
+
+    Raises
+    ------
+    UnknownNameError
+        None of that name; the nearest are named.
+    """
+    if name not in LAWS:
+        raise unknown("law", name, LAWS, place)
+    return LAWS[name]

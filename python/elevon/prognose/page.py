@@ -1,0 +1,123 @@
+"""The page of a prognosis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elevon.prognose.answer import survival
+from elevon.prognose.figures import course_figure, shown_unit, survival_figure
+from elevon.prognose.observation import Inspection
+from elevon.report import Report, Table
+from elevon.units import to_display
+
+if TYPE_CHECKING:
+    from elevon.prognose.answer import Prognosis
+    from elevon.prognose.law import Law
+
+__all__ = ["prognosis_page", "sentence"]
+
+
+def sentence(result: Prognosis) -> str:
+    """Return the answer in one sentence."""
+    low, high = result.interval
+    if not np.isfinite(result.median):
+        return (
+            f"No end of life is in sight in more than half of the futures; the shortest "
+            f"{0.5 * (1.0 - result.level):.0%} end within {low:.4g} {result.unit}."
+        )
+    name, share = next(iter(result.first.items()))
+    upper = f"{high:.4g}" if np.isfinite(high) else "no end in sight"
+    return (
+        f"{result.median:.4g} {result.unit} remain ({result.level:.0%}: {low:.4g} to {upper}); "
+        f"{name} fails first in {share:.0%} of the futures."
+    )
+
+
+def prognosis_page(
+    result: Prognosis,
+    inspections: Sequence[Inspection],
+    laws: Sequence[Law],
+    *,
+    actuator: str,
+    date: str | None = None,
+) -> Report:
+    """Return the report of a prognosis."""
+    name = f"{actuator} {result.serial}".strip()
+    report = Report(f"Remaining life of {name}", sentence(result), date=date)
+    future = report.section("What is to come")
+    future.figure(
+        course_figure(result, inspections, laws),
+        "Severities that the inspections saw, and those to come: median and 90 % of the futures.",
+    )
+    future.figure(
+        survival_figure(result),
+        "Probability of surviving the next N; lines: median and interval of the remaining life.",
+    )
+    rows = [(n, p) for n, p in survival(result)]
+    future.table(Table((f"next N {result.unit}", "probability"), rows, digits=3))
+    _requirements(report, result)
+    _faults(report, result)
+    if result.findings:
+        report.section("Findings").points(result.findings)
+    _laws(report, laws)
+    return report
+
+
+def _requirements(report: Report, result: Prognosis) -> None:
+    rows = []
+    for item in result.reserve:
+        unit = shown_unit(item["unit"])
+        rows.append(
+            (
+                item["name"],
+                to_display(item["value"], unit),
+                to_display(item["threshold"], unit),
+                unit,
+                100.0 * result.first[item["name"]],
+            )
+        )
+    report.section("What must hold").table(
+        Table(
+            ("requirement", "now", "life ends at", "unit", "fails first [%]"),
+            rows,
+            "Evaluated with the model at the median severities; the limit includes its margin.",
+            digits=4,
+        )
+    )
+
+
+def _faults(report: Report, result: Prognosis) -> None:
+    rows = []
+    for item in result.known:
+        unit = shown_unit(item.unit)
+        low, high = (f"{to_display(v, unit):.3g}" for v in item.interval)
+        slow, fast = (f"{v:.3g}" for v in item.factor_interval)
+        rows.append(
+            (
+                f"{item.kind}@{item.place}",
+                f"{to_display(item.severity, unit):.3g} ({low} to {high}) {unit}",
+                f"{item.factor:.3g} ({slow} to {fast})",
+                item.inspections,
+            )
+        )
+    report.section("Faults now").table(
+        Table(
+            ("fault", "severity", "growth over the law's", "inspections that saw it"),
+            rows,
+            f"Median and {result.level:.0%} interval.",
+        )
+    )
+
+
+def _laws(report: Report, laws: Sequence[Law]) -> None:
+    rows = [
+        (law.name, law.key, name, f"{c.value:.4g} {c.unit}", c.source)
+        for law in laws
+        for name, c in law.coefficients.items()
+    ]
+    section = report.section("Laws of growth")
+    section.points([f"{law.name}: {law.text}. {law.source}." for law in laws])
+    section.table(Table(("law", "fault", "coefficient", "value", "source"), rows, folded="Numbers"))

@@ -1,0 +1,113 @@
+"""Particle filter over severities, growth and the diagnoses' common error."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.prognose.observation import Inspection
+from elevon.prognose.process import Population, Process
+
+__all__ = ["BIAS", "COUNT", "ParticleFilter", "resampled"]
+
+Floats = npt.NDArray[np.float64]
+COUNT = 2000
+BIAS = 0.03
+"""Deviation of the diagnoses' common relative error. ASSUMED: the model behind them is one and the
+same at each inspection, so that part of its error does not average out."""
+SURPRISE = 4.0
+_SHRINK = 0.98  # of Liu and West: growth and bias are jittered, their spread stays
+_FEWEST = 0.5  # effective particles, of all, below which they are drawn anew
+
+
+class ParticleFilter:
+    """Sequential importance resampling with the process as proposal (Gordon 1993), fixed
+    parameters by the kernel of Liu and West (2001).
+
+    Parameters
+    ----------
+    process : Process
+        How units grow.
+    count : int
+        Particles.
+    seed : int
+        Of chance.
+    bias : float
+        See `BIAS`.
+
+    Attributes
+    ----------
+    units : Population
+        The posterior of the moment.
+    surprises : list of (float, str, float)
+        Use, fault and deviations off of diagnoses that stood more than `SURPRISE` of them from
+        what was expected.
+    """  # noqa: D205
+
+    def __init__(
+        self, process: Process, *, count: int = COUNT, seed: int = 0, bias: float = BIAS
+    ) -> None:
+        self.process = process
+        self.rng = np.random.default_rng([16, seed])
+        self.units = process.start(count, self.rng, bias=bias)
+        self.surprises: list[tuple[float, str, float]] = []
+
+    def update(self, item: Inspection) -> Population:
+        """Grow to an inspection, weigh by what it saw, make new what was replaced after it."""
+        units = self.process.to(self.units, item.usage, self.rng)
+        severity = self.process.severity(units.damage)
+        self._compare(units, severity, item)
+        score = np.log(np.maximum(units.weight, 1e-300))
+        for k, law in enumerate(self.process.laws):
+            if law.key in item.seen:
+                shown = severity[:, k] * np.exp(units.bias[:, k])
+                score += item.seen[law.key].log_likelihood(shown)
+        weight = np.exp(score - score.max())
+        units = replace(units, weight=weight / weight.sum())
+        if 1.0 / float(np.sum(units.weight**2)) < _FEWEST * len(weight):
+            units = resampled(units, len(weight), self.rng, shrink=_SHRINK)
+        if item.reset:
+            units = self.process.reset(units, item.reset, self.rng)
+        self.units = units
+        return units
+
+    def _compare(self, units: Population, severity: Floats, item: Inspection) -> None:
+        """Note a diagnosis that the units expected before it hardly allow."""
+        for k, law in enumerate(self.process.laws):
+            seen = item.seen.get(law.key)
+            if seen is None or seen.severity is None:
+                continue
+            mean = float(units.weight @ severity[:, k])
+            variance = float(units.weight @ (severity[:, k] - mean) ** 2)
+            deviation = seen.low if mean < seen.severity else seen.high
+            score = (seen.severity - mean) / np.sqrt(variance + deviation**2)
+            if abs(score) > SURPRISE:
+                self.surprises.append((item.usage, law.key, float(score)))
+
+
+def resampled(
+    units: Population, count: int, rng: np.random.Generator, *, shrink: float = 1.0
+) -> Population:
+    """Draw units by their weights (systematic); `shrink` below 1 jitters growth and bias."""
+    edges = np.cumsum(units.weight)
+    at = (rng.random() + np.arange(count)) / count * edges[-1]
+    index = np.minimum(np.searchsorted(edges, at), len(edges) - 1)
+    out = units.picked(index)
+    if shrink >= 1.0:
+        return out
+    return replace(
+        out,
+        growth=_kernel(units.growth, units.weight, out.growth, shrink, rng),
+        bias=_kernel(units.bias, units.weight, out.bias, shrink, rng),
+    )
+
+
+def _kernel(
+    before: Floats, weight: Floats, after: Floats, shrink: float, rng: np.random.Generator
+) -> Floats:
+    mean = weight @ before
+    deviation = np.sqrt(np.maximum(weight @ (before - mean) ** 2, 0.0))
+    jitter = np.sqrt(1.0 - shrink**2) * deviation * rng.standard_normal(after.shape)
+    return np.asarray(shrink * after + (1.0 - shrink) * mean + jitter)

@@ -1,0 +1,255 @@
+"""From inspections to the remaining useful life."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elevon.errors import InputError
+from elevon.prognose.answer import Known, Prognosis
+from elevon.prognose.future import look_ahead
+from elevon.prognose.observation import Inspection
+from elevon.prognose.particle import BIAS, COUNT, ParticleFilter, resampled
+from elevon.prognose.process import Process
+from elevon.prognose.response import Response, check_start, respond
+from elevon.units import to_display
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.prognose.mission import Mission
+    from elevon.prognose.process import Population
+
+__all__ = ["LEVEL", "predict", "prognosis"]
+
+LEVEL = 0.9
+_SAMPLES = 2000
+_LEAST = 3  # inspections that saw a fault before its growth counts as known
+
+
+def predict(
+    inspections: Sequence[Inspection],
+    actuator: Actuator,
+    mission: Mission,
+    *,
+    response: Response | None = None,
+    snapshots: bool = False,
+    particles: int = COUNT,
+    level: float = LEVEL,
+    seed: int = 0,
+    serial: str = "",
+) -> Prognosis:
+    """Predict a unit's remaining useful life.
+
+    Parameters
+    ----------
+    inspections : sequence of Inspection
+        In the order of use; irregular in time as they come.
+    actuator : Actuator
+        The healthy unit, calibrated.
+    mission : Mission
+        What it does, must do, and what grows.
+    response : Response, optional
+        Tables made before, for a series of predictions.
+    snapshots : bool
+        Correct the tables by runs at high fidelity.
+    particles : int
+        Of the filter.
+    level : float
+        Of the intervals.
+    seed : int
+        Of chance.
+    serial : str
+        Of the unit.
+
+    Raises
+    ------
+    InputError
+        Use goes back; a new unit violates a requirement; the actuator cannot do the mission.
+    """
+    if not 0.0 < level < 1.0:
+        raise InputError(f"level {level:g} must be between 0 and 1")
+    begin = clock.perf_counter()
+    tables = response or respond(actuator, mission, snapshots=snapshots)
+    _check_new(tables)
+    made = clock.perf_counter()
+    flt = ParticleFilter(Process(tables), count=particles, seed=seed, bias=BIAS)
+    check_order(inspections)
+    for item in inspections:
+        flt.update(item)
+    told = clock.perf_counter()
+    result = prognosis(flt, mission, inspections, level=level, seed=seed, serial=serial)
+    done = clock.perf_counter()
+    result.seconds.update(  # type: ignore[attr-defined]
+        {"tables": made - begin, "updates": told - made, "prediction": done - told}
+    )
+    return result
+
+
+def prognosis(
+    flt: ParticleFilter,
+    mission: Mission,
+    inspections: Sequence[Inspection],
+    *,
+    level: float = LEVEL,
+    seed: int = 0,
+    serial: str = "",
+) -> Prognosis:
+    """Look ahead from where a filter stands."""
+    rng = np.random.default_rng([17, seed])
+    units = resampled(flt.units, _SAMPLES, rng)
+    future = look_ahead(flt.process, units, mission.usage, rng)
+    response = flt.process.response
+    known = _known(flt.process, units, inspections, level)
+    severity = np.array([item.severity for item in known])
+    values = response.measured(severity[None, :])[:, 0]
+    reserve = tuple(
+        {
+            "name": item.name,
+            "measure": item.measure,
+            "value": _measured(item, float(values[k]), known),
+            "threshold": response.thresholds[k],
+            "unit": response.units[k],
+        }
+        for k, item in enumerate(response.requirements)
+    )
+    result = Prognosis(
+        mission.unit,
+        units.usage,
+        level,
+        future,
+        tuple(item.name for item in response.requirements),
+        known,
+        reserve,
+        (),
+        serial,
+        {},
+    )
+    return _with_findings(result, flt, inspections)
+
+
+def check_order(inspections: Sequence[Inspection]) -> None:
+    """Raise `InputError` where use or date goes back."""
+    for before, after in pairwise(inspections):
+        if after.usage < before.usage:
+            raise InputError(
+                f"the history is out of order: use falls from {before.usage:g} ({before.name}) to "
+                f"{after.usage:g} ({after.name})"
+            )
+        if before.date and after.date and after.date < before.date:
+            raise InputError(
+                f"the history is out of order: {after.name} ({after.date}, use {after.usage:g}) "
+                f"is dated before {before.name} ({before.date}, use {before.usage:g})"
+            )
+
+
+def _check_new(response: Response) -> None:
+    new = np.array([law.severity(np.array([law.start]))[0] for law in response.laws])
+    broken = check_start(response, new)
+    if broken:
+        raise InputError(
+            "a new unit violates what it must hold, so no life can be predicted: "
+            + "; ".join(broken)
+        )
+
+
+def _measured(item: Any, value: float, known: Sequence[Known]) -> float:
+    if item.fault is None:
+        return value
+    return next(k.severity for k in known if f"{k.kind}@{k.place}" == item.fault)
+
+
+def _known(
+    process: Process, units: Population, inspections: Sequence[Inspection], level: float
+) -> tuple[Known, ...]:
+    tail = 0.5 * (1.0 - level)
+    severity = process.severity(units.damage)
+    out = []
+    for k, law in enumerate(process.laws):
+        low, middle, high = np.quantile(severity[:, k], [tail, 0.5, 1.0 - tail])
+        slow, own, fast = np.exp(np.quantile(units.growth[:, k], [tail, 0.5, 1.0 - tail]))
+        since = _since_reset(inspections, law.key)
+        count = sum(
+            1 for i in since if (s := i.seen.get(law.key)) is not None and s.severity is not None
+        )
+        out.append(
+            Known(
+                law.kind,
+                law.place,
+                law.unit,
+                law.name,
+                float(middle),
+                (float(low), float(high)),
+                float(own),
+                (float(slow), float(fast)),
+                count,
+            )
+        )
+    return tuple(out)
+
+
+def _since_reset(inspections: Sequence[Inspection], key: str) -> Sequence[Inspection]:
+    last = max((n for n, item in enumerate(inspections) if key in item.reset), default=-1)
+    return inspections[last + 1 :]
+
+
+def _with_findings(
+    result: Prognosis, flt: ParticleFilter, inspections: Sequence[Inspection]
+) -> Prognosis:
+    from dataclasses import replace
+
+    process = flt.process
+    findings = list(_thin(result))
+    findings += [
+        f"{key} at {usage:g} {result.unit} stands {abs(score):.3g} deviations "
+        f"{'above' if score > 0.0 else 'below'} what law and history expected"
+        for usage, key, score in flt.surprises
+    ]
+    seen = {key for item in inspections for key in item.seen}
+    findings += [
+        f"{law.key}: no inspection looked for it; its course is the law's alone"
+        for law in process.laws
+        if inspections and law.key not in seen
+    ]
+    at_end = 1.0 - result.survives(0.0)
+    if at_end > 0.0:
+        findings.append(
+            f"the unit has already reached its end of life with a probability of {at_end:.2g}"
+        )
+    far = float(np.mean(~np.isfinite(result.future.end)))
+    if far > 0.0:
+        findings.append(f"no end of life is in sight in {100.0 * far:.3g} % of the futures")
+    findings += _beyond(result, process)
+    return replace(result, findings=tuple(findings))
+
+
+def _thin(result: Prognosis) -> list[str]:
+    """Say where the history is too short, and how wide the answer is."""
+    most = max((item.inspections for item in result.known), default=0)
+    if most >= _LEAST:
+        return []
+    low, high = result.interval
+    if np.isfinite(high):
+        wide = f"{low:.4g} to {high:.4g} {result.unit}"
+    else:
+        wide = f"{low:.4g} {result.unit} to no end in sight"
+    return [
+        f"{most} inspection(s) saw a growing fault; {_LEAST} are needed before its growth is "
+        f"known. Until then the answer is as wide as the laws' spread: {wide} at {result.level:.0%}"
+    ]
+
+
+def _beyond(result: Prognosis, process: Process) -> list[str]:
+    """Say where severities leave the tables."""
+    out = []
+    for k, law in enumerate(process.laws):
+        if result.future.course[-1, k, 2] > 1.05 * law.highest:
+            shown = to_display(law.highest, law.unit)
+            out.append(
+                f"{law.key} grows beyond {shown:.3g} {law.unit}, the last of the tables; what "
+                "happens beyond is taken as there"
+            )
+    return out

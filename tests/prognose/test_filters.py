@@ -1,0 +1,131 @@
+"""Both filters against the exact one, and what inspections may be."""
+
+import numpy as np
+import pytest
+
+from elevon.errors import InputError
+from elevon.prognose import Inspection, ParticleFilter, Seen, UnscentedFilter, inspection
+from elevon.prognose.future import look_ahead
+from elevon.prognose.mission import Usage
+from elevon.prognose.particle import resampled
+from elevon.prognose.predict import check_order
+from tests.prognose.units import law, process
+
+KEY = "play@transmission"
+
+
+def seen(usage, value, deviation, **fields):
+    return Inspection(usage, {KEY: Seen(value, deviation, deviation)}, **fields)
+
+
+def exact(observed, deviation, rate, prior):
+    """Posterior of the growth factor where damage = factor rate usage, on a grid."""
+    factor = np.exp(np.linspace(-3.0, 3.0, 4001) * prior)
+    score = -0.5 * np.linspace(-3.0, 3.0, 4001) ** 2
+    for usage, value in observed:
+        score -= 0.5 * ((value - factor * rate * usage) / deviation) ** 2
+    weight = np.exp(score - score.max())
+    weight /= weight.sum()
+    mean = weight @ np.log(factor)
+    return mean, np.sqrt(weight @ (np.log(factor) - mean) ** 2)
+
+
+@pytest.mark.parametrize("prior", [0.05, 0.8])
+def test_particles_and_sigma_points_agree_with_the_exact_posterior(prior):
+    """Sigma points are exact for what is linear, so only a narrow prior is theirs."""
+    rate, deviation, rng = 1e-3, 0.05, np.random.default_rng(1)
+    observed = [
+        (u, 1.2 * rate * u + deviation * rng.standard_normal()) for u in range(100, 600, 83)
+    ]
+    mean, spread = exact(observed, deviation, rate, prior)
+    unit = process(law(rate, spread=prior), limits=(5.0,))
+    particles = ParticleFilter(unit, count=8000, seed=2, bias=0.0)
+    sigma = UnscentedFilter(unit)
+    for usage, value in observed:
+        particles.update(seen(usage, value, deviation))
+        sigma.update(seen(usage, value, deviation))
+    growth = particles.units.growth[:, 0]
+    found = particles.units.weight @ growth
+    assert found == pytest.approx(mean, abs=0.3 * spread)
+    width = np.sqrt(particles.units.weight @ (growth - found) ** 2)
+    assert width == pytest.approx(spread, rel=0.35)
+    if prior < 0.1:
+        assert sigma.mean[1] == pytest.approx(mean, abs=0.3 * spread)
+
+
+def test_several_faults_grow_together_and_each_is_seen_by_its_own_inspections():
+    unit = process(law(1e-3, "play"), law(1e-3, "friction"), limits=(9.0, 9.0))
+    flt = ParticleFilter(unit, count=4000, seed=1)
+    for usage in (100.0, 250.0, 300.0, 700.0):
+        flt.update(
+            Inspection(usage, {
+                KEY: Seen(2e-3 * usage, 0.02, 0.02),
+                "friction@transmission": Seen(5e-4 * usage, 0.02, 0.02),
+            })
+        )  # fmt: skip
+    factor = np.exp(flt.units.weight @ flt.units.growth)
+    assert factor == pytest.approx([2.0, 0.5], rel=0.08)
+
+
+def test_a_fault_not_seen_bounds_its_growth():
+    unit = process(law(1e-3))
+    flt = ParticleFilter(unit, count=4000, seed=1)
+    before = flt.units.growth.mean()
+    flt.update(Inspection(300.0, {KEY: Seen(None, 0.05, 0.05)}))
+    assert flt.units.weight @ flt.units.growth[:, 0] < before - 0.5
+
+
+def test_maintenance_makes_the_part_new_and_its_growth_unknown():
+    unit = process(law(1e-3), limits=(1.0,))
+    flt = ParticleFilter(unit, count=4000, seed=1)
+    for usage in (100.0, 200.0, 400.0):
+        flt.update(seen(usage, 1e-3 * usage, 0.01))
+    known = flt.units.growth.std()
+    flt.update(seen(500.0, 0.5, 0.01, reset=(KEY,)))
+    assert flt.units.damage.max() == 0.0
+    assert flt.units.growth.std() > 3.0 * known
+    rng = np.random.default_rng(0)
+    future = look_ahead(unit, resampled(flt.units, 1000, rng), Usage(), rng)
+    assert np.median(future.remaining) == pytest.approx(1000.0, rel=0.15)
+
+
+def test_a_diagnosis_far_off_is_an_outlier_and_is_noted():
+    unit = process(law(1e-3, spread=0.3))
+    flt = ParticleFilter(unit, count=4000, seed=1)
+    for usage in (100.0, 200.0, 300.0):
+        flt.update(seen(usage, 1e-3 * usage, 0.01))
+    assert flt.surprises == []
+    flt.update(seen(400.0, 0.9, 0.01))
+    assert [item[:2] for item in flt.surprises] == [(400.0, KEY)]
+    factor = np.exp(flt.units.weight @ flt.units.growth[:, 0])
+    assert factor == pytest.approx(1.0, rel=0.1)
+
+
+def test_a_diagnosis_becomes_an_inspection():
+    item = law()
+    cause = {"kind": "play", "place": "gear", "probability": 0.9, "severity": 0.3,
+             "interval": [0.2, 0.35],
+             "equivalents": [{"kind": "play", "place": "transmission"}]}  # fmt: skip
+    data = {"faults": [cause], "detectable": {KEY: 0.06}}
+    got = inspection(data, [item], usage=5.0).seen[KEY]
+    assert (got.severity, got.low, got.high) == pytest.approx((0.3, 0.0608, 0.0304), rel=1e-3)
+    unlikely = {"faults": [{**cause, "probability": 0.3}], "detectable": {KEY: 0.06}}
+    assert inspection(unlikely, [item], usage=5.0).seen[KEY] == Seen(None, 0.02, 0.02)
+    assert inspection({"faults": []}, [item], usage=5.0).seen == {}
+    with pytest.raises(InputError, match="not within"):
+        inspection({"faults": [{**cause, "interval": [0.4, 0.5]}]}, [item], usage=5.0)
+
+
+def test_use_and_dates_go_forward():
+    check_order([Inspection(1.0, {}), Inspection(1.0, {}), Inspection(4.0, {})])
+    with pytest.raises(InputError, match=r"use falls from 4 \(b\) to 1"):
+        check_order([Inspection(4.0, {}, name="b"), Inspection(1.0, {}, name="c")])
+    with pytest.raises(InputError, match="is dated before"):
+        check_order(
+            [Inspection(1.0, {}, date="2026-02-01"), Inspection(4.0, {}, date="2026-01-01")]
+        )
+    with pytest.raises(InputError, match="goes back"):
+        unit = process(law())
+        flt = ParticleFilter(unit, count=100)
+        flt.update(seen(5.0, 0.0, 1.0))
+        flt.update(seen(4.0, 0.0, 1.0))
