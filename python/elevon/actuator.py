@@ -63,17 +63,17 @@ class Actuator:
         InputError
             The file is wrong; the message holds file, line, path and limit.
         """
-        found = load_set(reference)
+        loaded = load_set(reference)
         return cls(
-            name=found.name,
-            wiring=found.wiring,
-            parameters=found.parameters,
-            title=found.title,
-            references=found.references,
-            default_scenario=found.scenario,
-            path=found.path,
-            validation=found.validation,
-            compare=found.compare,
+            name=loaded.name,
+            wiring=loaded.wiring,
+            parameters=loaded.parameters,
+            title=loaded.title,
+            references=loaded.references,
+            default_scenario=loaded.scenario,
+            path=loaded.path,
+            validation=loaded.validation,
+            compare=loaded.compare,
         )
 
     def with_values(

@@ -154,8 +154,8 @@ def record_plan(
         for name in names:
             if owner.setdefault(name, text) != text:
                 raise InputError(f"record: {name!r} is asked for twice: {owner[name]!r}, {text!r}")
-        kept = chosen.setdefault(period, [])
-        kept.extend(name for name in names if name not in kept)
+        chosen_names = chosen.setdefault(period, [])
+        chosen_names.extend(name for name in names if name not in chosen_names)
     return [
         ClockPlan(clock_name(period, step), period, tuple(names), 1.0 / (period * step))
         for period, names in chosen.items()

@@ -145,7 +145,7 @@ class WorkLog:
         self.items[item.name] = item
         return item
 
-    def kept(self, name: str) -> Item | None:
+    def intact(self, name: str) -> Item | None:
         """Return a finished item whose files are all there, each as it was written."""
         item = self.items.get(name)
         return item if item is not None and item.intact(self.path.parent) else None

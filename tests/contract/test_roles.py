@@ -3,6 +3,8 @@
 import pytest
 
 from elevon import _core
+from elevon.features.roles import ROLES as FEATURE_ROLES
+from elevon.features.roles import players
 from elevon.units import parse_unit
 
 WIRINGS = [(w["name"], fidelity) for w in _core.wirings() for fidelity in w["fidelities"]]
@@ -31,4 +33,7 @@ def test_every_wiring_plays_the_roles_of_a_drives_log(wiring, fidelity):
 
 
 def test_features_are_made_of_the_same_roles():
-    assert {role["name"] for role in _core.feature_roles()} <= ROLES.keys()
+    assert set(FEATURE_ROLES) <= ROLES.keys()
+    for role in FEATURE_ROLES:
+        assert players(role), role
+    assert players("output_position") == ("encoder_position", "user_position")

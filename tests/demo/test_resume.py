@@ -18,8 +18,8 @@ from elevon.bench.procedure import load_procedure
 from elevon.calibrate.estimate import Estimate
 from elevon.calibrate.validation import SignalError, Trace, Validation
 from elevon.cli import main
+from elevon.demo.finished import FinishedSteps, work_key
 from elevon.demo.hidden import RECOVERED, hidden_actuator
-from elevon.demo.kept import Kept, work_key
 from elevon.demo.results import Plays, Recovered, validation_from_json, validation_to_json
 from elevon.demo.run import run_demo
 from elevon.errors import OutputExistsError
@@ -127,7 +127,7 @@ def test_the_work_is_told_by_version_seed_and_sets(base, monkeypatch):
 def test_a_step_counts_only_as_it_was_kept(tmp_path):
     page = tmp_path / "page.html"
     page.write_text("page")
-    kept = Kept(tmp_path, "a" * 32)
+    kept = FinishedSteps(tmp_path, "a" * 32)
     assert not kept.begun(force=False)
     kept.begin()
     kept.save("backlash", "in", {"x": 1.5}, 2.5, [page])
@@ -137,16 +137,16 @@ def test_a_step_counts_only_as_it_was_kept(tmp_path):
     assert kept.load("backlash", "other", read) is None
     assert kept.load("calibration", "in", read) is None
     assert kept.load("backlash", "in", lambda data: data["y"]) is None
-    assert Kept(tmp_path, "b" * 32).load("backlash", "in", read) is None
+    assert FinishedSteps(tmp_path, "b" * 32).load("backlash", "in", read) is None
     with pytest.raises(OutputExistsError, match="other work"):
-        Kept(tmp_path, "b" * 32).begun(force=False)
-    assert not Kept(tmp_path, "b" * 32).begun(force=True)
+        FinishedSteps(tmp_path, "b" * 32).begun(force=False)
+    assert not FinishedSteps(tmp_path, "b" * 32).begun(force=True)
     page.write_text("edited")
     assert kept.load("backlash", "in", read) is None
     page.write_text("page")
     file = tmp_path / "unfinished.log"
     file.write_text(file.read_text()[:-20])
-    assert Kept(tmp_path, "a" * 32).load("backlash", "in", read) is None
+    assert FinishedSteps(tmp_path, "a" * 32).load("backlash", "in", read) is None
     kept.clear()
     assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
 

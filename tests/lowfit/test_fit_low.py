@@ -26,7 +26,7 @@ def test_a_bad_number_is_fitted_and_the_errors_fall():
     fit = fit_low(actuator, [Case("moving", moving())])
     assert fit.old == {"low.band_ratio": 0.95}
     assert fit.new["low.band_ratio"] < 0.8
-    assert "low.voltage_ratio" in fit.kept
+    assert "low.voltage_ratio" in fit.unchanged
     before, after = (
         sum(value**2 for row in rows for value in row.values())
         for rows in (fit.errors_before, fit.errors_after)
@@ -39,7 +39,7 @@ def test_the_pwm_drive_has_no_band():
     actuator = elevon.Actuator.load("torino-rotary").with_values({"drive.kind": "pwm"})
     fit = fit_low(actuator, [Case("moving", moving())])
     assert not fit.new
-    assert fit.kept["low.band_ratio"] == "no case depends on it with this drive"
+    assert fit.unchanged["low.band_ratio"] == "no case depends on it with this drive"
 
 
 def test_refusals():

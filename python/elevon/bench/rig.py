@@ -150,16 +150,16 @@ def setups(
     """
     _check(actuator)
     rig = Rig()
-    found: list[Setup] = []
+    setups: list[Setup] = []
     for step in procedure.step:
         if isinstance(step, TraceStep):
-            conditions = draw_conditions(seed, len(found))
-            found.append(_setup(step, rig, actuator, conditions, faults))
+            conditions = draw_conditions(seed, len(setups))
+            setups.append(_setup(step, rig, actuator, conditions, faults))
         elif isinstance(step, ForceStep | RigStep):
             raise InputError(f"{procedure.name}: the rotary bench has no {step.kind!r}")
         else:
             rig = _changed(rig, step)
-    return found
+    return setups
 
 
 def _check(actuator: Actuator) -> None:

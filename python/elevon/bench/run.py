@@ -259,10 +259,10 @@ def _one(
     force: bool,
 ) -> tuple[BenchLogFiles, float]:
     name, folder = setup.trace.name, state.path.parent
-    kept = state.kept(name)
-    if kept is not None:
-        files = tuple(folder / file for file in kept.files)
-        return BenchLogFiles(name, kept.status, files, True, kept.message), 0.0
+    stored = state.intact(name)
+    if stored is not None:
+        files = tuple(folder / file for file in stored.files)
+        return BenchLogFiles(name, stored.status, files, True, stored.message), 0.0
     again = force or state.resumed
     if isinstance(setup, LoadedSetup):
         log, recording = run_loaded(setup, fidelity, progress)

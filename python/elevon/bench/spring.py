@@ -239,12 +239,12 @@ def search_springs(
     for name, value in (("longest", longest), ("coil_step", coil_step)):
         if not (math.isfinite(value) and value > 0.0):
             raise RangeError(f"spring: {name} = {value!r} must be above 0")
-    found = []
+    designs = []
     for wire in wires:
         top = min(task.largest_coil(wire), INDEX_RANGE[1] * wire)
         first = math.ceil(INDEX_RANGE[0] * wire / coil_step - 1e-9)
         for k in range(first, math.floor(top / coil_step + 1e-9) + 1):
             design = design_spring(task, wire=wire, coil=k * coil_step)
             if design.feasible and design.free_length <= longest:
-                found.append(design)
-    return sorted(found, key=lambda design: design.wire_volume)
+                designs.append(design)
+    return sorted(designs, key=lambda design: design.wire_volume)

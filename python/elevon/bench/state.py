@@ -80,9 +80,9 @@ class BenchState:
                     check_output(file)
         return cls(WorkLog.begin(path, key))
 
-    def kept(self, name: str) -> LogRecord | None:
+    def intact(self, name: str) -> LogRecord | None:
         """Return the record of a log whose files are there, each as it was written."""
-        item = self.log.kept(name)
+        item = self.log.intact(name)
         return None if item is None else _record(item)
 
     def note(self, name: str, status: str, message: str, files: Sequence[Path]) -> None:

@@ -152,7 +152,7 @@ def _waveform(term: Any) -> dict[str, Any]:
     from elevon.units import to_display
     from elevon.waveforms import unit_of, wave_records
 
-    found: dict[str, Any] = {"waveform": term.kind}
+    shape: dict[str, Any] = {"waveform": term.kind}
     for parameter in wave_records()[term.kind].parameters:
         name = parameter.name
         given = term.arguments.get(name)
@@ -161,5 +161,5 @@ def _waveform(term: Any) -> dict[str, Any]:
         unit = unit_of(parameter, "rad")
         shown = unit.replace("rad", "deg")
         value = parse_quantity(given, unit, name)
-        found[name] = float(f"{to_display(value, shown) if unit != shown else value:.12g}")
-    return found
+        shape[name] = float(f"{to_display(value, shown) if unit != shown else value:.12g}")
+    return shape

@@ -202,10 +202,10 @@ def _signals(
         for number, item, result in zip(numbers, prepared, results, strict=True)
         if clock.name in result["clocks"]
     ]
-    lengths = np.array([len(kept["time"]) for _, _, kept in parts])
+    lengths = np.array([len(rows["time"]) for _, _, rows in parts])
     runs = np.repeat(np.array([number for number, _, _ in parts], dtype=np.int64), lengths)
-    columns = {"run": runs, "time": np.concatenate([kept["time"] for _, _, kept in parts])}
-    values = np.concatenate([kept["values"][:, : len(clock.signals)] for _, _, kept in parts])
+    columns = {"run": runs, "time": np.concatenate([rows["time"] for _, _, rows in parts])}
+    values = np.concatenate([rows["values"][:, : len(clock.signals)] for _, _, rows in parts])
     columns.update({name: values[:, k].copy() for k, name in enumerate(clock.signals)})
     columns.update(_severities(resolved, clock, parts, lengths))
     schema = signal_schema(resolved, clock, parts[0][1].command_unit)
@@ -218,10 +218,10 @@ def _severities(
     """Return each fault's severity as it was applied at each sample; 0 in a run without it."""
     ends = np.cumsum(lengths)
     severities = {name: np.zeros(int(ends[-1])) for name in resolved.fault_names()}
-    for (_, item, kept), start, end in zip(parts, ends - lengths, ends, strict=True):
+    for (_, item, rows), start, end in zip(parts, ends - lengths, ends, strict=True):
         for place, fault in enumerate(item.core["faults"], start=len(clock.signals)):
             name = f"{fault['kind']}@{fault['place']}"
-            severities[name][start:end] = kept["values"][:, place]
+            severities[name][start:end] = rows["values"][:, place]
     return severities
 
 

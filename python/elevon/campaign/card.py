@@ -206,8 +206,8 @@ def _curves(
         section.text(f"{title}: {error}")
         return
     number = table["run"].to_numpy()
-    kept = {label: number == run for label, run in runs.items()}
-    longest = max(kept.values(), key=np.count_nonzero)
+    masks = {label: number == run for label, run in runs.items()}
+    longest = max(masks.values(), key=np.count_nonzero)
     time = table["time"].to_numpy()[longest]
     if len(time) < 2:
         return
@@ -215,7 +215,7 @@ def _curves(
         values = table[column["name"]].to_numpy()
         lines = {
             label: np.interp(time, table["time"].to_numpy()[mask], values[mask], right=np.nan)
-            for label, mask in kept.items()
+            for label, mask in masks.items()
             if mask.any()
         }
         section.chart(f"{title}: {column['name']}", time, lines, y_label=column["unit"])

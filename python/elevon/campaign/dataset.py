@@ -145,12 +145,12 @@ class Table:
                 raise unknown("column", name, data.schema.names, self.path)
         wanted = None if numbers is None else ds.field("run").isin(numbers)
         try:
-            kept: pa.Table = data.to_table(
+            table: pa.Table = data.to_table(
                 columns=None if columns is None else list(columns), filter=wanted
             )
         except (OSError, pa.ArrowException) as error:
             raise FormatError(f"{self.path}: cannot be read: {error}") from error
-        return kept
+        return table
 
     def to_pandas(
         self, columns: Sequence[str] | None = None, runs: Iterable[int] | None = None

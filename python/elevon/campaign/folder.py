@@ -111,7 +111,7 @@ def begin(folder: Path, resolved: Resolved, text: str | None, need: Cost | None)
         if text is not None and PLAN in Item("tables", manifest.files, {}).damaged(folder):
             write_text(folder / PLAN, text, force=True)
             manifest.files[PLAN] = digest(folder / PLAN)
-        return _found(folder, resolved, manifest)
+        return _there(folder, resolved, manifest)
     if need is None or text is None:
         raise OutputError(f"{folder}: its {MANIFEST} has gone meanwhile")
     write_text(folder / PLAN, text, force=True)
@@ -160,21 +160,21 @@ def finish(work: Work) -> dict[str, list[Any]]:
     return outcome
 
 
-def _found(folder: Path, resolved: Resolved, manifest: Manifest) -> Work:
+def _there(folder: Path, resolved: Resolved, manifest: Manifest) -> Work:
     """Find which blocks of a campaign are there, each file as it was written."""
     log = work_log(folder, manifest)
     before = {} if log is None else dict(log.items)
     earlier = _finished(folder, manifest)
     wanted = [block_name(block) for block in range(len(manifest.edges) - 1)]
-    kept = {}
+    items = {}
     for name in wanted:
         item = before.get(name) or earlier.get(name)
         if item is not None and item.intact(folder):
-            kept[name] = item
-    missing = [block for block, name in enumerate(wanted) if name not in kept]
-    if kept and missing:
+            items[name] = item
+    missing = [block for block, name in enumerate(wanted) if name not in items]
+    if items and missing:
         _check_build(folder, manifest)
-    log = WorkLog(folder / LOG, manifest.plan_hash, kept)
+    log = WorkLog(folder / LOG, manifest.plan_hash, items)
     if missing or manifest.status == "running":
         log.rewrite()
     return Work(folder, resolved, manifest, log, missing)

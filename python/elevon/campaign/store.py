@@ -339,11 +339,11 @@ def _resolved(content: Mapping[str, Any], table: Any) -> Resolved:
         references=data["references"],
     )
     own = {c: content[c] for c in _OWN}
-    kept = ("allow_not_acting", "runs_per_file", "files", "sources", "design")
+    keys = ("allow_not_acting", "runs_per_file", "files", "sources", "design")
     variants = [Variant(**item) for item in content["variants"]]
     return Resolved(
         **own,
-        **{key: content[key] for key in kept},
+        **{key: content[key] for key in keys},
         actuator=actuator,
         variants=variants,
         columns=[

@@ -89,7 +89,7 @@ def run(
     layout = DriveFormat(encoder_shaft=shaft, current_convention=current, gear_ratio=ratio)
     faults = [Fault.parse(text) for text in fault or ()]
     with (
-        interrupt.telling(lambda: _kept(out, asked, force=force)),
+        interrupt.telling(lambda: _story(out, asked, force=force)),
         progress_bar(f"bench: {asked.name}") as advance,
     ):
         result = run_procedure(
@@ -120,7 +120,7 @@ def run(
     say(f"{result.sim_s:g} s simulated in {result.wall_s:.1f} s")
 
 
-def _kept(out: Path, procedure: Procedure, *, force: bool) -> str:
+def _story(out: Path, procedure: Procedure, *, force: bool) -> str:
     from elevon.bench.run import state_file
     from elevon.bench.state import finished_logs
 

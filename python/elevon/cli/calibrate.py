@@ -82,16 +82,16 @@ def read(
     from elevon.calibrate.log import read_logs
 
     logs = without_companions(logs)
-    found = read_logs(
+    logs_read = read_logs(
         logs,
         loadcells=one_each("--loadcell", loadcell, len(logs)),
         commands=one_each("--command", command, len(logs), shared=True),
         column_map=column_map,
     )
-    for log in found:
+    for log in logs_read:
         for text in log.warnings:
             say(f"{log.name}: {text}")
-    return found
+    return logs_read
 
 
 def direct_logs(

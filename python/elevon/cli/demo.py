@@ -34,7 +34,7 @@ def demo(
     from elevon.demo.run import run_demo
     from elevon.report.checks import all_passed
 
-    with interrupt.telling(lambda: _kept(out)), progress_bar("demo") as advance:
+    with interrupt.telling(lambda: _story(out)), progress_bar("demo") as advance:
         result = run_demo(out, seed=seed, force=force, progress=advance)
     if json:
         print_json(result.to_dict())
@@ -43,8 +43,8 @@ def demo(
     return 0 if all_passed(result.checks) else 1
 
 
-def _kept(out: Path) -> str:
-    from elevon.demo.kept import finished_steps
+def _story(out: Path) -> str:
+    from elevon.demo.finished import finished_steps
 
     done = finished_steps(out.expanduser())
     if not done:
@@ -66,7 +66,7 @@ def _print(result: Demo) -> None:
     ]
     columns = ("parameter", "before", "hidden truth", "estimate", "90 % interval", "unit")
     print_table(columns, rows, title="hidden values recovered from three logs")
-    steps = [(step.name, f"{step.seconds:.1f}", step.kept) for step in result.steps]
+    steps = [(step.name, f"{step.seconds:.1f}", step.reused) for step in result.steps]
     print_table(("step", "s", ""), [*steps, ("all", f"{result.seconds:.1f}", "")])
     checks = result.checks
     failed = [check for check in checks if not check.passed]

@@ -161,10 +161,10 @@ def _warnings_in_words() -> Iterator[None]:
 def _interrupted(written: Sequence[Path]) -> int:
     interrupt.ignore()
     interrupt.drop_output()
-    return _fail(f"interrupted; {interrupt.story() or _kept(written)}", interrupt.code())
+    return _fail(f"interrupted; {interrupt.story() or _story(written)}", interrupt.code())
 
 
-def _kept(written: Sequence[Path], most: int = 4) -> str:
+def _story(written: Sequence[Path], most: int = 4) -> str:
     """Say which files of this command are there; each of them is whole."""
     files = [str(path) for path in dict.fromkeys(written) if path.is_file()]
     if not files:

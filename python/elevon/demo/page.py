@@ -45,7 +45,7 @@ def demo_report(demo: Demo) -> Report:
     length = f"{max(log.duration for log in demo.logs):.0f} s"
     times = "\N{MULTIPLICATION SIGN}"
     report.fact("Logs", f"{len(demo.logs)} {times} {length}", "one kept back from the fit")
-    resumed = sum(bool(step.kept) for step in demo.steps)
+    resumed = sum(bool(step.reused) for step in demo.steps)
     note = f"{resumed} of {len(demo.steps)} steps resumed" if resumed else ""
     report.fact("All steps", f"{demo.seconds:.0f} s", note)
     _bench(report, demo)
@@ -235,9 +235,9 @@ def _backlash(report: Report, demo: Demo) -> None:
 
 
 def _times(report: Report, demo: Demo) -> None:
-    rows: list[list[object]] = [[step.name, step.seconds, step.kept] for step in demo.steps]
+    rows: list[list[object]] = [[step.name, step.seconds, step.reused] for step in demo.steps]
     rows.append(["all", demo.seconds, ""])
-    resumed = any(step.kept for step in demo.steps)
+    resumed = any(step.reused for step in demo.steps)
     columns = ["Step", "Time [s]", "Resumed"] if resumed else ["Step", "Time [s]"]
     table = Table(
         columns,

@@ -35,21 +35,21 @@ class Step:
         What was done.
     seconds : float
         Time it took now.
-    kept : str
+    reused : str
         What of it was kept from an interrupted run; empty where nothing was.
     """
 
     name: str
     seconds: float
-    kept: str = ""
+    reused: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
         return {
             "name": self.name,
             "seconds": self.seconds,
-            "resumed": bool(self.kept),
-            "kept": self.kept,
+            "resumed": bool(self.reused),
+            "kept": self.reused,
         }
 
 

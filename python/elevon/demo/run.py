@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from elevon.demo.finished import FinishedSteps, inputs_of, work_key
 from elevon.demo.hidden import RECOVERED, hidden_actuator
-from elevon.demo.kept import Kept, inputs_of, work_key
 from elevon.demo.procedure import HELD_OUT, LOADED, demo_procedure
 from elevon.demo.results import Plays, Recovered, Step, validation_from_json, validation_to_json
 from elevon.parameters.relations import motor_torque_constant
@@ -52,7 +52,7 @@ class Demo:
         The published set, and the one on the bench.
     folder : Path
         Of the outputs.
-    kept : Kept
+    finished : FinishedSteps
         What an interrupted run left, and this one leaves if it is interrupted.
     steps : list of Step
         What was done, the seconds it took, and what of it was kept from an interrupted run.
@@ -68,7 +68,7 @@ class Demo:
     base: Actuator
     hidden: Actuator
     folder: Path
-    kept: Kept
+    finished: FinishedSteps
     steps: list[Step] = field(default_factory=list)
     backlash: Plays = field(init=False)
     imported: list[ImportedLog] = field(init=False)
@@ -80,19 +80,19 @@ class Demo:
     bench_truth: dict[str, Any] = field(default_factory=dict)
 
     def timed(
-        self, name: str, work: Callable[[], Result], kept: Callable[[Result], str] | None = None
+        self, name: str, work: Callable[[], Result], summary: Callable[[Result], str] | None = None
     ) -> Result:
-        """Do a step and note its time, and what `kept` says of its result."""
+        """Do a step and note its time, and what `summary` says of its result."""
         begin = clock.perf_counter()
         result = work()
         seconds = clock.perf_counter() - begin
-        self.steps.append(Step(name, seconds, "" if kept is None else kept(result)))
+        self.steps.append(Step(name, seconds, "" if summary is None else summary(result)))
         return result
 
     def resumed(self, name: str, work: _Work[Result]) -> Result:
         """Take a step's result from an interrupted run, or do it and keep its result."""
         begin = clock.perf_counter()
-        stored = self.kept.load(work.piece, work.inputs, work.read)
+        stored = self.finished.load(work.piece, work.inputs, work.read)
         if stored is not None:
             result, before = stored
             text = f"kept from the interrupted run, which took {before:.1f} s for it"
@@ -100,7 +100,7 @@ class Demo:
             return result
         result = self.timed(name, work.do)
         seconds = self.steps[-1].seconds
-        self.kept.save(work.piece, work.inputs, work.write(result), seconds, work.files)
+        self.finished.save(work.piece, work.inputs, work.write(result), seconds, work.files)
         return result
 
     @property
@@ -210,8 +210,8 @@ def run_demo(
     base = Actuator.load("torino-rotary")
     hidden = hidden_actuator(base, seed)
     folder = Path(out).expanduser()
-    kept = Kept(folder, work_key(seed, base, hidden))
-    demo = Demo(seed, base, hidden, folder, kept)
+    store = FinishedSteps(folder, work_key(seed, base, hidden))
+    demo = Demo(seed, base, hidden, folder, store)
     _claim(demo, force=force)
     _backlash(demo, part(progress, 0.0, 0.25))
     logs = _bench(demo, part(progress, 0.25, 0.5))
@@ -219,7 +219,7 @@ def run_demo(
     _calibrate(demo, part(progress, 0.5, 0.85), logs)
     _validate(demo, part(progress, 0.85, 0.97), logs)
     _report(demo, force=force)
-    kept.clear()
+    store.clear()
     if progress is not None:
         progress(1.0)
     return demo
@@ -230,13 +230,13 @@ def _claim(demo: Demo, *, force: bool) -> None:
     from elevon.bench.run import claim_bench
     from elevon.files import check_output
 
-    if demo.kept.begun(force=force):
+    if demo.finished.begun(force=force):
         check_output(demo.folder / "report.html", force=force)
         return
     for path in demo_files(demo.folder):
         check_output(path, force=force)
     claim_bench(demo_procedure(), demo.hidden, demo.folder / "logs", seed=demo.seed, force=force)
-    demo.kept.begin()
+    demo.finished.begin()
 
 
 def _backlash(demo: Demo, progress: Progress | None) -> None:
@@ -268,11 +268,11 @@ def _bench(demo: Demo, progress: Progress | None) -> list[Path]:
             demo_procedure(), demo.hidden, folder, seed=demo.seed, progress=progress
         )
 
-    def kept(result: BenchResult) -> str:
+    def reused(result: BenchResult) -> str:
         old = sum(log.resumed for log in result.logs)
         return f"{old} of {len(result.logs)} logs kept from the interrupted run" if old else ""
 
-    result = demo.timed("virtual bench: four logs of 20 s", work, kept)
+    result = demo.timed("virtual bench: four logs of 20 s", work, reused)
     text = json.dumps(result.hidden, indent=1, default=str) + "\n"
     write_text(truth, text, force=True)
     demo.bench_truth = json.loads(text)
@@ -309,7 +309,7 @@ def _calibrate(demo: Demo, progress: Progress | None, logs: Sequence[Path]) -> N
         _Work(
             "calibration",
             work,
-            lambda found: found.to_json(demo.base),
+            lambda calibration: calibration.to_json(demo.base),
             lambda data: Recovered.from_json(data, demo.base),
             inputs_of(logs),
             [target],

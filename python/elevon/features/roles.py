@@ -1,28 +1,34 @@
-"""Which signal serves which role."""
+"""Which signal serves which role: the roles that features use, of those of the core."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import cache
 
+from elevon import _core
 from elevon.errors import unknown
 
-__all__ = ["ROLES", "assign_roles", "comparable"]
+__all__ = ["ROLES", "assign_roles", "comparable", "players"]
 
-#: Signals that serve each role where the wiring or the log's column map does not say it: the first
-#: that is there, what a sensor shows before what is true.
-ROLES: Mapping[str, tuple[str, ...]] = {
-    "command": ("command",),
-    "output_position": ("encoder_position", "user_position"),
-    "motor_position": ("resolver_position", "motor_position"),
-    "motor_speed": ("resolver_speed", "speed_meas", "motor_speed"),
-    "torque_current": ("current_q_meas", "current_q", "current_line", "current_ref"),
-    "current_a": ("current_a_meas", "current_a"),
-    "current_b": ("current_b_meas", "current_b"),
-    "current_c": ("current_c_meas", "current_c"),
-    "temperature": ("winding_temperature",),
-    "leg_transitions": ("leg_transitions",),
-    "vibration": ("vibration",),
-}
+#: The roles that features are made of, in the order of the core.
+ROLES: tuple[str, ...] = tuple(record["name"] for record in _core.feature_roles())
+
+
+@cache
+def players(role: str) -> tuple[str, ...]:
+    """Return the signals that play a role in any wiring, what a sensor shows before what is true.
+
+    They serve where neither the wiring nor a log's column map states its roles.
+    """
+    # sensors stand behind what they sense
+    names = [
+        signal["name"]
+        for wiring in _core.wirings()
+        for fidelity in wiring["fidelities"]
+        for signal in reversed(_core.signals(wiring["name"], fidelity))
+        if signal["role"] == role
+    ]
+    return tuple(dict.fromkeys(names))
 
 
 def assign_roles(
@@ -39,7 +45,7 @@ def assign_roles(
     given : mapping of str to str, optional
         Role to signal, as the caller says.
     stated : mapping of str to str, optional
-        Role to signal, as the wiring or the log's column map says: else the first of `ROLES`.
+        Role to signal, as the wiring or the log's column map says: else the first of `players`.
 
     Raises
     ------
@@ -48,8 +54,8 @@ def assign_roles(
     """
     there = list(names)
     roles = {}
-    for role, usual in ROLES.items():
-        candidates = [(stated or {}).get(role), *usual]
+    for role in ROLES:
+        candidates = [(stated or {}).get(role), *players(role)]
         chosen = next((name for name in candidates if name in there), None)
         if chosen is not None:
             roles[role] = chosen
@@ -64,8 +70,8 @@ def assign_roles(
 
 def comparable(roles: Mapping[str, str], units: Mapping[str, str]) -> dict[str, str]:
     """Leave out a command that is of another kind than the output: there is no error to track."""
-    kept = dict(roles)
+    result = dict(roles)
     command, output = roles.get("command"), roles.get("output_position")
     if command and output and units[command] != units[output]:
-        del kept["command"]
-    return kept
+        del result["command"]
+    return result

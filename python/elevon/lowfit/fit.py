@@ -48,7 +48,7 @@ class LowFit:
         Value of every number that was fitted [SI].
     deviation : mapping of str to float
         Standard deviation of each over the cases, by leaving out one at a time (jackknife) [SI].
-    kept : mapping of str to str
+    unchanged : mapping of str to str
         Numbers left as they were, and why.
     errors_before, errors_after : tuple of mapping of str to float
         For each case, RMS of low less high over the size of high, by signal: RMS, of the
@@ -61,7 +61,7 @@ class LowFit:
     old: Mapping[str, float]
     new: Mapping[str, float]
     deviation: Mapping[str, float]
-    kept: Mapping[str, str]
+    unchanged: Mapping[str, str]
     errors_before: tuple[Mapping[str, float], ...]
     errors_after: tuple[Mapping[str, float], ...]
 
@@ -76,7 +76,7 @@ class LowFit:
                  "deviation": self.deviation[path]}
                 for path, value in self.new.items()
             ],
-            "kept": [{"path": path, "reason": reason} for path, reason in self.kept.items()],
+            "kept": [{"path": path, "reason": reason} for path, reason in self.unchanged.items()],
             "cases": [
                 {"name": case.name, "before": dict(old), "after": dict(new)}
                 for case, old, new in zip(
@@ -138,14 +138,14 @@ def _fitted(
 
     high = _signals(actuator, cases, "high", seed, part(progress, 0.0, 0.9))
     problem = _Problem(actuator, tuple(cases), tuple(high), seed)
-    seen, kept = problem.split(free)
+    seen, unchanged = problem.split(free)
     old = {path: float(actuator.parameters.value(path)) for path in seen}
     rows = range(len(cases))
     new = problem.solve(seen, rows)
     deviation = problem.jackknife(seen, new, progress)
     after = actuator.with_values(new, source="fitted to the high model", asked=False)
     errors = [problem.errors(values) for values in (old, new)]
-    return LowFit(actuator, after, tuple(cases), old, new, deviation, kept, *errors)
+    return LowFit(actuator, after, tuple(cases), old, new, deviation, unchanged, *errors)
 
 
 @dataclass(frozen=True)
@@ -178,14 +178,14 @@ class _Problem:
 
     def split(self, free: Sequence[str]) -> tuple[list[str], dict[str, str]]:
         """Return what the cases determine, and why the rest is kept."""
-        seen, kept = [], {}
+        seen, unchanged = [], {}
         for path in free:
             value = (1.0 - PROBE) * float(self.actuator.parameters.value(path))
             if self.moved(path, value) > SEEN:
                 seen.append(path)
             else:
-                kept[path] = "no case depends on it with this drive"
-        return seen, kept
+                unchanged[path] = "no case depends on it with this drive"
+        return seen, unchanged
 
     def solve(self, paths: Sequence[str], rows: Sequence[int]) -> dict[str, float]:
         """Return the best values over the cases in `rows`, one coordinate after another, twice.

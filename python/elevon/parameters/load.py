@@ -114,14 +114,14 @@ def load_set(reference: str | os.PathLike[str]) -> SetFile:
 
 
 def _marked(
-    found: Mapping[str, Parameter], base: Mapping[str, Parameter], layer: _Layer, wiring: str
+    parameters: Mapping[str, Parameter], base: Mapping[str, Parameter], layer: _Layer, wiring: str
 ) -> dict[str, Parameter]:
     """Mark what a set of the user's own changes in its base, or in the defaults the base leaves."""
     if not layer.header.base or is_shipped(Path(layer.document.origin)):
-        return dict(found)
+        return dict(parameters)
     known = records(wiring)
     marked = {}
-    for path, item in found.items():
+    for path, item in parameters.items():
         below = base.get(path)
         value = known[path].default_value() if below is None else below.value
         changed = value is not None and value != item.value
@@ -165,14 +165,14 @@ def _parameters(layer: _Layer, wiring: str) -> dict[str, Parameter]:
     from elevon.parameters.model import Entry
 
     known = records(wiring)
-    found: dict[str, Parameter] = {}
+    parameters: dict[str, Parameter] = {}
     for path, raw in _leaves(layer, layer.entries, ()):
         place = layer.document.place(tuple(path.split(".")))
         if path not in known:
             raise unknown("parameter", path, known, place)
         entry = validated(Entry, raw, layer.document.within(tuple(path.split("."))))
-        found[path] = _parameter(path, entry, known[path], place)
-    return found
+        parameters[path] = _parameter(path, entry, known[path], place)
+    return parameters
 
 
 def _leaves(

@@ -121,7 +121,7 @@ def chart(
     values = {name: np.asarray(line, dtype=np.float64) for name, line in lines.items()}
     if breaks:
         instants, values = _interrupted(instants, values, breaks)
-    shown, kept = thinned(instants, values)
+    shown, drawn = thinned(instants, values)
     if shown.size < instants.size:
         note = f"{note} " if note else ""
         note += f"{instants.size} samples drawn as the extremes of {shown.size // 2} time slices."
@@ -132,7 +132,7 @@ def chart(
         "time": _base64(shown),
         "series": [
             {"name": name, "colour": COLOURS[k % len(COLOURS)], "values": _base64(_float32(line))}
-            for k, (name, line) in enumerate(kept.items())
+            for k, (name, line) in enumerate(drawn.items())
         ],
     }
     data = json.dumps(spec).replace("<", "\\u003c")

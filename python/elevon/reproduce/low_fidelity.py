@@ -55,11 +55,11 @@ class CaseRow:
 
     def checks(self) -> list[Check]:
         """Return what this case is held to."""
-        found = [Check(f"{self.name}: position", self.position_nrmse, POSITION_LIMIT, "")]
+        checks = [Check(f"{self.name}: position", self.position_nrmse, POSITION_LIMIT, "")]
         if self.floor_a is None:
             limit = CURRENT_LIMIT
-            found.append(Check(f"{self.name}: q current", self.q_current_nrmse, limit, ""))
-        return found
+            checks.append(Check(f"{self.name}: q current", self.q_current_nrmse, limit, ""))
+        return checks
 
     def to_dict(self) -> dict[str, Any]:
         """Return one row of the command's JSON object."""
@@ -119,10 +119,10 @@ def reproduce_low_fidelity(
         start, stop = number / 4.0, (number + 1) / 4.0
         model = actuator.with_values({"drive.kind": drive})
         scenario = _scenario(actuator, braked)
-        found = compare(model, scenario, seed=seed, progress=part(progress, start, stop))
+        comparison = compare(model, scenario, seed=seed, progress=part(progress, start, stop))
         span = part(progress, stop, 1.0)
-        floor = _floor(model, scenario, found, seed, span) if floored else None
-        rows.append(_row(name, found, floor))
+        floor = _floor(model, scenario, comparison, seed, span) if floored else None
+        rows.append(_row(name, comparison, floor))
     return LowFidelityResult(actuator.name, tuple(rows))
 
 
@@ -135,7 +135,11 @@ def _scenario(actuator: Actuator, braked: bool) -> Scenario:
 
 
 def _floor(
-    model: Actuator, scenario: Scenario, found: Comparison, seed: int, progress: Progress | None
+    model: Actuator,
+    scenario: Scenario,
+    comparison: Comparison,
+    seed: int,
+    progress: Progress | None,
 ) -> float:
     """RMS difference of the q current of two high runs, one with four fifths of the step."""
     from elevon.simulate import simulate
@@ -148,17 +152,17 @@ def _floor(
         seed=seed,
         progress=progress,
     )
-    again = filtered(other, "current_q", found.time, found.cutoff)
-    return float(np.sqrt(np.mean((again - found.high["current_q"]) ** 2)))
+    again = filtered(other, "current_q", comparison.time, comparison.cutoff)
+    return float(np.sqrt(np.mean((again - comparison.high["current_q"]) ** 2)))
 
 
-def _row(name: str, found: Comparison, floor: float | None) -> CaseRow:
-    values = found.to_dict()
+def _row(name: str, comparison: Comparison, floor: float | None) -> CaseRow:
+    values = comparison.to_dict()
     return CaseRow(
         name,
-        found.position_nrmse,
-        found.speed_nrmse,
-        found.q_current_nrmse,
+        comparison.position_nrmse,
+        comparison.speed_nrmse,
+        comparison.q_current_nrmse,
         values["q_current_rms_a"],
         values["q_current_rms_error_a"],
         floor,

@@ -237,8 +237,8 @@ def _settled(log: Recording, lead: float) -> tuple[Floats, Floats]:
     """Return position and force over whole turns, the first turn left out."""
     position, force = log["nut_position"].values, log["load_cell"].values
     travel = np.abs(position - position[0])
-    kept = (travel >= lead) & (travel < (TURNS + 1) * lead * (1.0 - 1e-9))
-    return position[kept], force[kept]
+    settled = (travel >= lead) & (travel < (TURNS + 1) * lead * (1.0 - 1e-9))
+    return position[settled], force[settled]
 
 
 def _friction_rows(
@@ -312,11 +312,11 @@ def _efficiency_rows(actuator: Actuator, seed: int, progress: Progress | None) -
 def _steady(run: Recording) -> tuple[float, float, float]:
     """Mean current, motor speed and load of the steady part of a retraction."""
     ram, speed = run["user_position"].values, run["motor_speed"].values
-    kept = (speed < -560.0) & (ram > 0.075) & (ram < 0.16)
+    steady = (speed < -560.0) & (ram > 0.075) & (ram < 0.16)
     return (
-        float(run["current_mean"].values[kept].mean()),
-        float(speed[kept].mean()),
-        float(run["load_force"].values[kept].mean()),
+        float(run["current_mean"].values[steady].mean()),
+        float(speed[steady].mean()),
+        float(run["load_force"].values[steady].mean()),
     )
 
 

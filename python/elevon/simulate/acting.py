@@ -141,7 +141,7 @@ def together(runs: Iterable[tuple[Actuator, Scenario, str]]) -> Iterator[None]:
         yield
 
 
-def report(found: Iterable[Sequence[Doubt]], *, strict: bool, stacklevel: int = 3) -> None:
+def report(doubts_by_run: Iterable[Sequence[Doubt]], *, strict: bool, stacklevel: int = 3) -> None:
     """Warn of every doubt of a batch once, or refuse.
 
     Raises
@@ -149,7 +149,7 @@ def report(found: Iterable[Sequence[Doubt]], *, strict: bool, stacklevel: int = 
     NotActingError
         `strict`, and there is a doubt; all of them are in the message.
     """
-    doubts = dict.fromkeys(doubt for run in found for doubt in run)
+    doubts = dict.fromkeys(doubt for run in doubts_by_run for doubt in run)
     if strict and doubts:
         raise NotActingError("\n".join(doubt.text for doubt in doubts))
     for doubt in doubts:

@@ -72,7 +72,7 @@ def resting(actuator: Actuator, record: FaultRecord) -> list[Resting]:
         One of its own (`own_faults`).
     """
     cells = itertools.product(record.places, shown_drives(actuator))
-    found = []
+    places = []
     for place, drive in cells:
         vector = _with_drive(actuator, drive)
         for fidelity in wirings()[actuator.wiring]["fidelities"]:
@@ -80,8 +80,8 @@ def resting(actuator: Actuator, record: FaultRecord) -> list[Resting]:
                 actuator.wiring, fidelity, vector, record, place
             )
             if reason:
-                found.append(Resting(place, fidelity, drive, reason))
-    return found
+                places.append(Resting(place, fidelity, drive, reason))
+    return places
 
 
 def _with_drive(actuator: Actuator, drive: str) -> npt.NDArray[np.float64]:

@@ -32,13 +32,13 @@ def build_recording(
     channels: list[Channel] = []
     clocks: list[Clock] = []
     for index, plan in enumerate(prepared.plan):
-        kept = result["clocks"][plan.name]
-        key = (plan.name, plan.rate, id(kept["time"]))
-        clock = shared.get(key) or shared.setdefault(key, Clock(plan.name, kept["time"], plan.rate))
+        rows = result["clocks"][plan.name]
+        key = (plan.name, plan.rate, id(rows["time"]))
+        clock = shared.get(key) or shared.setdefault(key, Clock(plan.name, rows["time"], plan.rate))
         clocks.append(clock)
-        channels.extend(_channels(prepared, fidelity, plan, clock, kept["values"]))
+        channels.extend(_channels(prepared, fidelity, plan, clock, rows["values"]))
         if index == 0:
-            channels.extend(_severities(prepared, clock, kept["values"][:, len(plan.signals) :]))
+            channels.extend(_severities(prepared, clock, rows["values"][:, len(plan.signals) :]))
     return Recording(
         channels,
         clocks=clocks,

@@ -150,9 +150,9 @@ def _assembled(
         chosen = names[number * count : (number + 1) * count]
         width = 1 + len(chosen)
         for plan in prepared.plan:
-            kept = item["clocks"][plan.name]
-            values = kept["values"].reshape(len(kept["time"]), -1, width)
-            clocks.setdefault(plan.name, {"time": kept["time"], "values": values[:, :, 0]})
+            rows = item["clocks"][plan.name]
+            values = rows["values"].reshape(len(rows["time"]), -1, width)
+            clocks.setdefault(plan.name, {"time": rows["time"], "values": values[:, :, 0]})
             for column, signal in enumerate(plan.signals):
                 for place, name in enumerate(chosen):
                     derivatives[name][signal] = values[:, column, 1 + place]

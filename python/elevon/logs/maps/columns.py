@@ -55,7 +55,7 @@ def find_drive_columns(table: RawTable, given: Collection[str] = ()) -> dict[str
                 f"{key}; name one of them in a column map"
             )
         recognised[key] = name
-    _check_found(table, {*recognised, *given})
+    _check_columns(table, {*recognised, *given})
     return recognised
 
 
@@ -76,7 +76,7 @@ def parameter_key(name: str) -> str | None:
     return f"r{number}" if f"r{number}" in drive_columns() else None
 
 
-def _check_found(table: RawTable, recognised: Collection[str]) -> None:
+def _check_columns(table: RawTable, recognised: Collection[str]) -> None:
     names = ", ".join(quoted(name) for name in list(table.columns)[:12])
     if "time" not in recognised:
         raise FormatError(

@@ -219,5 +219,5 @@ def _checks(rows: Sequence[RowResult], count: float) -> list[Check]:
 def _rank_correlation(rows: Sequence[RowResult]) -> float:
     from scipy.stats import spearmanr
 
-    found = spearmanr([row.play_in_deg for row in rows], [row.flat_s for row in rows])
-    return float(found.statistic)
+    correlation = spearmanr([row.play_in_deg for row in rows], [row.flat_s for row in rows])
+    return float(correlation.statistic)

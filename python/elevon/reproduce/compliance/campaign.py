@@ -185,7 +185,7 @@ def _curvature(load: Array, loss: Array, group: np.ndarray[Any, Any]) -> float:
 
 def _checks(variants: Sequence[Variant], slips: Sequence[Slip]) -> list[Check]:
     printed, own, repaired = variants[0], variants[1], variants[-1]
-    found = {slip.row for slip in slips if slip.kind != "swapped"}
+    rows_called_wrong = {slip.row for slip in slips if slip.kind != "swapped"}
     return [
         Check("load on loss, printed rows, from 68.16", abs(printed.load_on_loss - 68.16),
               0.005, "N/deg"),
@@ -199,7 +199,8 @@ def _checks(variants: Sequence[Variant], slips: Sequence[Slip]) -> list[Check]:
               "N/deg"),
         Check("ratio of the two regressions less r squared",
               abs(printed.load_on_loss / printed.loss_on_load - printed.r2), 1e-9),
-        Check("rows called wrong by only one of program and eye", len(found ^ SLIPS_BY_HAND), 0,
+        Check("rows called wrong by only one of program and eye",
+              len(rows_called_wrong ^ SLIPS_BY_HAND), 0,
               "rows"),
     ]  # fmt: skip
 

@@ -94,10 +94,10 @@ def find_slips(drops: Sequence[Drop]) -> tuple[list[Drop], list[Slip]]:
     downwards = sum(_motor(drop, ends) < 0 for drop in drops) * 2 > len(drops)
     repaired, slips = [], []
     for drop in drops:
-        fixed, slips_found = _positions(drop, ends, downwards)
-        fixed, wrong = _loss(drop, fixed, bool(slips_found), drops)
+        fixed, misplaced = _positions(drop, ends, downwards)
+        fixed, wrong = _loss(drop, fixed, bool(misplaced), drops)
         repaired.append(fixed)
-        slips += slips_found + wrong
+        slips += misplaced + wrong
     return repaired, slips
 
 

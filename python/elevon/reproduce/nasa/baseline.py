@@ -152,8 +152,8 @@ def reproduce_baseline(
     effects: dict[str, list[FactorEffect]] = {}
     checks = _checks(rows, actuator)
     if whole:
-        effects, found = _effects(rows, replicates, seed)
-        checks += [*_order_checks(rows), *found]
+        effects, effect_checks = _effects(rows, replicates, seed)
+        checks += [*_order_checks(rows), *effect_checks]
     return BaselineResult(
         rows, checks, load_kind, seed, replicates, effects, _sheet(cells, orders),
         time_histories(actuator, part(progress, 0.9, 0.97)) if whole else [],
@@ -232,7 +232,7 @@ def _measure(
         alike.setdefault((wave, profile.duration), []).append(place)
     groups = [g[i : i + BATCH] for g in alike.values() for i in range(0, len(g), BATCH)]
     done, total = 0.0, sum(float(run.scenario.duration) for run in runs.values())
-    found: dict[tuple[int, int], tuple[float, ...]] = {}
+    measured: dict[tuple[int, int], tuple[float, ...]] = {}
     for number, group in enumerate(groups):
         spent = sum(float(runs[place].scenario.duration) for place in group)
         values = store.get(f"group {number}")
@@ -244,8 +244,8 @@ def _measure(
             values = np.array(list(map(_measures, recordings, periods)))
             store.put(f"group {number}", values)
         done += spent
-        found |= {place: tuple(v) for place, v in zip(group, values.tolist(), strict=True)}
-    return found
+        measured |= {place: tuple(v) for place, v in zip(group, values.tolist(), strict=True)}
+    return measured
 
 
 def _measures(recording: Recording, period: float) -> list[float]:
@@ -310,22 +310,22 @@ def _effects(
     chosen = [(level, row) for row in rows if row.runs and (level := _level(row)) is not None]
     levels = np.array([level for level, _ in chosen for _ in range(replicates)])
     block = np.tile(np.arange(replicates), len(chosen))
-    found = {}
+    fitted = {}
     for name in RESPONSES:
         column = list(MEASURES).index(name)
         response = np.array([run[column] for _, row in chosen for run in row.runs])
-        found[name] = fit_effects(FACTORS, levels, block, response)
+        fitted[name] = fit_effects(FACTORS, levels, block, response)
     column = list(MEASURES).index(RESPONSES[0])
     current = np.array([run[column] for _, row in chosen for run in row.runs])
     matrix = model_matrix(FACTORS, levels, block)
     weights, *_ = np.linalg.lstsq(matrix, current, rcond=None)
     truth = {
-        "effects": [effect.effect for effect in found[RESPONSES[0]]],
+        "effects": [effect.effect for effect in fitted[RESPONSES[0]]],
         "block": float(np.std(weights[:replicates])),
         "scatter": float(np.std(current - matrix @ weights)),
     }
     share, bias = coverage(FACTORS, levels, block, truth, seed=seed)
-    return found, [
+    return fitted, [
         Check("known effects held by their intervals, at least", 100 * share, 85.0, "%", True),
         Check("known effects held by their intervals, at most", 100 * share, 97.0, "%"),
         Check("known effects: mean error over its deviation", bias, 0.25, "1"),
@@ -357,21 +357,21 @@ def _worst(rows: Sequence[BaselineRow], name: str) -> float:
 
 def _order_checks(rows: Sequence[BaselineRow]) -> list[Check]:
     """Tensile and compressive runs are mirror images but for the start; more load, more current."""
-    found = {
+    currents = {
         (row.profile, row.load): row.mean("rms_current_a")
         for row in rows
         if row.profile.amplitude > 0.0 and row.runs
     }
     mirrored = [
-        abs(current / found[profile, -load] - 1.0)
-        for (profile, load), current in found.items()
-        if load > 0.0 and (profile, -load) in found
+        abs(current / currents[profile, -load] - 1.0)
+        for (profile, load), current in currents.items()
+        if load > 0.0 and (profile, -load) in currents
     ]
     falls = 0
-    for (profile, load), current in found.items():
+    for (profile, load), current in currents.items():
         larger = {500.0: 4500.0, 4500.0: 8500.0}.get(abs(load))
         if larger is not None:
-            falls += found[profile, float(np.copysign(larger, load))] <= current
+            falls += currents[profile, float(np.copysign(larger, load))] <= current
     return [
         Check("rms current, compressive against tensile", 100.0 * max(mirrored), 6.0, "%"),
         Check("loads whose increase does not raise the current", float(falls), 0.0),

@@ -115,8 +115,8 @@ class BaselineResult:
         effects = [
             {"response": name, "unit": MEASURES[name][1], "term": e.term, "effect": e.effect,
              "interval": [e.low, e.high], "p": e.p}
-            for name, found in self.effects.items()
-            for e in found
+            for name, fitted in self.effects.items()
+            for e in fitted
         ]  # fmt: skip
         return {
             "status": "pass" if all_passed(self.checks) else "fail",

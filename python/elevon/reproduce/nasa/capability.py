@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from elevon.actuator import Actuator
 from elevon.errors import InputError, RangeError
+from elevon.parameters.relations import torque_constant
 from elevon.reproduce.nasa.profiles import Profile
 
 __all__ = ["Capability"]
@@ -101,7 +102,7 @@ class Capability:
         force = (abs(load) + self.load_friction) * self.travel_per_radian / self.efficiency
         drag = self.viscous * rate / self.travel_per_radian
         drag += self.preload_torque * self._relieved(abs(load) + self.load_friction)
-        return (force + self.friction + drag) / (1.5 * self.emf)
+        return (force + self.friction + drag) / torque_constant(self.emf)
 
     def _relieved(self, force: float) -> float:
         """Load that the relieved half of the nut keeps, over the preload."""
@@ -136,7 +137,7 @@ class Capability:
 
     def acceleration(self, load: float, rate: float = 0.0) -> float:
         """Return the largest acceleration [m/s2] against `load` [N] at `rate` [m/s]."""
-        spare = 1.5 * self.emf * (self.current_limit - self.current(load, rate))
+        spare = torque_constant(self.emf) * (self.current_limit - self.current(load, rate))
         return self.travel_per_radian * spare / self.inertia
 
     def refusal(self, profile: Profile, load: float, opposing: float = 0.0) -> str | None:

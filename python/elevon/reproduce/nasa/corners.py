@@ -46,8 +46,8 @@ def corner_rows(actuator: Actuator, progress: Progress | None = None) -> list[di
     ]
     record = "command,user_position,current_ref@2 kHz"
     rows = []
-    found = simulate_batch(runs, fidelity="high", record=record, progress=progress)
-    for (shape, load, acceleration), recording in zip(cases, found, strict=True):
+    recordings = simulate_batch(runs, fidelity="high", record=record, progress=progress)
+    for (shape, load, acceleration), recording in zip(cases, recordings, strict=True):
         if recording.status != "ok":
             raise SimulationError(f"{recording.meta['label']}: {recording.meta['message']}")
         late = recording["command"].time >= SETTLE

@@ -99,11 +99,11 @@ class CurrentResult:
     def checks(self) -> list[Check]:
         """As many runs as published, and no worse on average than the paper's worst."""
         nominal = [row for row in self.rows if row.state == "nominal"]
-        found = [Check("nominal runs", float(len(nominal)), 32.0, "", at_least=True)]
+        checks = [Check("nominal runs", float(len(nominal)), 32.0, "", at_least=True)]
         for state, (_, most, _) in PUBLISHED.items():
             name = f"{state}: average error of the current"
-            found.append(Check(name, self.summary(state)[0], most, "%"))
-        return found
+            checks.append(Check(name, self.summary(state)[0], most, "%"))
+        return checks
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object of the command."""

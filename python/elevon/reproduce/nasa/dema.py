@@ -111,19 +111,19 @@ def fit_dema(seed: int = 0, progress: Progress | None = None) -> DemaFit:
     hidden = first + SPREAD * np.clip(rng.standard_normal(len(FITTED)), -2.0, 2.0)
     truth = _hours(nominal, [hidden], part(progress, 0.0, 0.1))[0]
     measured = truth[:2] + NOISE * rng.standard_normal(truth[:2].shape)
-    found = first
+    logarithms = first
     for round_ in range(ROUNDS):
         span = part(progress, 0.1 + 0.3 * round_, min(0.4 + 0.3 * round_, 1.0))
-        shifted = [found, *(found + STEP * row for row in np.eye(len(FITTED)))]
+        shifted = [logarithms, *(logarithms + STEP * row for row in np.eye(len(FITTED)))]
         runs = _hours(nominal, shifted, span)
         slopes = np.array([(run[:2] - runs[0][:2]).ravel() / STEP for run in runs[1:]]).T
         rest = (measured - runs[0][:2]).ravel()
-        found = found + np.linalg.lstsq(slopes, rest, rcond=None)[0]
+        logarithms = logarithms + np.linalg.lstsq(slopes, rest, rcond=None)[0]
     variance = float(rest @ rest) / (rest.size - len(FITTED))
     deviation = np.sqrt(np.diag(variance * np.linalg.inv(slopes.T @ slopes)))
     rows = [
         FitRow(path, *(float(np.exp(x)) for x in (h, f, f - 1.96 * d, f + 1.96 * d)))
-        for path, h, f, d in zip(FITTED, hidden, found, deviation, strict=True)
+        for path, h, f, d in zip(FITTED, hidden, logarithms, deviation, strict=True)
     ]
     time = np.arange(measured.shape[1], dtype=float)
     checks = _checks(rows, measured, runs[0], truth)
@@ -144,11 +144,13 @@ def _hours(nominal: Actuator, values: Sequence[Array], progress: Progress | None
     data["load"] = {"user": {"terms": terms}}
     scenario = Scenario.from_dict(data)
     runs = [Run(nominal.with_values(_named(v)), scenario, label="thermal hour") for v in values]
-    found = simulate_batch(runs, fidelity="low", record=RECORD, progress=progress)
-    for recording in found:
+    recordings = simulate_batch(runs, fidelity="low", record=RECORD, progress=progress)
+    for recording in recordings:
         if recording.status != "ok":
             raise SimulationError(f"thermal hour: {recording.meta['message']}", recording.status)
-    return [np.stack([recording[name].values for name in recording.names]) for recording in found]
+    return [
+        np.stack([recording[name].values for name in recording.names]) for recording in recordings
+    ]
 
 
 def _named(logarithms: Array) -> Mapping[str, float]:

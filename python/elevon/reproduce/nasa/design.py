@@ -154,8 +154,8 @@ def coverage(
         offsets = truth["block"] * rng.standard_normal(first)
         scatter = truth["scatter"] * rng.standard_normal(block.size)
         response = matrix @ np.concatenate([offsets, 0.5 * effects]) + scatter
-        found = fit_effects(factors, levels, block, response)
-        held.append([f.low <= e <= f.high for f, e in zip(found, effects, strict=True)])
-        errors.append([f.effect - e for f, e in zip(found, effects, strict=True)])
+        fitted = fit_effects(factors, levels, block, response)
+        held.append([f.low <= e <= f.high for f, e in zip(fitted, effects, strict=True)])
+        errors.append([f.effect - e for f, e in zip(fitted, effects, strict=True)])
     error = np.array(errors)
     return float(np.mean(held)), float(np.abs(error.mean(axis=0) / error.std(axis=0)).max())

@@ -73,14 +73,14 @@ def orders(angle: Array, speed: Array, signal: Array, wanted: Sequence[float]) -
     """
     moving = np.flatnonzero(np.abs(speed) > LEAST_SPEED)
     strokes = np.split(moving, np.flatnonzero(np.diff(moving) > 1) + 1)
-    found = [
+    levels = [
         _stroke_orders(angle[stroke], signal[stroke], wanted)
         for stroke in strokes
         if stroke.size > 2 and abs(angle[stroke[-1]] - angle[stroke[0]]) > 2 * np.pi * LEAST_TURNS
     ]
-    if not found:
+    if not levels:
         return [float("nan")] * len(wanted)
-    return [float(x) for x in np.median(np.array(found), axis=0)]
+    return [float(x) for x in np.median(np.array(levels), axis=0)]
 
 
 def _stroke_orders(angle: Array, signal: Array, wanted: Sequence[float]) -> list[float]:

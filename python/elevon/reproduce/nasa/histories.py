@@ -79,12 +79,12 @@ def time_histories(actuator: Actuator, progress: Progress | None = None) -> list
         Run(actuator, Scenario.from_dict(data), label=f"figure {number}")
         for number, _, data in wanted
     ]
-    found = simulate_batch(runs, fidelity="high", record=RECORD, progress=progress)
-    for recording in found:
+    recordings = simulate_batch(runs, fidelity="high", record=RECORD, progress=progress)
+    for recording in recordings:
         if recording.status != "ok":
             raise SimulationError(f"{recording.meta['label']}: {recording.meta['message']}")
     return [
         History(number, title, recording["command"].time,
                 {name: recording[name].values for name in recording.names})
-        for (number, title, _), recording in zip(wanted, found, strict=True)
+        for (number, title, _), recording in zip(wanted, recordings, strict=True)
     ]  # fmt: skip

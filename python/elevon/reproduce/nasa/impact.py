@@ -64,19 +64,19 @@ def _difference(healthy: Array, faulty: Array) -> tuple[float, float, float]:
     """Mean difference and its Welch interval."""
     from scipy.stats import ttest_ind
 
-    found = ttest_ind(faulty, healthy, equal_var=False).confidence_interval(LEVEL)
-    return float(np.mean(faulty) - np.mean(healthy)), float(found.low), float(found.high)
+    interval = ttest_ind(faulty, healthy, equal_var=False).confidence_interval(LEVEL)
+    return float(np.mean(faulty) - np.mean(healthy)), float(interval.low), float(interval.high)
 
 
-def gap_impacts(found: Cells) -> list[Impact]:
+def gap_impacts(cells: Cells) -> list[Impact]:
     """Return the gap's excess of every profile and load."""
     return [
         Impact(shape, load, *_difference(cell["healthy"][:, COLUMN], cell[GAP][:, COLUMN]))
-        for (shape, load), cell in found.items()
+        for (shape, load), cell in cells.items()
     ]
 
 
-def impact_checks(found: Cells) -> list[Check]:
+def impact_checks(cells: Cells) -> list[Check]:
     """Unloaded the triangle hits harder than the trapezoid (N 2.3), loaded the trapezoid.
 
     The units are the same in both profiles, so their differences are compared.
@@ -86,7 +86,7 @@ def impact_checks(found: Cells) -> list[Check]:
         (UNLOADED, "triangular", "trapezoidal"),
         (LOADED, "trapezoidal", "triangular"),
     ):
-        pair = [found.get((shape, load), {}) for shape in (stronger, weaker)]
+        pair = [cells.get((shape, load), {}) for shape in (stronger, weaker)]
         if not all(GAP in cell for cell in pair):
             continue
         more = [pair[0][name][:, COLUMN] - pair[1][name][:, COLUMN] for name in ("healthy", GAP)]

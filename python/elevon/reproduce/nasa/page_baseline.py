@@ -74,9 +74,9 @@ def _effects(report: Report, result: BaselineResult) -> None:
         "against compressive): least squares with one offset a block and all pairs of factors, "
         "95 % intervals, probabilities corrected over the terms (Holm).",
     )
-    for name, found in result.effects.items():
+    for name, effects in result.effects.items():
         title, unit, digits = MEASURES[name]
-        rows = [[e.term, e.effect, e.low, e.high, _probability(e.p)] for e in found]
+        rows = [[e.term, e.effect, e.low, e.high, _probability(e.p)] for e in effects]
         number = f"+.{digits}f"
         section.table(
             Table(["Factor or pair", f"Effect [{unit}]", "from", "to", "p"], rows, title,

@@ -122,19 +122,19 @@ def reproduce_separation(
     units = {"healthy": draw_units(nominal, "healthy", healthy, seed)}
     units |= {f.name: draw_units(nominal, f.name, reassemblies, seed) for f in faults}
     cells = [(shape, load) for load in loads for shape in shapes]
-    found: dict[tuple[str, float], dict[str, Array]] = {}
+    simulated: dict[tuple[str, float], dict[str, Array]] = {}
     for index, (shape, load) in enumerate(cells):
         span = part(progress, index / len(cells), (index + 1) / len(cells))
-        found[shape, load] = _cell(
+        simulated[shape, load] = _cell(
             units, faults, (shape, load), seed=seed, store=store, progress=span
         )
     level = 1.0 - FAMILY / (len(faults) * len(cells))
-    rows = _rows(found, faults, EffectScale(healthy, reassemblies, level), level)
-    rate, tables = _null(found, reassemblies, level, seed)
+    rows = _rows(simulated, faults, EffectScale(healthy, reassemblies, level), level)
+    rate, tables = _null(simulated, reassemblies, level, seed)
     seeded = any(fault.name == GAP for fault in faults)
-    impacts = gap_impacts(found) if seeded else []
+    impacts = gap_impacts(simulated) if seeded else []
     traces = gap_traces(nominal) if seeded else []
-    checks = [*_checks(rows, rate, tables), *impact_checks(found)]
+    checks = [*_checks(rows, rate, tables), *impact_checks(simulated)]
     return SeparationResult(rows, impacts, checks, rate, tables, seed, healthy, reassemblies, level,
                             traces, meta)  # fmt: skip
 
@@ -152,13 +152,13 @@ def _provenance(actuator: Actuator) -> dict[str, Any]:
 
 def _conditions(faults: Sequence[Seeded], load: float) -> dict[str, tuple[str, list[str]]]:
     """Every condition of a load: its group of units and its faults."""
-    found: dict[str, tuple[str, list[str]]] = {"healthy": ("healthy", [])}
+    conditions: dict[str, tuple[str, list[str]]] = {"healthy": ("healthy", [])}
     for fault in faults:
-        found[fault.name] = (fault.name, [fault.text()])
+        conditions[fault.name] = (fault.name, [fault.text()])
         if load == HALF_LOAD:
             # The same units: the fault has grown in them from half to whole.
-            found[f"half {fault.name}"] = (fault.name, [fault.text(0.5)])
-    return found
+            conditions[f"half {fault.name}"] = (fault.name, [fault.text(0.5)])
+    return conditions
 
 
 def _cell(
@@ -196,7 +196,7 @@ def _simulated(
     from elevon.errors import SimulationError
     from elevon.simulate import simulate_batch
 
-    found = []
+    chunks = []
     for start in range(0, len(runs), CHUNK):
         values = store.get(f"{name} {start}")
         if values is None:
@@ -210,21 +210,21 @@ def _simulated(
                     raise SimulationError(f"{meta['label']}: {meta['message']}", recording.status)
             values = np.array([features(recording) for recording in recordings])
             store.put(f"{name} {start}", values)
-        found.append(values)
-    return np.concatenate(found)
+        chunks.append(values)
+    return np.concatenate(chunks)
 
 
 def _rows(
-    found: Mapping[tuple[str, float], Mapping[str, Array]],
+    simulated: Mapping[tuple[str, float], Mapping[str, Array]],
     faults: Sequence[Seeded],
     scale: EffectScale,
     level: float,
 ) -> list[SeparationRow]:
     """Every fault under every load: the effects of all profiles, and whether one is the best."""
     rows = []
-    loads = dict.fromkeys(load for _, load in found)
+    loads = dict.fromkeys(load for _, load in simulated)
     for fault, load in product(faults, loads):
-        cells = {shape: cell for (shape, at), cell in found.items() if at == load}
+        cells = {shape: cell for (shape, at), cell in simulated.items() if at == load}
         column = FEATURES.index(fault.feature)
         whole = [_effect(scale, cell, fault.name, column) for cell in cells.values()]
         best = compare_profiles(whole, level)
@@ -262,14 +262,14 @@ def _draws(best: Comparison, effects: Sequence[Effect], drawn: int) -> int | Non
 
 
 def _null(
-    found: Mapping[tuple[str, float], Mapping[str, Array]], group: int, level: float, seed: int
+    cells: Mapping[tuple[str, float], Mapping[str, Array]], group: int, level: float, seed: int
 ) -> tuple[float, float]:
     """Compare healthy units with healthy units over random splits of the population.
 
     Returns the share of comparisons above the threshold and the share of tables that hold any.
     """
     rng = np.random.default_rng([seed, 1])
-    pool = np.concatenate([compared(cell["healthy"]) for cell in found.values()], axis=1)
+    pool = np.concatenate([compared(cell["healthy"]) for cell in cells.values()], axis=1)
     pool = pool[:, np.all(np.isfinite(pool), axis=0)]
     above = []
     for _ in range(SPLITS):

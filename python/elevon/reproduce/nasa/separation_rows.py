@@ -119,12 +119,12 @@ class SeparationResult:
 
     def winners(self) -> dict[tuple[str, float], str | None]:
         """Return the best profile of each fault and load, None where none can be named."""
-        found: dict[tuple[str, float], str | None] = {}
+        best: dict[tuple[str, float], str | None] = {}
         for row in self.rows:
-            found.setdefault((row.fault, row.load), None)
+            best.setdefault((row.fault, row.load), None)
             if row.winner:
-                found[row.fault, row.load] = row.profile
-        return found
+                best[row.fault, row.load] = row.profile
+        return best
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object of the command."""

@@ -49,9 +49,9 @@ class CellStore:
 
     def _read(self, path: Path) -> dict[str, list[Any]]:
         try:
-            found = json.loads(path.read_text("utf-8"))
-            same = found["work"] == self._key
-            return dict(found["cells"]) if same else {}
+            content = json.loads(path.read_text("utf-8"))
+            same = content["work"] == self._key
+            return dict(content["cells"]) if same else {}
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise OutputExistsError(
                 f"{path}: cannot be read ({error}); remove it to begin again"

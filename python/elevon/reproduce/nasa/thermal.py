@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import SimulationError
+from elevon.parameters.relations import copper_loss
 from elevon.progress import part
 from elevon.report.checks import Check, all_passed
 from elevon.reproduce.nasa.dema import DemaFit, fit_dema
@@ -223,7 +224,7 @@ def _held(
     terms = [{"kind": "constant", "value": torque}]
     data = {"duration": duration, "command": {"mode": "torque", "terms": terms}}
     recording = _simulate(actuator, data, "1 Hz", seed, progress)
-    return recording, 1.5 * float(recording["current_q"].values[-1]) ** 2
+    return recording, copper_loss(1.0, float(recording["current_q"].values[-1]))
 
 
 def _steady_check(actuator: Actuator, seed: int, progress: Progress | None) -> Check:
@@ -242,16 +243,16 @@ def _closed_form_check(
 ) -> Check:
     bare = actuator.with_values(LOCKED | {"thermal.model": model, "thermal.emissivity": 0.0})
     recording, square = _held(bare, HOUR, seed, progress)
-    found = recording["winding_temperature"]
-    error = np.max(np.abs(found.values - closed_form(bare, square, found.time)))
+    winding = recording["winding_temperature"]
+    error = np.max(np.abs(winding.values - closed_form(bare, square, winding.time)))
     return Check(f"one hour without radiation less the closed form, {model}", float(error),
                  LIMIT_K, "K")  # fmt: skip
 
 
 def _energy_check(hour: Recording) -> Check:
     given = hour["energy_copper"].values
-    kept = hour["energy_heat_stored"].values + hour["energy_air"].values
-    error = np.max(np.abs(given - kept)) / given[-1]
+    stored = hour["energy_heat_stored"].values + hour["energy_air"].values
+    error = np.max(np.abs(given - stored)) / given[-1]
     return Check("heat in less heat stored and given away", float(error), 1e-9, "1")
 
 

@@ -19,7 +19,7 @@ from elevon.worklog import WorkLog, digest
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["STEPS", "Kept", "finished_steps", "inputs_of", "work_key"]
+__all__ = ["STEPS", "FinishedSteps", "finished_steps", "inputs_of", "work_key"]
 
 Result = TypeVar("Result")
 LOG = "unfinished.log"
@@ -47,7 +47,7 @@ def work_key(seed: int, base: Actuator, hidden: Actuator) -> str:
     return mark.hexdigest()[:32]
 
 
-class Kept:
+class FinishedSteps:
     """The finished steps of one work.
 
     Parameters
@@ -102,7 +102,7 @@ class Kept:
             means that it does not fit.
         """
         log = self._own()
-        item = None if log is None else log.kept(name)
+        item = None if log is None else log.intact(name)
         if item is None or item.data.get("inputs") != inputs:
             return None
         try:
