@@ -30,8 +30,11 @@ __all__ = [
     "UnknownNameError",
     "did_you_mean",
     "nearest",
+    "quoted",
     "unknown",
 ]
+
+_SHOWN = 60
 
 
 class ElevonError(Exception):
@@ -236,6 +239,12 @@ def unknown(
     start = f"{place}: " if place else ""
     message = f"{start}unknown {what} {name!r}{did_you_mean(name, names)}"
     return UnknownNameError(message, name, nearest(name, names))
+
+
+def quoted(text: str) -> str:
+    """Return foreign text safe to show: escaped, quoted, and cut to a readable length."""
+    shown = text if len(text) <= _SHOWN else text[:_SHOWN] + "..."
+    return ascii(shown)
 
 
 def _plain(name: str) -> str:

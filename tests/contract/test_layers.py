@@ -12,7 +12,7 @@ PACKAGE = Path(__file__).resolve().parents[2] / "python" / "elevon"
 ROWS = [
     ["errors", "_core"],
     ["units", "files", "progress", "memory", "data"],
-    ["documents", "series", "report", "worklog"],
+    ["documents", "series", "report", "worklog", "containers"],
     ["recording"],
     ["parameters", "loads"],
     ["actuator", "faults", "waveforms"],

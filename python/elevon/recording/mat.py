@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.containers.mat5 import Variable, variables
 from elevon.errors import FormatError, InputError
 from elevon.recording.contents import Contents, check_size, header_bytes, rebuild
 from elevon.recording.header import Header
-from elevon.recording.mat5 import Variable, variables
 from elevon.recording.names import check_name
 
 if TYPE_CHECKING:

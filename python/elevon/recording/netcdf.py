@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.containers.hdf import dataset, opened, vector
 from elevon.errors import FormatError
 from elevon.recording.contents import Contents, check_size, header_bytes, rebuild
 from elevon.recording.convert import time_name
@@ -61,28 +62,21 @@ def write(recording: Recording, path: Path) -> None:
 
 def read(path: Path, max_bytes: int) -> Contents:
     """Read the description, then what it names."""
-    import h5py
+    with opened(path) as file:
+        raw = _vector(path, file, "elevon", "S", max_bytes)
+        header = Header.from_json(raw.tobytes(), str(path))
+        check_size(str(path), header_bytes(header), max_bytes)
+        several = len(header.clocks) > 1
 
-    try:
-        with h5py.File(path, "r") as file:
-            raw = _dataset(path, file, "elevon", "S", max_bytes)
-            header = Header.from_json(raw.tobytes(), str(path))
-            check_size(str(path), header_bytes(header), max_bytes)
-            several = len(header.clocks) > 1
+        def columns(name: str) -> dict[str, npt.NDArray[np.float64]]:
+            entry = next(clock for clock in header.clocks if clock.name == name)
+            time = f"time_{name}" if several else "time"
+            arrays = {"time": _vector(path, file, time, "f", max_bytes)}
+            for channel in entry.channels:
+                arrays[channel] = _vector(path, file, channel, "f", max_bytes)
+            return arrays
 
-            def columns(name: str) -> dict[str, npt.NDArray[np.float64]]:
-                entry = next(clock for clock in header.clocks if clock.name == name)
-                time = f"time_{name}" if several else "time"
-                arrays = {"time": _dataset(path, file, time, "f", max_bytes)}
-                for channel in entry.channels:
-                    arrays[channel] = _dataset(path, file, channel, "f", max_bytes)
-                return arrays
-
-            return rebuild(header, columns, str(path))
-    except (OSError, RuntimeError, KeyError, ValueError) as error:
-        if isinstance(error, FormatError):
-            raise
-        raise FormatError(f"{path}: is not a readable NetCDF 4 file: {error}") from error
+        return rebuild(header, columns, str(path))
 
 
 def _variable(
@@ -101,21 +95,14 @@ def _variable(
         variable.attrs[key] = value
 
 
-def _dataset(path: Path, file: Any, name: str, kind: str, max_bytes: int) -> npt.NDArray[Any]:
+def _vector(path: Path, file: Any, name: str, kind: str, max_bytes: int) -> npt.NDArray[Any]:
     """Read one vector stored in the file itself, of plain numbers or characters."""
-    import h5py
-
-    if name not in file:
-        if name == "elevon":
-            raise FormatError(f"{path}: is HDF5, but no recording (no variable 'elevon')")
+    data = dataset(file, name)
+    if data is None and name == "elevon":
+        raise FormatError(f"{path}: is HDF5, but no recording (no variable 'elevon')")
+    if data is None:
         raise FormatError(f"{path}: columns are missing: {name}")
-    if not isinstance(file.get(name, getlink=True), h5py.HardLink):
-        raise FormatError(f"{path}: {name!r} is a link to elsewhere; refused")
-    data = file[name]
-    if not isinstance(data, h5py.Dataset) or data.external or data.is_virtual:
-        raise FormatError(f"{path}: {name!r} is not stored in the file itself; refused")
-    if data.dtype.kind != kind or data.ndim != 1:
-        raise FormatError(f"{path}: {name!r} is {data.ndim}-dimensional {data.dtype}; refused")
-    check_size(str(path), data.size * data.dtype.itemsize, max_bytes)
-    values: npt.NDArray[Any] = data[()]
+    values = vector(data, kind, lambda size: check_size(str(path), size, max_bytes))
+    if isinstance(values, str):
+        raise FormatError(f"{path}: {name!r} refused: {values}")
     return values

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.containers.parquet import columns, declared_bytes, opened
 from elevon.errors import FormatError
 from elevon.recording.contents import Contents, check_size, header_bytes, rebuild
 from elevon.recording.header import Header
@@ -54,21 +55,11 @@ def write(recording: Recording, path: Path) -> None:
 
 def read(path: Path, max_bytes: int) -> Contents:
     """Read every clock from its rows."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        with pq.ParquetFile(path, memory_map=False, page_checksum_verification=True) as file:
-            header = _header(path, file)
-            check_size(str(path), header_bytes(header), max_bytes)
-            starts = _row_groups(path, file, header)
-            return rebuild(
-                header, lambda name: _columns(path, file, header, name, starts), str(path)
-            )
-    except FormatError:
-        raise
-    except (pa.ArrowException, ValueError, OverflowError, MemoryError) as error:
-        raise FormatError(f"{path}: is not a readable Parquet file: {error}") from error
+    with opened(path) as file:
+        header = _header(path, file)
+        check_size(str(path), max(header_bytes(header), declared_bytes(file)), max_bytes)
+        starts = _row_groups(path, file, header)
+        return rebuild(header, lambda name: _columns(path, file, header, name, starts), str(path))
 
 
 def _schema(recording: Recording) -> Any:
@@ -141,8 +132,13 @@ def _columns(
             raise FormatError(f"{path}: column {column!r} is missing or not float64")
     if not groups[name]:
         return {column: np.empty(0) for column in wanted}
-    table = file.read_row_groups(groups[name], columns=wanted)
+
+    def check_rows(rows: int) -> None:
+        if rows > entry.samples:
+            raise FormatError(f"{path}: clock {name!r} has more rows than its description says")
+
+    table = columns(file, wanted, check_rows, groups[name])
     for column in wanted:
-        if table.column(column).null_count:
+        if column in table.missing:
             raise FormatError(f"{path}: column {column!r} has nulls on its own clock")
-    return {column: table.column(column).to_numpy() for column in wanted}
+    return table.values

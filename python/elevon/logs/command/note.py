@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Any
 
 from elevon.documents import Document, check_depth, validated
-from elevon.errors import FormatError, InputError, did_you_mean
+from elevon.errors import FormatError, InputError, did_you_mean, quoted
 from elevon.logs.command.guess import FREE
-from elevon.logs.formats.limits import Limits, existing_file, quoted
+from elevon.logs.formats.limits import Limits, existing_file
 from elevon.scenario.scenario import Command, Scenario
 from elevon.units import parse_quantity
 from elevon.waveforms import wave_records

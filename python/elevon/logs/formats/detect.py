@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from elevon.containers.hdf import is_hdf5
 from elevon.errors import unknown
-from elevon.logs.formats.hdf import is_hdf5
 from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file
 from elevon.logs.formats.opening import head
 from elevon.logs.formats.table import RawTable

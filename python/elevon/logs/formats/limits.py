@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from elevon.errors import FormatError, InputError
+from elevon.errors import FormatError, InputError, quoted
 
-__all__ = ["DEFAULT_LIMITS", "Limits", "existing_file", "quoted"]
-
-_SHOWN = 60
+__all__ = ["DEFAULT_LIMITS", "Limits", "existing_file"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,9 +84,3 @@ def existing_file(path: str | Path, limits: Limits = DEFAULT_LIMITS) -> Path:
     if size > limits.file_bytes:
         raise FormatError(f"{file}: {size} bytes, more than the limit of {limits.file_bytes}")
     return file
-
-
-def quoted(text: str) -> str:
-    """Return foreign text safe to show: escaped, quoted, and cut to a readable length."""
-    shown = text if len(text) <= _SHOWN else text[:_SHOWN] + "..."
-    return ascii(shown)

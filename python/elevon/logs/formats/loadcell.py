@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from elevon.errors import FormatError, InputError, RangeError
+from elevon.errors import FormatError, InputError, RangeError, quoted
 from elevon.files import write_bytes
-from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, quoted
+from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits
 from elevon.logs.formats.text import read_text_table
 from elevon.units import check_kind, to_si
 

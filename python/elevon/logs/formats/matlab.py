@@ -6,12 +6,13 @@ from collections.abc import Generator, Iterator
 from contextlib import closing
 from pathlib import Path
 
-from elevon.errors import FormatError
-from elevon.logs.formats.hdf import is_hdf5, numeric_vectors
-from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file, quoted
+from elevon.containers.hdf import is_hdf5
+from elevon.containers.mat5 import Variable, variables
+from elevon.errors import FormatError, quoted
+from elevon.logs.formats.hdf import numeric_vectors
+from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file
 from elevon.logs.formats.table import FloatArray, RawTable
 from elevon.logs.formats.vectors import table_of_vectors
-from elevon.recording.mat5 import Variable, variables
 
 __all__ = ["has_variable", "read_matlab"]
 

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from elevon.errors import FormatError
-from elevon.logs.formats.hdf import is_hdf5, numeric_vectors
-from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file, quoted
+from elevon.containers.hdf import is_hdf5
+from elevon.errors import FormatError, quoted
+from elevon.logs.formats.hdf import numeric_vectors
+from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file
 from elevon.logs.formats.opening import head
 from elevon.logs.formats.table import FloatArray, RawTable
 from elevon.logs.formats.vectors import table_of_vectors

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from elevon.errors import FormatError
-from elevon.logs.formats.limits import quoted
+from elevon.errors import FormatError, quoted
 
 __all__ = ["FloatArray", "RawTable", "split_unit", "unique_names"]
 

@@ -16,8 +16,8 @@ from typing import IO
 
 import numpy as np
 
-from elevon.errors import FormatError
-from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file, quoted
+from elevon.errors import FormatError, quoted
+from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file
 from elevon.logs.formats.opening import open_bytes
 from elevon.logs.formats.table import RawTable, split_unit, unique_names
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from elevon.errors import FormatError
-from elevon.logs.formats.limits import Limits, quoted
+from elevon.errors import FormatError, quoted
+from elevon.logs.formats.limits import Limits
 from elevon.logs.formats.table import FloatArray, RawTable
 
 __all__ = ["quiet", "table_of_vectors"]

@@ -6,9 +6,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from elevon.errors import FormatError, InputError, unknown
+from elevon.errors import FormatError, InputError, quoted, unknown
 from elevon.logs.clocks.quality import IntArray
-from elevon.logs.formats.limits import quoted
 from elevon.logs.formats.table import FloatArray, RawTable
 from elevon.logs.maps.column_map import ColumnEntry, ColumnMap
 from elevon.logs.maps.columns import drive_columns, find_drive_columns, looks_like_drive

@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection
 
-from elevon.errors import FormatError, did_you_mean
-from elevon.logs.formats.limits import quoted
+from elevon.errors import FormatError, did_you_mean, quoted
 from elevon.logs.formats.table import RawTable
 from elevon.logs.maps.column_map import ColumnEntry, shipped_map
 

@@ -11,8 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from elevon.errors import FormatError
-from elevon.logs.formats.limits import quoted
+from elevon.errors import FormatError, quoted
 from elevon.logs.formats.table import FloatArray, RawTable
 from elevon.logs.maps.agreement import slope_and_fit
 from elevon.logs.maps.hints import role_hint, unit_hint

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from elevon.errors import FormatError
+from elevon.errors import FormatError, quoted
 
 __all__ = ["Variable", "variables"]
 
@@ -37,7 +37,6 @@ _PIECE = 2**16
 _MOST_VARIABLES = 512
 _MOST_SIZES = 32
 _LONGEST_FIELD = 64
-_SHOWN = 60
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,19 +165,19 @@ class Variable:
             name = bytes(names[start : start + width]).split(b"\0")[0].decode("latin-1")
             kind, body, at = source.element(self._content, at)
             if kind != _MATRIX:
-                raise self._damaged(f"the field {_quoted(name)} is an element of type {kind}")
+                raise self._damaged(f"the field {quoted(name)} is an element of type {kind}")
             yield _variable(source, body, name)
 
     @property
     def _place(self) -> str:
-        return f"{self._source.path}, {_quoted(self.name)}"
+        return f"{self._source.path}, {quoted(self.name)}"
 
     def _expect(self, kind: str) -> None:
         if self.kind != kind:
             raise FormatError(f"{self._place}: is of kind {self.kind}, not {kind}")
 
     def _damaged(self, why: str) -> FormatError:
-        return self._source.damaged(f"{_quoted(self.name)}: {why}")
+        return self._source.damaged(f"{quoted(self.name)}: {why}")
 
 
 def variables(path: Path, check: Callable[[int], None]) -> Generator[Variable, None, None]:
@@ -281,8 +280,3 @@ def _variable(source: _Source, data: memoryview, name: str | None = None) -> Var
         return Variable("", _KINDS[_OPAQUE], False, shape, source, data[:0])
     own = bytes(raw).decode("latin-1") if name is None else name
     return Variable(own, kind, bool((word >> 8) & _COMPLEX), shape, source, data[at:])
-
-
-def _quoted(text: str) -> str:
-    """Return foreign text safe to show."""
-    return ascii(text if len(text) <= _SHOWN else text[:_SHOWN] + "...")
