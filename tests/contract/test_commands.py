@@ -10,7 +10,6 @@ import pytest
 from elevon import Actuator, Recording
 from elevon.cli import main
 from elevon.parameters.find import set_names
-from elevon.parameters.records import wirings
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 SECONDS = 9.0
@@ -71,8 +70,6 @@ def test_validate_on_the_model_that_made_the_log(bench, capsys):
 @pytest.mark.long
 def test_calibrate_determines_something(bench, capsys):
     name, log = bench
-    if "position" not in wirings()[Actuator.load(name).wiring]["modes"]:
-        pytest.xfail("calibration of an actuator with a control unit of its own: not yet there")
     report = run(capsys, "calibrate", log, "--actuator", name, "--json")
     assert report["parameters"]
     for item in report["parameters"].values():

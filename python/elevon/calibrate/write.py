@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from elevon.calibrate.estimate import LEVEL, Estimate
 from elevon.calibrate.promise import thresholds
@@ -18,12 +18,15 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.calibrate.calibration import Calibration
     from elevon.calibrate.closed_loop import LoopCalibration
+    from elevon.calibrate.gear import GearCalibration
     from elevon.calibrate.validation import Validation
 
 __all__ = ["calibrated_parameters", "set_text", "write_calibration", "write_values"]
 
+Answer: TypeAlias = "Calibration | LoopCalibration | GearCalibration"
 
-def calibrated_parameters(result: Calibration | LoopCalibration) -> list[Parameter]:
+
+def calibrated_parameters(result: Answer) -> list[Parameter]:
     """Return the changed parameters with source, old value and interval."""
     reasons = getattr(result, "undetermined", {})
     names = ", ".join(log.name for log in result.logs)
@@ -71,9 +74,7 @@ def _followed(path: str) -> str:
     return reasons.get(path, "scaled with motor.inertia: only the sum is determined")
 
 
-def set_text(
-    result: Calibration | LoopCalibration, *, name: str, base: str, validation: Validation | None
-) -> str:
+def set_text(result: Answer, *, name: str, base: str, validation: Validation | None) -> str:
     """Return the TOML text of the calibrated set."""
     import tomlkit
 
@@ -101,7 +102,7 @@ def set_text(
 
 def write_calibration(
     path: str | os.PathLike[str],
-    result: Calibration | LoopCalibration,
+    result: Answer,
     *,
     validation: Validation | None = None,
     force: bool = False,

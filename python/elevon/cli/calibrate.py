@@ -21,6 +21,7 @@ from elevon.cli.common import (
     without_companions,
 )
 from elevon.cli.output import print_json, print_table, progress_bar, say
+from elevon.cli.unit_logs import calibrate_unit, has_control_unit
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
@@ -147,6 +148,11 @@ def calibrate(
     model = read_actuator(actuator, settings)
     if len(logs) == 1 and is_drop_table(logs[0]):
         return _drops(logs[0], model, out, as_json=json, force=force)
+    if has_control_unit(model):
+        return calibrate_unit(
+            logs, model, column_map=column_map, free=_paths(free), out=out, report=report,
+            as_json=json, force=force, date=date,
+        )  # fmt: skip
     data = direct_logs(model, logs, loadcell, command, column_map)
     if data is None:
         if free is not None and _paths(free) is not None:

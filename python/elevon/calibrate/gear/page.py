@@ -1,0 +1,48 @@
+"""The page of a calibration by parts: what was determined, and what not and why."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from elevon.calibrate.estimate import LEVEL
+from elevon.report import Report, Table
+
+if TYPE_CHECKING:
+    from elevon.calibrate.gear.result import GearCalibration
+
+__all__ = ["gear_report"]
+
+
+def gear_report(
+    result: GearCalibration,
+    *,
+    provenance: Mapping[str, object] | None = None,
+    date: str | None = None,
+) -> Report:
+    """Return the report of a calibration of an actuator with a control unit."""
+    names = ", ".join(log.name for log in result.logs)
+    report = Report(f"Calibration of {result.before.name}", f"From {names}.", date=date)
+    report.fact("Parameters determined", str(len(result.estimates)))
+    report.fact("Time", f"{result.wall_s:.1f} s")
+    section = report.section("Parameters", f"Intervals hold {100 * LEVEL:.0f} % of the time.")
+    rows: list[list[object]] = [
+        [
+            item.path,
+            item.old,
+            item.value,
+            f"{item.interval[0]:.5g} to {item.interval[1]:.5g}",
+            item.unit,
+            item.register,
+            ", ".join(item.given),
+        ]
+        for item in result.estimates
+    ]
+    columns = ["Parameter", "Before", "After", "Interval", "Unit", "Register", "Holds for"]
+    section.table(Table(columns, rows, digits=5))
+    missing: list[list[object]] = [[path, why] for path, why in result.undetermined.items()]
+    if missing:
+        report.section("Not determined").table(Table(["Parameter", "Reason"], missing))
+    if provenance:
+        report.provenance(provenance)
+    return report

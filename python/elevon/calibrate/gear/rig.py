@@ -1,0 +1,137 @@
+"""Friction from a rig that moves the ram: means over speed, harmonics of the pitch, detent.
+
+At a constant speed the load cell shows ``way F(v) - m g``, and what repeats over the pitch. Free
+fall (the stages apart) shows the screw side, modified free fall (the motor turns, its brake open)
+the whole train, and a set brake what it holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.calibrate.gear.log import GearLog
+from elevon.calibrate.regression import robust_regression
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["HARMONICS", "RigTest", "rig_tests"]
+
+Floats = npt.NDArray[np.float64]
+HARMONICS = 5
+_SETTLED = 0.3  # s left out: the rig's start
+_BAND = 0.25  # of the log's rate: a detent above it is damped by the recorder's filter
+_BLOCKS = 12
+_TRIES = 41  # frequencies of the detent that are tried, within what the speed leaves open
+
+
+@dataclass(frozen=True)
+class RigTest:
+    """One run of the rig.
+
+    Attributes
+    ----------
+    log : str
+        Name.
+    kind : str
+        ``ff``, ``ffm`` or ``brake``.
+    speed : float
+        Of the ram, signed [m/s].
+    level, level_std : float
+        Mean force of the cell and its deviation [N].
+    harmonics, harmonics_std : ndarray, shape (HARMONICS,)
+        Amplitudes over the pitch, positive with the resistance [N].
+    detent, detent_std : float or None
+        Amplitude of the detent at the ram [N], where the log's rate shows it.
+    """
+
+    log: str
+    kind: str
+    speed: float
+    level: float
+    level_std: float
+    harmonics: Floats
+    harmonics_std: Floats
+    detent: float | None
+    detent_std: float | None
+
+    @property
+    def way(self) -> float:
+        """1 extending, -1 retracting."""
+        return float(np.sign(self.speed))
+
+
+def rig_tests(
+    logs: Sequence[GearLog], actuator: Actuator, *, per_travel: float, pitch: float
+) -> list[RigTest]:
+    """Evaluate the logs in which a rig moved the ram.
+
+    Parameters
+    ----------
+    logs : sequence of GearLog
+        All; others are passed over.
+    actuator : Actuator
+        For the detent's periods.
+    per_travel, pitch : float
+        Motor angle over the ram's travel [rad/m], travel of one turn of the screw [m].
+    """
+    return [_test(log, actuator, per_travel, pitch) for log in logs if log.rig]
+
+
+def _kind(log: GearLog, per_travel: float) -> str:
+    if not log.connected(per_travel):
+        return "ff"
+    powered = str(log.setting("brake.powered") or "always")
+    return "ffm" if powered == "always" else "brake"
+
+
+def _test(log: GearLog, actuator: Actuator, per_travel: float, pitch: float) -> RigTest:
+    kind = _kind(log, per_travel)
+    used = log.time >= _SETTLED
+    time, force = log.time[used], log["load_cell"][used]
+    # The rig's speed is constant: a straight line is quieter than the position itself.
+    slope, offset = np.polyfit(time, log["output_position"][used], 1)
+    way = float(np.sign(slope))
+    turn = 2.0 * np.pi * (slope * time + offset) / pitch
+    columns = [np.ones_like(time)]
+    columns += [way * np.cos(n * turn) for n in range(1, HARMONICS + 1)]
+    frequency = actuator.parameters.value("motor.detent_periods") * abs(slope) * per_travel
+    shown = kind != "ff" and 0.0 < frequency / (2.0 * np.pi) < _BAND / log.period
+    if shown:
+        tone = _tone(time, force, np.stack(columns, axis=1), frequency)
+        columns += [np.cos(tone * time), np.sin(tone * time)]
+    design = np.stack(columns, axis=1)
+    value, rest, _, _ = robust_regression(design, force)
+    std = _deviations(design, rest)
+    size = (float(np.hypot(*value[-2:])), float(np.mean(std[-2:]))) if shown else (None, None)
+    part = slice(1, HARMONICS + 1)
+    return RigTest(
+        log.name, kind, float(slope), float(value[0]), float(std[0]), value[part], std[part], *size
+    )
+
+
+def _tone(time: Floats, force: Floats, design: Floats, frequency: float) -> float:
+    """Frequency of the detent: what the line through the position leaves open decides the phase."""
+    rest = force - design @ np.linalg.lstsq(design, force, rcond=None)[0]
+    width = 2.0 * np.pi / float(np.ptp(time))
+    tries = frequency + np.linspace(-width, width, _TRIES)
+    power = [abs(np.exp(-1j * w * time) @ rest) for w in tries]
+    best = int(np.argmax(power))
+    if not 0 < best < _TRIES - 1:
+        return float(tries[best])
+    a, b, c = power[best - 1 : best + 2]
+    return float(tries[best] + 0.5 * (a - c) / (a - 2.0 * b + c) * (tries[1] - tries[0]))
+
+
+def _deviations(design: Floats, rest: Floats) -> Floats:
+    """Deviations of coefficients from the spread of the scores over blocks of time."""
+    bread = np.linalg.inv(design.T @ design)
+    parts = np.array_split(np.arange(len(rest)), _BLOCKS)
+    sums = np.array([design[part].T @ rest[part] for part in parts])
+    meat = sums.T @ sums * (_BLOCKS / max(_BLOCKS - 1, 1))
+    return np.asarray(np.sqrt(np.diag(bread @ meat @ bread)), dtype=np.float64)

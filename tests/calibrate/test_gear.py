@@ -1,0 +1,80 @@
+"""Landing gear: what was put in comes out of its logs, and the rest is said with a reason."""
+
+import numpy as np
+import pytest
+
+from elevon import Actuator
+from elevon.bench.procedure import load_procedure
+from elevon.calibrate.gear import calibrate_gear
+from elevon.errors import InputError
+from tests.calibrate.gear_bench import chosen, drawn, make_logs
+
+RIG = ("ff-extension-2", "ff-retraction-2", "ff-extension-10", "ff-retraction-10",
+       "ffm-extension-2", "ffm-retraction-2", "ffm-extension-10", "ffm-retraction-10",
+       "brake-extension-2")  # fmt: skip
+DRAWS, HIGH = 20, 3
+
+
+@pytest.fixture(scope="module")
+def one(tmp_path_factory):
+    """Truth and calibration of one draw: half the rig's tests and one retraction."""
+    values, model = drawn(3)
+    procedures = [chosen("gear-friction", RIG), chosen("gear-cycles", ["retraction-normal"])]
+    logs = make_logs(model, tmp_path_factory.mktemp("gear"), procedures, seed=3)
+    return values, logs, calibrate_gear(logs, Actuator.load("pisa-landing-gear"))
+
+
+def test_what_the_logs_determine_is_recovered(one):
+    values, _, result = one
+    errors = {e.path: abs(e.value / values[e.path] - 1.0) for e in result.estimates}
+    for path in ("motor.emf_constant", "motor.inertia", "brake.torque", "screw.moving_mass",
+                 "control.gain_retraction", "control.zero_retraction",):  # fmt: skip
+        assert errors[path] < max(0.02, 2.5 * result[path].std / values[path]), path
+    for kind in ("ff", "ffm"):
+        for way in ("extension", "retraction"):
+            for k in (2, 4):
+                assert errors[f"friction.{kind}_{way}_{k}"] < 0.05
+    covered = [e.interval[0] <= values[e.path] <= e.interval[1] for e in result.estimates]
+    assert np.mean(covered) > 0.75
+
+
+def test_what_no_log_shows_is_listed_with_its_reason(one):
+    _, _, result = one
+    assert "no log of a motion in extension" in result.undetermined["control.gain_extension"]
+    assert "20 mm/s" in result.undetermined["friction.ff_extension_5"]
+    assert not set(result.undetermined) & {e.path for e in result.estimates}
+    old = Actuator.load("pisa-landing-gear").parameters
+    assert result.actuator.parameters["lock.stiffness"] == old["lock.stiffness"]
+
+
+def test_free_takes_some_and_refuses_what_is_not_there(one):
+    _, logs, _ = one
+    model = Actuator.load("pisa-landing-gear")
+    result = calibrate_gear(logs, model, free=["brake.torque"])
+    assert [e.path for e in result.estimates] == ["brake.torque"]
+    with pytest.raises(InputError, match="nothing broke"):
+        calibrate_gear(logs, model, free=["lock.strength"])
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("fidelity", "draws"), [("low", DRAWS), ("high", HIGH)])
+def test_truth_recovery_over_draws(fidelity, draws, tmp_path):
+    """Motions at either fidelity; the rig's own runs at low (no current flows there)."""
+    model = Actuator.load("pisa-landing-gear")
+    errors, covered = {}, []
+    for seed in range(1, draws + 1):
+        values, truth = drawn(seed)
+        folder = tmp_path / str(seed)
+        logs = make_logs(truth, folder / "rig", [load_procedure("gear-friction")], seed=seed)
+        cycles = [load_procedure("gear-cycles")]
+        logs += make_logs(truth, folder / "run", cycles, seed=seed, fidelity=fidelity)
+        for item in calibrate_gear(logs, model).estimates:
+            if item.path in values:
+                true = values[item.path]
+                errors.setdefault(item.path, []).append(abs(item.value / true - 1.0))
+                covered.append(item.interval[0] <= true <= item.interval[1])
+    often = {path: sizes for path, sizes in errors.items() if len(sizes) > draws / 2}
+    assert len(often) > 40
+    for path, sizes in often.items():
+        assert np.median(sizes) < (0.05 if path.startswith("friction.") else 0.02), path
+    assert 0.80 <= np.mean(covered) <= 0.97
