@@ -170,7 +170,7 @@ def test_severities_cover_what_was_drawn():
     inside, count = 0, 400
     for _ in range(count):
         true = 0.5 + rng.random()
-        error = 0.05 * true * slope * rng.standard_normal()
+        error = item.error * true * slope * rng.standard_normal()
         rest = true * slope + error + rng.standard_normal(3)
         result = posterior(rest, np.eye(3), 1e4, [item], lambda _key, s: s[:, None] * slope)
         low, high = quantiles(*marginals(result, item.key), (0.05, 0.95))

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["UNITS", "Evidence", "Signals", "evidence"]
+__all__ = ["SHARES", "SIZES", "UNITS", "Evidence", "Signals", "evidence", "regress"]
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -35,6 +35,13 @@ UNITS: dict[str, tuple[str, str]] = {
     "speed_gain": ("A s/rad", "current set point by speed error"),
     "following_gain": ("s", "following error over speed set point: 1/position gain"),
 }
+#: Amplitudes: what a unit has already and what a fault adds meet at an unknown angle.
+SIZES = frozenset(["current_order_1", "current_order_2", "voltage_order_1", "voltage_order_2"])
+#: Rates and gains: a fault moves them by a share of the unit's own value.
+SHARES = frozenset(
+    ["dry_current", "viscous_current", "inertia_current", "brake_current", "speed_gain",
+     "following_gain"]
+)  # fmt: skip
 _BLOCKS = 16  # stretches of a log whose scores give the deviations
 _LEAST = 100  # samples of a regression
 _SLOW = 0.1  # of the highest speed
@@ -93,7 +100,7 @@ class Evidence:
         return Evidence(tuple(names), self.values[at], self.std[at])
 
 
-def evidence(signals: Signals, *, ratio: float, pole_pairs: float) -> Evidence:
+def evidence(signals: Signals, *, ratio: float, pole_pairs: float, emf: float) -> Evidence:
     """Regress.
 
     Parameters
@@ -104,6 +111,8 @@ def evidence(signals: Signals, *, ratio: float, pole_pairs: float) -> Evidence:
         Gear ratio.
     pole_pairs : float
         Electrical angle over shaft angle.
+    emf : float
+        Of the set [V s/rad]: what the voltage's ripple is a share of.
     """
     rows: dict[str, tuple[float, float]] = {}
     width = float(np.median(np.diff(signals.time)))
@@ -113,7 +122,7 @@ def evidence(signals: Signals, *, ratio: float, pole_pairs: float) -> Evidence:
     waves = (cosine, sine, cosine**2 - sine**2, 2.0 * cosine * sine)
     rows |= _currents(signals, moving, waves, width)
     if signals.voltage is not None:
-        rows |= _voltages(signals, moving, waves)
+        rows |= _voltages(signals, moving, waves, emf)
     rows |= _control(signals, width)
     names = tuple(name for name in UNITS if name in rows)
     return Evidence(
@@ -123,9 +132,22 @@ def evidence(signals: Signals, *, ratio: float, pole_pairs: float) -> Evidence:
     )
 
 
-def _fit(columns: Sequence[Floats], target: Floats, keep: Bools) -> tuple[Floats, Floats]:
-    """Least squares; covariance from the scores of stretches, since residuals are coloured."""
-    rows, data = np.stack([column[keep] for column in columns]), target[keep]
+def regress(columns: Sequence[Floats], data: Floats) -> tuple[Floats, Floats]:
+    """Least squares; covariance from the scores of stretches, since residuals are coloured.
+
+    Parameters
+    ----------
+    columns : sequence of ndarray, shape (n,)
+        What explains.
+    data : ndarray, shape (n,)
+        What is explained.
+
+    Returns
+    -------
+    ndarray, shape (k,), ndarray, shape (k, k)
+        Weights and their covariance.
+    """
+    rows = np.stack(columns)
     scale = np.sqrt(np.mean(rows**2, axis=1))
     scale[scale == 0.0] = 1.0
     rows /= scale[:, None]
@@ -135,6 +157,10 @@ def _fit(columns: Sequence[Floats], target: Floats, keep: Bools) -> tuple[Floats
     parts = np.add.reduceat(score, _edges(score.shape[1]), axis=1)
     covariance = inverse @ (parts @ parts.T) @ inverse * _BLOCKS / (_BLOCKS - 1)
     return beta / scale, covariance / np.outer(scale, scale)
+
+
+def _fit(columns: Sequence[Floats], target: Floats, use: Bools) -> tuple[Floats, Floats]:
+    return regress([column[use] for column in columns], target[use])
 
 
 def _edges(count: int) -> npt.NDArray[np.intp]:
@@ -147,18 +173,18 @@ def _one(beta: Floats, covariance: Floats, at: int, factor: float = 1.0) -> tupl
 
 def _size(beta: Floats, covariance: Floats, at: int, over: float = 1.0) -> tuple[float, float]:
     """Amplitude of a cosine and a sine; its phase depends on where the angle has its zero."""
-    size = float(np.hypot(beta[at], beta[at + 1]))
     variance = 0.5 * float(covariance[at, at] + covariance[at + 1, at + 1])
+    size = float(np.hypot(beta[at], beta[at + 1]))
     return size / abs(over), float(np.sqrt(max(variance, 0.0))) / abs(over)
 
 
 def _positions(signals: Signals, moving: Bools, ratio: float) -> dict[str, tuple[float, float]]:
     gap = signals.motor / ratio - signals.user
-    keep = moving & _dragged(signals.motor / ratio, float(np.ptp(gap[moving])))
-    if keep.sum() < _LEAST:
-        keep = moving
-    centred = signals.user - float(np.mean(signals.user[keep]))
-    beta, cov = _fit([np.sign(signals.speed), centred, np.ones_like(gap)], gap, keep)
+    use = moving & _dragged(signals.motor / ratio, float(np.ptp(gap[moving])))
+    if use.sum() < _LEAST:
+        use = moving
+    centred = signals.user - float(np.mean(signals.user[use]))
+    beta, cov = _fit([np.sign(signals.speed), centred, np.ones_like(gap)], gap, use)
     return {"lost_motion": _one(beta, cov, 0, 2.0), "position_scale": _one(beta, cov, 1)}
 
 
@@ -210,22 +236,22 @@ def _mean(values: Floats, half: int) -> Floats:
 
 
 def _voltages(
-    signals: Signals, moving: Bools, waves: Sequence[Floats]
+    signals: Signals, moving: Bools, waves: Sequence[Floats], emf: float
 ) -> dict[str, tuple[float, float]]:
     assert signals.voltage is not None
-    keep = moving & np.isfinite(signals.voltage)
+    use = moving & np.isfinite(signals.voltage)
     columns = [signals.speed, signals.current, np.ones_like(signals.speed)]
     columns += [signals.speed * wave for wave in waves]
-    if keep.sum() < 200:
+    if use.sum() < 200:
         return {}
-    beta, cov = _fit(columns, signals.voltage, keep)
-    emf = float(beta[0])
-    return {
+    beta, cov = _fit(columns, signals.voltage, use)
+    rows = {
         "voltage_per_speed": _one(beta, cov, 0),
         "voltage_per_current": _one(beta, cov, 1),
-        "voltage_order_1": _size(beta, cov, 3, emf),
-        "voltage_order_2": _size(beta, cov, 5, emf),
     }
+    rows["voltage_order_1"] = _size(beta, cov, 3, emf)
+    rows["voltage_order_2"] = _size(beta, cov, 5, emf)
+    return rows
 
 
 def _control(signals: Signals, width: float) -> dict[str, tuple[float, float]]:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from elevon.diagnose.bymodel.evidence import Evidence
 from elevon.diagnose.bymodel.replay import Replay
 
-__all__ = ["DEGREES", "FLOOR", "MISMATCH", "Healthy", "healthy"]
+__all__ = ["DEGREES", "FLOOR", "MISMATCH", "POOLED", "Elsewhere", "Healthy", "healthy"]
 
 Floats = npt.NDArray[np.float64]
 DEGREES = 10.0  # ASSUMED: worth of the stated spread, in runs
@@ -21,14 +21,14 @@ DEGREES = 10.0  # ASSUMED: worth of the stated spread, in runs
 MISMATCH: Mapping[str, tuple[float, float]] = {
     "lost_motion": (0.03, 1e-4),
     "position_scale": (0.0, 1e-3),
-    "dry_current": (0.05, 0.0),
+    "dry_current": (0.10, 0.0),
     "viscous_current": (0.20, 0.0),
     "inertia_current": (0.05, 0.0),
     "brake_current": (0.03, 0.0),
     "current_order_1": (0.0, 0.006),
     "current_order_2": (0.0, 0.006),
-    "voltage_per_speed": (0.02, 0.0),
-    "voltage_per_current": (0.5, 0.0),
+    "voltage_per_speed": (0.30, 0.0),  # beside little current it takes what the switches drop
+    "voltage_per_current": (1.0, 10.0),
     "voltage_order_1": (0.0, 0.006),
     "voltage_order_2": (0.0, 0.006),
     "speed_gain": (0.30, 0.0),  # spikes of a derivative: 20 % off for a drive with hysteresis
@@ -82,11 +82,30 @@ class Healthy:
     scale: Floats
 
 
-def healthy(model: Replay, names: Sequence[str], baselines: Sequence[Evidence]) -> Healthy:
-    """Join the model's spread with baselines of the same test.
+#: Evidence that stands off the model by one share in all tests of a unit, and the deviation of
+#: that share between tests. ASSUMED: one friction law acts in all of them, at other speeds.
+POOLED: Mapping[str, float] = {"dry_current": 0.04}
 
-    The offset of a unit from the model is Gaussian with `MISMATCH`; the baselines' mean narrows
-    it. The spread's scale is that stated, worth `DEGREES` runs, and the baselines' scatter.
+
+@dataclass(frozen=True)
+class Elsewhere:
+    """A baseline of another test, and what the model shows there."""
+
+    shown: Evidence
+    model: Evidence
+
+
+def healthy(
+    model: Replay,
+    names: Sequence[str],
+    baselines: Sequence[Evidence],
+    elsewhere: Sequence[Elsewhere] = (),
+) -> Healthy:
+    """Join the model's spread with baselines.
+
+    The offset of a unit from the model is Gaussian with `MISMATCH`; the mean of the baselines of
+    the same test narrows it, those of other tests narrow what is `POOLED`. The spread's scale is
+    that stated, worth `DEGREES` runs, and the baselines' scatter.
     """
     at = [model.healthy.names.index(name) for name in names]
     draws = model.draws[:, at]
@@ -94,24 +113,46 @@ def healthy(model: Replay, names: Sequence[str], baselines: Sequence[Evidence]) 
     own = np.cov(draws.T).reshape(len(at), len(at)) + np.diag(_sizes(FLOOR, names, mean) ** 2)
     off = np.diag(_sizes(MISMATCH, names, mean) ** 2)
     count = len(baselines)
-    if not count:
-        return Healthy(tuple(names), mean, own + off, DEGREES, 0, np.ones(len(at)))
-    rest = np.array([b.only(names).values for b in baselines]) - mean
-    noise = np.array([b.only(names).std ** 2 for b in baselines]).mean(axis=0)
-    centre = rest.mean(axis=0)
-    scatter = np.sum((rest - centre) ** 2, axis=0) / (np.diag(own) + noise)
-    scale = (DEGREES + scatter) / (DEGREES + count - 1)
-    own *= np.sqrt(np.outer(scale, scale))
-    gain = off @ np.linalg.inv(off + (own + np.diag(noise)) / count)
-    left = off - gain @ off
+    scale = np.ones(len(at))
+    left, moved = off, np.zeros(len(at))
+    if count:
+        rest = np.array([b.only(names).values for b in baselines]) - mean
+        noise = np.array([b.only(names).std ** 2 for b in baselines]).mean(axis=0)
+        centre = rest.mean(axis=0)
+        scatter = np.sum((rest - centre) ** 2, axis=0) / (np.diag(own) + noise)
+        scale = (DEGREES + scatter) / (DEGREES + count - 1)
+        own *= np.sqrt(np.outer(scale, scale))
+        gain = off @ np.linalg.inv(off + (own + np.diag(noise)) / count)
+        left, moved = off - gain @ off, gain @ centre
+    for name, between in POOLED.items():
+        for other in elsewhere:
+            said = _said_elsewhere(name, other) if name in names else None
+            if said is None:
+                continue
+            k = list(names).index(name)
+            error = own[k, k] + (mean[k] ** 2) * (said[1] ** 2 + between**2)
+            gain = left[:, k] / (left[k, k] + error)
+            moved = moved + gain * (said[0] * mean[k] - moved[k])
+            left = left - np.outer(gain, left[k])
     return Healthy(
         tuple(names),
-        mean + gain @ centre,
+        mean + moved,
         own + 0.5 * (left + left.T),
-        DEGREES + count - 1,
+        DEGREES + max(count - 1, 0),
         count,
         np.sqrt(scale),
     )
+
+
+def _said_elsewhere(name: str, other: Elsewhere) -> tuple[float, float] | None:
+    """Share by which a number stands off the model in another test, and its deviation."""
+    if name not in other.shown.names or name not in other.model.names:
+        return None
+    modelled = float(other.model.only([name]).values[0])
+    if not modelled > 0.0:
+        return None
+    shown = other.shown.only([name])
+    return float(shown.values[0]) / modelled - 1.0, float(shown.std[0]) / modelled
 
 
 def _sizes(table: Mapping[str, tuple[float, float]], names: Sequence[str], mean: Floats) -> Floats:

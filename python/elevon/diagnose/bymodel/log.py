@@ -12,6 +12,8 @@ import numpy.typing as npt
 
 from elevon.calibrate.kinematics import command_fit
 from elevon.calibrate.log import BenchLog, bench_log
+from elevon.diagnose.bymodel.command import noted_command
+from elevon.diagnose.bymodel.evidence import regress
 from elevon.errors import InputError
 from elevon.logs.command.reconstruct import reconstruct
 
@@ -102,6 +104,8 @@ def prepared(item: TestLog, actuator: Actuator) -> TestLog:
         Too short, no motion, motion one way only, no position, or of another actuator.
     """
     log = item.log
+    if item.good is not None:
+        return item
     if log.user is None or log.motor is None:
         raise InputError(f"{log.name}: diagnosis by the model needs both positions (r4820, r4821)")
     if log.duration < _LEAST_TIME:
@@ -114,14 +118,27 @@ def prepared(item: TestLog, actuator: Actuator) -> TestLog:
     if trace.coverage < 0.05:
         raise InputError(f"{log.name}: the speed set point is at its limit; no command is seen")
     rebuilt = np.interp(log.time, log.time[trace.valid], trace.position[trace.valid])
+    noted = noted_command(log, limit)
+    if noted is not None:
+        wave = _joined(log, trace.valid, rebuilt, noted.wave, noted.window)
+        return TestLog(log, item.voltage, (noted.gain, noted.gain_std), wave, good)
     fit = command_fit(log, gain, limit)
     if fit is None:
         return TestLog(log, item.voltage, None, rebuilt, good)
-    wave = fit.waveform.at(log.time)
-    first, last = fit.waveform.window
-    inside = (log.time >= first) & (log.time <= last)
-    replay = np.where(inside | (~trace.valid & (log.time <= last)), wave, rebuilt)
-    return TestLog(log, item.voltage, (fit.gain, fit.gain_std), replay, good)
+    wave = _joined(log, trace.valid, rebuilt, fit.waveform.at(log.time), fit.waveform.window)
+    return TestLog(log, item.voltage, (fit.gain, fit.gain_std), wave, good)
+
+
+def _joined(
+    log: BenchLog,
+    valid: npt.NDArray[np.bool_],
+    rebuilt: Floats,
+    wave: Floats,
+    window: tuple[float, float],
+) -> Floats:
+    """Return the waveform where it explains the log or the set point is cut off; else rebuilt."""
+    inside = (log.time >= window[0]) & (log.time <= window[1])
+    return np.where(inside | (~valid & (log.time <= window[1])), wave, rebuilt)
 
 
 def _check_motion(log: BenchLog, good: npt.NDArray[np.bool_], actuator: Actuator) -> None:
@@ -134,7 +151,10 @@ def _check_motion(log: BenchLog, good: npt.NDArray[np.bool_], actuator: Actuator
     for way, text in ((1.0, "forwards"), (-1.0, "backwards")):
         if (good & (way * log.speed > _MOVING * top)).sum() < 100:
             raise InputError(f"{log.name}: hardly any motion {text}; friction and play need both")
-    slope = float(np.polyfit(log.user[good], log.motor[good], 1)[0])
+    moving = good & (np.abs(log.speed) > _MOVING * top)
+    # The direction stands beside the position: play would tilt the line of a short motion.
+    columns = [log.user[moving], np.sign(log.speed[moving]), np.ones(int(moving.sum()))]
+    slope = float(regress(columns, log.motor[moving])[0][0])
     ratio = actuator.parameters.value("gear.ratio")
     if not abs(slope / ratio - 1.0) < _RATIO:
         raise InputError(

@@ -20,7 +20,6 @@ from elevon.diagnose.bymodel.candidates import Candidate
 __all__ = ["Hypothesis", "Posterior", "marginals", "posterior", "quantiles"]
 
 Floats = npt.NDArray[np.float64]
-MODEL_ERROR = 0.05  # of a shift: ASSUMED; what the low model misses of a fault's effect
 PRIOR_FAULTY = 0.5  # ASSUMED: a log is diagnosed since somebody doubts
 SECOND = 0.1  # ASSUMED: a faulty unit has a second fault
 _COARSE = 401
@@ -119,31 +118,35 @@ def posterior(
     return Posterior(tuple(out[k] for k in order), tuple(float(probability[k]) for k in order))
 
 
-def _log_t(rest: Floats, degrees: float, shift: Floats | None = None) -> Floats:
+def _log_t(rest: Floats, degrees: float, *errors: Floats) -> Floats:
     """Log density of Student's distribution, shape (m,), but for a constant.
 
-    The model's error adds the outer product of `MODEL_ERROR` x shift to the unit covariance.
+    Each fault's model error, shape (m, k), adds its outer product to the unit covariance.
     """
     square = np.sum(rest**2, axis=1)
     log_det: Floats = np.zeros(len(rest))
-    if shift is not None:
-        own = MODEL_ERROR**2 * np.sum(shift**2, axis=1)
-        along = MODEL_ERROR**2 * np.sum(rest * shift, axis=1) ** 2
-        square = square - along / (1.0 + own)
-        log_det = np.log1p(own)
-    size = rest.shape[1]
-    return np.asarray(
-        -0.5 * log_det - 0.5 * (degrees + size) * np.log1p(square / degrees), dtype=np.float64
-    )
+    if len(errors) == 1:
+        own = 1.0 + np.sum(errors[0] ** 2, axis=1)
+        square = square - np.sum(rest * errors[0], axis=1) ** 2 / own
+        log_det = np.log(own)
+    elif len(errors) == 2:
+        a, b = (1.0 + np.sum(e**2, axis=1) for e in errors)
+        c = np.sum(errors[0] * errors[1], axis=1)
+        p, q = (np.sum(rest * e, axis=1) for e in errors)
+        det = a * b - c**2
+        square = square - (b * p**2 - 2.0 * c * p * q + a * q**2) / det
+        log_det = np.log(det)
+    power = 0.5 * (degrees + rest.shape[1])
+    return np.asarray(-0.5 * log_det - power * np.log1p(square / degrees), dtype=np.float64)
 
 
 def _one(y: Floats, degrees: float, c: Candidate, shift: Shift, prior: float) -> Hypothesis:
     grid = np.linspace(c.low, c.high, _COARSE)
     moved = shift(c.key, grid)
-    best = float(grid[int(np.argmax(_log_t(y - moved, degrees, moved)))])
+    best = float(grid[int(np.argmax(_log_t(y - moved, degrees, c.error * moved)))])
     fine = _around(best, _scale(c, shift, best), c)
     moved = shift(c.key, fine)
-    log = _log_t(y - moved, degrees, moved)
+    log = _log_t(y - moved, degrees, c.error * moved)
     evidence, weight = _integrate(log, fine, c)
     return Hypothesis(
         (c.key,), evidence, prior, (fine,), (weight,), (float(fine[int(np.argmax(log))]),)
@@ -156,7 +159,7 @@ def _scale(c: Candidate, shift: Shift, at: float) -> float:
     pair = np.clip(np.array([at - step, at + step]), c.low, c.high)
     low, high = shift(c.key, pair)
     slope = float(np.linalg.norm(high - low) / (pair[1] - pair[0]))
-    own = MODEL_ERROR * float(np.linalg.norm(shift(c.key, np.array([at]))))
+    own = c.error * float(np.linalg.norm(shift(c.key, np.array([at]))))
     return min(float(np.hypot(1.0, own)) / max(slope, 1e-12), c.high - c.low)
 
 
@@ -182,8 +185,7 @@ def _two(
     grids = [_around(b, 1.5 * _joint(pair, shift, best)[k], c, _PAIR)
              for k, (b, c) in enumerate(zip(best, pair, strict=True))]  # fmt: skip
     left, right = shift(first.key, grids[0]), shift(second.key, grids[1])
-    moved = (left[:, None, :] + right[None, :, :]).reshape(-1, len(y))
-    log = _log_t(y - moved, degrees, moved).reshape(_PAIR, _PAIR)
+    log = _of_both(y, degrees, pair, left, right)
     top = float(log.max())
     mass = np.exp(log - top) * np.outer(np.gradient(grids[0]), np.gradient(grids[1]))
     total = float(mass.sum())
@@ -199,23 +201,35 @@ def _two(
     )
 
 
+def _of_both(
+    y: Floats, degrees: float, pair: tuple[Candidate, Candidate], left: Floats, right: Floats
+) -> Floats:
+    """Log density at every pair of two faults' shifts, shape (m, n)."""
+    shape = (len(left), len(right), len(y))
+    first = np.broadcast_to(left[:, None, :], shape).reshape(-1, len(y))
+    second = np.broadcast_to(right[None, :, :], shape).reshape(-1, len(y))
+    rest = y - first - second
+    log = _log_t(rest, degrees, pair[0].error * first, pair[1].error * second)
+    return log.reshape(shape[:2])
+
+
 def _start(
     y: Floats, degrees: float, pair: tuple[Candidate, Candidate], shift: Shift
 ) -> tuple[float, float]:
     """Coarse search on a grid that is dense near zero, then along each severity in turn."""
     grids = [_dense(c) for c in pair]
     tables = [shift(c.key, g) for c, g in zip(pair, grids, strict=True)]
-    moved = tables[0][:, None, :] + tables[1][None, :, :]
-    flat = moved.reshape(-1, len(y))
-    log = _log_t(y - flat, degrees, flat).reshape(moved.shape[:2])
+    log = _of_both(y, degrees, pair, *tables)
     at = np.unravel_index(int(np.argmax(log)), log.shape)
     best = [float(grids[0][at[0]]), float(grids[1][at[1]])]
     for _ in range(6):
         for k in (0, 1):
             line = np.linspace(pair[k].low, pair[k].high, _COARSE)
             other = shift(pair[1 - k].key, np.array([best[1 - k]]))
-            row = shift(pair[k].key, line) + other
-            best[k] = float(line[int(np.argmax(_log_t(y - row, degrees, row)))])
+            row = shift(pair[k].key, line)
+            still = np.broadcast_to(pair[1 - k].error * other, row.shape)
+            log = _log_t(y - row - other, degrees, pair[k].error * row, still)
+            best[k] = float(line[int(np.argmax(log))])
     return best[0], best[1]
 
 
@@ -235,7 +249,7 @@ def _joint(
         ends = np.clip(np.array([b - step, b + step]), c.low, c.high)
         low, high = shift(c.key, ends)
         columns.append((high - low) / (ends[1] - ends[0]))
-        own += MODEL_ERROR**2 * float(np.sum(shift(c.key, np.array([b])) ** 2))
+        own += c.error**2 * float(np.sum(shift(c.key, np.array([b])) ** 2))
     design = np.column_stack(columns)
     scale = np.maximum(np.linalg.norm(design, axis=0), 1e-12)
     inverse = np.linalg.pinv((design / scale).T @ (design / scale), rcond=1e-6, hermitian=True)

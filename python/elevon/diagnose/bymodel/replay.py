@@ -11,13 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.diagnose.bymodel.candidates import Candidate
-from elevon.diagnose.bymodel.evidence import Evidence, Signals, evidence
+from elevon.diagnose.bymodel.evidence import SIZES, Evidence, Signals, evidence
 from elevon.diagnose.bymodel.log import TestLog
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["SPREAD", "Replay", "logged_evidence", "replay"]
+__all__ = ["SPREAD", "Replay", "logged_evidence", "modelled", "replay"]
 
 Floats = npt.NDArray[np.float64]
 _SIGNALS = (
@@ -53,7 +53,7 @@ class Replay:
     severities : mapping of str to ndarray, shape (m,)
         Key of the candidate to the severities that were run.
     shifts : mapping of str to ndarray, shape (m, k)
-        What they do to the evidence.
+        What they do to the evidence; of sizes (`SIZES`) the part at a right angle.
     draws : ndarray, shape (d, k)
         Evidence of healthy units as they differ from run to run.
     """
@@ -88,17 +88,58 @@ def logged_evidence(item: TestLog, actuator: Actuator) -> Evidence:
         log.time, log.user, log.motor, log.speed_ref, log.speed, log.current_target,
         log.current, item.voltage, brake, None, item.gain, item.good,
     )  # fmt: skip
-    return evidence(signals, **_geometry(actuator))
+    return evidence(signals, **_constants(actuator))
 
 
 def replay(item: TestLog, actuator: Actuator, candidates: Sequence[Candidate]) -> Replay:
-    """Run the test on the model: healthy, each candidate at several severities, and the spread."""
+    """Run the test on the model: healthy, each candidate at several severities, and the spread.
+
+    Logs of one test, by its note, share the runs of the first of them: they differ only by when
+    the command and the brake began, to which no regression looks.
+    """
+    key = _test_key(item, actuator, candidates)
+    if key in _RECENT:
+        return _RECENT[key]
+    made = _replayed(item, actuator, candidates)
+    if key is not None:
+        _RECENT[key] = made
+        while len(_RECENT) > _REMEMBERED:
+            _RECENT.pop(next(iter(_RECENT)))
+    return made
+
+
+def modelled(item: TestLog, actuator: Actuator) -> Evidence:
+    """Return the evidence of the healthy model in a log's test."""
+    return replay(item, actuator, ()).healthy
+
+
+_REMEMBERED = 32  # tests
+_RECENT: dict[Any, Replay] = {}
+
+
+def _test_key(item: TestLog, actuator: Actuator, candidates: Sequence[Candidate]) -> Any:
+    """What logs of one test have in common; None where the note does not say which test it was."""
+    log = item.log
+    if log.note is None or log.note.waveform is None or item.good is None:
+        return None
+    noted = tuple(sorted((k, float(f"{v:.3g}")) for k, v in log.note.parameters.items()))
+    level = float(np.mean(log.brake.level)) if item.braked else 0.0
+    shape = (round(log.duration), round(1e5 * log.period), round(20.0 * float(item.good.mean())))
+    return (
+        actuator.hash, tuple(candidates), log.note.waveform, noted, item.braked,
+        round(10.0 * level), shape, log.current_signal, item.voltage is None, item.gain is None,
+    )  # fmt: skip
+
+
+def _replayed(item: TestLog, actuator: Actuator, candidates: Sequence[Candidate]) -> Replay:
     severities = {c.key: _severities(c) for c in candidates}
     units = [_Unit(actuator)]
     for c in candidates:
         units += [_Unit(actuator, (c.text(float(s)),)) for s in severities[c.key] if s != 0.0]
-    units += [_drawn(actuator, np.random.default_rng([15, k])) for k in range(_DRAWS)]
-    shown = [evidence(signals, **_geometry(actuator)) for signals in _runs(item, units)]
+    if candidates:
+        units += [_drawn(actuator, np.random.default_rng([15, k])) for k in range(_DRAWS)]
+    constants = _constants(actuator)
+    shown = [evidence(run, **constants) for run in _runs(item, units)]
     names = tuple(n for n in shown[0].names if all(n in s.names for s in shown))
     rows = np.array([s.only(names).values for s in shown])
     shifts, at = {}, 1
@@ -106,15 +147,29 @@ def replay(item: TestLog, actuator: Actuator, candidates: Sequence[Candidate]) -
         zero = severities[c.key] == 0.0
         table = np.zeros((len(zero), len(names)))
         count = int((~zero).sum())
-        table[~zero] = rows[at : at + count] - rows[0]
+        table[~zero] = _moved_by(rows[at : at + count], rows[0], names)
         shifts[c.key] = table
         at += count
     return Replay(shown[0].only(names), severities, shifts, rows[at:])
 
 
-def _geometry(actuator: Actuator) -> dict[str, float]:
+def _moved_by(rows: Floats, healthy: Floats, names: Sequence[str]) -> Floats:
+    """Differences from the healthy run; of sizes, what must be added at a right angle."""
+    out = rows - healthy
+    for k, name in enumerate(names):
+        if name in SIZES:
+            power = np.maximum(rows[:, k] ** 2 - healthy[k] ** 2, 0.0)
+            out[:, k] = np.sqrt(power)
+    return out
+
+
+def _constants(actuator: Actuator) -> dict[str, float]:
     value = actuator.parameters.value
-    return {"ratio": value("gear.ratio"), "pole_pairs": value("motor.pole_pairs")}
+    return {
+        "ratio": value("gear.ratio"),
+        "pole_pairs": value("motor.pole_pairs"),
+        "emf": value("motor.emf_constant"),
+    }
 
 
 def _severities(candidate: Candidate) -> Floats:
@@ -162,8 +217,8 @@ def _runs(item: TestLog, units: Sequence[_Unit]) -> Iterator[Signals]:
         ready.append(replace(run, core=_with_arrays(run.core, item, unit)))
     plan = ready[0].plan[0]
     for result in simulate_prepared(ready, fidelity="low"):
-        kept = result["clocks"][plan.name]
-        yield _shown(kept["time"], dict(zip(plan.signals, kept["values"].T, strict=False)), item)
+        rows = result["clocks"][plan.name]
+        yield _shown(rows["time"], dict(zip(plan.signals, rows["values"].T, strict=False)), item)
 
 
 def _with_arrays(core: Mapping[str, Any], item: TestLog, unit: _Unit) -> dict[str, Any]:
@@ -215,11 +270,11 @@ def _drawn(actuator: Actuator, rng: np.random.Generator) -> _Unit:
 def _shown(clock: Floats, values: Mapping[str, Floats], item: TestLog) -> Signals:
     log = item.log
     assert item.good is not None
-    kept = {name: np.interp(log.time, clock, values[name]) for name in _SIGNALS.split(",")}
+    seen = {name: np.interp(log.time, clock, values[name]) for name in _SIGNALS.split(",")}
     brake = np.interp(log.time, log.brake.time, log.brake.level) if item.braked else None
-    voltage = None if item.voltage is None else kept["voltage_q_ref"]
+    voltage = None if item.voltage is None else seen["voltage_q_ref"]
     return Signals(
-        log.time, kept["encoder_position"], kept["motor_position"], kept["speed_ref"],
-        kept["motor_speed"], kept["current_ref"], kept[log.current_signal], voltage, brake,
+        log.time, seen["encoder_position"], seen["motor_position"], seen["speed_ref"],
+        seen["motor_speed"], seen["current_ref"], seen[log.current_signal], voltage, brake,
         item.replay, None, item.good,
     )  # fmt: skip

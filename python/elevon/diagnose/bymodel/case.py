@@ -1,0 +1,213 @@
+"""One log against its healthy unit: evidence, expectation, what each fault would do to it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.diagnose.bymodel.candidates import Candidate
+from elevon.diagnose.bymodel.detection import Detector
+from elevon.diagnose.bymodel.evidence import SHARES, SIZES, Evidence
+from elevon.diagnose.bymodel.healthy import Elsewhere, Healthy, healthy
+from elevon.diagnose.bymodel.log import TestLog
+from elevon.diagnose.bymodel.replay import Replay, logged_evidence, modelled, replay
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["Case", "case_of", "detector_of", "joined", "shift_of"]
+
+Floats = npt.NDArray[np.float64]
+SUSPECT = 1e-3  # chance of a baseline below which it is called faulty
+_SAME = 0.2  # relative difference of two logs' motion up to which they are one test
+_NOTED = 0.02  # of two noted parameters
+_SHARE = 3.0  # a unit's value over the model's, either way, that a shift is scaled by at most
+
+
+@dataclass(frozen=True)
+class Case:
+    """One log against its healthy unit, before whitening.
+
+    Attributes
+    ----------
+    name : str
+        The log.
+    shown : Evidence
+        Of the log.
+    unit : Healthy
+        What a healthy unit would show.
+    model : Replay
+        What faults do to the evidence.
+    """
+
+    name: str
+    shown: Evidence
+    unit: Healthy
+    model: Replay
+
+    @property
+    def covariance(self) -> Floats:
+        """Of the healthy unit's evidence with this log's noise, shape (k, k)."""
+        return self.unit.covariance + np.diag(self.shown.std**2)
+
+    def shift(self, key: str, severity: Floats) -> Floats:
+        """Return what severities, shape (m,), do to this unit's evidence, shape (m, k)."""
+        at = [self.model.healthy.names.index(n) for n in self.unit.names]
+        out = self.model.shift(key, severity)[:, at]
+        for k, name in enumerate(self.unit.names):
+            own, modelled = float(self.unit.mean[k]), float(self.model.healthy.values[at[k]])
+            if name in SIZES:
+                out[:, k] = np.hypot(max(own, 0.0), out[:, k]) - max(own, 0.0)
+            elif name in SHARES and own * modelled > 0.0:
+                out[:, k] *= min(max(own / modelled, 1.0 / _SHARE), _SHARE)
+        return out
+
+
+#: Evidence that only a measured torque current gives.
+_OF_THE_CURRENT = frozenset(
+    ["dry_current", "viscous_current", "inertia_current", "brake_current", "current_order_1",
+     "current_order_2", "voltage_per_current"]
+)  # fmt: skip
+
+
+def case_of(
+    item: TestLog,
+    actuator: Actuator,
+    candidates: Sequence[Candidate],
+    baselines: Sequence[TestLog],
+    findings: list[str],
+) -> Case:
+    """Hold a log against the model and the baselines; what it lacks goes to the findings."""
+    shown = logged_evidence(item, actuator)
+    model = replay(item, actuator, candidates)
+    same = [b for b in baselines if _same_test(item, b)]
+    proofs = [(b.name, logged_evidence(b, actuator)) for b in same]
+    names = [n for n in shown.names if n in model.healthy.names]
+    names = [n for n in names if all(n in e.names for _, e in proofs)]
+    if any(log.log.current_signal == "current_ref" for log in (item, *same)):
+        # A set point has the derivative's spikes, which the motor's current never follows.
+        names = [n for n in names if n not in _OF_THE_CURRENT]
+    elsewhere = [
+        Elsewhere(logged_evidence(b, actuator), modelled(b, actuator))
+        for b in baselines
+        if all(b is not s for s in same) and b.log.current_signal != "current_ref"
+    ]
+    sound = _sound(model, names, proofs, candidates, findings)
+    _lost(item, same, findings)
+    return Case(item.name, shown.only(names), healthy(model, names, sound, elsewhere), model)
+
+
+def _same_test(a: TestLog, b: TestLog) -> bool:
+    """Whether two logs are of one test: by their notes, else brake, travel and speed alike."""
+    if a.braked != b.braked:
+        return False
+    notes = (a.log.note, b.log.note)
+    if notes[0] is not None and notes[1] is not None and notes[0].waveform and notes[1].waveform:
+        if notes[0].waveform != notes[1].waveform:
+            return False
+        first, second = notes[0].parameters, notes[1].parameters
+        return all(_near(first[n], second[n], _NOTED) for n in first.keys() & second.keys())
+    pairs = []
+    for item in (a, b):
+        assert item.log.user is not None
+        pairs.append((float(np.std(item.log.user)), float(np.sqrt(np.mean(item.log.speed**2)))))
+    return all(_near(x, y, _SAME) for x, y in zip(*pairs, strict=True))
+
+
+def _near(a: float, b: float, share: float) -> bool:
+    return abs(a - b) <= share * max(abs(a), abs(b))
+
+
+def _sound(
+    model: Replay,
+    names: Sequence[str],
+    proofs: Sequence[tuple[str, Evidence]],
+    candidates: Sequence[Candidate],
+    findings: list[str],
+) -> list[Evidence]:
+    """Leave out baselines that stand off the model and off the other baselines alike."""
+    sound = []
+    for k, (name, shown) in enumerate(proofs):
+        others = [e for j, (_, e) in enumerate(proofs) if j != k]
+        alone = _chance(model, names, shown, [], candidates)
+        beside = _chance(model, names, shown, others, candidates) if others else alone
+        if max(alone, beside) >= SUSPECT:
+            sound.append(shown)
+            continue
+        findings.append(
+            f"baseline {name} looks faulty itself, or {'' if others else 'the set is not '}"
+            f"{'unlike the other baselines' if others else 'calibrated to this unit'} "
+            f"(a healthy unit deviates as much in less than {100 * SUSPECT:g} % of logs); "
+            "it is left out"
+        )
+    return sound
+
+
+def _chance(
+    model: Replay,
+    names: Sequence[str],
+    shown: Evidence,
+    others: Sequence[Evidence],
+    candidates: Sequence[Candidate],
+) -> float:
+    case = Case("", shown.only(names), healthy(model, names, others), model)
+    rest, root, detector = detector_of([case], candidates)
+    return detector.chance(float(detector.ratio((root @ rest)[None, :])[0]))
+
+
+def _lost(item: TestLog, same: Sequence[TestLog], findings: list[str]) -> None:
+    """Say what a log lacks and what it costs."""
+    if not same:
+        findings.append(
+            f"{item.name}: no baseline of this test: how far a healthy unit stands off the model "
+            "is assumed, small faults are not seen"
+        )
+    if item.log.current_signal == "current_ref":
+        findings.append(
+            f"{item.name}: no measured torque current (r78): friction, current ripple and faults "
+            "of the drive's current loop and of current sensors are not seen"
+        )
+    if item.voltage is None:
+        findings.append(
+            f"{item.name}: no voltage (r1733): shorts, eccentricity and lost flux are judged by "
+            "the current's ripple alone"
+        )
+    if item.gain is None:
+        findings.append(
+            f"{item.name}: no waveform explains the command: drift of the position gain is not seen"
+        )
+    missing = 1.0 - float(np.mean(item.log.good))
+    if missing > 0.01:
+        findings.append(f"{item.name}: {100 * missing:.0f} % of the samples are missing; left out")
+
+
+def detector_of(
+    cases: Sequence[Case], candidates: Sequence[Candidate]
+) -> tuple[Floats, Floats, Detector]:
+    """Return the deviation from healthy, what whitens it, and the test of healthy or not."""
+    rest, covariance = joined(cases)
+    root = np.linalg.inv(np.linalg.cholesky(covariance))
+    rows, both = [], []
+    for c in candidates:
+        at = cases[0].model.severities[c.key]
+        rows.append(shift_of(cases, c.key, at[at != 0.0]) @ root.T)
+        both += [False] * int((at != 0.0).sum())
+    degrees = min(case.unit.degrees for case in cases)
+    return rest, root, Detector(np.vstack(rows), both, degrees)
+
+
+def joined(cases: Sequence[Case]) -> tuple[Floats, Floats]:
+    """Stack the logs; what changes from run to run is independent between them."""
+    from scipy.linalg import block_diag
+
+    rest = np.concatenate([case.shown.values - case.unit.mean for case in cases])
+    return rest, np.asarray(block_diag(*[case.covariance for case in cases]))
+
+
+def shift_of(cases: Sequence[Case], key: str, severity: Floats) -> Floats:
+    """Return what severities, shape (m,), do to the evidence of all logs, shape (m, k)."""
+    return np.hstack([case.shift(key, severity) for case in cases])

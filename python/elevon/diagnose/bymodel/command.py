@@ -1,0 +1,164 @@
+"""Position gain and command of a log whose note names the waveform, by projection.
+
+A sine of about the noted frequency, or a chirp of the noted sweep that began at an instant nobody
+noted: one unknown enters nonlinearly, everything else is a linear regression
+
+    user = a sin(phase) + b cos(phase) + c - speed_ref / gain.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.diagnose.bymodel.evidence import regress
+
+if TYPE_CHECKING:
+    from elevon.calibrate.log import BenchLog
+
+__all__ = ["NotedCommand", "noted_command"]
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+#: Unknown and instants to the phase [rad] and what the unknown does to it.
+Phase = Callable[[float, Floats], tuple[Floats, Floats]]
+_TAU = 2.0 * math.pi
+_SMALL = 0.02  # RMS of the misfit over the spread, above which the note does not explain the log
+_STEPS = 8  # of Gauss and Newton
+_LATEST = 0.25  # of the log: a chirp begins before it
+_SCAN = 0.02  # s between the starts tried
+_THIN = 1200  # samples of a scan
+_LEAST = 400
+_OUTLIER = 8.0  # robust deviations beyond which an early sample was under another command
+
+
+@dataclass(frozen=True)
+class NotedCommand:
+    """What the note and the set point say together.
+
+    Attributes
+    ----------
+    gain, gain_std : float
+        Position gain [1/s].
+    wave : ndarray, shape (n,)
+        The command [rad] at the log's instants.
+    window : (float, float)
+        First and last instant at which it explains the log [s].
+    """
+
+    gain: float
+    gain_std: float
+    wave: Floats
+    window: tuple[float, float]
+
+
+def noted_command(log: BenchLog, limit: float) -> NotedCommand | None:
+    """Fit the noted waveform; None where there is no note, or it does not explain the log.
+
+    Parameters
+    ----------
+    log : BenchLog
+        With the user's position.
+    limit : float
+        Of the speed set point [rad/s]; what stands at it is left out.
+    """
+    if log.note is None or log.user is None or log.note.waveform not in ("sine", "chirp"):
+        return None
+    inside = log.good & (np.abs(log.speed_ref) < 0.999 * limit) & np.isfinite(log.user)
+    known = log.note.parameters
+    if inside.sum() < _LEAST:
+        return None
+    if log.note.waveform == "sine":
+        frequency = known.get("frequency", 0.0)
+        return _solved(log, inside, frequency, _sine) if frequency * log.duration > 0.5 else None
+    sweep = known.get("sweep_time", 0.0)
+    if not sweep > 0.0 or not {"start_frequency", "end_frequency"} <= known.keys():
+        return None
+    phase = _chirp(known["start_frequency"], known["end_frequency"], sweep)
+    return _solved(log, inside, _scanned(log, inside, phase), phase)
+
+
+def _sine(frequency: float, time: Floats) -> tuple[Floats, Floats]:
+    return _TAU * frequency * time, _TAU * time
+
+
+def _chirp(first: float, last: float, sweep: float) -> Phase:
+    rate = (last - first) / sweep
+
+    def phase(start: float, time: Floats) -> tuple[Floats, Floats]:
+        since = np.clip(time - start, 0.0, sweep)
+        slope = np.where((since > 0.0) & (since < sweep), -_TAU * (first + rate * since), 0.0)
+        return _TAU * (first + 0.5 * rate * since) * since, slope
+
+    return phase
+
+
+def _columns(log: BenchLog, turn: Floats, at: npt.NDArray[np.intp]) -> list[Floats]:
+    return [np.sin(turn), np.cos(turn), np.ones(len(turn)), -log.speed_ref[at]]
+
+
+def _scanned(log: BenchLog, inside: Bools, phase: Phase) -> float:
+    """Coarse search of the chirp's start, on samples behind the latest one allowed."""
+    assert log.user is not None
+    at = np.flatnonzero(inside & (log.time > _LATEST * log.duration))
+    at = at[:: max(1, len(at) // _THIN)]
+    target, costs = log.user[at], []
+    starts = np.arange(0.0, _LATEST * log.duration, _SCAN)
+    for start in starts:
+        rows = np.stack(_columns(log, phase(float(start), log.time[at])[0], at))
+        right = rows @ target
+        beta = np.linalg.lstsq(rows @ rows.T, right, rcond=1e-12)[0]
+        costs.append(-float(beta @ right))
+    return float(starts[int(np.argmin(costs))])
+
+
+def _solved(log: BenchLog, inside: Bools, first: float, phase: Phase) -> NotedCommand | None:
+    """Gauss and Newton in the one unknown, first on the late half, then on all it explains."""
+    assert log.user is not None
+    value = first
+    at = np.flatnonzero(inside & (log.time > 0.5 * log.duration))
+    for final in (False, True):
+        for _ in range(_STEPS):
+            beta, covariance, rest, step = _step(log, at, value, phase)
+            value += step
+        if not final:
+            spread = 1.4826 * float(np.median(np.abs(rest - np.median(rest))))
+            at = _explained(log, np.flatnonzero(inside), phase(value, log.time)[0], beta, spread)
+    if len(at) < _LEAST or float(rest.std()) > _SMALL * float(np.std(log.user)):
+        return None
+    if not beta[3] > 0.0:
+        return None
+    turn, _ = phase(value, log.time)
+    wave = beta[0] * np.sin(turn) + beta[1] * np.cos(turn) + beta[2]
+    std = float(np.sqrt(max(covariance[3, 3], 0.0)))
+    window = (float(log.time[at[0]]), float(log.time[at[-1]]))
+    return NotedCommand(1.0 / float(beta[3]), std / float(beta[3]) ** 2, wave, window)
+
+
+def _step(
+    log: BenchLog, at: npt.NDArray[np.intp], value: float, phase: Phase
+) -> tuple[Floats, Floats, Floats, float]:
+    """Regression at one value of the unknown, and the step that its slope asks for."""
+    assert log.user is not None
+    turn, slope = phase(value, log.time[at])
+    columns = _columns(log, turn, at)
+    beta, _ = regress(columns, log.user[at])
+    bend = slope * (beta[0] * columns[1] - beta[1] * columns[0])
+    both, covariance = regress([*columns, bend], log.user[at])
+    rest = log.user[at] - both @ np.stack([*columns, bend])
+    return beta, covariance, rest, float(both[4])
+
+
+def _explained(
+    log: BenchLog, at: npt.NDArray[np.intp], turn: Floats, beta: Floats, spread: float
+) -> npt.NDArray[np.intp]:
+    """Samples behind the last one that the fit of the late half does not explain."""
+    assert log.user is not None
+    off = log.user[at] - beta @ np.stack(_columns(log, turn[at], at))
+    strays = np.flatnonzero(np.abs(off[: len(off) // 2]) > max(_OUTLIER * spread, 1e-9))
+    return at[strays[-1] + 1 :] if strays.size else at

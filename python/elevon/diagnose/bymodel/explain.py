@@ -1,0 +1,137 @@
+"""What an answer says beside its most probable set: causes, equivalents, limits, what moved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.diagnose.bymodel.answer import SEEN, Cause, Moved
+from elevon.diagnose.bymodel.candidates import Candidate
+from elevon.diagnose.bymodel.case import Case, shift_of
+from elevon.diagnose.bymodel.evidence import UNITS
+from elevon.diagnose.bymodel.posterior import Posterior, marginals, quantiles
+
+__all__ = ["causes", "limits", "moved", "unexplained"]
+
+Floats = npt.NDArray[np.float64]
+LISTED = 0.02  # probability below which a cause is not listed
+ALIKE = 1.0  # deviations between two faults' shifts below which no log separates them
+
+
+def unexplained(
+    root: Floats,
+    rest: Floats,
+    cases: Sequence[Case],
+    keys: Sequence[str],
+    values: Sequence[float],
+) -> tuple[str, ...]:
+    """Return the finding that the named faults do not explain the logs, where they do not."""
+    from scipy.stats import f as fisher
+
+    left = rest - _sum(cases, keys, values)
+    degrees = min(case.unit.degrees for case in cases)
+    square = float(np.sum((root @ left) ** 2)) / len(rest)
+    chance = float(fisher.sf(square, len(rest), degrees))
+    if chance > 1e-3:
+        return ()
+    return (
+        "what is named does not explain all of the logs: another fault, or a set that is not "
+        f"calibrated to this unit (rest {np.sqrt(square):.1f} deviations RMS)",
+    )
+
+
+def _sum(cases: Sequence[Case], keys: Sequence[str], values: Sequence[float]) -> Floats:
+    total = np.zeros(sum(len(case.unit.names) for case in cases))
+    for key, value in zip(keys, values, strict=True):
+        total = total + shift_of(cases, key, np.array([value]))[0]
+    return total
+
+
+def causes(
+    result: Posterior,
+    cases: Sequence[Case],
+    candidates: Sequence[Candidate],
+    root: Floats,
+    best: Sequence[str],
+) -> tuple[Cause, ...]:
+    """Return one cause for each fault of the best set, and for others of some probability."""
+    ranked = sorted(candidates, key=lambda c: (c.key not in best, -result.of(c.key)))
+    out: list[Cause] = []
+    covered: set[str] = set()
+    for c in ranked:
+        probability = result.of(c.key)
+        if c.key in covered or (probability < LISTED and c.key not in best):
+            continue
+        low, middle, high = quantiles(*marginals(result, c.key), (0.05, 0.5, 0.95))
+        alike = [o for o in _alike(cases, c, middle, candidates, root) if o.key not in best]
+        covered |= {o.key for o in alike}
+        probability = min(probability + sum(result.of(o.key) for o in alike), 1.0)
+        names = [(c.kind, place) for place in c.same]
+        names += [(o.kind, p) for o in alike for p in (o.place, *o.same)]
+        out.append(Cause(c.kind, c.place, c.unit, probability, middle, (low, high), tuple(names)))
+    return tuple(sorted(out, key=lambda cause: -cause.probability))
+
+
+def _alike(
+    cases: Sequence[Case],
+    candidate: Candidate,
+    severity: float,
+    candidates: Sequence[Candidate],
+    root: Floats,
+) -> list[Candidate]:
+    """Candidates that shift the evidence as this one does at this severity, to `ALIKE`."""
+    own = root @ shift_of(cases, candidate.key, np.array([severity]))[0]
+    if np.linalg.norm(own) < SEEN:
+        return []
+    out = []
+    for other in candidates:
+        if other.key == candidate.key:
+            continue
+        grid = np.linspace(other.low, other.high, 401)
+        moved = shift_of(cases, other.key, grid) @ root.T
+        if float(np.linalg.norm(moved - own, axis=1).min()) < ALIKE:
+            out.append(other)
+    return out
+
+
+def limits(
+    cases: Sequence[Case], candidates: Sequence[Candidate], root: Floats
+) -> tuple[tuple[dict[str, str], ...], dict[str, float]]:
+    """Return what the logs cannot show, and the least severity of what they can."""
+    blind, limits = [], {}
+    for c in candidates:
+        grid = np.linspace(0.0, c.high, 2001)
+        size = np.linalg.norm(shift_of(cases, c.key, grid) @ root.T, axis=1)
+        seen = np.flatnonzero(size > SEEN)
+        if seen.size:
+            limits[c.key] = float(grid[seen[0]])
+            continue
+        reason = (
+            f"up to {c.high:g} {c.unit if c.unit != '1' else ''}".rstrip()
+            + f" it moves nothing here by {SEEN:g} deviations of a healthy unit"
+        )
+        blind.append({"kind": c.kind, "place": c.place, "reason": reason})
+    return tuple(blind), limits
+
+
+def moved(cases: Sequence[Case], keys: Sequence[str], values: Sequence[float]) -> tuple[Moved, ...]:
+    """Return the evidence with what the named faults make of it."""
+    out = []
+    for case in cases:
+        std = np.sqrt(np.diag(case.covariance))
+        explained = _sum([case], keys, values)
+        for k, name in enumerate(case.unit.names):
+            out.append(
+                Moved(
+                    case.name,
+                    name,
+                    UNITS[name][0],
+                    float(case.shown.values[k]),
+                    float(case.unit.mean[k]),
+                    float(std[k]),
+                    float(explained[k]),
+                )
+            )
+    return tuple(out)

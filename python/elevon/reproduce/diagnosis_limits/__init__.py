@@ -1,0 +1,1 @@
+"""How small a fault `elevon diagnose` sees, on benches that are unlike its model."""
