@@ -4,7 +4,7 @@ use crate::spec::{bad, model, vector, Resolver};
 use elevon_core::command::{self, Term, Wave};
 use elevon_core::fault::{profiles as fault_profiles, Attribute};
 use elevon_core::registry::KINDS;
-use elevon_core::solver::{Width, DERIVATIVES};
+use elevon_core::solver::{derivatives, Width};
 use elevon_core::variable::acts::{records, Fidelity};
 use elevon_core::variable::{Group, Range, Role};
 use numpy::{PyArray1, PyReadonlyArray1};
@@ -215,7 +215,7 @@ pub fn waveform<'py>(
 /// Derivatives that one pass of `sensitivities` carries.
 #[pyfunction]
 pub fn derivatives_per_pass() -> usize {
-    DERIVATIVES
+    derivatives()
 }
 
 #[pyfunction]

@@ -1,7 +1,7 @@
 //! Runs without the GIL; the calling thread polls for progress and interruption.
 
 use crate::spec::{bad, Resolver};
-use elevon_core::solver::{Clock, Monitor, RunOutput, RunSpec, Status, Width, DERIVATIVES};
+use elevon_core::solver::{derivatives, Clock, Monitor, RunOutput, RunSpec, Status, Width};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -210,7 +210,7 @@ pub fn sensitivities<'py>(
     let model = resolver.model;
     let dt = model.step(&spec.parameters);
     let chosen = wanted.len() + faults.len();
-    let passes = chosen.div_ceil(DERIVATIVES) as u64;
+    let passes = chosen.div_ceil(derivatives()) as u64;
     let total = (spec.duration / dt).round() as u64 * passes;
     let outputs = polled(py, total, progress, |monitor| model.sensitivities(&spec, &wanted, &faults, &clocks, monitor))?;
     let outputs = outputs.ok_or_else(|| {
@@ -220,7 +220,7 @@ pub fn sensitivities<'py>(
     let list = PyList::empty(py);
     let mut times = Times::default();
     for (i, output) in outputs.into_iter().enumerate() {
-        let width = 1 + (chosen - 8 * i).min(8);
+        let width = 1 + (chosen - derivatives() * i).min(derivatives());
         list.append(result(py, dt, &asked, width, output, &mut times)?)?;
     }
     Ok(list)

@@ -247,8 +247,9 @@ class Problem:
             lambda _fraction: self.check(),
         )
         found = {}
+        count = _core.derivatives_per_pass()
         for number, item in enumerate(passes):
-            chosen = paths[8 * number : 8 * number + 8]
+            chosen = paths[count * number : count * (number + 1)]
             kept = item["clocks"]["every_step"]
             array = kept["values"].reshape(len(kept["time"]), -1, 1 + len(chosen))
             for k, path in enumerate(chosen):

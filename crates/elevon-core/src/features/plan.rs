@@ -9,7 +9,7 @@ use super::orders::Orders;
 use super::phases::Phases;
 use super::rows::{Columns, Role};
 use super::slow::{Switching, Temperature};
-use crate::scalar::{Kernel, Scalar};
+use crate::scalar::{best, Kernel};
 use std::sync::Arc;
 
 /// What the features need to know besides the rows.
@@ -153,7 +153,7 @@ impl Accumulator {
 
     /// Takes the next rows.
     pub fn push(&mut self, rows: &Columns<'_>) {
-        f64::vectorize(Push(&mut self.sums, rows));
+        best(Push(&mut self.sums, rows));
     }
 
     /// The features, in the order in which they were asked for; NaN where the rows do not give one.

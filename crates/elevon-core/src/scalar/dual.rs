@@ -1,4 +1,4 @@
-//! Dual numbers: exact derivatives of a run with respect to `N` parameters at once.
+//! Dual numbers: exact derivatives of a run with respect to as many parameters at once as a scalar type has lanes.
 //!
 //! Selections follow the real part, so a derivative is that of the branch taken: at a stick-slip
 //! switch the true function has a kink and the derivative is one-sided.
@@ -7,71 +7,71 @@ use super::{trig, Kernel, Scalar};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 #[derive(Clone, Copy, Debug)]
-pub struct Dual<const N: usize> {
+pub struct Dual<V> {
     pub value: f64,
-    pub slope: [f64; N],
+    pub slope: V,
 }
 
-impl<const N: usize> Dual<N> {
+impl<V: Scalar> Dual<V> {
     /// The independent variable number `index`.
     pub fn variable(value: f64, index: usize) -> Self {
-        Self { value, slope: std::array::from_fn(|i| if i == index { 1.0 } else { 0.0 }) }
+        Self { value, slope: V::from_fn(|i| if i == index { 1.0 } else { 0.0 }) }
     }
     #[inline(always)]
     fn chain(self, value: f64, derivative: f64) -> Self {
-        Self { value, slope: self.slope.map(|d| d * derivative) }
+        Self { value, slope: self.slope * V::splat(derivative) }
     }
 }
 
-impl<const N: usize> Add for Dual<N> {
+impl<V: Scalar> Add for Dual<V> {
     type Output = Self;
     #[inline(always)]
     fn add(self, o: Self) -> Self {
-        Self { value: self.value + o.value, slope: std::array::from_fn(|i| self.slope[i] + o.slope[i]) }
+        Self { value: self.value + o.value, slope: self.slope + o.slope }
     }
 }
-impl<const N: usize> Sub for Dual<N> {
+impl<V: Scalar> Sub for Dual<V> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, o: Self) -> Self {
-        Self { value: self.value - o.value, slope: std::array::from_fn(|i| self.slope[i] - o.slope[i]) }
+        Self { value: self.value - o.value, slope: self.slope - o.slope }
     }
 }
 // The product and quotient rules mix the operators.
 #[allow(clippy::suspicious_arithmetic_impl)]
-impl<const N: usize> Mul for Dual<N> {
+impl<V: Scalar> Mul for Dual<V> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, o: Self) -> Self {
-        let slope = std::array::from_fn(|i| self.slope[i] * o.value + self.value * o.slope[i]);
+        let slope = self.slope * V::splat(o.value) + V::splat(self.value) * o.slope;
         Self { value: self.value * o.value, slope }
     }
 }
 #[allow(clippy::suspicious_arithmetic_impl)]
-impl<const N: usize> Div for Dual<N> {
+impl<V: Scalar> Div for Dual<V> {
     type Output = Self;
     #[inline(always)]
     fn div(self, o: Self) -> Self {
         let value = self.value / o.value;
-        Self { value, slope: std::array::from_fn(|i| (self.slope[i] - value * o.slope[i]) / o.value) }
+        Self { value, slope: (self.slope - V::splat(value) * o.slope) / V::splat(o.value) }
     }
 }
-impl<const N: usize> Neg for Dual<N> {
+impl<V: Scalar> Neg for Dual<V> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self { value: -self.value, slope: self.slope.map(|d| -d) }
+        Self { value: -self.value, slope: -self.slope }
     }
 }
 
-impl<const N: usize> Scalar for Dual<N> {
+impl<V: Scalar> Scalar for Dual<V> {
     type Mask = bool;
     type Quarters = u64;
     const LANES: usize = 1;
 
     #[inline(always)]
     fn splat(value: f64) -> Self {
-        Self { value, slope: [0.0; N] }
+        Self { value, slope: V::zero() }
     }
     #[inline(always)]
     fn from_fn(mut f: impl FnMut(usize) -> f64) -> Self {
@@ -165,9 +165,9 @@ impl<const N: usize> Scalar for Dual<N> {
     }
     #[inline(always)]
     fn vectorize<K: Kernel>(kernel: K) -> K::Output {
-        f64::vectorize(kernel)
+        V::vectorize(kernel)
     }
     fn finite(self) -> bool {
-        self.value.is_finite() && self.slope.iter().all(|d| d.is_finite())
+        self.value.is_finite() && self.slope.finite()
     }
 }

@@ -44,6 +44,9 @@ pub trait Scalar:
     /// Quarter turns as an integer, low bits valid.
     type Quarters: Copy;
     const LANES: usize;
+    /// Has each kind of run a form of the step of its own, without what it does not need? Faster, and as many forms to
+    /// compile; the form with every detail gives the same bits.
+    const FORMS: bool = false;
 
     fn splat(x: f64) -> Self;
     fn from_fn(f: impl FnMut(usize) -> f64) -> Self;
@@ -156,11 +159,21 @@ pub trait Scalar:
 /// 1.5 * 2^52: adding it rounds to an integer, which then stands in the low bits.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
-/// Runs code without vector types with AVX2 and FMA where the processor has them: faster, the same results.
+/// Has this processor a fused multiply-add for single numbers, in the instruction sets that are used here?
 #[inline(always)]
-fn best<K: Kernel>(kernel: K) -> K::Output {
+pub fn fused() -> bool {
     #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
+    return std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma");
+    #[cfg(not(target_arch = "x86_64"))]
+    true
+}
+
+/// Runs small code without vector types with AVX2 and FMA where the processor has them: faster, the same results. What is
+/// large compiles once, by `Scalar::vectorize`.
+#[inline(always)]
+pub(crate) fn best<K: Kernel>(kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    if fused() {
         // SAFETY: the features were just detected.
         return unsafe { x86::with_avx2(kernel) };
     }

@@ -6,6 +6,7 @@ impl Scalar for f64 {
     type Mask = bool;
     type Quarters = u64;
     const LANES: usize = 1;
+    const FORMS: bool = cfg!(not(feature = "physics"));
 
     #[inline(always)]
     fn splat(x: f64) -> Self {
@@ -85,8 +86,14 @@ impl Scalar for f64 {
         let cos_sign = (quarters.wrapping_add(1) & 2) << 62;
         (f64::from_bits(s.to_bits() ^ sin_sign), f64::from_bits(c.to_bits() ^ cos_sign))
     }
+    /// Compiled once, with fused multiply-adds: `solver::width` runs nothing in `f64` where the processor has none.
     #[inline(always)]
     fn vectorize<K: Kernel>(kernel: K) -> K::Output {
-        super::best(kernel)
+        assert!(super::fused(), "single runs need a processor with AVX2 and FMA in this build");
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: the features were just detected.
+        return unsafe { super::x86::with_avx2(kernel) };
+        #[cfg(not(target_arch = "x86_64"))]
+        kernel.run()
     }
 }

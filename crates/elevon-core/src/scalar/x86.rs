@@ -107,6 +107,7 @@ macro_rules! vector_type {
             type Mask = $mask;
             type Quarters = $integers;
             const LANES: usize = $lanes;
+            const FORMS: bool = true;
 
             #[inline(always)]
             fn splat(x: f64) -> Self {

@@ -1,13 +1,13 @@
 //! Many runs: sorted into lane blocks of one structure, blocks shared between threads.
 
 use super::block::{structure, Block};
-use super::kernels::{Lift, Plain};
+use super::kernels::Plain;
 use super::spec::{Clock, RunOutput, RunSpec, Status};
 use super::width::Width;
 use crate::actuator::{Tick, Wiring, MAX_CHUNKS};
 #[cfg(not(any(feature = "physics", feature = "widest")))]
 use crate::scalar::Portable;
-use crate::scalar::{Dual, Scalar};
+use crate::scalar::Scalar;
 use crate::time::Steps;
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -82,6 +82,8 @@ fn run_block<W: Wiring, S: Scalar>(runs: &[&RunSpec], clocks: &[Clock], recorded
 }
 
 fn run_width<W: Wiring>(width: Width, runs: &[&RunSpec], clocks: &[Clock], recorded: &[usize], monitor: &Monitor) -> Vec<RunOutput> {
+    // A run by name of its width, too.
+    let width = if width == Width::Single { Width::alone() } else { width };
     match width {
         // A build for work on physics knows single runs only (`Width::detect`).
         #[cfg(feature = "physics")]
@@ -106,7 +108,7 @@ fn run_caught<W: Wiring>(width: Width, runs: &[&RunSpec], clocks: &[Clock], reco
     match (catch_unwind(AssertUnwindSafe(work)), runs) {
         (Ok(outputs), _) => outputs,
         (Err(_), [run]) => vec![broken::<W>(run, clocks)],
-        (Err(_), _) => runs.iter().flat_map(|run| run_caught::<W>(Width::Single, &[run], clocks, recorded, monitor)).collect(),
+        (Err(_), _) => runs.iter().flat_map(|run| run_caught::<W>(Width::alone(), &[run], clocks, recorded, monitor)).collect(),
     }
 }
 
@@ -125,7 +127,7 @@ fn broken<W: Wiring>(run: &RunSpec, clocks: &[Clock]) -> RunOutput {
 }
 
 /// The signals any clock keeps.
-fn recorded(clocks: &[Clock]) -> Vec<usize> {
+pub(super) fn recorded(clocks: &[Clock]) -> Vec<usize> {
     let mut all: Vec<usize> = clocks.iter().flat_map(|c| c.signals.iter().copied()).collect();
     all.sort_unstable();
     all.dedup();
@@ -136,7 +138,7 @@ fn recorded(clocks: &[Clock]) -> Vec<usize> {
 pub fn run_all<W: Wiring>(runs: &[RunSpec], clocks: &[Clock], threads: usize, width: Width, monitor: &Monitor) -> Vec<RunOutput> {
     let recorded = recorded(clocks);
     if let [run] = runs {
-        return run_caught::<W>(Width::Single, &[run], clocks, &recorded, monitor);
+        return run_caught::<W>(Width::alone(), &[run], clocks, &recorded, monitor);
     }
     let blocks = blocks::<W>(runs, &recorded, width, threads);
     let work = || -> Vec<(Vec<usize>, Vec<RunOutput>)> {
@@ -145,7 +147,7 @@ pub fn run_all<W: Wiring>(runs: &[RunSpec], clocks: &[Clock], threads: usize, wi
             .map(|indices| {
                 let members: Vec<&RunSpec> = indices.iter().map(|&i| &runs[i]).collect();
                 // A lone run gains nothing from lanes.
-                let width = if members.len() == 1 { Width::Single } else { width };
+                let width = if members.len() == 1 { Width::alone() } else { width };
                 let outputs = run_caught::<W>(width, &members, clocks, &recorded, monitor);
                 (indices, outputs)
             })
@@ -186,63 +188,4 @@ fn blocks<W: Wiring>(runs: &[RunSpec], recorded: &[usize], width: Width, threads
         all.extend(members.chunks(size).map(<[usize]>::to_vec));
     }
     all
-}
-
-/// Seeds of a dual run: parameters and faults whose derivatives are wanted.
-struct Seeds<'a, const N: usize> {
-    run: &'a RunSpec,
-    parameters: &'a [usize],
-    faults: &'a [usize],
-}
-
-impl<const N: usize> Lift<Dual<N>> for Seeds<'_, N> {
-    fn parameter(&self, _first: usize, index: usize) -> Dual<N> {
-        let value = self.run.parameters[index];
-        match self.parameters.iter().position(|&p| p == index) {
-            Some(slot) => Dual::variable(value, slot),
-            None => Dual::splat(value),
-        }
-    }
-    fn severity(&self, _lane: usize, fault: usize) -> Dual<N> {
-        let value = self.run.faults[fault].severity;
-        match self.faults.iter().position(|&f| f == fault) {
-            Some(slot) => Dual::variable(value, self.parameters.len() + slot),
-            None => Dual::splat(value),
-        }
-    }
-    fn emit(&self, x: Dual<N>, _lane: usize, out: &mut Vec<f64>) {
-        out.push(x.value);
-        out.extend_from_slice(&x.slope[..self.parameters.len() + self.faults.len()]);
-    }
-    fn width(&self) -> usize {
-        1 + self.parameters.len() + self.faults.len()
-    }
-}
-
-/// Derivatives that one pass carries.
-pub const DERIVATIVES: usize = 8;
-
-/// One run with exact derivatives: each value is followed by its derivatives with respect to the chosen
-/// parameters, then to the severities of the chosen faults.
-pub fn sensitivities<W: Wiring>(
-    run: &RunSpec,
-    parameters: &[usize],
-    faults: &[usize],
-    clocks: &[Clock],
-    monitor: &Monitor,
-) -> Vec<RunOutput> {
-    let recorded = recorded(clocks);
-    let mut chosen: Vec<(bool, usize)> = parameters.iter().map(|&p| (true, p)).collect();
-    chosen.extend(faults.iter().map(|&f| (false, f)));
-    chosen
-        .chunks(DERIVATIVES)
-        .map(|pass| {
-            let parameters: Vec<usize> = pass.iter().filter(|x| x.0).map(|x| x.1).collect();
-            let faults: Vec<usize> = pass.iter().filter(|x| !x.0).map(|x| x.1).collect();
-            let seeds = Seeds::<DERIVATIVES> { run, parameters: &parameters, faults: &faults };
-            let runs = [run];
-            let mut outputs = Block::<W, Dual<DERIVATIVES>, Seeds<DERIVATIVES>>::new(&runs, 1, seeds, clocks, &recorded).run(monitor);
-            outputs.remove(0)
-        })
-        .collect()
 }

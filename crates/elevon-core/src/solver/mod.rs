@@ -2,6 +2,7 @@
 
 mod batch;
 mod block;
+mod dual;
 mod ending;
 mod kernels;
 mod rows;
@@ -9,6 +10,7 @@ mod spec;
 mod summing;
 mod width;
 
-pub use batch::{run_all, sensitivities, Monitor, DERIVATIVES};
+pub use batch::{run_all, Monitor};
+pub use dual::{derivatives, sensitivities};
 pub use spec::{Clock, RunOutput, RunSpec, Status};
 pub use width::Width;

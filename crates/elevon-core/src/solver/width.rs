@@ -1,6 +1,8 @@
 //! The vector width of batches, chosen at run time.
 
-/// Lane types that this processor can run.
+use crate::scalar::fused;
+
+/// Lane types that a processor can run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Width {
     Single,
@@ -18,15 +20,23 @@ impl Width {
         #[cfg(target_arch = "x86_64")]
         {
             let wide = is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") && is_x86_feature_detected!("avx512vl");
-            let fused = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
-            if wide && fused {
+            if wide && fused() {
                 return Self::Avx512;
             }
-            if fused && !cfg!(feature = "widest") {
+            if fused() && !cfg!(feature = "widest") {
                 return Self::Avx2;
             }
         }
         if cfg!(feature = "widest") {
+            Self::Single
+        } else {
+            Self::Portable
+        }
+    }
+
+    /// Of a run by itself: where `f64` is not compiled for the processor, the portable lanes, with the same bits.
+    pub fn alone() -> Self {
+        if fused() || cfg!(any(feature = "physics", feature = "widest")) {
             Self::Single
         } else {
             Self::Portable

@@ -5,19 +5,55 @@ use super::model::*;
 use super::step::{leg_current, link_voltage, park, seen_current};
 use crate::actuator::servo::advance::Instant;
 use crate::actuator::servo::details::Structure;
-use crate::actuator::servo::form::Form;
 use crate::actuator::servo::layout::*;
 use crate::actuator::servo::shaft::Shown;
 use crate::actuator::servo::signals::{shared, HighSignal as Q, HIGH, HIGH_OWN};
 use crate::actuator::Inputs;
 use crate::motor::short::{GROUND, PAIR, TAPPED};
-use crate::scalar::{three_phase, Scalar};
+use crate::scalar::{three_phase, Kernel, Scalar};
 use crate::three;
 
+/// What is observed of a chunk. It depends on no form of servo, so that all forms share its code.
+pub(crate) struct Observation<'a, S: Scalar> {
+    pub structure: &'a Structure,
+    pub model: &'a Model<S>,
+    pub inputs: &'a Inputs<S>,
+    pub state: &'a State<S>,
+    pub t: S,
+    /// With the signals of a screw.
+    pub linear: bool,
+}
+
+impl<S: Scalar> Observation<'_, S> {
+    #[inline(never)]
+    pub(crate) fn write(self, out: &mut [S]) {
+        S::vectorize(Write(self, out));
+    }
+}
+
+struct Write<'a, 'b, S: Scalar>(Observation<'a, S>, &'b mut [S]);
+
+impl<S: Scalar> Kernel for Write<'_, '_, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let Observation { structure, model, inputs, state, t, linear } = self.0;
+        states(structure, model, state, self.1);
+        self.1[Q::Command as usize] = inputs[COMMAND].at(t) + state.command_noise;
+        electrical(structure, model, inputs, state, t, self.1);
+        let x = Instant::at(inputs, t);
+        let shown = mechanical(structure, model, &x, state, self.1);
+        energies(model, structure, state, self.1);
+        if linear {
+            screw(structure, model, &x, state, &shown, self.1);
+        }
+    }
+}
+
+/// What stands in the state.
 #[inline(always)]
-pub(crate) fn high<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, out: &mut [S]) {
+fn states<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, out: &mut [S]) {
     let mut set = |q: Q, x: S| out[q as usize] = x;
-    set(Q::Command, inputs[COMMAND].at(t) + s.command_noise);
     set(Q::UserPosition, s.shaft.user_position);
     set(Q::MotorPosition, s.shaft.motor_position);
     set(Q::MotorSpeed, s.shaft.motor_speed);
@@ -42,26 +78,24 @@ pub(crate) fn high<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, inpu
     set(Q::ResolverPosition, resolver);
     set(Q::ResolverSpeed, speed);
     set(Q::ResolverSignal, signal);
-    electrical(structure, m, inputs, s, t, out);
-    let x = Instant::at(inputs, t);
-    let shown = mechanical(structure, m, &x, s, out);
-    energies(m, structure, s, out);
-    if F::LINEAR {
-        let [position, speed, torque, efficiency, aiding] = m.shaft.show_screw(&s.shaft, &shown);
-        let [friction, spall] = m.shaft.show_load_side(&structure.shaft, &x, &s.shaft, &shown);
-        out[HIGH.len()..].copy_from_slice(&[
-            position,
-            speed,
-            friction,
-            torque,
-            spall,
-            efficiency,
-            aiding,
-            s.shaft.nut.temperature,
-            s.shaft.nut.power,
-            s.shaft.vibration.acceleration,
-        ]);
-    }
+}
+
+#[inline(always)]
+fn screw<S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s: &State<S>, shown: &Shown<S>, out: &mut [S]) {
+    let [position, speed, torque, efficiency, aiding] = m.shaft.show_screw(&s.shaft, shown);
+    let [friction, spall] = m.shaft.show_load_side(&structure.shaft, x, &s.shaft, shown);
+    out[HIGH.len()..].copy_from_slice(&[
+        position,
+        speed,
+        friction,
+        torque,
+        spall,
+        efficiency,
+        aiding,
+        s.shaft.nut.temperature,
+        s.shaft.nut.power,
+        s.shaft.vibration.acceleration,
+    ]);
 }
 
 #[inline(always)]

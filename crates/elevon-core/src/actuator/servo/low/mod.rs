@@ -12,6 +12,7 @@ mod phase;
 mod step;
 
 use self::model::{Model, State, Structure};
+use self::observe::Observation;
 use self::step::LowStep;
 use super::advance::Stretch;
 use super::form::Form;
@@ -131,6 +132,9 @@ impl<F: Form> Wiring for Low<F> {
         count: Steps,
     ) {
         let x = Stretch { structure, models, inputs, states, from, count };
+        if !S::FORMS {
+            return x.run::<LowStep<true, true>>();
+        }
         match (structure.full, structure.extra) {
             (false, _) => x.run::<LowStep<false, false>>(),
             (true, false) => x.run::<LowStep<true, false>>(),
@@ -138,9 +142,16 @@ impl<F: Form> Wiring for Low<F> {
         }
     }
 
-    #[inline(always)]
-    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, state: &State<S>, t: S, asked: Signals, out: &mut [S]) {
-        observe::observe::<F, S>(structure, m, inputs, state, t, asked, out);
+    fn observe<S: Scalar>(
+        structure: &Structure,
+        model: &Model<S>,
+        inputs: &Inputs<S>,
+        state: &State<S>,
+        t: S,
+        asked: Signals,
+        out: &mut [S],
+    ) {
+        Observation { structure, model, inputs, state, t, asked, linear: F::LINEAR }.write(out);
     }
 
     #[inline(always)]

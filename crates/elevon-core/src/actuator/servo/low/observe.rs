@@ -2,11 +2,10 @@
 
 use super::model::{Model, State, Structure};
 use crate::actuator::servo::advance::Instant;
-use crate::actuator::servo::form::Form;
 use crate::actuator::servo::layout::COMMAND;
 use crate::actuator::servo::signals::{shared, LowSignal as Q, LOW, LOW_OWN};
 use crate::actuator::{Inputs, Signals};
-use crate::scalar::Scalar;
+use crate::scalar::{Kernel, Scalar};
 
 /// What the loads on the shaft decide; what stands behind the own signals is theirs, too.
 const OF_SHAFT: Signals = Signals::of(&[Q::UserSpeed as usize, Q::FrictionTorque as usize, Q::LoadTorque as usize, Q::StopTorque as usize])
@@ -15,16 +14,51 @@ const OF_INPUTS: Signals = Signals::of(&[Q::BrakeTorque as usize, Q::SupplyVolta
 const SENSORS: [Q; 4] = [Q::EncoderPosition, Q::ResolverPosition, Q::ResolverSpeed, Q::ResolverSignal];
 const OF_SENSORS: Signals = Signals::of(&[SENSORS[0] as usize, SENSORS[1] as usize, SENSORS[2] as usize, SENSORS[3] as usize]);
 
+/// What is observed of a chunk. It depends on no form of servo, so that all forms share its code.
+pub(super) struct Observation<'a, S: Scalar> {
+    pub structure: &'a Structure,
+    pub model: &'a Model<S>,
+    pub inputs: &'a Inputs<S>,
+    pub state: &'a State<S>,
+    pub t: S,
+    pub asked: Signals,
+    /// With the signals of a screw.
+    pub linear: bool,
+}
+
+impl<S: Scalar> Observation<'_, S> {
+    #[inline(never)]
+    pub(super) fn write(self, out: &mut [S]) {
+        S::vectorize(Write(self, out));
+    }
+}
+
+struct Write<'a, 'b, S: Scalar>(Observation<'a, S>, &'b mut [S]);
+
+impl<S: Scalar> Kernel for Write<'_, '_, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        let (Observation { structure, model, inputs, state, t, asked, linear }, out) = (self.0, self.1);
+        states(structure, model, state, out);
+        if asked.any(Signals::of(&[Q::Command as usize])) {
+            out[Q::Command as usize] = inputs[COMMAND].at(t) + state.command_noise;
+        }
+        if asked.any(OF_SENSORS) {
+            let shown = model.sensing.show(&structure.sensing, &state.shaft, state.sensed);
+            for (q, value) in SENSORS.into_iter().zip(shown) {
+                out[q as usize] = value;
+            }
+        }
+        if asked.any(OF_INPUTS) || asked.any(OF_SHAFT) {
+            loaded(structure, model, &Instant::at(inputs, t), state, linear, out);
+        }
+    }
+}
+
+/// What stands in the state.
 #[inline(always)]
-pub(super) fn observe<F: Form, S: Scalar>(
-    structure: &Structure,
-    m: &Model<S>,
-    inputs: &Inputs<S>,
-    s: &State<S>,
-    t: S,
-    asked: Signals,
-    out: &mut [S],
-) {
+fn states<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, out: &mut [S]) {
     let limited = m.control.speed_limit.le(s.speed_ref.abs()) | m.control.torque_limit.le(s.torque_ref.abs());
     for (q, value) in [
         (Q::UserPosition, s.shaft.user_position),
@@ -51,23 +85,11 @@ pub(super) fn observe<F: Form, S: Scalar>(
     ] {
         out[q as usize] = value;
     }
-    if asked.any(Signals::of(&[Q::Command as usize])) {
-        out[Q::Command as usize] = inputs[COMMAND].at(t) + s.command_noise;
-    }
-    if asked.any(OF_SENSORS) {
-        let shown = m.sensing.show(&structure.sensing, &s.shaft, s.sensed);
-        for (q, value) in SENSORS.into_iter().zip(shown) {
-            out[q as usize] = value;
-        }
-    }
-    if asked.any(OF_INPUTS) || asked.any(OF_SHAFT) {
-        loaded::<F, S>(structure, m, &Instant::at(inputs, t), s, out);
-    }
 }
 
 /// What inputs and loads decide.
 #[inline(always)]
-fn loaded<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s: &State<S>, out: &mut [S]) {
+fn loaded<S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s: &State<S>, linear: bool, out: &mut [S]) {
     let shown = m.shaft.show(&structure.shaft, x, &s.shaft, s.motor_torque);
     let source = x.supply * m.drive.supply_scale;
     for (q, value) in [
@@ -81,7 +103,7 @@ fn loaded<F: Form, S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S
         out[q as usize] = value;
     }
     shared(LOW_OWN, shown.added.signals(), out);
-    if F::LINEAR {
+    if linear {
         let [position, speed, torque, efficiency, aiding] = m.shaft.show_screw(&s.shaft, &shown);
         // Current and voltage of the printed L-R circuit.
         let root = S::splat(1.5_f64.sqrt());
