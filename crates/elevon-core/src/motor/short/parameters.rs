@@ -15,6 +15,9 @@ const GROUNDED: When = When::Either(&[
     When::Away("motor.ground_short_b", 0.0),
     When::Away("motor.ground_short_c", 0.0),
 ]);
+/// The contact is within the winding, which it parts in two.
+const PARTED_BY_PAIR: When = When::Away("motor.phase_short_turns", 1.0);
+const PARTED_BY_GROUND: When = When::Away("motor.ground_short_turns", 1.0);
 
 variables! {
     /// Resistors between terminals and centre tap: the stand's way to seed a short (N 4.3).
@@ -54,6 +57,9 @@ variables! {
         GroundPotential => "ground_potential", "-", "1", Unit, Plant, Some(0.0), "where ground stands in the DC link: 0 the lower rail (the drive's ground), 0.5 the middle, 1 the upper rail",
             high_only("the contact draws its own current from the link, phase by phase: its one phase has none").when(&[GROUNDED]);
         ContactCoupling => "contact_coupling", "kappa_c", "1", Unit, Plant, Some(0.9), "magnetic coupling of the two parts into which a contact with another phase or with ground divides a winding",
-            high_only("the contact draws its own current from the link, phase by phase: its one phase has none").when(&[Either(&[PAIRED, GROUNDED])]);
+            high_only("the contact draws its own current from the link, phase by phase: its one phase has none").when(&[
+                // (paired and parted by it) or (grounded and parted by it), as sums that must all hold
+                Either(&[PAIRED, GROUNDED]), Either(&[PAIRED, PARTED_BY_GROUND]), Either(&[PARTED_BY_PAIR, GROUNDED]), Either(&[PARTED_BY_PAIR, PARTED_BY_GROUND]),
+            ]);
     }
 }
