@@ -16,14 +16,14 @@ from elevon.parameters.write import updated_set
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
+    from elevon.calibrate.by_parts import PartsCalibration
     from elevon.calibrate.calibration import Calibration
     from elevon.calibrate.closed_loop import LoopCalibration
-    from elevon.calibrate.gear import GearCalibration
     from elevon.calibrate.validation import Validation
 
 __all__ = ["calibrated_parameters", "set_text", "write_calibration", "write_values"]
 
-Answer: TypeAlias = "Calibration | LoopCalibration | GearCalibration"
+Answer: TypeAlias = "Calibration | LoopCalibration | PartsCalibration"
 
 
 def calibrated_parameters(result: Answer) -> list[Parameter]:

@@ -12,7 +12,7 @@ from elevon.errors import InputError
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.calibrate.gear import GearCalibration
+    from elevon.calibrate.by_parts import PartsCalibration
     from elevon.calibrate.validation import Validation
     from elevon.recording import Recording
 
@@ -53,11 +53,11 @@ def calibrate_unit(
     if out is not None:
         say(f"set: {write_calibration(out, result, validation=promise, force=force)}")
     if report is not None:
-        say(f"report: {_page(result, date, report, force=force)}")
+        say(f"report: {page(result, date, report, force=force)}")
     if as_json:
         print_json(result.to_dict() | {"out": None if out is None else str(out)})
     else:
-        _print(result)
+        print_parts(result)
     return 0
 
 
@@ -73,7 +73,7 @@ def _read(paths: Sequence[Path], column_map: Path | None) -> dict[str, Recording
 def _promise(
     recordings: dict[str, Recording],
     model: Actuator,
-    result: GearCalibration,
+    result: PartsCalibration,
     free: Sequence[str] | None,
 ) -> Validation | None:
     """Thresholds of the set, from motions held out where there are several."""
@@ -89,15 +89,15 @@ def _promise(
     return promise
 
 
-def _page(result: GearCalibration, date: str | None, path: Path, *, force: bool) -> Path:
+def page(result: PartsCalibration, date: str | None, path: Path, *, force: bool) -> Path:
     import elevon
-    from elevon.calibrate.gear.page import gear_report
+    from elevon.calibrate.parts_page import parts_report
 
-    page = gear_report(result, provenance={"Elevon": elevon.__version__}, date=date)
-    return page.save(path, force=force)
+    shown = parts_report(result, provenance={"Elevon": elevon.__version__}, date=date)
+    return shown.save(path, force=force)
 
 
-def _print(result: GearCalibration) -> None:
+def print_parts(result: PartsCalibration) -> None:
     print_table(
         ("parameter", "before", "after", "low", "high", "unit", "holds for"),
         [

@@ -5,6 +5,6 @@ from the torque balance while the motor drives, the unit's gains from its own se
 """
 
 from elevon.calibrate.gear.log import GearLog, gear_log
-from elevon.calibrate.gear.result import GearCalibration, calibrate_gear
+from elevon.calibrate.gear.result import calibrate_gear
 
-__all__ = ["GearCalibration", "GearLog", "calibrate_gear", "gear_log"]
+__all__ = ["GearLog", "calibrate_gear", "gear_log"]

@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from elevon.calibrate.gear.log import GearLog, Move
 from elevon.calibrate.gear.rig import RigTest
-from elevon.calibrate.gear.tables import GRAVITY, Level, per_travel
+from elevon.calibrate.gear.tables import GRAVITY, per_travel
+from elevon.calibrate.level import Level
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator

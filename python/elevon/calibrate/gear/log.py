@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from elevon.errors import InputError
+from elevon.calibrate.role_log import RoleLog, role_channels
 
 if TYPE_CHECKING:
     from elevon.recording import Recording
 
 __all__ = ["EXTENDING", "LOCKED", "RETRACTING", "GearLog", "Move", "gear_log"]
 
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 #: States of the control unit that mean a motion, and the state it ends in.
 EXTENDING, LOCKED, RETRACTING = 1, 2, 3
-_FEWEST = 100  # samples
 _RIG_MOTION = 2e-3  # m at least that a rig has moved the ram
 _FOLLOWS = 0.5  # of the ram's speed: a motor that turns with it
 _NEEDED = ("output_position", "motor_speed")
@@ -44,41 +39,8 @@ class Move:
 
 
 @dataclass(frozen=True)
-class GearLog:
-    """A log, SI, on the clock of the output's position.
-
-    Attributes
-    ----------
-    name : str
-        Of the file.
-    time : ndarray, shape (n,)
-        s, from zero.
-    roles : mapping of str to ndarray, shape (n,)
-        What was shown.
-    stand : mapping of str to object
-        Parameters that the stand set (`brake.powered` and the like), as they were written.
-    total_load : bool
-        Whether the role ``load`` is the whole load, positive towards extension, as a run records
-        it; else it is the stand's force, positive against extension.
-    """
-
-    name: str
-    time: Floats
-    roles: Mapping[str, Floats]
-    stand: Mapping[str, Any] = field(default_factory=dict)
-    total_load: bool = False
-
-    @cached_property
-    def period(self) -> float:
-        """Median step of the clock, s."""
-        return float(np.median(np.diff(self.time)))
-
-    def has(self, *roles: str) -> bool:
-        """Whether all of some roles were recorded."""
-        return all(role in self.roles for role in roles)
-
-    def __getitem__(self, role: str) -> Floats:
-        return self.roles[role]
+class GearLog(RoleLog):
+    """A log on the clock of the output's position; the whole load is positive towards extension."""
 
     @cached_property
     def moves(self) -> tuple[Move, ...]:
@@ -103,10 +65,6 @@ class GearLog:
             return False
         return float(np.ptp(self["output_position"])) > _RIG_MOTION
 
-    def setting(self, path: str) -> Any:
-        """Return what the stand set, None where it says nothing."""
-        return self.stand.get(path)
-
     def connected(self, per_travel: float) -> bool:
         """Whether the motor turned with the ram that a rig moved."""
         span = float(self.time[-1])
@@ -130,24 +88,4 @@ def gear_log(recording: Recording, name: str) -> GearLog:
     InputError
         A role that is needed is missing, or the log is too short.
     """
-    roles = recording.roles
-    for role in _NEEDED:
-        if role not in roles:
-            raise InputError(f"{name}: no channel plays {role!r}; roles: {', '.join(roles)}")
-    base = recording.role("output_position")
-    clock = np.asarray(base.time, dtype=np.float64)
-    if len(clock) < _FEWEST:
-        raise InputError(f"{name}: {len(clock)} samples; at least {_FEWEST}")
-    shown = {}
-    for role in roles:
-        channel = recording.role(role)
-        values = np.asarray(channel.values, dtype=np.float64)
-        if channel.unit == "1":
-            at = np.searchsorted(channel.time, clock + 1e-9, side="right") - 1
-            shown[role] = values[at.clip(0)]
-        else:
-            shown[role] = np.interp(clock, channel.time, values)
-    stand = recording.meta.get("stand")
-    settings = stand.get("parameters", {}) if isinstance(stand, Mapping) else {}
-    own = not isinstance(stand, Mapping) and "scenario" in recording.meta
-    return GearLog(name, clock - clock[0], shown, dict(settings), own)
+    return GearLog(**role_channels(recording, name, _NEEDED))

@@ -17,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.calibrate.gear.log import GearLog, Move
-from elevon.calibrate.gear.tables import Level, per_travel
+from elevon.calibrate.gear.tables import per_travel
+from elevon.calibrate.level import Level
 from elevon.calibrate.regression import Regression, robust_regression, with_deviations
 
 if TYPE_CHECKING:

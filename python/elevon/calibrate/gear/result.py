@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elevon.calibrate.estimate import Estimate
+from elevon.calibrate.by_parts import Parts, PartsCalibration, go
 from elevon.calibrate.gear import events, unit
 from elevon.calibrate.gear.log import GearLog
 from elevon.calibrate.gear.motor import Motor, driving, motor_constants
 from elevon.calibrate.gear.rig import RigTest, rig_tests
 from elevon.calibrate.gear.tables import (
-    Level,
-    as_values,
     friction_knots,
     hanging_mass,
     harmonic_knots,
@@ -25,17 +22,17 @@ from elevon.calibrate.gear.tables import (
     per_travel,
 )
 from elevon.calibrate.gear.train import Balance, Known, torque_balance
-from elevon.errors import InputError, Interrupted
+from elevon.calibrate.level import Level, as_values
+from elevon.errors import InputError
 from elevon.parameters.records import record_of
 from elevon.progress import Progress
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["GearCalibration", "calibrate_gear"]
+__all__ = ["calibrate_gear"]
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
-_WIDE = 0.2  # of a value: a deviation above which it is not determined
 #: What no log of these roles shows, whatever was done.
 _NEVER = {
     "motor.bearing_torque": "the rig shows it only within the whole train's friction (FFM)",
@@ -58,77 +55,13 @@ _GIVEN = {
 }
 
 
-@dataclass(frozen=True)
-class GearCalibration:
-    """The answer.
-
-    Attributes
-    ----------
-    actuator, before : Actuator
-        With the calibrated values, and as given.
-    logs : tuple of GearLog
-        The data.
-    estimates : tuple of Estimate
-        What the logs determine.
-    undetermined : mapping of str to str
-        What they do not, and why.
-    tests : tuple of RigTest
-        Runs of the friction rig.
-    torque : float
-        Torque of an ampere that the balance of power shows [N m/A].
-    residual : float
-        Of the torque balance, at the ram [N]; NaN without one.
-    wall_s : float
-        Time it took.
-    """
-
-    actuator: Actuator
-    before: Actuator
-    logs: tuple[GearLog, ...]
-    estimates: tuple[Estimate, ...]
-    undetermined: Mapping[str, str]
-    tests: tuple[RigTest, ...]
-    torque: float
-    residual: float
-    wall_s: float = field(compare=False)
-
-    def __getitem__(self, path: str) -> Estimate:
-        for item in self.estimates:
-            if item.path == path:
-                return item
-        from elevon.errors import unknown
-
-        raise unknown("estimate", path, [item.path for item in self.estimates])
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {
-            "status": "ok",
-            "actuator": self.before.name,
-            "logs": [
-                {
-                    "name": log.name,
-                    "samples": len(log.time),
-                    "rate_hz": 1.0 / log.period,
-                    "kind": "rig" if log.rig else "motion" if log.moves else "rest",
-                }
-                for log in self.logs
-            ],
-            "parameters": {item.path: item.to_dict() for item in self.estimates},
-            "undetermined": dict(self.undetermined),
-            "torque_per_ampere": self.torque,
-            "balance_residual_n": None if np.isnan(self.residual) else self.residual,
-            "wall_s": self.wall_s,
-        }
-
-
 def calibrate_gear(
     logs: Sequence[GearLog],
     actuator: Actuator,
     *,
     free: Sequence[str] | None = None,
     progress: Progress | None = None,
-) -> GearCalibration:
+) -> PartsCalibration:
     """Estimate what logs of an actuator with a control unit determine.
 
     Parameters
@@ -154,61 +87,49 @@ def calibrate_gear(
         raise InputError("calibration needs at least one log")
     for path in free or ():
         record_of(actuator.wiring, path, "--free")
-    _go(progress, 0.05)
+    go(progress, 0.05)
     work = _Work(logs, actuator)
     work.rig()
-    _go(progress, 0.5)
+    go(progress, 0.5)
     work.drive()
-    _go(progress, 0.9)
+    go(progress, 0.9)
     work.ends()
     estimates, undetermined = work.answer(free)
-    if not estimates:
-        raise InputError("the logs determine no parameter: " + "; ".join(
-            dict.fromkeys(list(undetermined.values())[:3])))  # fmt: skip
     values: dict[str, str | float] = {item.path: item.value for item in estimates}
-    _go(progress, 1.0)
-    return GearCalibration(
+    go(progress, 1.0)
+    return PartsCalibration(
         actuator=actuator.with_values(values, source="calibration"),
         before=actuator,
         logs=tuple(logs),
         estimates=tuple(estimates),
         undetermined=undetermined,
-        tests=tuple(work.tests),
-        torque=work.motor.torque,
-        residual=work.balance.residual,
+        facts=work.facts(),
         wall_s=clock.perf_counter() - begin,
     )
 
 
-def _go(progress: Progress | None, fraction: float) -> None:
-    if progress is not None and progress(fraction) is False:
-        raise Interrupted("calibration stopped")
-
-
-class _Work:
+class _Work(Parts):
     """The stages in their order; each uses what the ones before have determined."""
 
     def __init__(self, logs: Sequence[GearLog], actuator: Actuator) -> None:
+        super().__init__(actuator, _GIVEN, _NEVER)
         self.logs = logs
-        self.actuator = actuator
-        self.levels: dict[str, Level] = {}
-        self.reasons: dict[str, str] = dict(_NEVER)
         self.tests: list[RigTest] = []
         believed = 2.0 * actuator.parameters.value("motor.emf_constant")
         self.motor = Motor({}, {}, believed, 0.0, 0.0, given=True)
         self.balance = Balance({}, {}, float("nan"))
 
-    def add(self, levels: Mapping[str, Level], reasons: Mapping[str, str]) -> None:
-        """Take over what a stage determined, and why it did not the rest."""
-        self.levels |= levels
-        self.reasons |= {path: why for path, why in reasons.items() if path not in self.levels}
-        for path in levels:
-            self.reasons.pop(path, None)
-
-    def value(self, path: str) -> float:
-        """Return what is determined by now, else what is given."""
-        item = self.levels.get(path)
-        return self.actuator.parameters.value(path) if item is None else item.value
+    def facts(self) -> dict[str, Any]:
+        """Return what else is known: kinds of logs, torque of an ampere, residual at the ram."""
+        kinds = {
+            log.name: "rig" if log.rig else "motion" if log.moves else "rest" for log in self.logs
+        }
+        residual = self.balance.residual
+        return {
+            "kinds": kinds,
+            "torque_per_ampere": self.motor.torque,
+            "balance_residual_n": None if np.isnan(residual) else residual,
+        }
 
     def rig(self) -> None:
         """Run the friction rig's evaluation."""
@@ -250,15 +171,10 @@ class _Work:
         self.motor = motor_constants(parts, self.actuator)
         self.add(self.motor.levels, self.motor.reasons)
         known = {p: v for p, v in as_values(self.levels).items() if p.startswith("friction.ffm_")}
-        settled = self._settled()
+        settled = self.settled()
         inertia = beside_motor(self.logs, settled)
         self.balance = torque_balance(parts, Known(settled, self.motor, known, inertia))
         self.add(self.balance.levels, self.balance.reasons)
-
-    def _settled(self) -> Actuator:
-        """The actuator as the stages so far have it, for what is only read from it."""
-        values: dict[str, str | float] = dict(as_values(self.levels))
-        return self.actuator.with_values(values, source="calibration")
 
     def ends(self) -> None:
         """Evaluate the lock and the brake."""
@@ -276,32 +192,6 @@ class _Work:
         way = "extension" if test.way > 0.0 else "retraction"
         table = [self.value(f"friction.ffm_{way}_{k}") for k in range(1, 9)]
         return float((hats(np.array([test.speed]), knots(self.actuator)) @ np.array(table))[0])
-
-    def answer(self, free: Sequence[str] | None) -> tuple[list[Estimate], dict[str, str]]:
-        """Return the estimates, those asked for only, and the rest with its reasons."""
-        estimates = []
-        for path, level in self.levels.items():
-            if not level.std < _WIDE * abs(level.value):
-                self.reasons[path] = "the logs' noise is larger than its effect"
-            elif free is None or path in free:
-                estimates.append(self._estimate(path, level))
-        for path in free or ():
-            if path not in {item.path for item in estimates}:
-                why = self.reasons.get(path, "nothing in the logs speaks of it")
-                raise InputError(f"--free {path}: {why}")
-        order = {path: k for k, path in enumerate(self.actuator.parameters)}
-        estimates.sort(key=lambda item: order[item.path])
-        missing = {p: self.reasons[p] for p in sorted(self.reasons, key=lambda p: order[p])}
-        return estimates, {} if free is not None else missing
-
-    def _estimate(self, path: str, level: Level) -> Estimate:
-        record = record_of(self.actuator.wiring, path)
-        low, high = level.interval
-        return Estimate(
-            path=path, value=level.value, std=level.std, interval=(max(low, 0.0), high),
-            unit=record.unit, register=record.register, old=self.actuator.parameters.value(path),
-            method="direct", given=_GIVEN.get(path, ()),
-        )  # fmt: skip
 
 
 def beside_motor(logs: Sequence[GearLog], actuator: Actuator) -> tuple[Floats, Floats]:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from elevon.calibrate.estimate import quantile
 from elevon.calibrate.gear.rig import HARMONICS, RigTest
+from elevon.calibrate.level import Level
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -18,7 +17,6 @@ if TYPE_CHECKING:
 __all__ = [
     "KNOTS",
     "Knot",
-    "Level",
     "friction_knots",
     "hanging_mass",
     "harmonic_knots",
@@ -33,21 +31,6 @@ GRAVITY = 9.80665
 _SEEN = 0.98  # resolution from which a knot is determined by tests
 _BELIEF = 0.3  # of a table's value, as a deviation: what holds a knot that no test reaches
 _SHAPE = 2.5e-4  # of a table's value: what a table of straight pieces leaves between its knots
-
-
-@dataclass(frozen=True)
-class Level:
-    """A value with its deviation and degrees of freedom."""
-
-    value: float
-    std: float
-    degrees: float = np.inf
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """90 % interval."""
-        half = quantile(self.degrees) * self.std
-        return self.value - half, self.value + half
 
 
 #: Path to value.
@@ -167,8 +150,3 @@ def _table(
         else:
             missing[path] = f"no rig test at or beside {1e3 * at[k]:.4g} mm/s"
     return levels, missing
-
-
-def as_values(levels: Mapping[str, Level]) -> dict[str, float]:
-    """Return path to value."""
-    return {path: item.value for path, item in levels.items()}

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from elevon.calibrate.blocks import stroke_blocks
+from elevon.calibrate.balance_fit import Balanced, Sought, fit_balance
 from elevon.calibrate.gear.motor import Driving, Motor
-from elevon.calibrate.gear.tables import KNOTS, Level, hats, knots, per_travel
+from elevon.calibrate.gear.tables import KNOTS, hats, knots, per_travel
+from elevon.calibrate.level import Level
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -31,6 +32,7 @@ _BELIEF = {_INERTIA: 0.5, _UNLOADED: 0.15, _LOADED: 0.15}
 _TABLE = 0.5  # the same, of a knot of the friction
 _SURE = 0.15  # of the belief: a deviation below which the logs have determined a number
 _NUDGE = 1e-3  # of the torque, for what its deviation moves
+_REACH = 0.3  # weight of a knot in the samples that come nearest to it
 _FORCE = 20.0  # N, first deviation of the residual
 
 
@@ -44,12 +46,9 @@ class Balance:
 
 
 @dataclass(frozen=True)
-class _Problem:
-    """Stacked samples: y = axial balance without what is free."""
+class _Samples:
+    """Stacked samples: balance without what is free, and what it is made of."""
 
-    names: tuple[str, ...]
-    first: Floats
-    belief: Floats
     data: Floats
     acceleration: Floats
     axial: Floats
@@ -58,21 +57,13 @@ class _Problem:
     gear: float
     force: float
 
-    def model(self, x: Floats) -> Floats:
-        """Return the resistance [N] of a point (shares of `first`)."""
-        value = x * self.first
+    def model(self, value: Floats) -> Floats:
+        """Return the resistance [N] of inertia, efficiencies and free knots."""
         inertia, unloaded, loaded = value[:3]
         size = np.abs(self.axial)
         eta = self.gear * (loaded + (unloaded - loaded) * np.exp(-size / self.force))
         lost = self.way * (1.0 / eta - 1.0) * size
         return np.asarray(inertia * self.acceleration + lost + self.tables @ value[3:])
-
-    def slope(self, x: Floats) -> Floats:
-        """Return derivatives, shape (n, p), by small differences: smooth in all of them."""
-        step = 1e-6
-        rows = [(self.model(x + step * e) - self.model(x - step * e)) / (2.0 * step)
-                for e in np.eye(len(x))]  # fmt: skip
-        return np.stack(rows, axis=1)
 
 
 @dataclass(frozen=True)
@@ -109,25 +100,40 @@ def torque_balance(parts: Sequence[Driving], known: Known) -> Balance:
     # A direction that no sample shows is not free.
     shown = {_way(part) for part in loaded}
     free = [path for path in open_paths if path.split("_")[1] in shown]
-    problem = _problem(loaded, known, free)
-    x, covariance, degrees, residual = _solve(problem, loaded)
-    spread = np.hypot(np.sqrt(np.diag(covariance)), _choices(loaded, known, free, x))
-    levels, reasons = _judged(problem, x, spread, degrees)
+    sought = _sought(known.actuator, free)
+    fit = _fitted(loaded, known, sought)
+    spread = np.hypot(fit.std, _choices(loaded, known, sought, fit.x))
+    reach = np.abs(_samples(loaded, known, free, 1.0).tables).max(axis=0)
+    levels, reasons = _judged(sought, fit, spread, np.concatenate(([1.0] * 3, reach)))
     idle = {
         path: f"the motor does not drive in {path.split('_')[1]}"
         for path in open_paths
         if path not in free
     }
-    return Balance(levels, reasons | idle, residual)
+    return Balance(levels, reasons | idle, fit.residual)
 
 
-def _choices(parts: Sequence[Driving], known: Known, free: Sequence[str], x: Floats) -> Floats:
+def _sought(actuator: Actuator, free: Sequence[str]) -> Sought:
+    names = (_INERTIA, _UNLOADED, _LOADED, *free)
+    first = np.array([max(actuator.parameters.value(name), 1e-12) for name in names])
+    return Sought(names, first, np.array([_BELIEF.get(name, _TABLE) for name in names]))
+
+
+def _fitted(
+    parts: Sequence[Driving], known: Known, sought: Sought, *, scale: float = 1.0
+) -> Balanced:
+    samples = _samples(parts, known, sought.names[3:], scale)
+    times = [(p.log.time[p.used], np.ones(int(p.used.sum())), p.log.period) for p in parts]
+    return fit_balance(sought, samples.data, samples.model, times, scale=_FORCE)
+
+
+def _choices(parts: Sequence[Driving], known: Known, sought: Sought, x: Floats) -> Floats:
     """Deviation of a point from the scale of the torque, and from the drag with the bridge off."""
     motor = known.motor
-    nudged = _solve(_problem(parts, known, free, scale=1.0 + _NUDGE), parts)[0] - x
+    nudged = _fitted(parts, known, sought, scale=1.0 + _NUDGE).x - x
     scale = nudged * (motor.torque_std / motor.torque / _NUDGE)
     plain = replace(known, motor=replace(motor, drag=0.0))
-    drag = (_solve(_problem(parts, plain, free), parts)[0] - x) / np.sqrt(12.0)
+    drag = (_fitted(parts, plain, sought).x - x) / np.sqrt(12.0)
     return np.asarray(np.hypot(scale, drag))
 
 
@@ -155,12 +161,9 @@ def _plain(setting: object, default: float) -> float:
     return float(setting) if isinstance(setting, (int, float)) else default
 
 
-def _problem(
-    parts: Sequence[Driving], known: Known, free: Sequence[str], *, scale: float = 1.0
-) -> _Problem:
+def _samples(parts: Sequence[Driving], known: Known, free: Sequence[str], scale: float) -> _Samples:
     value = known.actuator.parameters.value
     travel = 1.0 / per_travel(known.actuator)
-    names = (_INERTIA, _UNLOADED, _LOADED, *free)
     data, tables = [], []
     stacked: dict[str, list[Floats]] = {"acceleration": [], "axial": [], "way": []}
     for part in parts:
@@ -174,16 +177,10 @@ def _problem(
         stacked["axial"].append(axial)
         stacked["way"].append(np.full(len(axial), part.move.way))
     joined = {name: np.concatenate(rows) for name, rows in stacked.items()}
-    return _Problem(
-        names,
-        np.array([max(value(name), 1e-12) for name in names]),
-        np.array([_BELIEF.get(name, _TABLE) for name in names]),
-        np.concatenate(data),
-        tables=np.vstack(tables),
-        gear=value("gear.efficiency_first") * value("gear.efficiency_second"),
-        force=value("screw.efficiency_force"),
-        **joined,
-    )
+    gear = value("gear.efficiency_first") * value("gear.efficiency_second")
+    force = value("screw.efficiency_force")
+    rows = np.vstack(tables)
+    return _Samples(np.concatenate(data), tables=rows, gear=gear, force=force, **joined)
 
 
 def _friction(part: Driving, known: Known, free: Sequence[str]) -> tuple[Floats, Floats]:
@@ -200,54 +197,15 @@ def _friction(part: Driving, known: Known, free: Sequence[str]) -> tuple[Floats,
     return held, row
 
 
-def _solve(problem: _Problem, parts: Sequence[Driving]) -> tuple[Floats, Floats, float, float]:
-    """Gauss and Newton with robust weights; covariance from scores over blocks."""
-    x = np.ones(len(problem.first))
-    scale = _FORCE
-    prior = np.diag(problem.belief**-2.0)
-    for _ in range(12):
-        rest = problem.data - problem.model(x)
-        slope = problem.slope(x)
-        weight = 1.0 / np.maximum(1.0, np.abs(rest) / (2.0 * scale))
-        heavy = slope * (weight / scale**2)[:, None]
-        step = np.linalg.solve(heavy.T @ slope + prior, heavy.T @ rest - prior @ (x - 1.0))
-        x = np.maximum(x + np.clip(step, -0.3, 0.3), 0.05)
-        if np.max(np.abs(step)) < 1e-9:
-            break
-    rest = problem.data - problem.model(x)
-    slope = problem.slope(x)
-    blocks, at, scores = [], 0, []
-    for part in parts:
-        count = int(part.used.sum())
-        mine = rest[at : at + count]
-        scores.append(slope[at : at + count] * (mine / scale**2)[:, None])
-        blocks.append(
-            stroke_blocks(part.log.time[part.used], np.ones(count), mine, part.log.period)
-        )
-        at += count
-    normal = slope.T @ slope / scale**2
-    degrees = float(max(sum(int(b.max()) + 1 for b in blocks) - 3, 2))
-    bread = np.linalg.inv(normal + prior)
-    total = np.vstack([_sums(s, b) for s, b in zip(scores, blocks, strict=True)])
-    meat = total.T @ total * (len(total) / degrees) + prior
-    return x, bread @ meat @ bread, degrees, float(np.std(rest))
-
-
-def _sums(score: Floats, block: npt.NDArray[np.int64]) -> Floats:
-    total = np.zeros((int(block.max()) + 1, score.shape[1]))
-    np.add.at(total, block, score)
-    return total
-
-
 def _judged(
-    problem: _Problem, x: Floats, spread: Floats, degrees: float
+    sought: Sought, fit: Balanced, spread: Floats, reach: Floats
 ) -> tuple[dict[str, Level], dict[str, str]]:
     levels, reasons = {}, {}
     why = "the drive's logs hardly pass the speeds or loads that would show it"
-    for k, name in enumerate(problem.names):
-        if spread[k] > _SURE * problem.belief[k]:
+    for k, name in enumerate(sought.names):
+        if spread[k] > _SURE * sought.belief[k] or reach[k] < _REACH:
             reasons[name] = why
             continue
-        first = float(problem.first[k])
-        levels[name] = Level(float(x[k]) * first, float(spread[k]) * first, degrees)
+        first = float(sought.first[k])
+        levels[name] = Level(float(fit.x[k]) * first, float(spread[k]) * first, fit.degrees)
     return levels, reasons

@@ -9,18 +9,18 @@ from elevon.calibrate.estimate import LEVEL
 from elevon.report import Report, Table
 
 if TYPE_CHECKING:
-    from elevon.calibrate.gear.result import GearCalibration
+    from elevon.calibrate.by_parts import PartsCalibration
 
-__all__ = ["gear_report"]
+__all__ = ["parts_report"]
 
 
-def gear_report(
-    result: GearCalibration,
+def parts_report(
+    result: PartsCalibration,
     *,
     provenance: Mapping[str, object] | None = None,
     date: str | None = None,
 ) -> Report:
-    """Return the report of a calibration of an actuator with a control unit."""
+    """Return the report of a calibration put together from parts."""
     names = ", ".join(log.name for log in result.logs)
     report = Report(f"Calibration of {result.before.name}", f"From {names}.", date=date)
     report.fact("Parameters determined", str(len(result.estimates)))
