@@ -197,7 +197,7 @@ def test_no_second_ctrl_c_cuts_the_message(capsys, monkeypatch, tmp_path):
         press()
         return "all of it"
 
-    monkeypatch.setattr("elevon.cli.bench._kept", describe)
+    monkeypatch.setattr("elevon.cli.bench._story", describe)
     monkeypatch.setattr("elevon.bench.run.recorded", press)
     run = ["bench", "run", "chirp", "--actuator", "torino-rotary", "--out", str(tmp_path / "o")]
     assert main(run) == 130

@@ -20,6 +20,7 @@ from elevon.cli.common import (
     read_actuator,
     without_companions,
 )
+from elevon.cli.numbers import estimate_row, estimate_texts, written_unit
 from elevon.cli.output import print_json, print_table, progress_bar, say
 from elevon.cli.unit_logs import calibrate_unit, has_control_unit
 from elevon.errors import InputError
@@ -192,7 +193,7 @@ def _drops(path: Path, model: Actuator, out: Path | None, *, as_json: bool, forc
         print_json(result.to_dict() | facts | {"out": None if out is None else str(out)})
         return 0
     rows = [
-        (i.path, f"{i.value:.5g}", f"{i.interval[0]:.5g}", f"{i.interval[1]:.5g}", i.unit)
+        (i.path, *estimate_texts(i.value, i.interval, i.unit, written_unit(model, i.path)))
         for i in result.estimates
     ]
     print_table(("parameter", "value", "low", "high", "unit"), rows)
@@ -280,21 +281,8 @@ def _print(
         }
         print_json(values)
         return
-    rows = [
-        (
-            i.path,
-            "" if i.old is None else f"{i.old:.5g}",
-            f"{i.value:.5g}",
-            f"{i.interval[0]:.5g}",
-            f"{i.interval[1]:.5g}",
-            i.unit,
-            i.register,
-            ", ".join(i.given),
-        )
-        for i in result.estimates
-    ]
-    print_table(
-        ("parameter", "before", "after", "low", "high", "unit", "register", "holds for"), rows
-    )
+    rows = [estimate_row(i, result.before, i.register) for i in result.estimates]
+    columns = ("parameter", "before", "after", "low", "high", "unit", "register", "holds for")
+    print_table(columns, rows, optional=("register",))
     for text in result.findings:
         say(text)

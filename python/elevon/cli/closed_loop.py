@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from elevon.cli.numbers import estimate_row
 from elevon.cli.output import print_json, print_table, progress_bar, say
 from elevon.errors import FormatError, InputError
 
@@ -71,18 +72,7 @@ def _print(result: LoopCalibration, after: Validation) -> None:
     say(f"controller: {result.structure} ({result.why})")
     print_table(
         ("parameter", "before", "after", "low", "high", "unit", "holds for"),
-        [
-            (
-                item.path,
-                "" if item.old is None else f"{item.old:.5g}",
-                f"{item.value:.5g}",
-                f"{item.interval[0]:.5g}",
-                f"{item.interval[1]:.5g}",
-                item.unit,
-                ", ".join(item.given),
-            )
-            for item in result.estimates
-        ],
+        [estimate_row(item, result.actuator) for item in result.estimates],
     )
     for path, reason in result.undetermined.items():
         say(f"{path} is not determined: {reason}")

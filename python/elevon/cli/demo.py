@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -52,18 +52,23 @@ def _story(out: Path) -> str:
     return f"kept in {out}: {', '.join(done)}; give the same command again to go on"
 
 
+def _row(row: dict[str, Any], result: Demo) -> tuple[str, ...]:
+    """Return a row of the table, in the unit of the set and with the digits of the interval."""
+    from elevon.cli.numbers import estimate_texts, written_unit
+    from elevon.units import to_display
+
+    unit = written_unit(result.base, row["path"])
+    interval = (row["low"], row["high"])
+    value, low, high, shown = estimate_texts(row["value"], interval, row["unit"], unit)
+    before, truth = (
+        "" if row[name] is None else f"{float(to_display(row[name], shown or '1')):.5g}"
+        for name in ("before", "truth")
+    )
+    return row["path"], before, truth, value, f"{low} to {high}", shown
+
+
 def _print(result: Demo) -> None:
-    rows = [
-        (
-            row["path"],
-            "" if row["before"] is None else f"{row['before']:.5g}",
-            f"{row['truth']:.5g}",
-            f"{row['value']:.5g}",
-            f"{row['low']:.5g} to {row['high']:.5g}",
-            row["unit"],
-        )
-        for row in result.rows()
-    ]
+    rows = [_row(row, result) for row in result.rows()]
     columns = ("parameter", "before", "hidden truth", "estimate", "90 % interval", "unit")
     print_table(columns, rows, title="hidden values recovered from three logs")
     steps = [(step.name, f"{step.seconds:.1f}", step.reused) for step in result.steps]

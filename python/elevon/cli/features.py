@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from elevon.cli.common import JsonOption
+from elevon.cli.numbers import quantity_text
 from elevon.cli.output import print_json, print_table, say
 
 app = typer.Typer(rich_markup_mode=None)
@@ -48,7 +49,10 @@ def features(
     if json:
         print_json({"features": rows, "signals": result.signals, "rate_hz": result.rate})
         return 0
-    cells = [(row["name"], f"{row['value']:.6g}", row["unit"]) for row in rows]
+    cells = [
+        (name, *quantity_text(value, result.units[name], 6))
+        for name, value in result.values.items()
+    ]
     print_table(("feature", "value", "unit"), cells)
     return 0
 

@@ -10,6 +10,7 @@ import typer
 from elevon.cli.common import without_companions
 from elevon.cli.output import print_json, print_table, say
 from elevon.errors import InputError
+from elevon.units import shown_unit, to_display
 
 if TYPE_CHECKING:
     from elevon.logs.importing import ImportedLog
@@ -190,7 +191,7 @@ def _result(imported: list[ImportedLog], targets: list[Path]) -> dict[str, Any]:
 def _show(report: ImportReport, target: Path) -> None:
     title = f"{report.source} ({report.file_format}) -> {target}"
     rows = [
-        (c["name"], c["column"], c["unit"], _number(c["minimum"]), _number(c["maximum"]),
+        (c["name"], c["column"], shown_unit(c["unit"]), _shown(c, "minimum"), _shown(c, "maximum"),
          c["missing"])
         for c in report.channels
     ]  # fmt: skip
@@ -207,6 +208,10 @@ def _show(report: ImportReport, target: Path) -> None:
         facts = report.synchronisation
         rows_ = [(name, _number(value)) for name, value in facts.items()]
         print_table(("synchronisation", "value"), rows_)
+
+
+def _shown(channel: dict[str, Any], name: str) -> str:
+    return _number(float(to_display(channel[name], shown_unit(channel["unit"]))))
 
 
 def _number(value: Any) -> str:

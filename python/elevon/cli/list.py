@@ -271,7 +271,8 @@ def _print(what: str, rows: list[dict[str, Any]], json: bool, columns: tuple[str
     if json:
         print_json({what: rows})
         return
-    print_table(columns, [[_cell(row[column]) for column in columns] for row in rows])
+    cells = [[_cell(row[column]) for column in columns] for row in rows]
+    print_table(columns, cells, optional=("acts", "declined"))
 
 
 def _cell(value: Any) -> str:

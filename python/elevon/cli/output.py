@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -39,26 +41,33 @@ def print_json(value: Mapping[str, Any]) -> None:
 
 
 def print_table(
-    columns: Sequence[str], rows: Sequence[Sequence[object]], *, title: str | None = None
+    columns: Sequence[str],
+    rows: Sequence[Sequence[object]],
+    *,
+    title: str | None = None,
+    optional: Sequence[str] = (),
 ) -> None:
-    """Write a table on stdout: rich's for a terminal, aligned plain lines for a pipe."""
-    if sys.stdout.isatty():
-        from rich import box
-        from rich.console import Console
-        from rich.table import Table
+    """Write a table on stdout: fitted to a terminal, one line a row for a pipe.
 
-        table = Table(*columns, title=title, box=box.SIMPLE, title_justify="left")
-        for row in rows:
-            table.add_row(*(str(cell).replace("[", r"\[") for cell in row))
-        Console().print(table)
-        return
-    cells = [[str(cell) for cell in row] for row in [columns, *rows]]
-    widths = [max(len(row[k]) for row in cells) for k in range(len(columns))]
-    if title:
-        sys.stdout.write(title + "\n")
-    for row in cells:
-        line = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-        sys.stdout.write(line.rstrip() + "\n")
+    Parameters
+    ----------
+    columns : sequence of str
+        Headings.
+    rows : sequence of sequences
+        Cells; no name and no value is cut, see `table_lines`.
+    title : str, optional
+        Above it.
+    optional : sequence of str
+        Columns that may be left out where the terminal is too narrow, the first one first.
+    """
+    from elevon.cli.table import table_lines
+
+    terminal = sys.stdout.isatty()
+    width = shutil.get_terminal_size().columns if terminal else None
+    lines = table_lines(columns, rows, width, optional)
+    if terminal and "NO_COLOR" not in os.environ:
+        lines[0] = f"\033[1m{lines[0]}\033[0m"
+    sys.stdout.write("\n".join([*([title] if title else []), *lines]) + "\n")
 
 
 def say(message: str) -> None:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from elevon.cli.calibrate import ActuatorOption
 from elevon.cli.common import (
+    ActuatorOption,
     ForceOption,
     JsonOption,
     SeedOption,

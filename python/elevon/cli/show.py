@@ -89,7 +89,7 @@ def _print_parameters(loaded: Any, parameters: list[Any], notes: bool) -> None:
         for p in parameters
     ]
     columns += ["note"] if notes else []
-    print_table(columns, rows)
+    print_table(columns, rows, optional=("acts", "note"))
 
 
 def _write_schema(path: Path, wiring: str, *, force: bool) -> None:

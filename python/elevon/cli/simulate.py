@@ -152,28 +152,22 @@ def _print_result(recording: Any, wiring: str) -> None:
         lines = [[f"{event['time_s']:.3f}", event["text"]] for event in events]
         print_table(("time [s]", "event"), lines or [["", "nothing changed"]])
         typer.echo("")
+    from elevon.units import shown_unit, to_display
+
     rows = []
     for channel in recording.channels:
         name, values = channel.name, channel.values
         words = code_names(wiring, name) if events is not None and name in _WORDS else {}
-        unit, scale = (
-            _SHOWN.get(name, (channel.unit, 1.0)) if events is not None else (channel.unit, 1.0)
-        )
+        unit = shown_unit(channel.unit or "1")
         if not len(channel):
             rows.append([name, unit, "", "", ""])
         elif words:
             rows.append([name, "", "", "", words.get(round(float(values[-1])), f"{values[-1]:g}")])
         else:
-            shown = (values.min(), values.max(), values[-1])
-            rows.append([name, unit, *(f"{scale * x:.6g}" for x in shown)])
+            shown = to_display([values.min(), values.max(), values[-1]], unit)
+            rows.append([name, unit, *(f"{x:.6g}" for x in shown)])
     print_table(("signal", "unit", "least", "greatest", "last"), rows)
 
 
 _WORDS = ("command", "state", "fault_code", "warning_code", "command_refused")
 """Signals of a control unit that are shown by name."""
-_SHOWN = {
-    "user_position": ("mm", 1e3),
-    "user_speed": ("mm/s", 1e3),
-    "nut_position": ("mm", 1e3),
-}
-"""Units in which a test engineer reads them."""

@@ -26,6 +26,7 @@ from elevon.cli.common import (
     check_outputs,
     read_actuator,
 )
+from elevon.cli.numbers import quantity_text
 from elevon.cli.output import print_json, print_table, progress_bar, say
 
 app = typer.Typer(rich_markup_mode=None)
@@ -79,9 +80,8 @@ def validate(
             (
                 e.log,
                 e.signal,
-                f"{e.rms:.4g}",
-                f"{e.largest:.4g}",
-                e.unit,
+                quantity_text(e.rms, e.unit, 4)[0],
+                *quantity_text(e.largest, e.unit, 4),
                 f"{e.of_rms:.3g}",
                 f"{e.of_range:.3g}",
                 "" if e.limit is None else f"{e.limit:.3g}",

@@ -15,7 +15,7 @@ from elevon.errors import InputError, unknown
 from elevon.files import atomic_path, check_output, write_text
 from elevon.recording.channel import Channel
 from elevon.recording.clock import Clock
-from elevon.recording.shown import shown_unit
+from elevon.units import shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

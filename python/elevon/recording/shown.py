@@ -1,4 +1,4 @@
-"""What a notebook shows of a recording, and the units a person reads."""
+"""What a notebook shows of a recording."""
 
 from __future__ import annotations
 
@@ -7,19 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.report.cards import Html, badge, card, sparkline, table
+from elevon.units import shown_unit
 
 if TYPE_CHECKING:
     from elevon.recording.channel import Channel
     from elevon.recording.recording import Recording
 
-__all__ = ["recording_card", "shown_unit"]
-
-_SHOWN = {"rad": "deg", "rad/s": "rpm", "rad/s2": "deg/s2", "K": "degC"}
-
-
-def shown_unit(unit: str) -> str:
-    """Return the unit in which a person reads an SI quantity."""
-    return _SHOWN.get(unit, unit)
+__all__ = ["recording_card"]
 
 
 def recording_card(recording: Recording) -> Html:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from elevon.report import Report, Table
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.pisa_validation import SHOWN, ValidationResult
 from elevon.reproduce.provenance import provenance
+from elevon.units import shown_unit, to_display
 
 __all__ = ["validation_page"]
 
@@ -26,20 +30,17 @@ def validation_page(result: ValidationResult, *, date: str | None = None) -> Rep
         "sensors). It shows the way, not how good the thesis's model is.",
         date=date,
     )
-    rows = [
-        [r["stroke"], r["signal"], r["rms"], r["unit"], r["percent_of_rms"], r["percent_of_range"],
-         "none printed"]
-        for r in result.rows
-    ]  # fmt: skip
-    columns = ["Stroke", "Signal", "RMS error", "Unit", "% of RMS", "% of range", "Published"]
+    rows = [_row(row) for row in result.rows]
+    columns = ["Stroke", "Signal", "RMS error", "Unit", "% of RMS", "% of range"]
     caption = "Percent of the measured signal's RMS about its mean, and of its range."
-    report.section("Errors").table(Table(columns, rows, caption))
+    formats = ["", "", ".3g", "", ".3g", ".3g"]
+    report.section("Errors").table(Table(columns, rows, caption, formats=formats))
     for trace in result.traces:
         section = report.section(trace.log[0].upper() + trace.log[1:])
         with new_figure(3, 1, width=8.0, height=5.4, sharex=True) as (figure, axes):
             for axis, role in zip(axes, SHOWN, strict=True):
                 label, scale = _AXES[role]
-                axis.plot(trace.time, scale * trace.measured[role], color=COLOURS["grey"], lw=1.4)
+                axis.plot(trace.time, scale * trace.measured[role], color=COLOURS["grey"], lw=3.0)
                 axis.plot(trace.time, scale * trace.simulated[role], color=COLOURS["orange"], lw=1)
                 axis.set_ylabel(label)
             axes[-1].set_xlabel("Time [s]")
@@ -48,3 +49,15 @@ def validation_page(result: ValidationResult, *, date: str | None = None) -> Rep
     command = f"elevon reproduce pisa-validation --seed {result.seed} --out DIR"
     report.provenance(provenance(command, **{"Parameter hash": result.parameter_hash}))
     return report
+
+
+def _row(row: Mapping[str, Any]) -> list[object]:
+    unit = shown_unit(row["unit"])
+    return [
+        row["stroke"],
+        row["signal"].replace("_", " "),
+        to_display(row["rms"], unit),
+        unit,
+        row["percent_of_rms"],
+        row["percent_of_range"],
+    ]

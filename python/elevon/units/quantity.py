@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import InputError, RangeError, UnitError
-from elevon.units.table import KINDS
+from elevon.units.table import KINDS, SHOWN
 from elevon.units.unit import Unit, parse_unit, unit_names
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "kind_name",
     "known_units",
     "parse_quantity",
+    "shown_unit",
     "si_unit",
     "to_display",
     "to_si",
@@ -127,6 +128,11 @@ def si_unit(unit_text: str) -> str:
             return example
     symbols = zip(("m", "kg", "s", "A", "K", "rad"), dimension, strict=True)
     return " ".join(f"{name}{power if power != 1 else ''}" for name, power in symbols if power)
+
+
+def shown_unit(unit: str) -> str:
+    """Return the unit in which a person reads an SI quantity: ``"deg"`` for ``"rad"``."""
+    return SHOWN.get(unit, unit)
 
 
 @overload

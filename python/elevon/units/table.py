@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-__all__ = ["KINDS", "OFFSETS", "PREFIXED", "PREFIXES", "PRODUCTS", "SYMBOLS", "WORDS", "Dimension"]
+__all__ = [
+    "KINDS",
+    "OFFSETS",
+    "PREFIXED",
+    "PREFIXES",
+    "PRODUCTS",
+    "SHOWN",
+    "SYMBOLS",
+    "WORDS",
+    "Dimension",
+]
 
 Dimension = tuple[int, int, int, int, int, int]
 """Exponents of length, mass, time, current, temperature, angle."""
@@ -203,3 +213,13 @@ KINDS: tuple[tuple[str, str], ...] = (
 )
 
 PRODUCTS = ("kg cm2", "g cm2", "N/mm", "lbf in", "deg/s", "deg/s2", "mm/s", "mm/rev", "V/krpm")
+SHOWN = {
+    "rad": "deg",
+    "rad/s": "rpm",
+    "rad/s2": "deg/s2",
+    "m": "mm",
+    "m/s": "mm/s",
+    "kg m2": "kg cm2",
+    "K": "degC",
+}
+"""The units in which a person reads SI quantities, where these are others."""

@@ -48,8 +48,8 @@ def current_report(result: CurrentResult, *, date: str | None = None) -> Report:
     for trace in result.traces:
         part = report.section(f"As Fig. {trace.figure}: {trace.title}")
         with new_figure(1, 1, width=8.0, height=3.0) as (figure, axes):
-            axes.plot(trace.time, trace.measured, color=COLOURS["grey"], lw=1.0, label="measured")
-            axes.plot(trace.time, trace.predicted, color=COLOURS["orange"], lw=1.2, label="model")
+            axes.plot(trace.time, trace.measured, color=COLOURS["grey"], lw=3.0, label="measured")
+            axes.plot(trace.time, trace.predicted, color=COLOURS["orange"], lw=1.0, label="model")
             axes.set(xlabel="Time [s]", ylabel="Current [A]")
             axes.legend(loc="upper right", ncols=2)
         part.figure(figure, "Torque current of the virtual stand and of the model.")
