@@ -20,7 +20,7 @@ from elevon.units import parse_quantity
 if TYPE_CHECKING:
     from elevon.recording import Recording
 
-__all__ = ["recorded", "trace_files", "write_traces"]
+__all__ = ["cell_signals", "drive_signals", "recorded", "trace_files", "write_traces"]
 
 Floats = npt.NDArray[np.float64]
 
@@ -63,17 +63,17 @@ def write_traces(
     OutputExistsError, OutputError
         As `elevon.files.write_text`.
     """
-    cell = _cell(setup, recording)
+    cell = cell_signals(setup, recording)
     files = trace_files(folder, setup.trace.name, cell=cell is not None)
     note = json.dumps(_note(setup, layout), indent=2) + "\n"
     write_text(files[0], note, force=force)
     if cell is not None:
         write_loadcell(files[1], *cell, force=force)
-    write_drive_csv(files[-1], _signals(setup, recording), layout=layout, force=force)
+    write_drive_csv(files[-1], drive_signals(setup, recording), layout=layout, force=force)
     return files
 
 
-def _signals(setup: Setup, recording: Recording) -> dict[str, Floats]:
+def drive_signals(setup: Setup, recording: Recording) -> dict[str, Floats]:
     """The drive's own channels: its sensors, never the true motions."""
     time = np.asarray(recording["resolver_position"].time, dtype=np.float64)
     signals = {"time": time}
@@ -87,7 +87,7 @@ def _signals(setup: Setup, recording: Recording) -> dict[str, Floats]:
     return signals
 
 
-def _cell(setup: Setup, recording: Recording) -> tuple[Floats, Floats] | None:
+def cell_signals(setup: Setup, recording: Recording) -> tuple[Floats, Floats] | None:
     """Time and force of the load cell on its own clock, None where it hangs idle."""
     conditions, rig = setup.conditions, setup.rig
     converter, stretch = Hx711(), 1.0 + conditions.cell.clock_drift

@@ -28,9 +28,12 @@ from elevon.cli.output import print_json, print_table, say
 from elevon.errors import InputError, unknown
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from elevon.diagnose.bymodel.answer import Diagnosis
 
 app = typer.Typer(rich_markup_mode=None)
+METHODS = ["model", "surrogate", "both"]
 
 
 @app.command()
@@ -45,7 +48,13 @@ def diagnose(
         list[Path] | None,
         typer.Option("--baseline", metavar="LOG", help="Log of the healthy unit; repeatable."),
     ] = None,
-    method: Annotated[str, typer.Option(help="model.")] = "model",
+    method: Annotated[
+        str, typer.Option(help="model, surrogate, or both (it proposes, the model refines).")
+    ] = "model",
+    surrogate: Annotated[
+        Path | None,
+        typer.Option(help="Surrogate by elevon diagnose-train; default: the package's own."),
+    ] = None,
     fault: Annotated[
         list[str] | None,
         typer.Option("--fault", metavar="KIND@PLACE", help="Candidate; repeatable. Default: all."),
@@ -60,12 +69,10 @@ def diagnose(
     force: ForceOption = False,
 ) -> int:
     """Diagnose the unit that wrote the logs, all in one condition."""
-    from elevon.diagnose.bymodel import diagnose as run
     from elevon.diagnose.bymodel import read_test_logs
 
     check_outputs([report], force=force)
-    if method != "model":
-        raise unknown("method", method, ["model"], "--method")
+    run = _method(method, surrogate)
     if not 0.0 < false_alarm < 1.0:
         raise InputError(f"--false-alarm {false_alarm:g}: must be between 0 and 1")
     model = read_actuator(actuator, settings)
@@ -83,10 +90,35 @@ def diagnose(
 
         say(f"report: {diagnosis_page(result, model.name).save(report, force=force)}")
     if json:
-        print_json(result.to_dict())
+        print_json({**result.to_dict(), "method": method})
         return 0
     _print(result)
     return 0
+
+
+def _method(method: str, file: Path | None) -> Callable[..., Diagnosis]:
+    """Return what diagnoses; a surrogate's file is read before any log."""
+    from functools import partial
+
+    from elevon.diagnose.bymodel import diagnose as by_model
+
+    if method not in METHODS:
+        raise unknown("method", method, METHODS, "--method")
+    if method == "model":
+        if file is not None:
+            raise InputError("--surrogate: serves --method surrogate and both")
+        return by_model
+    from elevon.diagnose.surrogate import (
+        Surrogate,
+        diagnose_by_both,
+        diagnose_by_surrogate,
+        shipped,
+    )
+
+    trained = shipped() if file is None else Surrogate.load(file)
+    return partial(
+        diagnose_by_surrogate if method == "surrogate" else diagnose_by_both, surrogate=trained
+    )
 
 
 def _print(result: Diagnosis) -> None:

@@ -40,6 +40,9 @@ COMMANDS: dict[str, Command] = {
     ),
     "diagnose": Command("elevon.cli.diagnose", "Say what is wrong, where, how bad, how sure."),
     "predict": Command("elevon.cli.predict", "Say how long a unit will do what it must."),
+    "diagnose-train": Command(
+        "elevon.cli.diagnose_train", "Train the surrogate that diagnose --method surrogate asks."
+    ),
     "demo": Command("elevon.cli.demo", "Find a bench's hidden values from its logs; one report."),
     "reproduce": Command("elevon.cli.reproduce", "Recompute a published table or figure."),
 }

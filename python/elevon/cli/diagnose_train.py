@@ -1,0 +1,79 @@
+"""`elevon diagnose-train`: train the surrogate that `elevon diagnose --method surrogate` asks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from elevon.cli.common import ForceOption, JsonOption, SeedOption, check_outputs, read_actuator
+from elevon.cli.output import print_json, print_table, progress_bar, say
+
+app = typer.Typer(rich_markup_mode=None)
+
+
+@app.command()
+def diagnose_train(
+    *,
+    actuator: Annotated[
+        str, typer.Option(metavar="ACTUATOR", help="Units are drawn about it.")
+    ] = "torino-rotary",
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Surrogate to write (.npz).")],
+    units: Annotated[int, typer.Option(min=8, help="Units on the high model.")] = 160,
+    low_units: Annotated[int, typer.Option(min=0, help="More units, on the low model.")] = 480,
+    test_units: Annotated[
+        int, typer.Option(min=0, help="Units of another seed that only judge it.")
+    ] = 32,
+    rounds: Annotated[int, typer.Option(min=10, help="Training steps of a network.")] = 3000,
+    runs: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Keeps the runs, and goes on from there.")
+    ] = None,
+    seed: SeedOption = 0,
+    force: ForceOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Simulate drawn units on the bench's tests, train, and write the surrogate."""
+    from elevon.diagnose.surrogate.training import trained
+
+    check_outputs([out], force=force)
+    with progress_bar("runs and training") as advance:
+        result = trained(
+            read_actuator(actuator),
+            units=units,
+            low_units=low_units,
+            test_units=test_units,
+            rounds=rounds,
+            seed=seed,
+            folder=runs,
+            progress=advance,
+        )
+    path = result.save(out, force=force)
+    size = path.stat().st_size
+    if json:
+        print_json({"file": str(path), "bytes": size, **result.report})
+        return
+    say(f"{path}: {size / 1000:.0f} kB")
+    _print(result.report)
+
+
+def _print(report: Any) -> None:
+    rows = [
+        (
+            name,
+            what.replace("_", " "),
+            s["runs"],
+            f"{s['false_alarms']}/{s['healthy']}",
+            f"{s['alarms']}/{s['faulty']}",
+            f"{s['singles_first']}/{s['singles']}",
+            f"{s['exactly_named']}/{s['runs']}",
+            f"{s['covered']}/{s['severities']}",
+        )
+        for what in ("cross_validation", "test")
+        for name, s in report.get(what, {}).items()
+    ]
+    print_table(
+        ("test and view", "judged by", "runs", "false alarms", "alarms", "single named first",
+         "all named", "within 90 %"),
+        rows,
+    )  # fmt: skip

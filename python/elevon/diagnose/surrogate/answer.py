@@ -1,0 +1,345 @@
+"""Diagnosis by the surrogate, and by both: the surrogate proposes, the model refines."""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.diagnose.bymodel.answer import Cause, Diagnosis, Moved
+from elevon.diagnose.bymodel.candidates import Candidate, chosen
+from elevon.diagnose.bymodel.evidence import UNITS
+from elevon.diagnose.surrogate.features import NAMES, SCALES, LogFeatures, log_features
+from elevon.diagnose.surrogate.model import Head, Said, Surrogate, shipped
+from elevon.diagnose.surrogate.population import FAULTS, learned
+from elevon.diagnose.surrogate.sampling import severities
+from elevon.errors import ElevonError, InputError
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.diagnose.bymodel.log import TestLog
+
+__all__ = ["Proposal", "diagnose_by_both", "diagnose_by_surrogate", "proposed"]
+
+Floats = npt.NDArray[np.float64]
+LISTED = 0.02  # probability below which a cause is not listed, and not proposed to the model
+PRESENT, FAULTY = 0.09, 0.63  # shares of trained runs: of each fault, and of any
+LEAST_PROPOSED = 3  # causes that the model is given at least
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What the surrogate says of logs of one unit.
+
+    Attributes
+    ----------
+    logs : tuple of str
+        The logs.
+    probability : dict of str to float
+        Of each fault, by key.
+    p_fault, chance : float
+        Probability of any fault; how often a healthy unit looks as faulty.
+    severity : dict of str to (float, float, float)
+        Of each fault were it there: middle, ends of the 90 % interval.
+    detectable : dict of str to float
+        Severity from which on 95 % of held-out single faults were named.
+    moved : tuple of Moved
+        The features.
+    outside, findings : tuple of str
+        What lies outside the training set; what the user should know.
+    """
+
+    logs: tuple[str, ...]
+    probability: dict[str, float]
+    p_fault: float
+    chance: float
+    severity: dict[str, tuple[float, float, float]]
+    detectable: dict[str, float]
+    moved: tuple[Moved, ...]
+    outside: tuple[str, ...]
+    findings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Read:
+    """One log with its head and baselines."""
+
+    shown: LogFeatures
+    head: Head
+    baselines: list[Floats]
+    said: Said
+
+
+def proposed(
+    logs: Sequence[TestLog],
+    actuator: Actuator,
+    *,
+    baselines: Sequence[TestLog] = (),
+    surrogate: Surrogate | None = None,
+) -> Proposal:
+    """Ask the surrogate; arguments and errors as `diagnose_by_surrogate`."""
+    trained = surrogate or shipped()
+    healthy = [log_features(item, actuator) for item in baselines]
+    read = [_read(log_features(item, actuator), trained, healthy) for item in logs]
+    logits = _joint([r.said.presence for r in read])
+    faulty = float(_joint([np.array([r.said.faulty]) for r in read])[0])
+    chance = 1.0 - (1.0 - min(r.said.chance for r in read)) ** len(read)
+    sizes, reach = _sizes(read)
+    ends = [severities(sizes + k * reach) for k in (0.0, -1.0, 1.0)]
+    severity = {
+        key: (float(ends[0][k]), float(ends[1][k]), float(ends[2][k]))
+        for k, key in enumerate(FAULTS)
+    }
+    return Proposal(
+        tuple(r.shown.name for r in read),
+        {key: _logistic(float(logits[k])) for k, key in enumerate(FAULTS)},
+        _logistic(faulty),
+        chance,
+        severity,
+        _detectable(read),
+        tuple(m for r in read for m in _moved(r)),
+        tuple(f"{r.shown.name}: {text}" for r in read for text in r.said.outside),
+        tuple(_without_baseline(r) for r in read if not r.baselines),
+    )
+
+
+def _read(shown: LogFeatures, trained: Surrogate, healthy: Sequence[LogFeatures]) -> _Read:
+    name = trained.test_of(shown)
+    if name is None:
+        raise InputError(
+            f"{shown.name}: the surrogate was not trained on such a test (travel "
+            f"{math.degrees(shown.travel):.3g} deg, motor {shown.speed:.3g} rad/s, brake "
+            f"{'on' if shown.braked else 'off'}); it knows {', '.join(trained.tests)}; "
+            "--method model serves any test"
+        )
+    test = trained.tests[name]
+    baselines = [b.values for b in healthy if test.matches(b)]
+    head = test.heads["relative" if baselines else "absolute"]
+    return _Read(shown, head, baselines, head.says(shown.values, baselines))
+
+
+def _without_baseline(read: _Read) -> str:
+    return (
+        f"{read.shown.name}: no baseline of this test: held against all units that were trained; "
+        "small faults are not seen"
+    )
+
+
+def _joint(logits: Sequence[Floats]) -> Floats:
+    """Join logs of one unit: they differ from day to day by themselves."""
+    prior = _logit(PRESENT if len(logits[0]) > 1 else FAULTY)
+    return np.asarray(np.sum(logits, axis=0) - (len(logits) - 1) * prior)
+
+
+def _sizes(read: Sequence[_Read]) -> tuple[Floats, Floats]:
+    """Weigh the logs' sizes by their intervals."""
+    weight = np.array([1.0 / r.said.reach**2 for r in read])
+    size = (weight * np.array([r.said.size for r in read])).sum(axis=0) / weight.sum(axis=0)
+    return size, 1.0 / np.sqrt(weight.sum(axis=0))
+
+
+def _detectable(read: Sequence[_Read]) -> dict[str, float]:
+    named = np.array([r.head.named for r in read])
+    out = {}
+    for k, key in enumerate(FAULTS):
+        if np.isfinite(named[:, k]).any():
+            out[key] = float(np.nanmin(named[:, k]))
+    return out
+
+
+def _moved(read: _Read) -> list[Moved]:
+    view, shown = read.head.view, read.shown
+    healthy = np.mean(read.baselines, axis=0) if read.baselines else view.centre
+    share = np.array([name in SCALES for name in NAMES])
+    size = np.where(share, np.maximum(np.abs(healthy), view.floor), 1.0)
+    return [
+        Moved(
+            shown.name, name, UNITS[name][0], float(shown.values[k]), float(healthy[k]),
+            float(view.spread[k] * size[k]), math.nan,
+        )
+        for k, name in enumerate(NAMES)
+        if math.isfinite(shown.values[k]) and math.isfinite(healthy[k])
+    ]  # fmt: skip
+
+
+def diagnose_by_surrogate(
+    logs: Sequence[TestLog],
+    actuator: Actuator,
+    *,
+    baselines: Sequence[TestLog] = (),
+    faults: Sequence[str] | None = None,
+    false_alarm: float = 0.05,
+    surrogate: Surrogate | None = None,
+) -> Diagnosis:
+    """Say what is wrong by a trained network.
+
+    Parameters
+    ----------
+    logs : sequence of TestLog
+        Of one unit in one condition.
+    actuator : Actuator
+        Gear ratio and pole pairs are used, nothing else.
+    baselines : sequence of TestLog
+        Of the healthy unit; those of the same test serve.
+    faults : sequence of str, optional
+        ``KIND@PLACE`` of the candidates; default: all that were trained.
+    false_alarm : float
+        Rate at which a healthy unit may be called faulty.
+    surrogate : Surrogate, optional
+        Default: the one that comes with the package.
+
+    Raises
+    ------
+    InputError
+        No log, a rate outside 0 to 1, another wiring, a test that was not trained, a log without
+        positions or measured current.
+    UnknownNameError
+        A fault that is no candidate.
+    """
+    begin = clock.perf_counter()
+    _check(logs, actuator, false_alarm)
+    candidates = _known(faults)
+    said = proposed(logs, actuator, baselines=baselines, surrogate=surrogate)
+    faulty = said.chance <= false_alarm
+    best = _best(said, candidates, faulty=faulty)
+    shares = [said.probability[c.key] for c in learned()]
+    p_best = math.prod(
+        p if c.key in best else 1.0 - p for c, p in zip(learned(), shares, strict=True)
+    )
+    findings = list(said.findings)
+    if said.outside:
+        findings.append(
+            "outside the training set, do not trust this answer (--method model): "
+            + "; ".join(said.outside)
+        )
+    return Diagnosis(
+        logs=said.logs,
+        status="faulty" if faulty else "healthy",
+        p_fault=said.p_fault,
+        false_alarm=false_alarm,
+        chance=said.chance,
+        faults=_causes(said, candidates, best),
+        best=best,
+        p_best=p_best,
+        unobservable=_blind(said, candidates),
+        detectable={k: v for k, v in said.detectable.items() if k in {c.key for c in candidates}},
+        moved=said.moved,
+        findings=tuple(findings),
+        seconds=clock.perf_counter() - begin,
+    )
+
+
+def _check(logs: Sequence[TestLog], actuator: Actuator, rate: float) -> None:
+    if not logs:
+        raise InputError("diagnosis needs at least one log")
+    if not 0.0 < rate < 1.0:
+        raise InputError(f"false-alarm rate {rate:g} must be between 0 and 1")
+    if actuator.wiring != "rotary":
+        raise InputError(
+            f"{actuator.name}: the surrogate serves the wiring 'rotary' so far, "
+            f"not {actuator.wiring!r}"
+        )
+
+
+def _known(faults: Sequence[str] | None) -> list[Candidate]:
+    """Return the candidates that the surrogate was trained on."""
+    candidates = learned() if not faults else [c for c in chosen(faults) if c.key in FAULTS]
+    if not candidates:
+        raise InputError(f"--fault: the surrogate knows {', '.join(FAULTS)}")
+    return candidates
+
+
+def _best(said: Proposal, candidates: Sequence[Candidate], *, faulty: bool) -> tuple[str, ...]:
+    """The faults more likely there than not, two at most; the likeliest if none is."""
+    if not faulty:
+        return ()
+    ranked = sorted(candidates, key=lambda c: -said.probability[c.key])
+    likely = [c.key for c in ranked if said.probability[c.key] > 0.5]
+    return tuple(likely[:2]) or (ranked[0].key,)
+
+
+def _causes(
+    said: Proposal, candidates: Sequence[Candidate], best: Sequence[str]
+) -> tuple[Cause, ...]:
+    out = []
+    for c in candidates:
+        p = said.probability[c.key]
+        if p >= LISTED or c.key in best:
+            middle, low, high = said.severity[c.key]
+            alike = tuple((c.kind, place) for place in c.same)
+            out.append(Cause(c.kind, c.place, c.unit, p, middle, (low, high), alike))
+    return tuple(sorted(out, key=lambda cause: -cause.probability))
+
+
+def _blind(said: Proposal, candidates: Sequence[Candidate]) -> tuple[dict[str, str], ...]:
+    reason = "no severity of it was named in 95 % of held-out runs of this test"
+    return tuple(
+        {"kind": c.kind, "place": c.place, "reason": reason}
+        for c in candidates
+        if c.key not in said.detectable
+    )
+
+
+def diagnose_by_both(
+    logs: Sequence[TestLog],
+    actuator: Actuator,
+    *,
+    baselines: Sequence[TestLog] = (),
+    faults: Sequence[str] | None = None,
+    false_alarm: float = 0.05,
+    surrogate: Surrogate | None = None,
+) -> Diagnosis:
+    """Let the surrogate propose causes and the model weigh those; as `diagnose_by_surrogate`.
+
+    Where the surrogate cannot speak, or says that the logs lie outside its training set, the
+    model weighs all causes.
+    """
+    from elevon.diagnose.bymodel import diagnose
+
+    begin = clock.perf_counter()
+    _check(logs, actuator, false_alarm)
+    candidates = chosen(faults)
+    keys, note = _proposal(logs, actuator, baselines, candidates, surrogate)
+    result = diagnose(logs, actuator, baselines=baselines, faults=keys, false_alarm=false_alarm)
+    return replace(result, findings=(*result.findings, note), seconds=clock.perf_counter() - begin)
+
+
+def _proposal(
+    logs: Sequence[TestLog],
+    actuator: Actuator,
+    baselines: Sequence[TestLog],
+    candidates: Sequence[Candidate],
+    surrogate: Surrogate | None,
+) -> tuple[list[str], str]:
+    """Return the keys for the model and a finding."""
+    every = [c.key for c in candidates]
+    try:
+        said = proposed(logs, actuator, baselines=baselines, surrogate=surrogate)
+    except ElevonError as error:
+        return every, f"surrogate: no proposal ({error}); the model weighed all causes"
+    if said.outside:
+        return every, (
+            "surrogate: outside its training set; the model weighed all causes: "
+            + "; ".join(said.outside)
+        )
+    ranked = sorted(every, key=lambda key: -said.probability.get(key, 1.0))
+    keys = [
+        key
+        for k, key in enumerate(ranked)
+        if k < LEAST_PROPOSED or said.probability.get(key, 1.0) >= LISTED
+    ]
+    shares = ", ".join(f"{k} {said.probability.get(k, math.nan):.2g}" for k in keys)
+    return keys, f"surrogate: proposed {shares}"
+
+
+def _logistic(logit: float) -> float:
+    return 0.5 * (1.0 + math.tanh(0.5 * logit))
+
+
+def _logit(share: float) -> float:
+    return math.log(share / (1.0 - share))

@@ -1,0 +1,303 @@
+"""The runs a surrogate learns from: drawn units on the bench's own tests, high fidelity."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.bench.procedure import PlayStep, Procedure, TraceStep, load_procedure
+from elevon.bench.rig import Setup, setups
+from elevon.bench.traces import cell_signals, drive_signals, recorded
+from elevon.diagnose.bymodel.log import TestLog
+from elevon.diagnose.surrogate.features import NAMES, LogFeatures, log_features
+from elevon.diagnose.surrogate.population import (
+    FAULTS,
+    NOISE,
+    Day,
+    day_of,
+    drawn_faults,
+    learned,
+    unit_of,
+)
+from elevon.errors import InputError
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.logs.command.note import CommandNote
+    from elevon.progress import Progress
+    from elevon.recording import Recording
+
+__all__ = ["HEALTHY_DAYS", "TESTS", "Table", "gathered"]
+
+Floats = npt.NDArray[np.float64]
+#: Procedures of the bench that are learned; the first trace of each, with the unit's own play.
+TESTS = ("backlash", "loaded")
+HEALTHY_DAYS = 3
+FAULTY_DAYS = 7
+_UNITS = 16  # of a block: what is run, and written, at a time
+_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Table:
+    """What the runs of one test showed.
+
+    Attributes
+    ----------
+    unit : ndarray of int, shape (n,)
+        Number of the unit.
+    baseline : ndarray of bool, shape (n,)
+        The first `HEALTHY_DAYS` days of a unit, healthy all.
+    severity : ndarray, shape (n, f)
+        By `FAULTS`; zero where absent.
+    values : ndarray, shape (n, k)
+        By `NAMES`.
+    about : ndarray, shape (n, 2)
+        Travel and speed of `LogFeatures`.
+    """
+
+    unit: npt.NDArray[np.int64]
+    baseline: npt.NDArray[np.bool_]
+    severity: Floats
+    values: Floats
+    about: Floats
+
+    @staticmethod
+    def joined(parts: Sequence[Table]) -> Table:
+        """Stack tables."""
+        names = ("unit", "baseline", "severity", "values", "about")
+        return Table(*(np.concatenate([getattr(p, n) for p in parts]) for n in names))
+
+
+def gathered(
+    actuator: Actuator,
+    test: str,
+    *,
+    units: int,
+    seed: int,
+    fidelity: str = "high",
+    folder: Path | None = None,
+    progress: Progress | None = None,
+) -> Table:
+    """Run drawn units through a test and gather what the logs show.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        The units are drawn about it.
+    test : str
+        Of `TESTS`.
+    units : int
+        How many; each `HEALTHY_DAYS` days healthy and then seven days that may be faulty.
+    seed : int
+        Of everything that is drawn.
+    fidelity : str
+        ``high`` or ``low``.
+    folder : path, optional
+        Finished blocks are kept there, and used when they are there already.
+    progress : callable, optional
+        Told the done fraction; returns False to stop.
+
+    Raises
+    ------
+    InputError
+        An actuator of another wiring, an unknown test.
+    Interrupted
+        `progress` returned False; finished blocks stay.
+    """
+    if actuator.wiring != "rotary":
+        raise InputError(f"{actuator.name}: the surrogate learns rotary actuators so far")
+    if test not in TESTS:
+        raise InputError(f"test {test!r}: one of {', '.join(TESTS)}")
+    parts = []
+    blocks = list(_blocks(units))
+    for number, block in enumerate(blocks):
+        path = None if folder is None else folder / _file(actuator, test, seed, block, fidelity)
+        share = _share(progress, number, len(blocks))
+        if path is not None and path.exists():
+            parts.append(_read(path))
+            continue
+        parts.append(_block(actuator, test, seed, block, fidelity=fidelity, progress=share))
+        if path is not None:
+            _write(path, parts[-1])
+    return Table.joined(parts)
+
+
+def _blocks(units: int) -> Iterator[range]:
+    for first in range(0, units, _UNITS):
+        yield range(first, min(first + _UNITS, units))
+
+
+def _share(progress: Progress | None, number: int, total: int) -> Progress | None:
+    from elevon.progress import part
+
+    return part(progress, number / total, (number + 1) / total)
+
+
+def _file(actuator: Actuator, test: str, seed: int, block: range, fidelity: str) -> str:
+    name = f"{actuator.hash[:12]}-v{_VERSION}-s{seed}"
+    kind = "" if fidelity == "high" else f"-{fidelity}"
+    return f"{test}{kind}-{name}-{block.start:05d}-{block.stop:05d}.npz"
+
+
+def _read(path: Path) -> Table:
+    with np.load(path, allow_pickle=False) as data:
+        return Table(*(data[n] for n in ("unit", "baseline", "severity", "values", "about")))
+
+
+def _write(path: Path, table: Table) -> None:
+    import io
+
+    from elevon.files import write_bytes
+
+    stream = io.BytesIO()
+    np.savez(stream, **vars(table))
+    write_bytes(path, stream.getvalue())
+
+
+def _block(
+    actuator: Actuator,
+    test: str,
+    seed: int,
+    block: range,
+    *,
+    fidelity: str,
+    progress: Progress | None,
+) -> Table:
+    """Simulate some units; runs that trip or diverge give no row."""
+    from elevon.scenario.compile import signal_records
+    from elevon.simulate import Run, simulate_batch
+
+    planned = [row for number in block for row in _unit_runs(actuator, test, seed, number)]
+    runs = [Run(p.setup.actuator, p.setup.scenario, p.setup.conditions.seed) for p in planned]
+    record = recorded(list(signal_records(actuator.wiring, fidelity)))
+    shown = simulate_batch(runs, fidelity=fidelity, record=record, progress=progress)
+    rows = []
+    for p, recording in zip(planned, shown, strict=True):
+        if recording.status == "ok" and (row := _row(p, recording)) is not None:
+            rows.append((p, row))
+    return Table(
+        np.array([p.unit for p, _ in rows], dtype=np.int64),
+        np.array([p.baseline for p, _ in rows], dtype=np.bool_),
+        np.array([[p.faults.get(key, 0.0) for key in FAULTS] for p, _ in rows]).reshape(
+            -1, len(FAULTS)
+        ),
+        np.array([row.values for _, row in rows]).reshape(-1, len(NAMES)),
+        np.array([[row.travel, row.speed] for _, row in rows]).reshape(-1, 2),
+    )
+
+
+@dataclass(frozen=True)
+class _Planned:
+    unit: int
+    baseline: bool
+    day: Day
+    faults: dict[str, float]
+    noise: dict[str, float]
+    setup: Setup
+
+
+def _unit_runs(actuator: Actuator, test: str, seed: int, number: int) -> Iterator[_Planned]:
+    """One unit, drawn alike for every test, and its days, which are not."""
+    own = np.random.default_rng([seed, number])
+    unit = unit_of(actuator, own)
+    noise = {name: most * float(own.random()) for name, most in NOISE.items()}
+    procedure, candidates = _procedure(test), learned()
+    for k in range(HEALTHY_DAYS + FAULTY_DAYS):
+        rng = np.random.default_rng([seed, number, TESTS.index(test), k])
+        day = day_of(unit, rng)
+        faults = {} if k < HEALTHY_DAYS else drawn_faults(rng, candidates)
+        texts = [_text(key, severity, rng) for key, severity in faults.items()]
+        setup = setups(procedure, day.actuator, faults=texts, seed=int(rng.integers(2**31)))[0]
+        yield _Planned(number, k < HEALTHY_DAYS, day, faults, noise, setup)
+
+
+def _text(key: str, severity: float, rng: np.random.Generator) -> str:
+    """Return a fault in the grammar; what the electrical zero hides is drawn."""
+    if key.startswith("short@"):
+        return f"short@motor.phase_{rng.choice(list('abc'))}={severity!r}"
+    if key.startswith("eccentricity"):
+        return f"{key}={severity!r},phase={float(rng.uniform(0.0, 2.0 * math.pi))!r}"
+    return f"{key}={severity!r}"
+
+
+def _procedure(test: str) -> Procedure:
+    """Return the bench's procedure up to its first trace, without setting the play."""
+    full = load_procedure(test)
+    steps = []
+    for step in full.step:
+        if not isinstance(step, PlayStep):
+            steps.append(step)
+        if isinstance(step, TraceStep):
+            break
+    return full.model_copy(update={"step": tuple(steps)})
+
+
+def _row(planned: _Planned, recording: Recording) -> LogFeatures | None:
+    try:
+        return log_features(_log(planned, recording), planned.setup.actuator)
+    except InputError:
+        return None
+
+
+def _log(planned: _Planned, recording: Recording) -> TestLog:
+    """Return the log that the bench writes of a run, without the file."""
+    from elevon.calibrate.brake_level import brake_of
+    from elevon.calibrate.log import BenchLog
+
+    shown = drive_signals(planned.setup, recording)
+    rng = np.random.default_rng([planned.setup.conditions.seed, 7])
+    for name, deviation in planned.noise.items():
+        shown[name] = shown[name] + deviation * rng.standard_normal(len(shown[name]))
+    time = shown["time"]
+    note = _noted(planned.setup)
+    log = BenchLog(
+        name=planned.setup.trace.name,
+        start=0.0,
+        time=time,
+        speed_ref=shown["speed_ref"],
+        speed=shown["motor_speed"],
+        current=shown["current_q_meas"],
+        current_signal="current_q_meas",
+        current_target=shown["current_ref"],
+        motor=shown["resolver_position"],
+        user=shown["encoder_position"],
+        brake=brake_of(_cell(planned, recording), note, time, 0.0, shown["motor_speed"]),
+        note=note,
+        good=np.ones(len(time), dtype=np.bool_),
+        warnings=(),
+    )
+    return TestLog(log, shown["voltage_q_ref"])
+
+
+def _noted(setup: Setup) -> CommandNote:
+    """What the operator notes of the command: kind and frequency of a single waveform."""
+    from elevon.logs.command.note import CommandNote
+    from elevon.units import parse_quantity
+
+    term = setup.trace.command.terms[0]
+    parameters = {}
+    if "frequency" in term.arguments:
+        parameters["frequency"] = parse_quantity(term.arguments["frequency"], "Hz", "frequency")
+    return CommandNote("", term.kind, parameters, brake=setup.brake is not None)
+
+
+def _cell(planned: _Planned, recording: Recording) -> Recording:
+    """Return a recording of the brake's torque by the load cell, on the drive's clock."""
+    from elevon.recording import Recording as Built
+
+    setup = planned.setup
+    cell = cell_signals(setup, recording)
+    if cell is None:
+        return recording
+    time, force = cell
+    equipment = setup.rig.equipment
+    torque = planned.day.cell * force * equipment.arm / equipment.chain_ratio
+    clock = setup.conditions.trigger + time * (1.0 + setup.conditions.cell.clock_drift)
+    return Built.build(clock, {"load_cell_torque": torque}, {"load_cell_torque": "N m"})

@@ -1,0 +1,171 @@
+"""Numbers of one log that the surrogate is given, in a few milliseconds, and their changes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.diagnose.bymodel.evidence import Signals, evidence
+from elevon.diagnose.bymodel.log import RUN_IN, TestLog
+from elevon.errors import InputError
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.calibrate.log import BenchLog
+
+__all__ = ["NAMES", "SCALES", "VOLTAGE", "LogFeatures", "changes", "log_features"]
+
+Floats = npt.NDArray[np.float64]
+
+#: Keys of `elevon.diagnose.bymodel.evidence.UNITS`, in the surrogate's order.
+NAMES = (
+    "lost_motion",
+    "position_scale",
+    "dry_current",
+    "viscous_current",
+    "inertia_current",
+    "brake_current",
+    "current_order_1",
+    "current_order_2",
+    "voltage_per_speed",
+    "voltage_per_current",
+    "voltage_order_1",
+    "voltage_order_2",
+    "speed_gain",
+    "following_gain",
+)
+#: Those that change by a share of what the healthy unit shows; the others by a difference.
+SCALES = frozenset(
+    [
+        "dry_current", "viscous_current", "inertia_current", "brake_current", "voltage_per_speed",
+        "voltage_per_current", "speed_gain", "following_gain",
+    ]
+)  # fmt: skip
+#: Those that need the voltage.
+VOLTAGE = frozenset(name for name in NAMES if name.startswith("voltage"))
+_SETTLED = 3.0  # s of the log until the command has begun and is followed
+_STEPS = 2  # linear fits: at the noted frequency, then with its correction
+_FAR = 8.0  # median deviations
+
+
+@dataclass(frozen=True)
+class LogFeatures:
+    """What one log shows.
+
+    Attributes
+    ----------
+    name : str
+        The log.
+    values : ndarray, shape (k,)
+        By `NAMES`, SI; NaN where the log does not give it.
+    braked : bool
+        Whether a brake of measured torque acted.
+    travel, speed : float
+        Deviation of the user's position [rad], RMS speed of the motor [rad/s].
+    """
+
+    name: str
+    values: Floats
+    braked: bool
+    travel: float
+    speed: float
+
+
+def log_features(item: TestLog, actuator: Actuator) -> LogFeatures:
+    """Compute the features of a log.
+
+    Parameters
+    ----------
+    item : TestLog
+        From `elevon.diagnose.bymodel.read_test_logs`.
+    actuator : Actuator
+        Its gear ratio and pole pairs are used, nothing else.
+
+    Raises
+    ------
+    InputError
+        A position or the measured torque current is missing, or nothing moves.
+    """
+    log = item.log
+    if log.user is None or log.motor is None:
+        raise InputError(f"{log.name}: the surrogate needs both positions (r4820, r4821)")
+    if log.current_signal != "current_q_meas":
+        raise InputError(f"{log.name}: the surrogate needs the measured torque current (r78)")
+    good = log.good & (log.time >= RUN_IN) & np.isfinite(log.motor) & np.isfinite(log.user)
+    top = float(np.abs(log.speed[good]).max()) if good.any() else 0.0
+    if top < 1.0:
+        raise InputError(f"{log.name}: nothing moves (motor up to {top:.3g} rad/s)")
+    brake = np.interp(log.time, log.brake.time, log.brake.level) if item.braked else None
+    signals = Signals(
+        log.time, log.user, log.motor, log.speed_ref, log.speed, log.current_target,
+        log.current, item.voltage, brake, None, None, good,
+    )  # fmt: skip
+    value = actuator.parameters.value
+    shown = evidence(signals, ratio=value("gear.ratio"), pole_pairs=value("motor.pole_pairs"))
+    rows = dict(zip(shown.names, shown.values.tolist(), strict=True))
+    rows["following_gain"] = _following(log, good)
+    return LogFeatures(
+        log.name,
+        np.array([rows.get(name, math.nan) for name in NAMES]),
+        item.braked,
+        float(np.std(log.user)),
+        float(np.sqrt(np.mean(log.speed**2))),
+    )
+
+
+def changes(values: Floats, healthy: Floats, floor: Floats) -> Floats:
+    """Return what changed against a healthy unit: by a share for `SCALES`, else the difference.
+
+    Parameters
+    ----------
+    values, healthy : ndarray, shape (..., k)
+        By `NAMES`.
+    floor : ndarray, shape (k,)
+        Least size of what a share is taken of.
+    """
+    scale = np.array([name in SCALES for name in NAMES])
+    size = np.where(scale, np.maximum(np.abs(healthy), floor), 1.0)
+    return np.asarray((values - healthy) / size)
+
+
+def _following(log: BenchLog, good: npt.NDArray[np.bool_]) -> float:
+    """Following error over speed set point [s], of a noted sine; NaN without one.
+
+    The command is a sine of nearly the noted frequency: user + following x set point = a sin + b
+    cos + c, the frequency by Gauss-Newton. What lies far off (the command's start) is left out.
+    """
+    note = log.note
+    frequency = note.parameters.get("frequency") if note and note.waveform == "sine" else None
+    if not frequency or log.user is None:
+        return math.nan
+    reference = np.abs(log.speed_ref)
+    keep = good & (reference < 0.999 * reference.max()) & (log.time > _SETTLED)
+    if keep.sum() < 100:
+        return math.nan
+    centre = log.time[keep] - 0.5 * log.duration
+    return _sine(centre, log.user[keep], log.speed_ref[keep], 2.0 * math.pi * frequency)
+
+
+def _sine(centre: Floats, user: Floats, set_point: Floats, rate: float) -> float:
+    scale = float(np.std(set_point)) or 1.0
+    beta: Floats = np.zeros(4)
+    rows: Floats = np.zeros((4, 0))
+    for step in range(_STEPS):
+        sine, cosine = np.sin(rate * centre), np.cos(rate * centre)
+        columns: Sequence[Floats] = [-set_point / scale, sine, cosine, np.ones_like(centre)]
+        if step:
+            columns = [*columns, centre * (beta[1] * cosine - beta[2] * sine)]
+        rows = np.stack(columns)
+        beta = np.asarray(np.linalg.lstsq(rows @ rows.T, rows @ user, rcond=None)[0])
+        if step:
+            rate += float(np.clip(beta[4], -0.05 * rate, 0.05 * rate))
+    rest = np.abs(user - beta @ rows)
+    near = rest < _FAR * float(np.median(rest)) + 1e-12
+    rows = rows[:, near]
+    last = np.linalg.lstsq(rows @ rows.T, rows @ user[near], rcond=None)[0]
+    return float(last[0]) / scale

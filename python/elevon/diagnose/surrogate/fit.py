@@ -1,0 +1,320 @@
+"""A surrogate from tables of runs: trained on some units, made honest by the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.diagnose.surrogate.campaign import Table
+from elevon.diagnose.surrogate.features import NAMES, SCALES, changes
+from elevon.diagnose.surrogate.model import Head, Surrogate, TestModel
+from elevon.diagnose.surrogate.network import Batch, Ensemble, Opinion, train
+from elevon.diagnose.surrogate.population import FAULTS
+from elevon.diagnose.surrogate.sampling import Rows, sizes
+from elevon.diagnose.surrogate.view import VIEWS, View
+
+__all__ = ["Plan", "fitted", "tested"]
+
+Floats = npt.NDArray[np.float64]
+Progress = Callable[[float], object]
+FALSE_ALARM = 0.05
+_KNOWN = 1500  # training runs kept to tell what is unlike them
+_FAR = 0.995  # of held-out runs lie nearer to a training run
+_ROOM = 0.1  # of the trained range beyond its ends
+_LEAST = 0.2  # of the healthy median: what a share is taken of at least
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How it is trained.
+
+    Attributes
+    ----------
+    folds : int
+        Parts of the units; each part is held out of the networks that are calibrated on it.
+    members, rounds, batch : int
+        Networks of a fold, steps of each, runs of a step.
+    seed : int
+        Of starts and batches.
+    """
+
+    folds: int = 4
+    members: int = 2
+    rounds: int = 3000
+    batch: int = 256
+    seed: int = 0
+
+
+def fitted(
+    high: Mapping[str, Table],
+    low: Mapping[str, Table],
+    plan: Plan,
+    report: Mapping[str, Any],
+    progress: Progress | None = None,
+) -> Surrogate:
+    """Train a surrogate.
+
+    Parameters
+    ----------
+    high, low : mapping of str to Table
+        Test to runs of the high model and, beside them, of the low one. The high ones alone are
+        calibrated on.
+    plan : Plan
+        How.
+    report : mapping
+        Kept in the file, what calibration says beside it.
+    progress : callable, optional
+        Told the done fraction; False stops.
+    """
+    tests, said = {}, {}
+    steps = len(high) * len(VIEWS)
+    for number, (name, table) in enumerate(high.items()):
+        heads = {}
+        for k, view in enumerate(VIEWS):
+            heads[view], said[f"{name}.{view}"] = _head(
+                Rows.of(table), Rows.of(low[name]) if name in low else None, view == "relative",
+                plan, _part(progress, (number * len(VIEWS) + k) / steps, 1.0 / steps),
+            )  # fmt: skip
+        first = np.flatnonzero(table.baseline)
+        travel, speed = np.median(table.about[first], axis=0)
+        tests[name] = TestModel(name == "loaded", float(travel), float(speed), heads)
+    return Surrogate(tests, {**report, "cross_validation": said})
+
+
+def _part(progress: Progress | None, first: float, share: float) -> Progress | None:
+    return None if progress is None else lambda done: progress(first + share * done)
+
+
+def _head(
+    high: Rows, low: Rows | None, relative: bool, plan: Plan, progress: Progress | None
+) -> tuple[Head, dict[str, Any]]:
+    rng = np.random.default_rng([plan.seed, 99])
+    view = _view(high, relative, rng)
+    usable = high.usable()
+    fold = high.table.unit[usable] % plan.folds
+    ensembles, parts = [], []
+    for k in range(plan.folds):
+        train_rows = usable[fold != k]
+        ensembles.append(
+            train(
+                _sampler(high, train_rows, low, view, plan.batch),
+                3 * len(FAULTS) + 1,
+                members=plan.members,
+                rounds=plan.rounds,
+                seed=plan.seed + 1000 * k,
+                progress=_part(progress, k / plan.folds, 1.0 / plan.folds),
+            )
+        )
+        held = usable[fold == k]
+        parts.append((held, ensembles[-1].says(high.inputs(view, held, rng))))
+    rows = np.concatenate([held for held, _ in parts])
+    opinion = _stacked([said for _, said in parts])
+    return _calibrated(high, low, view, _union(ensembles), rows=rows, opinion=opinion, rng=rng)
+
+
+def _sampler(
+    high: Rows, rows: npt.NDArray[np.int64], low: Rows | None, view: View, size: int
+) -> Callable[[np.random.Generator], Batch]:
+    """Batches of the high model's runs, half of them the low model's where there are any."""
+    others = None if low is None else low.usable()
+
+    def batch(rng: np.random.Generator) -> Batch:
+        count = size if others is None else size // 2
+        first = high.batch(view, rng.choice(rows, count), rng)
+        if others is None or low is None:
+            return first
+        second = low.batch(view, rng.choice(others, size - count), rng)
+        return Batch(np.vstack((first.inputs, second.inputs)), np.vstack((first.size, second.size)))
+
+    return batch
+
+
+def _union(ensembles: Sequence[Ensemble]) -> Ensemble:
+    layers = zip(*(e.weights for e in ensembles), strict=True)
+    return Ensemble([np.concatenate(layer) for layer in layers])
+
+
+def _stacked(opinions: Sequence[Opinion]) -> Opinion:
+    names = ("presence", "faulty", "size", "deviation")
+    return Opinion(*(np.concatenate([getattr(o, n) for o in opinions]) for n in names))
+
+
+def _view(high: Rows, relative: bool, rng: np.random.Generator) -> View:
+    """Scales of the features, from the healthy days of all units."""
+    table = high.table
+    healthy = table.values[table.baseline]
+    centre = np.nan_to_num(np.nanmedian(np.where(np.isfinite(healthy), healthy, 0.0), axis=0))
+    floor = np.where([n in SCALES for n in NAMES], _LEAST * np.abs(centre) + 1e-12, 1.0)
+    over = np.nan_to_num(changes(healthy, centre, floor))
+    view = View(relative, centre, floor, *(np.ones(len(NAMES)) for _ in range(4)))
+    rows = high.usable()
+    own = rows[table.baseline[rows]]
+    against = high.references(own, rng)[0] if relative else None
+    spread = view.change(table.values[own], against).std(axis=0)
+    spread = np.where(spread > 0.0, spread, 1.0)
+    against = high.references(rows, rng)[0] if relative else None
+    wide = view.change(table.values[rows], against).std(axis=0)
+    return View(
+        relative, centre, floor, spread, np.where(wide > 0.0, wide, 1.0),
+        over.mean(axis=0), np.where(over.std(axis=0) > 0.0, over.std(axis=0), 1.0),
+    )  # fmt: skip
+
+
+def _calibrated(
+    high: Rows,
+    low: Rows | None,
+    view: View,
+    ensemble: Ensemble,
+    *,
+    rows: npt.NDArray[np.int64],
+    opinion: Opinion,
+    rng: np.random.Generator,
+) -> tuple[Head, dict[str, Any]]:
+    severity = high.table.severity[rows]
+    there = severity != 0.0
+    faulty = there.any(axis=1)
+    logits = np.column_stack((opinion.presence, opinion.faulty))
+    truth = np.column_stack((there, faulty))
+    scaling = np.array([_platt(logits[:, k], truth[:, k]) for k in range(truth.shape[1])])
+    score = np.abs(sizes(severity) - opinion.size) / opinion.deviation
+    conformal = np.array([_quantile(score[there[:, k], k]) for k in range(there.shape[1])])
+    healthy = np.sort(opinion.faulty[~faulty])
+    change = _changes(high, view, rows, rng)
+    known = _known(high, low, view, rng)
+    head = Head(
+        view, ensemble, scaling, conformal, healthy, known,
+        *_ends(np.vstack((change, np.sinh(known)))), np.full(len(FAULTS), np.nan), np.inf,
+    )  # fmt: skip
+    named = _named(opinion, scaling, severity)
+    reach = float(np.quantile(_to_neighbour(head, change), _FAR))
+    head = Head(**{**vars(head), "named": named, "reach": reach})
+    return head, scores(head, opinion, severity)
+
+
+def _changes(
+    rows_of: Rows, view: View, rows: npt.NDArray[np.int64], rng: np.random.Generator
+) -> Floats:
+    healthy = rows_of.references(rows, rng)[0] if view.relative else None
+    return view.change(rows_of.table.values[rows], healthy)
+
+
+def _known(high: Rows, low: Rows | None, view: View, rng: np.random.Generator) -> Floats:
+    parts = []
+    for source in (high, low):
+        if source is not None:
+            rows = source.usable()
+            rows = rng.choice(rows, min(_KNOWN // 2, len(rows)), replace=False)
+            parts.append(np.arcsinh(_changes(source, view, rows, rng)))
+    return np.vstack(parts)
+
+
+def _to_neighbour(head: Head, change: Floats) -> Floats:
+    """Distance to the second nearest of the known runs: the nearest may be the run itself."""
+    own = np.arcsinh(change)
+    square = (own**2).sum(axis=1)[:, None] + (head.known**2).sum(axis=1)[None, :]
+    square = np.maximum(square - 2.0 * own @ head.known.T, 0.0)
+    return np.asarray(np.sqrt(np.partition(square, 1, axis=1))[:, 1])
+
+
+def _ends(change: Floats) -> tuple[Floats, Floats]:
+    low, high = change.min(axis=0), change.max(axis=0)
+    return low - _ROOM * (high - low) - 1e-9, high + _ROOM * (high - low) + 1e-9
+
+
+def _platt(logit: Floats, truth: npt.NDArray[np.bool_]) -> tuple[float, float]:
+    """Factor and offset of the logit by logistic regression, with smoothed targets (Platt)."""
+    from scipy.optimize import minimize
+
+    count = float(truth.sum())
+    target = np.where(truth, (count + 1.0) / (count + 2.0), 1.0 / (len(truth) - count + 2.0))
+
+    def loss(x: Floats) -> float:
+        z = x[0] * logit + x[1]
+        return float(np.mean(np.logaddexp(0.0, z) - target * z))
+
+    best = minimize(loss, np.array([1.0, 0.0]), method="Nelder-Mead").x
+    return max(float(best[0]), 0.05), float(best[1])
+
+
+def _quantile(score: Floats, level: float = 0.9) -> float:
+    """Conformal quantile: the rank that holds `level` of the next one."""
+    if not len(score):
+        return 3.0
+    rank = min(int(np.ceil(level * (len(score) + 1))), len(score))
+    return float(np.sort(score)[rank - 1])
+
+
+def _named(opinion: Opinion, scaling: Floats, severity: Floats) -> Floats:
+    """Least severity from which on 95 % of the single faults are the most probable one."""
+    logit = opinion.presence * scaling[:-1, 0] + scaling[:-1, 1]
+    single = (severity != 0.0).sum(axis=1) == 1
+    out = np.full(severity.shape[1], np.nan)
+    for k in range(severity.shape[1]):
+        rows = np.flatnonzero(single & (severity[:, k] != 0.0))
+        rows = rows[np.argsort(-np.abs(severity[rows, k]))]
+        right = (logit[rows].argmax(axis=1) == k) & (logit[rows, k] > 0.0)
+        share = np.cumsum(right) / np.arange(1, len(rows) + 1)
+        good = np.flatnonzero(share >= 0.95)
+        if good.size:
+            out[k] = abs(severity[rows[good[-1]], k])
+    return out
+
+
+def scores(head: Head, opinion: Opinion, severity: Floats) -> dict[str, Any]:
+    """Return what an opinion of held-out runs is worth."""
+    there = severity != 0.0
+    faulty = there.any(axis=1)
+    logit = opinion.presence * head.scaling[:-1, 0] + head.scaling[:-1, 1]
+    probability = 1.0 / (1.0 + np.exp(-logit))
+    above = len(head.healthy) - np.searchsorted(head.healthy, opinion.faulty)
+    alarm = (above + 1.0) / (len(head.healthy) + 1.0) <= FALSE_ALARM
+    inside = np.abs(sizes(severity) - opinion.size) <= head.conformal * opinion.deviation
+    single = there.sum(axis=1) == 1
+    best = probability.argmax(axis=1) == there.argmax(axis=1)
+    named = ((probability > 0.5) == there).all(axis=1)
+    return {
+        "runs": len(severity),
+        "healthy": int((~faulty).sum()),
+        "false_alarms": int(alarm[~faulty].sum()),
+        "faulty": int(faulty.sum()),
+        "alarms": int(alarm[faulty].sum()),
+        "singles": int(single.sum()),
+        "singles_first": int(best[single].sum()),
+        "exactly_named": int(named.sum()),
+        "covered": int(inside[there].sum()),
+        "severities": int(there.sum()),
+        "brier": float(np.mean((probability - there) ** 2)),
+        "brier_by_rate": float(np.mean((there.mean(axis=0) - there) ** 2)),
+        "reliability": _reliability(probability.ravel(), there.ravel()),
+    }
+
+
+def _reliability(probability: Floats, there: npt.NDArray[np.bool_]) -> list[dict[str, float]]:
+    """Given and true shares in bins of the probability."""
+    edges = np.array([0.0, 0.02, 0.1, 0.3, 0.7, 0.9, 0.98, 1.0])
+    at = np.clip(np.searchsorted(edges, probability, side="right") - 1, 0, len(edges) - 2)
+    return [
+        {
+            "given": float(probability[at == k].mean()),
+            "true": float(there[at == k].mean()),
+            "count": int((at == k).sum()),
+        }
+        for k in range(len(edges) - 1)
+        if (at == k).any()
+    ]
+
+
+def tested(surrogate: Surrogate, tables: Mapping[str, Table]) -> dict[str, Any]:
+    """Return the scores of a surrogate on runs of units it never saw."""
+    out = {}
+    for name, table in tables.items():
+        rows_of = Rows.of(table)
+        rows = rows_of.usable()
+        for view, head in surrogate.tests[name].heads.items():
+            inputs = rows_of.inputs(head.view, rows, np.random.default_rng(0))
+            out[f"{name}.{view}"] = scores(head, head.ensemble.says(inputs), table.severity[rows])
+    return out

@@ -1,0 +1,254 @@
+"""A trained surrogate: what a file holds, and what it says of features. NumPy is all it needs."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.diagnose.surrogate.features import NAMES, LogFeatures
+from elevon.diagnose.surrogate.network import Ensemble, packed, unpacked
+from elevon.diagnose.surrogate.population import FAULTS
+from elevon.diagnose.surrogate.view import VIEWS, View
+from elevon.errors import FormatError
+
+__all__ = ["Head", "Said", "Surrogate", "TestModel", "shipped"]
+
+Floats = npt.NDArray[np.float64]
+_FORMAT, _VERSION = "elevon-surrogate", 1
+_MOST_BYTES = 50_000_000
+_TEST = 0.2  # relative difference of travel and speed up to which a log is of a test
+_KEPT = ("scaling", "conformal", "healthy", "known", "low", "high", "named")
+
+
+@dataclass(frozen=True)
+class Said:
+    """What the surrogate says of one log.
+
+    Attributes
+    ----------
+    presence : ndarray, shape (f,)
+        Calibrated logit of each fault.
+    faulty : float
+        Calibrated logit of any fault.
+    chance : float
+        How often a healthy unit looks as faulty.
+    size, reach : ndarray, shape (f,)
+        Scaled size of each fault were it there, and half its 90 % interval.
+    change : ndarray, shape (k,)
+        Features off the healthy unit, in its spread.
+    outside : tuple of str
+        What lies outside the training set; empty when nothing does.
+    """
+
+    presence: Floats
+    faulty: float
+    chance: float
+    size: Floats
+    reach: Floats
+    change: Floats
+    outside: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Head:
+    """Networks of one test and view, with what held-out units made of them.
+
+    Attributes
+    ----------
+    view : View
+        Features to inputs.
+    ensemble : Ensemble
+        Inputs to an opinion.
+    scaling : ndarray, shape (f + 1, 2)
+        Factor and offset that make the logits honest; the last row is for any fault.
+    conformal : ndarray, shape (f,)
+        Deviations that hold 90 % of held-out sizes.
+    healthy : ndarray, shape (h,)
+        Sorted logits (any fault) of held-out healthy runs.
+    known : ndarray, shape (p, k)
+        Changes of training runs, as arsinh.
+    low, high : ndarray, shape (k,)
+        Ends of what was trained.
+    named : ndarray, shape (f,)
+        Least severity from which on 95 % of held-out single faults were named; NaN: none.
+    reach : float
+        Distance to the nearest training run that one held-out run of two hundred exceeds.
+    """
+
+    view: View
+    ensemble: Ensemble
+    scaling: Floats
+    conformal: Floats
+    healthy: Floats
+    known: Floats
+    low: Floats
+    high: Floats
+    named: Floats
+    reach: float
+
+    def says(self, values: Floats, baselines: Sequence[Floats]) -> Said:
+        """Return what it says of one log's features against those of baselines."""
+        row = values[None, :]
+        healthy = np.mean(baselines, axis=0)[None, :] if self.view.relative else None
+        inputs = self.view.inputs(row, healthy, np.array([float(max(len(baselines), 1))]))
+        opinion = self.ensemble.says(inputs)
+        change = self.view.change(row, healthy)[0]
+        above = len(self.healthy) - int(np.searchsorted(self.healthy, opinion.faulty[0]))
+        return Said(
+            self.scaling[:-1, 0] * opinion.presence[0] + self.scaling[:-1, 1],
+            float(self.scaling[-1, 0] * opinion.faulty[0] + self.scaling[-1, 1]),
+            (above + 1.0) / (len(self.healthy) + 1.0),
+            opinion.size[0],
+            self.conformal * opinion.deviation[0],
+            change,
+            self._outside(change),
+        )
+
+    def _outside(self, change: Floats) -> tuple[str, ...]:
+        out = [
+            f"{name} {x:+.3g} healthy deviations (trained {a:+.3g} to {b:+.3g})"
+            for name, x, a, b in zip(NAMES, change, self.low, self.high, strict=True)
+            if not a <= x <= b
+        ]
+        distance = float(self.distances(change[None, :])[0])
+        if distance > self.reach:
+            out.append(
+                f"no training run is like it (nearest at {distance:.2g}, "
+                f"held-out runs within {self.reach:.2g})"
+            )
+        return tuple(out)
+
+    def distances(self, change: Floats) -> Floats:
+        """Return the distance of changes, shape (n, k), to the nearest training run."""
+        rows = np.arcsinh(change)
+        square = (rows**2).sum(axis=1)[:, None] + (self.known**2).sum(axis=1)[None, :]
+        return np.asarray(np.sqrt(np.maximum(square - 2.0 * rows @ self.known.T, 0.0).min(axis=1)))
+
+
+@dataclass(frozen=True)
+class TestModel:
+    """One test: how it is recognised, and its heads by view."""
+
+    __test__ = False  # not a test, whatever pytest thinks of the name
+
+    braked: bool
+    travel: float
+    speed: float
+    heads: Mapping[str, Head]
+
+    def matches(self, shown: LogFeatures) -> bool:
+        """Whether a log is of this test: brake, travel and speed alike."""
+        near = abs(shown.travel / self.travel - 1.0) < _TEST
+        return shown.braked == self.braked and near and abs(shown.speed / self.speed - 1.0) < _TEST
+
+
+@dataclass(frozen=True)
+class Surrogate:
+    """Trained networks.
+
+    Attributes
+    ----------
+    tests : mapping of str to TestModel
+        By the bench's procedure.
+    report : mapping
+        How it was trained and what held-out units said of it.
+    """
+
+    tests: Mapping[str, TestModel]
+    report: Mapping[str, Any]
+
+    def test_of(self, shown: LogFeatures) -> str | None:
+        """Return the name of the test a log is of, None for a test that was not trained."""
+        return next((name for name, test in self.tests.items() if test.matches(shown)), None)
+
+    def save(self, path: str | os.PathLike[str], *, force: bool = False) -> Path:
+        """Write one NumPy archive: arrays, and a JSON text; nothing executable.
+
+        Raises
+        ------
+        OutputExistsError, OutputError
+            As `elevon.files.write_bytes`.
+        """
+        from elevon.files import write_bytes
+
+        arrays: dict[str, Any] = {}
+        tests: dict[str, Any] = {}
+        for name, test in self.tests.items():
+            tests[name] = {"braked": test.braked, "travel": test.travel, "speed": test.speed}
+            for view, head in test.heads.items():
+                key = f"{name}.{view}"
+                tests[name][view] = head.reach
+                arrays |= {
+                    f"{key}.{n}": a.astype(np.float32) for n, a in head.view.arrays().items()
+                }
+                arrays |= {f"{key}.{n}": getattr(head, n).astype(np.float32) for n in _KEPT}
+                arrays[f"{key}.known"] = head.known.astype(np.float16)
+                arrays |= packed(head.ensemble, key)
+        about = {
+            "format": _FORMAT, "version": _VERSION, "names": list(NAMES), "faults": list(FAULTS),
+            "tests": tests, "report": dict(self.report),
+        }  # fmt: skip
+        stream = io.BytesIO()
+        np.savez_compressed(stream, about=np.array(json.dumps(about)), **arrays)
+        return write_bytes(path, stream.getvalue(), force=force)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Surrogate:
+        """Read what `save` wrote.
+
+        Raises
+        ------
+        FormatError
+            The file is absent, damaged, of another version or something else.
+        """
+        try:
+            with zipfile.ZipFile(path) as archive:
+                if sum(item.file_size for item in archive.infolist()) > _MOST_BYTES:
+                    raise ValueError(f"more than {_MOST_BYTES} bytes")
+            with np.load(path, allow_pickle=False) as stored:
+                return _assembled({name: stored[name] for name in stored.files})
+        except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+            raise FormatError(f"{path}: not a surrogate of this version: {error}") from error
+
+
+def _assembled(data: Mapping[str, Any]) -> Surrogate:
+    about = json.loads(str(data["about"]))
+    if about.get("format") != _FORMAT or about.get("version") != _VERSION:
+        raise ValueError(f"format {about.get('format')!r}, version {about.get('version')!r}")
+    if tuple(about["names"]) != NAMES or tuple(about["faults"]) != FAULTS:
+        raise ValueError("features or faults of another version; train it anew")
+    if not all(np.isfinite(a).all() for n, a in data.items() if n != "about" and "named" not in n):
+        raise ValueError("an array is not finite")
+    tests = {}
+    for name, item in about["tests"].items():
+        heads = {
+            view: _head(data, f"{name}.{view}", float(item[view])) for view in VIEWS if view in item
+        }
+        tests[name] = TestModel(
+            bool(item["braked"]), float(item["travel"]), float(item["speed"]), heads
+        )
+    return Surrogate(tests, about["report"])
+
+
+def _head(data: Mapping[str, Any], key: str, reach: float) -> Head:
+    own = {n.removeprefix(f"{key}."): a for n, a in data.items() if n.startswith(f"{key}.")}
+    view = View.build(key.endswith("relative"), own)
+    kept = {n: np.asarray(own[n], dtype=np.float64) for n in _KEPT}
+    return Head(view=view, ensemble=unpacked(data, key), reach=reach, **kept)
+
+
+@lru_cache(maxsize=1)
+def shipped() -> Surrogate:
+    """Return the surrogate that comes with the package."""
+    return Surrogate.load(Path(str(files("elevon.diagnose.surrogate") / "rotary.npz")))

@@ -1,0 +1,211 @@
+"""A small network, several times over: what it says, and how it is trained, in NumPy alone.
+
+Each member is a perceptron with tanh layers. For every fault it gives the logit of its presence,
+and mean and logarithm of the deviation of its size; one more logit says that anything is wrong.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["Batch", "Ensemble", "Opinion", "loss_and_gradient", "packed", "train", "unpacked"]
+
+Floats = npt.NDArray[np.float64]
+Weights = list[Floats]  # w1, b1, w2, b2, ...
+HIDDEN = (48, 48)
+_LEAST_LOG, _MOST_LOG = -5.0, 1.5  # of a deviation
+_DECAY = 1e-4  # of the weights
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What a member is trained on.
+
+    Attributes
+    ----------
+    inputs : ndarray, shape (n, m)
+        Normalised.
+    size : ndarray, shape (n, f)
+        Of each fault, scaled to its range; zero where absent.
+    """
+
+    inputs: Floats
+    size: Floats
+
+
+@dataclass(frozen=True)
+class Opinion:
+    """What an ensemble says of n inputs.
+
+    Attributes
+    ----------
+    presence : ndarray, shape (n, f)
+        Logit of each fault, not yet calibrated.
+    faulty : ndarray, shape (n,)
+        Logit of any fault.
+    size, deviation : ndarray, shape (n, f)
+        Of each fault, were it there.
+    """
+
+    presence: Floats
+    faulty: Floats
+    size: Floats
+    deviation: Floats
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """Networks of one shape, trained from different starts.
+
+    Attributes
+    ----------
+    weights : list of ndarray, shape (e, a, b) or (e, 1, b)
+        Of all members, layer by layer.
+    """
+
+    weights: Weights
+
+    def says(self, inputs: Floats) -> Opinion:
+        """Return the ensemble's opinion of inputs, shape (n, m): the members as one mixture."""
+        out = _forward(self.weights, np.asarray(inputs)[None, :, :])[-1]
+        count = (out.shape[2] - 1) // 3
+        size, log = out[..., count : 2 * count], out[..., 2 * count : 3 * count]
+        own = np.exp(2.0 * np.clip(log, _LEAST_LOG, _MOST_LOG)).mean(axis=0)
+        return Opinion(
+            out[..., :count].mean(axis=0),
+            out[..., -1].mean(axis=0),
+            size.mean(axis=0),
+            np.sqrt(own + size.var(axis=0)),
+        )
+
+
+def _forward(weights: Sequence[Floats], inputs: Floats) -> list[Floats]:
+    layers = [inputs]
+    last = len(weights) // 2 - 1
+    for k in range(last + 1):
+        out = layers[-1] @ weights[2 * k] + weights[2 * k + 1]
+        layers.append(out if k == last else np.tanh(out))
+    return layers
+
+
+def loss_and_gradient(weights: Weights, batch: Batch) -> tuple[float, Weights]:
+    """Return the mean loss of one member, and its gradient.
+
+    Cross entropy of presence and of any fault, and the Gaussian's negative log likelihood of the
+    sizes of those that are there.
+    """
+    layers = _forward(weights, batch.inputs)
+    out, there = layers[-1], (batch.size != 0.0).astype(np.float64)
+    n, f = there.shape
+    size, raw = out[:, f : 2 * f], out[:, 2 * f : 3 * f]
+    log = np.clip(raw, _LEAST_LOG, _MOST_LOG)
+    score = (batch.size - size) * np.exp(-log)
+    any_ = there.max(axis=1)
+    loss = (
+        float(
+            np.sum(_entropy(out[:, :f], there))
+            + np.sum(_entropy(out[:, -1], any_))
+            + np.sum(there * (0.5 * score**2 + log))
+        )
+        / n
+    )
+    slope = np.empty_like(out)
+    slope[:, :f] = _logistic(out[:, :f]) - there
+    slope[:, f : 2 * f] = -there * score * np.exp(-log)
+    slope[:, 2 * f : 3 * f] = there * (1.0 - score**2) * (raw == log)
+    slope[:, -1] = _logistic(out[:, -1]) - any_
+    return loss, _backward(weights, layers, slope / n)
+
+
+def _entropy(logit: Floats, there: Floats) -> Floats:
+    return np.asarray(np.logaddexp(0.0, logit) - there * logit)
+
+
+def _logistic(logit: Floats) -> Floats:
+    return np.asarray(0.5 * (1.0 + np.tanh(0.5 * logit)))
+
+
+def _backward(weights: Weights, layers: list[Floats], slope: Floats) -> Weights:
+    out: Weights = [np.zeros(0)] * len(weights)
+    for k in range(len(weights) // 2 - 1, -1, -1):
+        out[2 * k] = layers[k].T @ slope
+        out[2 * k + 1] = slope.sum(axis=0, keepdims=True)
+        if k:
+            slope = (slope @ weights[2 * k].T) * (1.0 - layers[k] ** 2)
+    return out
+
+
+def train(
+    batches: Callable[[np.random.Generator], Batch],
+    outputs: int,
+    *,
+    members: int,
+    rounds: int,
+    seed: int,
+    progress: Callable[[float], object] | None = None,
+) -> Ensemble:
+    """Train the members by Adam with a rate that falls to nothing.
+
+    Parameters
+    ----------
+    batches : callable
+        Random generator to a batch.
+    outputs : int
+        Of a member: three for each fault and one more.
+    members, rounds : int
+        Networks; steps of each.
+    seed : int
+        Of starts and batches.
+    progress : callable, optional
+        Told the done fraction; False stops (`Interrupted`).
+    """
+    from elevon.errors import Interrupted
+
+    all_weights = []
+    for k in range(members):
+        if progress is not None and progress(k / members) is False:
+            raise Interrupted("training was interrupted")
+        rng = np.random.default_rng([seed, k])
+        all_weights.append(_member(batches, outputs, rounds, rng))
+    return Ensemble([np.stack(layer) for layer in zip(*all_weights, strict=True)])
+
+
+def _member(
+    batches: Callable[[np.random.Generator], Batch],
+    outputs: int,
+    rounds: int,
+    rng: np.random.Generator,
+) -> Weights:
+    widths = (batches(rng).inputs.shape[1], *HIDDEN, outputs)
+    weights: Weights = []
+    for a, b in itertools.pairwise(widths):
+        weights += [rng.standard_normal((a, b)) / math.sqrt(a), np.zeros((1, b))]
+    mean = [np.zeros_like(w) for w in weights]
+    square = [np.zeros_like(w) for w in weights]
+    for step in range(1, rounds + 1):
+        _, gradient = loss_and_gradient(weights, batches(rng))
+        rate = 4e-3 * 0.5 * (1.0 + math.cos(math.pi * step / rounds))
+        for k, g in enumerate(gradient):
+            mean[k] += 0.1 * (g - mean[k])
+            square[k] += 0.01 * (g * g - square[k])
+            way = mean[k] / (1.0 - 0.9**step)
+            size = np.sqrt(square[k] / (1.0 - 0.99**step)) + 1e-8
+            weights[k] = weights[k] - rate * (way / size + _DECAY * weights[k])
+    return weights
+
+
+def packed(ensemble: Ensemble, name: str) -> dict[str, npt.NDArray[np.float16]]:
+    """Return the arrays of an ensemble for a file."""
+    return {f"{name}.w{k}": w.astype(np.float16) for k, w in enumerate(ensemble.weights)}
+
+
+def unpacked(data: Mapping[str, npt.NDArray[np.float16]], name: str) -> Ensemble:
+    """Return an ensemble from a file's arrays."""
+    count = sum(key.startswith(f"{name}.w") for key in data)
+    return Ensemble([data[f"{name}.w{k}"].astype(np.float64) for k in range(count)])
