@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from elevon.bench.procedure import PlayStep, Procedure, TraceStep, load_procedure
+from elevon.bench.procedure import load_procedure
 from elevon.bench.rig import Setup, setups
-from elevon.bench.traces import cell_signals, drive_signals, recorded
-from elevon.diagnose.bymodel.log import TestLog
+from elevon.bench.traces import recorded
 from elevon.diagnose.surrogate.features import NAMES, LogFeatures, log_features
 from elevon.diagnose.surrogate.population import (
     FAULTS,
@@ -25,11 +24,11 @@ from elevon.diagnose.surrogate.population import (
     learned,
     unit_of,
 )
+from elevon.diagnose.virtual import first_trace, traced
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.logs.command.note import CommandNote
     from elevon.progress import Progress
     from elevon.recording import Recording
 
@@ -208,7 +207,7 @@ def _unit_runs(actuator: Actuator, test: str, seed: int, number: int) -> Iterato
     own = np.random.default_rng([seed, number])
     unit = unit_of(actuator, own)
     noise = {name: most * float(own.random()) for name, most in NOISE.items()}
-    procedure, candidates = _procedure(test), learned()
+    procedure, candidates = first_trace(load_procedure(test)), learned()
     for k in range(HEALTHY_DAYS + FAULTY_DAYS):
         rng = np.random.default_rng([seed, number, TESTS.index(test), k])
         day = day_of(unit, rng)
@@ -227,77 +226,9 @@ def _text(key: str, severity: float, rng: np.random.Generator) -> str:
     return f"{key}={severity!r}"
 
 
-def _procedure(test: str) -> Procedure:
-    """Return the bench's procedure up to its first trace, without setting the play."""
-    full = load_procedure(test)
-    steps = []
-    for step in full.step:
-        if not isinstance(step, PlayStep):
-            steps.append(step)
-        if isinstance(step, TraceStep):
-            break
-    return full.model_copy(update={"step": tuple(steps)})
-
-
 def _row(planned: _Planned, recording: Recording) -> LogFeatures | None:
     try:
-        return log_features(_log(planned, recording), planned.setup.actuator)
+        log = traced(planned.setup, recording, cell=planned.day.cell, noise=planned.noise)
+        return log_features(log, planned.setup.actuator)
     except InputError:
         return None
-
-
-def _log(planned: _Planned, recording: Recording) -> TestLog:
-    """Return the log that the bench writes of a run, without the file."""
-    from elevon.calibrate.brake_level import brake_of
-    from elevon.calibrate.log import BenchLog
-
-    shown = drive_signals(planned.setup, recording)
-    rng = np.random.default_rng([planned.setup.conditions.seed, 7])
-    for name, deviation in planned.noise.items():
-        shown[name] = shown[name] + deviation * rng.standard_normal(len(shown[name]))
-    time = shown["time"]
-    note = _noted(planned.setup)
-    log = BenchLog(
-        name=planned.setup.trace.name,
-        start=0.0,
-        time=time,
-        speed_ref=shown["speed_ref"],
-        speed=shown["motor_speed"],
-        current=shown["current_q_meas"],
-        current_signal="current_q_meas",
-        current_target=shown["current_ref"],
-        motor=shown["resolver_position"],
-        user=shown["encoder_position"],
-        brake=brake_of(_cell(planned, recording), note, time, 0.0, shown["motor_speed"]),
-        note=note,
-        good=np.ones(len(time), dtype=np.bool_),
-        warnings=(),
-    )
-    return TestLog(log, shown["voltage_q_ref"])
-
-
-def _noted(setup: Setup) -> CommandNote:
-    """What the operator notes of the command: kind and frequency of a single waveform."""
-    from elevon.logs.command.note import CommandNote
-    from elevon.units import parse_quantity
-
-    term = setup.trace.command.terms[0]
-    parameters = {}
-    if "frequency" in term.arguments:
-        parameters["frequency"] = parse_quantity(term.arguments["frequency"], "Hz", "frequency")
-    return CommandNote("", term.kind, parameters, brake=setup.brake is not None)
-
-
-def _cell(planned: _Planned, recording: Recording) -> Recording:
-    """Return a recording of the brake's torque by the load cell, on the drive's clock."""
-    from elevon.recording import Recording as Built
-
-    setup = planned.setup
-    cell = cell_signals(setup, recording)
-    if cell is None:
-        return recording
-    time, force = cell
-    equipment = setup.rig.equipment
-    torque = planned.day.cell * force * equipment.arm / equipment.chain_ratio
-    clock = setup.conditions.trigger + time * (1.0 + setup.conditions.cell.clock_drift)
-    return Built.build(clock, {"load_cell_torque": torque}, {"load_cell_torque": "N m"})

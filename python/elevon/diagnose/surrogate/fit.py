@@ -17,7 +17,7 @@ from elevon.diagnose.surrogate.population import FAULTS
 from elevon.diagnose.surrogate.sampling import Rows, sizes
 from elevon.diagnose.surrogate.view import VIEWS, View
 
-__all__ = ["Plan", "fitted", "tested"]
+__all__ = ["Plan", "fitted", "judged"]
 
 Floats = npt.NDArray[np.float64]
 Progress = Callable[[float], object]
@@ -308,7 +308,7 @@ def _reliability(probability: Floats, there: npt.NDArray[np.bool_]) -> list[dict
     ]
 
 
-def tested(surrogate: Surrogate, tables: Mapping[str, Table]) -> dict[str, Any]:
+def judged(surrogate: Surrogate, tables: Mapping[str, Table]) -> dict[str, Any]:
     """Return the scores of a surrogate on runs of units it never saw."""
     out = {}
     for name, table in tables.items():

@@ -202,10 +202,10 @@ def _member(
 
 def packed(ensemble: Ensemble, name: str) -> dict[str, npt.NDArray[np.float16]]:
     """Return the arrays of an ensemble for a file."""
-    return {f"{name}.w{k}": w.astype(np.float16) for k, w in enumerate(ensemble.weights)}
+    return {f"{name}.layer{k}": w.astype(np.float16) for k, w in enumerate(ensemble.weights)}
 
 
 def unpacked(data: Mapping[str, npt.NDArray[np.float16]], name: str) -> Ensemble:
     """Return an ensemble from a file's arrays."""
-    count = sum(key.startswith(f"{name}.w") for key in data)
-    return Ensemble([data[f"{name}.w{k}"].astype(np.float64) for k in range(count)])
+    count = sum(key.startswith(f"{name}.layer") for key in data)
+    return Ensemble([data[f"{name}.layer{k}"].astype(np.float64) for k in range(count)])

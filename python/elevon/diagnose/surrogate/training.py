@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from elevon.diagnose.surrogate.campaign import TESTS, Table, gathered
-from elevon.diagnose.surrogate.fit import Plan, fitted, tested
+from elevon.diagnose.surrogate.fit import Plan, fitted, judged
 from elevon.diagnose.surrogate.model import Surrogate
 from elevon.errors import InputError
 
@@ -82,7 +82,7 @@ def trained(
     )
     if not test_units:
         return result
-    return Surrogate(result.tests, {**result.report, "test": tested(result, tables["test"])})
+    return Surrogate(result.tests, {**result.report, "test": judged(result, tables["test"])})
 
 
 def _part(

@@ -1,0 +1,149 @@
+"""What the population searches make small: the misfit of a monitor to a log.
+
+The vector is that of the literature on these actuators: dry friction, play, shorted turns of each
+phase, size and phase of the static eccentricity, drift of the position gain, each from 0 to 1 over
+its range. The misfit is the mean square difference of the torque current, as there; the gap
+between the two positions and the user's position stand beside it, since play and gain hardly show
+in the current without load. Weights and ranges are ASSUMED: no paper at hand prints them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.diagnose.bymodel.candidates import CANDIDATES
+
+if TYPE_CHECKING:
+    from elevon.bench.rig import Setup
+    from elevon.diagnose.bymodel.log import TestLog
+
+__all__ = ["CAUSES", "Monitor"]
+
+Floats = npt.NDArray[np.float64]
+#: The faults of the vector, by key; the short stands for that of any phase.
+CAUSES = (
+    "friction@transmission",
+    "play@transmission",
+    "short@motor.phase_a",
+    "eccentricity_static@motor",
+    "gain_drift@control.position",
+)
+_SLOTS = (
+    "friction@transmission",
+    "play@transmission",
+    "short@motor.phase_a",
+    "short@motor.phase_b",
+    "short@motor.phase_c",
+    "eccentricity_static@motor",
+    "phase",
+    "gain_drift@control.position",
+)
+_SIGNALS = ("current_q_meas", "encoder_position", "motor_position")
+_RATE = 100.0  # Hz at which log and monitor are compared
+_FROM = 1.0  # s left out
+
+
+class Monitor:
+    """The low model in a log's own test, its command and start known to the last bit.
+
+    Parameters
+    ----------
+    setup : Setup
+        The log's test; its faults are left out.
+    log : TestLog
+        What the bench wrote.
+
+    Attributes
+    ----------
+    evaluations : int
+        Runs so far.
+    """
+
+    size = len(_SLOTS)
+
+    def __init__(self, setup: Setup, log: TestLog) -> None:
+        from elevon.faults import Fault
+        from elevon.simulate import Run
+        from elevon.simulate.prepare import prepare
+
+        bare = setup.scenario.model_copy(update={"fault": ()})
+        texts = [f"{key}={0.01!r}" for key in _SLOTS if key != "phase"]
+        scenario = bare.with_faults([Fault.parse(text) for text in texts])
+        run = Run(setup.actuator, scenario)
+        self._ready = prepare(run, "low", f"{','.join(_SIGNALS)}@{_RATE:g} Hz")
+        self._ratio = setup.actuator.parameters.value("gear.ratio")
+        self._limits = limits()
+        self.evaluations = 0
+        self._keep = np.zeros(0, dtype=np.bool_)
+        self._shown = np.zeros((0, 3))
+        self._shown, self._scale = self._of(log, setup)
+
+    def _of(self, log: TestLog, setup: Setup) -> tuple[Floats, Floats]:
+        bench = log.log
+        assert bench.user is not None
+        assert bench.motor is not None
+        clock = np.arange(0.0, bench.duration + 1e-9, 1.0 / _RATE)
+        self._keep = clock >= _FROM
+        columns = (bench.current, bench.user, bench.motor / self._ratio - bench.user)
+        shown = np.column_stack([np.interp(clock, bench.time, c) for c in columns])
+        gain = setup.actuator.parameters.value("control.position_gain")
+        followed = float(np.sqrt(np.mean(bench.speed_ref**2))) / gain
+        sizes = (float(np.std(bench.current)), followed, float(np.std(columns[2])))
+        return shown[self._keep], np.array(sizes)
+
+    def severities(self, vector: Floats) -> dict[str, float]:
+        """Return the severities of a vector in [0, 1], by `CAUSES`; the worst of the phases."""
+        values = dict(zip(_SLOTS, self._scaled(vector), strict=True))
+        phases = [values[f"short@motor.phase_{p}"] for p in "abc"]
+        return {key: max(phases) if key.startswith("short") else values[key] for key in CAUSES}
+
+    def _scaled(self, vector: Floats) -> list[float]:
+        out = []
+        for key, x in zip(_SLOTS, vector, strict=True):
+            low, high = (0.0, 2.0 * math.pi) if key == "phase" else self._limits[_cause(key)]
+            out.append(low + float(x) * (high - low))
+        return out
+
+    def costs(self, vectors: Floats) -> Floats:
+        """Return the misfit of vectors, shape (n, 8), one run of the monitor each."""
+        from elevon.simulate.batch import simulate_prepared
+
+        ready = [replace(self._ready, core=self._core(v)) for v in np.atleast_2d(vectors)]
+        results = simulate_prepared(ready, fidelity="low", threads=1)
+        self.evaluations += len(ready)
+        return np.array([self._misfit(result) for result in results])
+
+    def _core(self, vector: Floats) -> dict[str, Any]:
+        values = dict(zip(_SLOTS, self._scaled(vector), strict=True))
+        faults = []
+        for fault in self._ready.core["faults"]:
+            key = f"{fault['kind']}@{fault['place']}"
+            extra: Mapping[str, float] = {"phase": values["phase"]} if "ecc" in key else {}
+            attributes = {**fault["attributes"], **extra}
+            faults.append({**fault, "severity": values[key], "attributes": attributes})
+        return {**self._ready.core, "faults": faults}
+
+    def _misfit(self, result: Mapping[str, Any]) -> float:
+        kept = result["clocks"][self._ready.plan[0].name]["values"][: len(self._keep)]
+        if result["status"] != "ok" or len(kept) < len(self._keep):
+            return 1e6
+        current, user, motor = kept.T[:3]
+        shown = np.column_stack((current, user, motor / self._ratio - user))[self._keep]
+        rest = (shown - self._shown) / self._scale
+        return float(np.mean(rest**2)) if np.isfinite(rest).all() else 1e6
+
+
+def limits() -> dict[str, tuple[float, float]]:
+    """Return the range of each cause: that of diagnosis by the model."""
+    known = {c.key: c for c in CANDIDATES}
+    return {key: (known[key].low, known[key].high) for key in CAUSES}
+
+
+def _cause(slot: str) -> str:
+    return CAUSES[2] if slot.startswith("short") else slot

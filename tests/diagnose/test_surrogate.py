@@ -1,0 +1,250 @@
+"""Diagnosis by the trained networks."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from elevon import Actuator
+from elevon.diagnose.bymodel.evidence import UNITS
+from elevon.diagnose.surrogate import (
+    Surrogate,
+    diagnose_by_both,
+    diagnose_by_surrogate,
+    shipped,
+)
+from elevon.diagnose.surrogate.campaign import Table
+from elevon.diagnose.surrogate.features import NAMES, changes, log_features
+from elevon.diagnose.surrogate.fit import Plan, fitted, judged
+from elevon.diagnose.surrogate.network import Batch, loss_and_gradient, train
+from elevon.diagnose.surrogate.population import FAULTS, day_of, drawn_faults, learned, unit_of
+from elevon.diagnose.surrogate.sampling import Rows, severities, sizes
+from elevon.errors import FormatError, InputError
+from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
+from tests.diagnose.virtual import bench_logs
+
+pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
+PLAY = "play@transmission=0.3 deg"
+SHORT = "short@motor.phase_b=0.25"
+
+
+@pytest.fixture(scope="module")
+def unit():
+    return Actuator.load("torino-rotary").with_values({"drive.kind": "pwm"})
+
+
+@pytest.fixture(scope="module")
+def logs(unit):
+    cases = [(1, []), (2, []), (3, [PLAY]), (4, [SHORT]), (5, ["gain@sensor.encoder=0.1"])]
+    return dict(
+        zip(("base", "healthy", "play", "short", "far"), bench_logs(unit, cases), strict=True)
+    )
+
+
+def _batch(rng, n=40, inputs=5, faults=2):
+    there = rng.random((n, faults)) < 0.5
+    return Batch(rng.standard_normal((n, inputs)), there * rng.uniform(-1.0, 1.0, (n, faults)))
+
+
+def test_the_gradient_is_that_of_the_loss():
+    rng = np.random.default_rng(0)
+    batch = _batch(rng)
+    weights = [0.3 * rng.standard_normal(s) for s in ((5, 6), (1, 6), (6, 7), (1, 7))]
+    _, gradient = loss_and_gradient(weights, batch)
+    for k, layer in enumerate(weights):
+        way = rng.standard_normal(layer.shape)
+        ends = []
+        for step in (1e-5, -1e-5):
+            moved = [w + step * way if j == k else w for j, w in enumerate(weights)]
+            ends.append(loss_and_gradient(moved, batch)[0])
+        slope = (ends[0] - ends[1]) / 2e-5
+        assert slope == pytest.approx(float(np.sum(gradient[k] * way)), rel=1e-6, abs=1e-9)
+
+
+def test_training_learns_a_linear_law_and_its_noise():
+    """Input = size + noise of deviation 0.2: the size's deviation is the posterior's."""
+
+    def draw(rng, n=128):
+        size = np.where(rng.random((n, 1)) < 0.5, rng.standard_normal((n, 1)), 0.0)
+        return Batch(size + 0.2 * rng.standard_normal((n, 1)), size)
+
+    ensemble = train(draw, 4, members=1, rounds=1500, seed=0)
+    fresh = draw(np.random.default_rng(9), 4000)
+    said = ensemble.says(fresh.inputs)
+    there = fresh.size[:, 0] != 0.0
+    score = ((fresh.size - said.size) / said.deviation)[there, 0]
+    assert np.std(score) == pytest.approx(1.0, abs=0.1)
+    assert np.median(said.deviation[there]) == pytest.approx(0.2 / np.sqrt(1.04), rel=0.15)
+    large = np.abs(fresh.inputs[:, 0]) > 1.0
+    assert (said.faulty[large] > 2.0).all()
+    assert said.faulty[np.abs(fresh.inputs[:, 0]) < 0.1].max() < 0.0
+
+
+def test_sizes_and_severities_are_inverse():
+    rng = np.random.default_rng(1)
+    low, high = (np.array([getattr(c, end) for c in learned()]) for end in ("low", "high"))
+    severity = low + rng.random((50, len(FAULTS))) * (high - low)
+    np.testing.assert_allclose(severities(sizes(severity)), severity, rtol=1e-12)
+    assert np.abs(sizes(severity)).max() <= 1.0
+    assert (severities(np.full(len(FAULTS), 3.0)) == high).all()
+
+
+def test_features_are_the_evidence_and_the_position_gain(unit, logs):
+    shown = log_features(logs["healthy"], unit)
+    assert set(NAMES) <= set(UNITS)
+    values = dict(zip(NAMES, shown.values, strict=True))
+    assert values["lost_motion"] == pytest.approx(unit.parameters.value("play.total"), rel=0.01)
+    gain = unit.parameters.value("control.position_gain")
+    assert values["following_gain"] == pytest.approx(1.0 / gain, rel=0.005)
+    assert np.isnan(values["brake_current"])
+
+
+def test_a_change_is_a_share_where_it_scales():
+    healthy, floor = np.full(len(NAMES), 2.0), np.zeros(len(NAMES))
+    change = dict(zip(NAMES, changes(healthy + 0.5, healthy, floor), strict=True))
+    assert change["dry_current"] == pytest.approx(0.25)
+    assert change["lost_motion"] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("name", "best"), [("healthy", ()), ("play", (FAULTS[0],)), ("short", (FAULTS[3],))]
+)
+def test_the_surrogate_names_the_fault(unit, logs, name, best):
+    result = diagnose_by_surrogate([logs[name]], unit, baselines=[logs["base"]])
+    assert result.best == best
+    assert result.status == ("faulty" if best else "healthy")
+    assert not any("outside" in text for text in result.findings)
+    if best:
+        cause = result.faults[0]
+        true = np.radians(0.3) if name == "play" else 0.25
+        assert cause.interval[0] < true < cause.interval[1]
+    if name == "short":
+        assert set(cause.equivalents) == {("short", "motor.phase_b"), ("short", "motor.phase_c")}
+
+
+def test_both_is_the_model_on_what_was_proposed(unit, logs):
+    result = diagnose_by_both([logs["short"]], unit, baselines=[logs["base"]])
+    assert result.best == (FAULTS[3],)
+    assert any("surrogate: proposed" in text for text in result.findings)
+    assert {f"{i['kind']}@{i['place']}" for i in result.unobservable} | set(
+        result.detectable
+    ) < set(FAULTS)
+
+
+def test_two_logs_of_a_unit_are_surer_than_one(unit, logs):
+    one = diagnose_by_surrogate([logs["short"]], unit, baselines=[logs["base"]])
+    again = replace(logs["short"], log=replace(logs["short"].log, name="again"))
+    two = diagnose_by_surrogate([logs["short"], again], unit, baselines=[logs["base"]])
+    width = [r.faults[0].interval[1] - r.faults[0].interval[0] for r in (one, two)]
+    assert width[1] < width[0]
+    assert two.p_fault >= one.p_fault
+
+
+def test_what_was_not_trained_is_said(unit, logs):
+    result = diagnose_by_surrogate([logs["far"]], unit, baselines=[logs["base"]])
+    assert any("outside the training set" in text for text in result.findings)
+    with pytest.raises(InputError, match="not trained on such a test"):
+        diagnose_by_surrogate(bench_logs(unit, [(1, [])], procedure="chirp"), unit)
+    without = replace(logs["play"], log=replace(logs["play"].log, current_signal="current_ref"))
+    with pytest.raises(InputError, match="r78"):
+        diagnose_by_surrogate([without], unit)
+
+
+def test_a_log_without_voltage_is_still_read(unit, logs):
+    without = replace(logs["play"], voltage=None)
+    result = diagnose_by_surrogate([without], unit, baselines=[logs["base"]])
+    assert result.best == (FAULTS[0],)
+
+
+def test_the_file_that_ships(tmp_path):
+    ours = shipped()
+    assert set(ours.tests) == {"backlash", "loaded"}
+    path = ours.save(tmp_path / "again.npz")
+    assert path.stat().st_size < 700_000
+    again = Surrogate.load(path)
+    for name, test in ours.tests.items():
+        for view, head in test.heads.items():
+            other = again.tests[name].heads[view]
+            np.testing.assert_array_equal(head.known, other.known)
+            for a, b in zip(head.ensemble.weights, other.ensemble.weights, strict=True):
+                np.testing.assert_array_equal(a, b)
+    for damage in (path.read_bytes()[:-2000], b"nothing"):
+        (tmp_path / "bad.npz").write_bytes(damage)
+        with pytest.raises(FormatError):
+            Surrogate.load(tmp_path / "bad.npz")
+
+
+def _table(units, rng):
+    """Units of known law: each fault moves a feature of its own; days scatter."""
+    severity, values, unit, baseline = [], [], [], []
+    for u in range(units):
+        centre = 1.0 + 0.1 * rng.standard_normal(len(NAMES))
+        for k in range(10):
+            faults = {} if k < 3 else drawn_faults(rng, learned())
+            row = np.array([faults.get(key, 0.0) for key in FAULTS])
+            shift = np.zeros(len(NAMES))
+            shift[: len(FAULTS)] = sizes(row)
+            severity.append(row)
+            values.append(centre + shift + 0.02 * rng.standard_normal(len(NAMES)))
+            unit.append(u)
+            baseline.append(k < 3)
+    about = np.ones((len(unit), 2))
+    return Table(*map(np.array, (unit, baseline, severity, values)), about)
+
+
+def test_calibration_holds_on_units_never_seen():
+    rng = np.random.default_rng(3)
+    tables = {"backlash": _table(40, rng)}
+    plan = Plan(folds=2, members=1, rounds=150)
+    result = fitted(tables, {}, plan, {})
+    scores = judged(result, {"backlash": _table(40, rng)})["backlash.relative"]
+    assert scores["covered"] / scores["severities"] > 0.82
+    assert scores["false_alarms"] / scores["healthy"] < 0.12
+    assert scores["brier"] < 0.7 * scores["brier_by_rate"]
+
+
+def test_references_are_other_days_of_the_same_unit():
+    rows = Rows.of(_table(3, np.random.default_rng(4)))
+    for row, near in enumerate(rows.others):
+        known = near[near >= 0]
+        assert row not in known
+        assert (rows.table.unit[known] == rows.table.unit[row]).all()
+        assert rows.table.baseline[known].all()
+
+
+def test_units_and_days_differ(unit):
+    rng = np.random.default_rng(5)
+    first, second = unit_of(unit, rng), unit_of(unit, rng)
+    day = day_of(first, rng).actuator
+    dry = [u.parameters.value("friction.dynamic") for u in (first, second, day)]
+    assert len(set(dry)) == 3
+    assert dry[2] / dry[0] == pytest.approx(1.0, abs=0.3)
+
+
+def test_the_command_line(elevon_cli, tmp_path):  # noqa: F811
+    for name, seed, faults in (("base", 1, []), ("log", 3, ["--fault", PLAY])):
+        elevon_cli("bench", "run", "backlash", "--actuator", "torino-rotary", "--fidelity", "low",
+                   "--out", tmp_path / name, "--seed", seed, *faults)  # fmt: skip
+    log, base = (tmp_path / n / "backlash.csv" for n in ("log", "base"))
+    asked = ("diagnose", log, "--actuator", "torino-rotary", "--baseline", base, "--json")
+    result = elevon_cli(*asked, "--method", "surrogate")
+    assert result.code == 0
+    document = json.loads(result.out)
+    assert document["method"] == "surrogate"
+    assert document["best"]["faults"] == [FAULTS[0]]
+    assert elevon_cli(*asked, "--method", "magic").code == 2
+    assert elevon_cli(*asked, "--surrogate", tmp_path / "none.npz").code == 2
+    assert elevon_cli(*asked, "--method", "both", "--surrogate", tmp_path / "none.npz").code == 2
+
+
+@pytest.mark.long
+def test_training_by_one_command(elevon_cli, tmp_path):  # noqa: F811
+    out = tmp_path / "own.npz"
+    asked = ("diagnose-train", "--out", out, "--units", "8", "--low-units", "16", "--rounds", "200",
+             "--test-units", "2", "--runs", tmp_path / "runs", "--json")  # fmt: skip
+    first = elevon_cli(*asked)
+    assert first.code == 0
+    again = elevon_cli(*asked, "--force")
+    assert json.loads(again.out) == json.loads(first.out)
+    assert set(Surrogate.load(out).tests) == {"backlash", "loaded"}
