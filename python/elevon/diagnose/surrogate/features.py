@@ -106,8 +106,12 @@ def log_features(item: TestLog, actuator: Actuator) -> LogFeatures:
         log.current, item.voltage, brake, None, None, good,
     )  # fmt: skip
     value = actuator.parameters.value
-    shown = evidence(signals, ratio=value("gear.ratio"), pole_pairs=value("motor.pole_pairs"))
+    ratio, pole_pairs = value("gear.ratio"), value("motor.pole_pairs")
+    shown = evidence(signals, ratio=ratio, pole_pairs=pole_pairs, emf=1.0)
     rows = dict(zip(shown.names, shown.values.tolist(), strict=True))
+    for name in ("voltage_order_1", "voltage_order_2"):  # of the log's own EMF, not the set's
+        if name in rows:
+            rows[name] /= abs(rows["voltage_per_speed"])
     rows["following_gain"] = _following(log, good)
     return LogFeatures(
         log.name,
