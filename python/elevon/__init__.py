@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from elevon.recording import Clock as Clock
     from elevon.recording import Recording as Recording
     from elevon.scenario import Scenario as Scenario
+    from elevon.session import Session as Session
     from elevon.simulate import Run as Run
     from elevon.simulate import simulate as simulate
     from elevon.simulate import simulate_batch as simulate_batch
@@ -40,6 +41,7 @@ _PUBLIC = {
     "Scenario": "elevon.scenario",
     "list_actuators": "elevon.actuator",
     "load_campaign": "elevon.campaign",
+    "Session": "elevon.session",
     "simulate": "elevon.simulate",
     "simulate_batch": "elevon.simulate",
 }

@@ -21,7 +21,7 @@ ROWS = [
     ["features"],
     ["logs"],
     ["simulate"],
-    ["bench", "campaign", "calibrate", "compare"],
+    ["bench", "campaign", "calibrate", "compare", "session"],
     ["lowfit", "analysis", "benchmark", "compare_loads"],
     ["diagnose"],
     ["prognose"],

@@ -2,7 +2,7 @@
 
 use crate::actuator::{ballscrew, landing_gear, rotary, Finding, Port, Wiring};
 use crate::fault::{FaultKind, FaultSpec};
-use crate::solver::{self, Clock, Monitor, RunOutput, RunSpec, Width};
+use crate::solver::{self, Clock, Live, Monitor, RunOutput, RunSpec, Width};
 use crate::variable::acts::{Fidelity, Standing};
 use crate::variable::{Group, Signal};
 
@@ -140,6 +140,10 @@ impl Model {
     }
     pub fn run_all(self, runs: &[RunSpec], clocks: &[Clock], threads: usize, width: Width, monitor: &Monitor) -> Vec<RunOutput> {
         dispatch!(self, W => solver::run_all::<W>(runs, clocks, threads, width, monitor))
+    }
+    /// Runs that go on from call to call, in blocks: which runs each holds, and the block.
+    pub fn live(self, runs: &[RunSpec], recorded: &[usize], width: Width) -> Vec<(Vec<usize>, Box<dyn Live>)> {
+        dispatch!(self, W => solver::live::<W>(runs, recorded, width))
     }
     /// Low fidelities without a state machine only: switching has no useful derivative.
     pub fn sensitivities(

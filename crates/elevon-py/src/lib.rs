@@ -3,6 +3,7 @@
 mod describe;
 mod features;
 mod run;
+mod session;
 mod spec;
 
 use pyo3::prelude::*;
@@ -30,5 +31,6 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(features::features, m)?)?;
     m.add_function(wrap_pyfunction!(run::simulate, m)?)?;
     m.add_function(wrap_pyfunction!(run::sensitivities, m)?)?;
+    m.add_class::<session::Session>()?;
     Ok(())
 }

@@ -72,21 +72,28 @@ fn report(py: Python<'_>, callback: Option<&Py<PyAny>>, fraction: f64) -> PyResu
     }
 }
 
-fn status(d: &Bound<'_, PyDict>, output: &RunOutput) -> PyResult<()> {
-    let (name, message) = match &output.status {
+/// A status in a word and in a sentence.
+pub fn described(status: &Status) -> (&'static str, String) {
+    match status {
         Status::Ok => ("ok", String::new()),
         Status::Tripped { time, reason } if reason.is_empty() => ("tripped", format!("the drive tripped at {time} s")),
         Status::Tripped { time, reason } => ("tripped", format!("at {:.6} s: {reason}", time)),
         Status::Overheated { time, temperature } => {
             ("tripped", format!("the winding passed thermal.trip at {time} s, {temperature:.2} K: the drive opened its bridge"))
         }
-        Status::Diverged { time, signal } => {
-            d.set_item("diverged_signal", *signal)?;
-            ("diverged", format!("{signal} diverged at {time} s"))
-        }
+        Status::Diverged { time, signal } => ("diverged", format!("{signal} diverged at {time} s")),
         Status::Broken => ("diverged", "the core panicked in this run; this is a defect of elevon, please report it".to_string()),
-        Status::Interrupted => ("interrupted", format!("interrupted at {} s", output.time)),
-    };
+        Status::Interrupted => ("interrupted", "interrupted".to_string()),
+    }
+}
+
+fn status(d: &Bound<'_, PyDict>, output: &RunOutput) -> PyResult<()> {
+    let (name, mut message) = described(&output.status);
+    match &output.status {
+        Status::Diverged { signal, .. } => d.set_item("diverged_signal", *signal)?,
+        Status::Interrupted => message = format!("interrupted at {} s", output.time),
+        _ => {}
+    }
     d.set_item("status", name)?;
     d.set_item("message", message)
 }

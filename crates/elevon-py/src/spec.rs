@@ -55,6 +55,8 @@ fn in_range(model: Model, raw: &[f64], start: &str) -> PyResult<()> {
 /// Steps are counted in whole numbers that a double holds exactly.
 const MOST_STEPS: f64 = 9.0e15;
 
+const WHOLE: &str = "the faults at their whole severity: ";
+
 /// A required entry of a dictionary.
 pub fn need<'py>(d: &Bound<'py, PyDict>, key: &str) -> PyResult<Bound<'py, PyAny>> {
     d.get_item(key)?.ok_or_else(|| bad(format!("missing {key:?}")))
@@ -183,7 +185,7 @@ impl Resolver {
         }
         let given = need(d, "faults")?.cast_into::<PyList>()?;
         let faults = self.faults(&given)?;
-        in_range(self.model, &whole(&parameters, &faults), "the faults at their whole severity: ")?;
+        in_range(self.model, &whole(&parameters, &faults), WHOLE)?;
         if let Some(message) = self.refused(&parameters, &faults, &names_of(&given)?) {
             return Err(bad(message));
         }
@@ -197,6 +199,7 @@ impl Resolver {
             ports,
             driven,
             faults,
+            tunable: Vec::new(),
             initial: names.iter().map(|n| initial.get(*n).copied().unwrap_or(f64::NAN)).collect(),
             duration,
             seed: need(d, "seed")?.extract()?,
@@ -206,6 +209,18 @@ impl Resolver {
 
     pub fn faults(&self, given: &Bound<'_, PyList>) -> PyResult<Vec<FaultSpec>> {
         given.iter().map(|f| fault(&self.faults, &self.places, &f.cast_into::<PyDict>()?)).collect()
+    }
+
+    /// Refuses parameters or faults, changed while a run goes on, that no run could have begun with.
+    pub fn allowed(&self, parameters: &[f64], faults: &[FaultSpec]) -> PyResult<()> {
+        in_range(self.model, parameters, "")?;
+        in_range(self.model, &whole(parameters, faults), WHOLE)?;
+        let healthy = self.model.check(parameters).into_iter();
+        let faulty = self.model.check_faulted(&whole(parameters, faults)).into_iter();
+        match healthy.chain(faulty).find(|f| f.severity == Severity::Error) {
+            Some(finding) => Err(bad(finding.message)),
+            None => Ok(()),
+        }
     }
 
     /// Why the faults cannot run at their whole severity: the one that alone is too much, and how much of it is not.
@@ -229,18 +244,27 @@ impl Resolver {
         Some(format!("{} at its whole severity: {}{rest}", names[alone], finding.message))
     }
 
+    /// Signals by their names.
+    pub fn signals(&self, names: &[String]) -> PyResult<Vec<usize>> {
+        names.iter().map(|n| self.signals.get(n.as_str()).copied().ok_or_else(|| bad(format!("no signal {n:?}")))).collect()
+    }
+
+    /// A sum of waveforms.
+    pub fn plan(&self, terms: &Bound<'_, PyList>) -> PyResult<SourcePlan> {
+        let terms = terms.iter().map(|d| term(&d.cast_into::<PyDict>()?)).collect::<PyResult<Vec<_>>>()?;
+        Ok(SourcePlan { terms })
+    }
+
     fn ports(&self, parameters: &[f64], inputs: &Bound<'_, PyDict>) -> PyResult<(Vec<SourcePlan>, Vec<bool>)> {
         let (mut ports, mut driven) = (Vec::new(), Vec::new());
         for port in self.model.ports() {
-            let mut terms = Vec::new();
-            if let Some(list) = inputs.get_item(port.name)? {
-                for d in list.cast_into::<PyList>()?.iter() {
-                    terms.push(term(&d.cast_into::<PyDict>()?)?);
-                }
-            }
-            driven.push(!terms.is_empty());
-            let rest = terms.is_empty() && !port.parameter.is_empty();
-            ports.push(if rest { SourcePlan::constant(parameters[self.parameter(port.parameter)?]) } else { SourcePlan { terms } });
+            let plan = match inputs.get_item(port.name)? {
+                Some(list) => self.plan(&list.cast_into::<PyList>()?)?,
+                None => SourcePlan::default(),
+            };
+            driven.push(!plan.terms.is_empty());
+            let rest = plan.terms.is_empty() && !port.parameter.is_empty();
+            ports.push(if rest { SourcePlan::constant(parameters[self.parameter(port.parameter)?]) } else { plan });
         }
         for name in inputs.keys() {
             let name: String = name.extract()?;
@@ -261,10 +285,7 @@ impl Resolver {
                 return Err(bad("period_steps: 0"));
             }
             let wanted: Vec<String> = need(&d, "signals")?.extract()?;
-            let signals = wanted
-                .iter()
-                .map(|n| self.signals.get(n.as_str()).copied().ok_or_else(|| bad(format!("no signal {n:?}"))))
-                .collect::<PyResult<Vec<_>>>()?;
+            let signals = self.signals(&wanted)?;
             let features = features::plan(&d)?.map(Arc::new);
             clocks.push(Clock { period, signals, features });
             names.push(need(&d, "clock")?.extract()?);

@@ -18,6 +18,7 @@ __all__ = [
     "CompiledScenario",
     "compile_scenario",
     "compile_term",
+    "port_units",
     "signal_records",
     "signal_units",
 ]
@@ -84,7 +85,7 @@ def compile_scenario(scenario: Scenario, wiring: str, fidelity: str) -> Compiled
         message names the place in the scenario.
     """
     mode = _mode(scenario, wiring)
-    units = _port_units(mode, wiring)
+    units = port_units(mode, wiring)
     inputs = {
         port: [
             compile_term(term, units[port], f"{place}.terms[{index}]")
@@ -140,7 +141,7 @@ def _ports(
             raise InputError(f"{place}: the actuator has no such input; {', '.join(known)}")
 
 
-def _port_units(mode: str, wiring: str) -> dict[str, str]:
+def port_units(mode: str, wiring: str) -> dict[str, str]:
     """Return the unit of every port; that of the command goes with its mode."""
     from elevon import _core
 

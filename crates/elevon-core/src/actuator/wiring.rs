@@ -141,7 +141,7 @@ pub struct Overheat<S> {
     pub temperature: S,
 }
 
-pub trait Wiring: Sized + Send + Sync + 'static {
+pub trait Wiring: Clone + Send + Sync + 'static {
     type Structure: Clone + Eq + Hash + Debug + Send + Sync;
     type Model<S: Scalar>: Clone + Send + Sync;
     type State<S: Scalar>: Clone + Send + Sync;

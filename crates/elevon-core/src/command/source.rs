@@ -75,6 +75,12 @@ impl SourceLanes {
         self.soonest
     }
 
+    /// Gives a lane another plan; it acts at the next renewal.
+    pub fn replace(&mut self, lane: usize, plan: SourcePlan) {
+        self.plans[lane] = plan;
+        (self.next[lane], self.soonest) = (0, 0);
+    }
+
     /// Renews the lanes whose breakpoint is step `k`; true if any did.
     pub fn renew(&mut self, k: Steps, dt: f64) -> bool {
         let mut renewed = false;
@@ -98,10 +104,11 @@ impl SourceLanes {
     /// Packs the present parabolas and oscillators of lanes `first..first + S::LANES`.
     pub fn pack<S: Scalar>(&self, first: usize) -> Source<S> {
         let lane = |f: &dyn Fn(usize) -> f64| S::from_fn(|i| f(first + i));
-        let count = self.oscillations[first].len();
+        // Lanes with fewer have oscillators of no amplitude.
+        let count = self.oscillations[first..first + S::LANES].iter().map(Vec::len).max().unwrap_or(0);
         let oscillators = (0..count)
             .map(|j| {
-                let get = |f: &dyn Fn(&Oscillation) -> f64| lane(&|i| f(&self.oscillations[i][j]));
+                let get = |f: &dyn Fn(&Oscillation) -> f64| lane(&|i| self.oscillations[i].get(j).map_or(0.0, f));
                 [get(&|o| o.at), get(&|o| o.amplitude), get(&|o| o.phase), get(&|o| o.rate), get(&|o| o.sweep)]
             })
             .collect();

@@ -99,6 +99,21 @@ impl FaultLanes {
         self.held[lane].get(fault).map_or(0.0, |held| held.label)
     }
 
+    pub fn severity(&self, lane: usize, fault: usize) -> f64 {
+        self.faults[lane][fault].severity
+    }
+
+    /// Puts a fault in the place of another of a lane, or behind the last; it acts at the next renewal.
+    pub fn replace(&mut self, lane: usize, fault: usize, spec: FaultSpec) {
+        if fault < self.faults[lane].len() {
+            self.faults[lane][fault] = spec;
+        } else {
+            self.faults[lane].push(spec);
+            self.held[lane].push(Held::default());
+        }
+        (self.next[lane], self.soonest) = (0, 0);
+    }
+
     pub fn count(&self, lane: usize) -> usize {
         self.faults[lane].len()
     }

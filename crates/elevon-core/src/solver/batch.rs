@@ -42,17 +42,18 @@ impl Monitor {
 
 /// What the runs of a block must have in common.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-struct Shape<T> {
+pub(super) struct Shape<T> {
     structure: T,
     dt: u64,
     steps: Steps,
     grid: u64,
     ticks: Vec<Tick>,
-    oscillators: Vec<usize>,
+    /// Of each port.
+    pub(super) oscillators: Vec<usize>,
     choices: Vec<u8>,
 }
 
-fn shape<W: Wiring>(run: &RunSpec, recorded: &[usize]) -> Shape<W::Structure> {
+pub(super) fn shape<W: Wiring>(run: &RunSpec, recorded: &[usize]) -> Shape<W::Structure> {
     let structure = structure::<W>(run, recorded);
     let dt = W::step(&run.parameters);
     let choices = W::groups()
@@ -73,12 +74,14 @@ fn shape<W: Wiring>(run: &RunSpec, recorded: &[usize]) -> Shape<W::Structure> {
     }
 }
 
+/// The runs, the last of them repeated up to whole chunks.
+pub(super) fn padded<'a, S: Scalar>(runs: &[&'a RunSpec]) -> Vec<&'a RunSpec> {
+    let count = runs.len().next_multiple_of(S::LANES);
+    (0..count).map(|i| runs[i.min(runs.len() - 1)]).collect()
+}
+
 fn run_block<W: Wiring, S: Scalar>(runs: &[&RunSpec], clocks: &[Clock], recorded: &[usize], monitor: &Monitor) -> Vec<RunOutput> {
-    let mut padded = runs.to_vec();
-    while !padded.len().is_multiple_of(S::LANES) {
-        padded.push(runs[runs.len() - 1]);
-    }
-    Block::<W, S, Plain>::new(&padded, runs.len(), Plain(&padded), clocks, recorded).run(monitor)
+    Block::<W, S, Plain>::new(&padded::<S>(runs), runs.len(), Plain, clocks, recorded).run(monitor)
 }
 
 fn run_width<W: Wiring>(width: Width, runs: &[&RunSpec], clocks: &[Clock], recorded: &[usize], monitor: &Monitor) -> Vec<RunOutput> {
@@ -168,7 +171,7 @@ pub fn run_all<W: Wiring>(runs: &[RunSpec], clocks: &[Clock], threads: usize, wi
 
 /// Groups runs by shape and cuts the groups into blocks: large enough to hide latencies, enough of them for
 /// the threads.
-fn blocks<W: Wiring>(runs: &[RunSpec], recorded: &[usize], width: Width, threads: usize) -> Vec<Vec<usize>> {
+pub(super) fn blocks<W: Wiring>(runs: &[RunSpec], recorded: &[usize], width: Width, threads: usize) -> Vec<Vec<usize>> {
     let mut order: Vec<Shape<W::Structure>> = Vec::new();
     let mut groups: HashMap<Shape<W::Structure>, Vec<usize>> = HashMap::new();
     for (i, run) in runs.iter().enumerate() {

@@ -6,7 +6,7 @@ use super::rows::Rows;
 use super::spec::{Clock, RunOutput, RunSpec, Status};
 use crate::actuator::{Inputs, Setup, Signals, Tick, Wiring};
 use crate::command::SourceLanes;
-use crate::fault::FaultLanes;
+use crate::fault::{FaultLanes, FaultSpec};
 use crate::noise::Key;
 use crate::scalar::Scalar;
 use crate::time::Steps;
@@ -19,15 +19,17 @@ const STRETCH: Steps = 4096;
 pub fn structure<W: Wiring>(run: &RunSpec, recorded: &[usize]) -> W::Structure {
     let mut touched = vec![false; run.parameters.len()];
     let dt = W::step(&run.parameters);
-    for index in run.faults.iter().flat_map(|f| f.touched(dt)) {
+    for index in run.faults.iter().flat_map(|f| f.touched(dt)).chain(run.tunable.iter().copied()) {
         touched[index] = true;
     }
     W::structure(&Setup { raw: &run.parameters, touched: &touched, driven: &run.driven, recorded })
 }
 
 /// A block of lanes in progress.
+#[derive(Clone)]
 pub struct Block<'a, W: Wiring, S: Scalar, L: Lift<S>> {
-    pub(super) runs: &'a [&'a RunSpec],
+    /// Seed and number of each run: the keys of its random numbers.
+    keys: Vec<(u64, u64)>,
     /// Runs before the padding of the last chunk.
     pub(super) real: usize,
     pub(super) lift: L,
@@ -37,11 +39,17 @@ pub struct Block<'a, W: Wiring, S: Scalar, L: Lift<S>> {
     asked: Signals,
     pub(super) dt: f64,
     steps: Steps,
+    /// The step that comes next.
+    pub(super) k: Steps,
+    /// Something was seen to have left its limits, or nothing was looked at so far.
+    trouble: bool,
+    /// Parameters were changed from outside.
+    stale: bool,
     healthy: Vec<Vec<S>>,
     pub(super) models: Vec<W::Model<S>>,
     pub(super) states: Vec<W::State<S>>,
     inputs: Vec<Inputs<S>>,
-    sources: Vec<SourceLanes>,
+    pub(super) sources: Vec<SourceLanes>,
     pub(super) faults: FaultLanes,
     ticks: Vec<Tick>,
     /// Steps at which each tick and each clock is due next.
@@ -57,14 +65,14 @@ pub struct Block<'a, W: Wiring, S: Scalar, L: Lift<S>> {
 
 impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
     /// `runs` is padded to whole chunks; the first `real` are kept.
-    pub fn new(runs: &'a [&'a RunSpec], real: usize, lift: L, clocks: &'a [Clock], recorded: &[usize]) -> Self {
+    pub fn new(runs: &[&RunSpec], real: usize, lift: L, clocks: &'a [Clock], recorded: &[usize]) -> Self {
         let first = runs[0];
         let dt = W::step(&first.parameters);
         let steps = (first.duration / dt).round() as Steps;
         let structure = structure::<W>(first, recorded);
         let chunks = runs.len() / S::LANES;
         let count = first.parameters.len();
-        let healthy: Vec<Vec<S>> = (0..chunks).map(|c| (0..count).map(|i| lift.parameter(c * S::LANES, i)).collect()).collect();
+        let healthy: Vec<Vec<S>> = (0..chunks).map(|c| (0..count).map(|i| lift.parameter(runs, c * S::LANES, i)).collect()).collect();
         let grid = (W::fault_grid(&first.parameters) / dt).round() as Steps;
         let faults = FaultLanes::new(runs.iter().map(|r| r.faults.clone()).collect(), grid);
         let sources = (0..W::PORTS.len()).map(|p| SourceLanes::new(runs.iter().map(|r| r.ports[p].clone()).collect())).collect();
@@ -73,12 +81,15 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         let mut block = Self {
             tick_due: ticks.iter().map(|tick| tick.first).collect(),
             clock_due: vec![0; clocks.len()],
-            runs,
+            keys: runs.iter().map(|r| (r.seed, r.run)).collect(),
             real,
             lift,
             clocks,
             dt,
             steps,
+            k: 0,
+            trouble: true,
+            stale: false,
             healthy,
             faults,
             sources,
@@ -94,18 +105,18 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             asked: Signals::of(recorded),
             wall: 0.0,
         };
-        block.begin();
+        block.begin(runs);
         block
     }
 
-    fn begin(&mut self) {
+    fn begin(&mut self, runs: &[&RunSpec]) {
         self.faults.renew(0, self.dt);
         for chunk in 0..self.healthy.len() {
             let raw = self.parameters_now(chunk);
             let model = W::derive(&raw, &self.structure);
             let count = W::INITIAL.len();
             let first = chunk * S::LANES;
-            let initial: Vec<S> = (0..count).map(|i| S::from_fn(|l| self.runs[first + l].initial[i])).collect();
+            let initial: Vec<S> = (0..count).map(|i| S::from_fn(|l| runs[first + l].initial[i])).collect();
             self.states.push(W::start(&model, &raw, &initial));
             self.models.push(model);
         }
@@ -113,41 +124,74 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
 
     fn parameters_now(&self, chunk: usize) -> Vec<S> {
         let mut raw = self.healthy[chunk].clone();
-        self.faults.apply(chunk * S::LANES, &mut raw, &|lane, fault| self.lift.severity(lane, fault));
+        self.faults.apply(chunk * S::LANES, &mut raw, &|lane, fault| self.lift.severity(&self.faults, lane, fault));
         raw
     }
 
     /// Runs to the end or until interrupted.
     pub fn run(mut self, monitor: &Monitor) -> Vec<RunOutput> {
         let began = Instant::now();
-        let (mut k, mut trouble): (Steps, bool) = (0, true);
         let mut out = vec![S::zero(); W::signals().len()];
-        loop {
-            // Looked for at instants that every run of this shape has, so that a run ends at the same one in any company.
-            let look = trouble && self.shared(k);
-            self.renew(k);
-            if look {
-                self.watch(k, &mut out, Self::mark_diverged);
-            }
-            self.tick(k);
-            self.record(k, &mut out);
-            if look {
-                self.watch(k, &mut out, Self::mark_tripped);
-            }
-            if k >= self.steps || self.stopped[..self.real].iter().all(Option::is_some) {
-                break;
-            }
-            let next = self.next_event(k);
-            trouble = self.advance(k, next - k);
-            let advanced = next - k;
-            k = next;
-            if !monitor.advance(advanced * self.real as u64) {
-                self.interrupt(k);
-                break;
-            }
+        if self.proceed(self.steps, monitor, &mut out) {
+            self.events(&mut out);
         }
         self.wall = began.elapsed().as_secs_f64();
+        let k = self.k;
         self.finish(k, out)
+    }
+
+    /// Steps on to step `until`, whose own events stay for whoever goes on from there; false when all lanes have stopped,
+    /// or the caller wants to.
+    pub(super) fn proceed(&mut self, until: Steps, monitor: &Monitor, out: &mut [S]) -> bool {
+        while self.k < until {
+            self.events(out);
+            if self.ended() {
+                return false;
+            }
+            let count = self.next_event(self.k).min(until) - self.k;
+            self.trouble = self.advance(self.k, count);
+            self.k += count;
+            if !monitor.advance(count * self.real as u64) {
+                self.interrupt(self.k);
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Have all lanes stopped?
+    fn ended(&self) -> bool {
+        self.stopped[..self.real].iter().all(Option::is_some)
+    }
+
+    /// What happens at the present step before anything moves.
+    fn events(&mut self, out: &mut [S]) {
+        let k = self.k;
+        // Looked for at instants that every run of this shape has, so that a run ends at the same one in any company.
+        let look = self.trouble && self.shared(k);
+        self.renew(k);
+        if look {
+            self.watch(k, out, Self::mark_diverged);
+        }
+        self.tick(k);
+        self.record(k, out);
+        if look {
+            self.watch(k, out, Self::mark_tripped);
+        }
+    }
+
+    /// A lane gets another value of a parameter, which acts from the present step on.
+    pub(super) fn set(&mut self, lane: usize, index: usize, value: f64) {
+        let place = &mut self.healthy[lane / S::LANES][index];
+        let before = *place;
+        *place = S::from_fn(|i| if i == lane % S::LANES { value } else { before.lane(i) });
+        self.stale = true;
+    }
+
+    /// A lane gets another fault, which acts from the present step on.
+    pub(super) fn replace_fault(&mut self, lane: usize, fault: usize, spec: FaultSpec) {
+        self.faults.replace(lane, fault, spec);
+        self.stale = true;
     }
 
     /// Is step `k` an instant of every run of this shape, whatever its inputs and faults: a tick, a sample, a whole stretch
@@ -168,7 +212,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
     }
 
     /// Inputs and parameters that change at step `k`.
-    fn renew(&mut self, k: Steps) {
+    pub(super) fn renew(&mut self, k: Steps) {
         let mut renewed = k == 0;
         for source in &mut self.sources {
             if source.next() <= k {
@@ -180,7 +224,8 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
                 self.inputs[chunk] = self.sources.iter().map(|s| s.pack(chunk * S::LANES)).collect();
             }
         }
-        if k > 0 && self.faults.next() <= k {
+        if self.stale || k > 0 && self.faults.next() <= k {
+            self.stale = false;
             self.faults.renew(k, self.dt);
             for chunk in 0..self.models.len() {
                 let raw = self.parameters_now(chunk);
@@ -199,8 +244,8 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             let count = k / tick.period;
             for chunk in 0..self.states.len() {
                 let first = chunk * S::LANES;
-                let runs = self.runs;
-                let mut noise = |channel: u64| S::from_fn(|i| Key::new(runs[first + i].seed, runs[first + i].run, channel).gaussian(count));
+                let keys = &self.keys[first..];
+                let mut noise = |channel: u64| S::from_fn(|i| Key::new(keys[i].0, keys[i].1, channel).gaussian(count));
                 S::vectorize(Ticking::<W, S> {
                     kind: tick.kind,
                     structure: &self.structure,

@@ -5,6 +5,7 @@ use super::block::Block;
 use super::kernels::Lift;
 use super::spec::{Clock, RunOutput, RunSpec};
 use crate::actuator::Wiring;
+use crate::fault::FaultLanes;
 #[cfg(all(target_arch = "x86_64", not(feature = "physics")))]
 use crate::scalar::{fused, Avx2x4};
 use crate::scalar::{Dual, Scalar};
@@ -16,22 +17,21 @@ type Slopes = crate::scalar::Portable<2>;
 type Slopes = f64;
 
 /// Seeds of a dual run: parameters and faults whose derivatives are wanted.
-struct Seeds<'a> {
-    run: &'a RunSpec,
+struct Seeds {
     parameters: Vec<usize>,
     faults: Vec<usize>,
 }
 
-impl<V: Scalar> Lift<Dual<V>> for Seeds<'_> {
-    fn parameter(&self, _first: usize, index: usize) -> Dual<V> {
-        let value = self.run.parameters[index];
+impl<V: Scalar> Lift<Dual<V>> for Seeds {
+    fn parameter(&self, runs: &[&RunSpec], first: usize, index: usize) -> Dual<V> {
+        let value = runs[first].parameters[index];
         match self.parameters.iter().position(|&p| p == index) {
             Some(slot) => Dual::variable(value, slot),
             None => Dual::splat(value),
         }
     }
-    fn severity(&self, _lane: usize, fault: usize) -> Dual<V> {
-        let value = self.run.faults[fault].severity;
+    fn severity(&self, faults: &FaultLanes, lane: usize, fault: usize) -> Dual<V> {
+        let value = faults.severity(lane, fault);
         match self.faults.iter().position(|&f| f == fault) {
             Some(slot) => Dual::variable(value, self.parameters.len() + slot),
             None => Dual::splat(value),
@@ -83,7 +83,7 @@ fn passes<W: Wiring, V: Scalar>(
     chosen.extend(faults.iter().map(|&f| (false, f)));
     let pass = |pass: &[(bool, usize)]| {
         let of = |kind: bool| pass.iter().filter(|x| x.0 == kind).map(|x| x.1).collect();
-        let seeds = Seeds { run, parameters: of(true), faults: of(false) };
+        let seeds = Seeds { parameters: of(true), faults: of(false) };
         Block::<W, Dual<V>, Seeds>::new(&[run], 1, seeds, clocks, &recorded).run(monitor).remove(0)
     };
     chosen.chunks(V::LANES).map(pass).collect()

@@ -9,8 +9,9 @@ use crate::time::Steps;
 
 /// Turns the plain numbers of a run into scalars: lanes by default, dual numbers with their seeds otherwise.
 pub trait Lift<S> {
-    fn parameter(&self, first: usize, index: usize) -> S;
-    fn severity(&self, lane: usize, fault: usize) -> S;
+    /// A parameter of the lanes from `first` on.
+    fn parameter(&self, runs: &[&RunSpec], first: usize, index: usize) -> S;
+    fn severity(&self, faults: &FaultLanes, lane: usize, fault: usize) -> S;
     fn emit(&self, x: S, lane: usize, out: &mut Vec<f64>);
     /// A row of values of one lane.
     #[inline(always)]
@@ -27,14 +28,15 @@ pub trait Lift<S> {
 }
 
 /// Lanes of plain runs.
-pub struct Plain<'a>(pub &'a [&'a RunSpec]);
+#[derive(Clone, Copy)]
+pub struct Plain;
 
-impl<S: Scalar> Lift<S> for Plain<'_> {
-    fn parameter(&self, first: usize, index: usize) -> S {
-        S::from_fn(|i| self.0[first + i].parameters[index])
+impl<S: Scalar> Lift<S> for Plain {
+    fn parameter(&self, runs: &[&RunSpec], first: usize, index: usize) -> S {
+        S::from_fn(|i| runs[first + i].parameters[index])
     }
-    fn severity(&self, lane: usize, fault: usize) -> S {
-        S::splat(self.0[lane].faults[fault].severity)
+    fn severity(&self, faults: &FaultLanes, lane: usize, fault: usize) -> S {
+        S::splat(faults.severity(lane, fault))
     }
     #[inline(always)]
     fn emit(&self, x: S, lane: usize, out: &mut Vec<f64>) {

@@ -5,6 +5,7 @@ mod block;
 mod dual;
 mod ending;
 mod kernels;
+mod live;
 mod rows;
 mod spec;
 mod summing;
@@ -12,5 +13,6 @@ mod width;
 
 pub use batch::{run_all, Monitor};
 pub use dual::{derivatives, sensitivities};
+pub use live::{live, Change, Live, Refusal};
 pub use spec::{Clock, RunOutput, RunSpec, Status};
 pub use width::Width;

@@ -16,6 +16,8 @@ pub struct RunSpec {
     /// Ports that waveforms drive.
     pub driven: Vec<bool>,
     pub faults: Vec<FaultSpec>,
+    /// Parameters that the caller may change while the run goes on: what depends on them is in its structure from the start.
+    pub tunable: Vec<usize>,
     /// In the order of the wiring's `INITIAL`; NaN where not given.
     pub initial: Vec<f64>,
     pub duration: f64,

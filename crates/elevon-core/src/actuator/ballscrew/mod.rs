@@ -17,6 +17,7 @@ use crate::transmission::vibration::Vibration;
 use crate::variable::{Group, Signal};
 use layout::At;
 
+#[derive(Clone)]
 pub struct Ballscrew;
 
 impl Form for Ballscrew {

@@ -14,6 +14,7 @@ use crate::time::Steps;
 use crate::variable::{Group, Signal};
 
 /// The landing-gear actuator at high fidelity.
+#[derive(Clone)]
 pub struct High;
 
 #[derive(Clone, Debug)]

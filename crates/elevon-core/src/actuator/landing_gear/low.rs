@@ -15,6 +15,7 @@ use crate::time::Steps;
 use crate::variable::{Group, Signal};
 
 /// The landing-gear actuator at low fidelity.
+#[derive(Clone)]
 pub struct Low;
 
 #[derive(Clone, Debug)]

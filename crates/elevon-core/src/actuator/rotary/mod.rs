@@ -11,6 +11,7 @@ use crate::transmission::vibration::Vibration;
 use crate::variable::{Group, Signal};
 use layout::At;
 
+#[derive(Clone)]
 pub struct Rotary;
 
 impl Form for Rotary {

@@ -12,7 +12,7 @@ use crate::variable::{Group, Signal};
 ///
 /// The groups begin with those of `layout::GROUPS`, in their order and of their lengths (units and names may differ), so
 /// that a parameter of a shared component stands at one place in every form.
-pub trait Form: Send + Sync + 'static {
+pub trait Form: Clone + Send + Sync + 'static {
     /// The user's side travels: its coordinate is in metres, and the brake acts there.
     const LINEAR: bool;
     const GROUPS: &'static [Group];

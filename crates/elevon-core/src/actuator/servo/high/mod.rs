@@ -24,6 +24,7 @@ use crate::variable::{Group, Signal};
 use std::marker::PhantomData;
 
 /// A servo at high fidelity.
+#[derive(Clone)]
 pub struct High<F>(PhantomData<F>);
 
 impl<F: Form> Wiring for High<F> {

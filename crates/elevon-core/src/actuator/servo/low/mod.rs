@@ -29,6 +29,7 @@ use crate::variable::{Group, Signal};
 use std::marker::PhantomData;
 
 /// A servo at low fidelity.
+#[derive(Clone)]
 pub struct Low<F>(PhantomData<F>);
 
 const TICK_THERMAL: u8 = 0;

@@ -1,0 +1,6 @@
+"""Live sessions: actuators that are stepped, read and changed while they run."""
+
+from elevon.session.loop import Controller, run_loop
+from elevon.session.session import Session, SessionState
+
+__all__ = ["Controller", "Session", "SessionState", "run_loop"]

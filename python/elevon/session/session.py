@@ -1,0 +1,415 @@
+"""A run, or many, that go on from call to call."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.actuator import Actuator
+from elevon.documents import Document, validated
+from elevon.errors import ArgumentTypeError, InputError, unknown
+from elevon.faults import Fault, find_record
+from elevon.parameters.records import record_of
+from elevon.progress import Progress
+from elevon.recording import Recording
+from elevon.scenario import Scenario, Term
+from elevon.scenario.compile import compile_term, port_units, signal_records
+from elevon.simulate.acting import report
+from elevon.simulate.arguments import ActuatorLike, ScenarioLike, as_actuator
+from elevon.simulate.prepare import Run, prepare, solver_step
+from elevon.units import parse_quantity
+
+__all__ = ["Session", "SessionState", "Value"]
+
+Floats = npt.NDArray[np.float64]
+Value = float | str | Sequence[float] | Floats
+_FOREVER = 4.0e15  # solver steps: a session has no end of its own
+
+
+@dataclass(frozen=True)
+class SessionState:
+    """All that a session holds, as `Session.save` found it; `Session.restore` goes back to it.
+
+    It lives in this process only: the core's state has no form on a disk.
+    """
+
+    core: Any
+    actuators: tuple[Actuator, ...]
+    faults: tuple[Mapping[str, int], ...]
+
+
+class Session:
+    """An actuator that its caller steps, reads and changes while it runs; or many, side by side.
+
+    It has no clock of its own: time passes in `advance` only. A session that is stepped through the
+    instants of a scenario gives the bits that `elevon.simulate` gives, whatever the steps.
+
+    Parameters
+    ----------
+    actuator : Actuator, str, path, or sequence of Run
+        What moves. A sequence of `elevon.Run` is a session of many lanes, one a run, all of one
+        wiring: every reading then is an array of shape (runs,), every value set may be one.
+    scenario : Scenario, mapping or path, optional
+        What acts at the start, such as waveforms of loads; its duration does not count. Without it
+        nothing is asked: a constant zero command.
+    fidelity : str
+        ``high`` or ``low``.
+    mode : str, optional
+        Without a scenario: what the command asks for, ``position``, ``speed`` or ``torque``.
+    seed : int
+        Of the random numbers.
+    tunable : iterable of str
+        Parameters that `set_parameter` will change. The core leaves out equations that values at
+        the start do not need; what is named here keeps them. Others may be changed as well, as long
+        as the equations in use hold them.
+    faults : iterable of str
+        ``KIND@PLACE`` of the faults that `set_fault` will set; as for `tunable`.
+    signals : iterable of str
+        Signals to read that need equations of their own (energies, filtered currents, vibration).
+    lanes : str
+        Vector width, as for `elevon.simulate`.
+
+    Attributes
+    ----------
+    time : float
+        s.
+    step : float
+        Solver step in s.
+    actuators : tuple of Actuator
+        One a run, with the parameters as they are now.
+
+    Raises
+    ------
+    InputError
+        Anything in actuator, scenario, names that cannot be; place, value, limit are named.
+
+    Examples
+    --------
+    >>> session = Session("torino-rotary", mode="speed")  # doctest: +SKIP
+    >>> session.set(command="100 rpm")  # doctest: +SKIP
+    >>> session.advance(0.1)  # doctest: +SKIP
+    >>> session["motor_speed"]  # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        actuator: ActuatorLike | Sequence[Run],
+        scenario: ScenarioLike = None,
+        *,
+        fidelity: str = "high",
+        mode: str | None = None,
+        seed: int = 0,
+        tunable: Iterable[str] = (),
+        faults: Iterable[str] = (),
+        signals: Iterable[str] = (),
+        lanes: str = "auto",
+    ) -> None:
+        runs = _runs(actuator, scenario, mode, seed)
+        self.many = not isinstance(actuator, (Actuator, str, os.PathLike))
+        prepared = [prepare(run, fidelity, f"{_POSITION}@every") for run in runs]
+        report([item.doubts for item in prepared], strict=False)
+        wirings = {item.actuator.wiring for item in prepared}
+        if len(wirings) > 1:
+            raise InputError(f"the runs of a session have one wiring; got {', '.join(wirings)}")
+        self.wiring, self.fidelity = wirings.pop(), fidelity
+        self.actuators = tuple(item.actuator for item in prepared)
+        self._modes = [item.core["command_mode"] for item in prepared]
+        self._units = [port_units(mode, self.wiring) for mode in self._modes]
+        self._faults: tuple[dict[str, int], ...] = tuple(_placed(run.scenario) for run in runs)
+        self.step = solver_step(self.actuators[0], fidelity)
+        self._index = {name: i for i, name in enumerate(signal_records(self.wiring, fidelity))}
+        from elevon import _core
+
+        try:
+            self._core = _core.Session(
+                self.wiring,
+                fidelity,
+                [{**item.core, "duration": _FOREVER * self.step} for item in prepared],
+                [*self._tunable(tunable), *self._moved(faults)],
+                [self._known(name) for name in signals],
+                lanes,
+            )
+        except ValueError as error:
+            raise InputError(str(error)) from error
+        self._readable: dict[str, bool] = {}
+
+    def __repr__(self) -> str:
+        names = dict.fromkeys(actuator.name for actuator in self.actuators)
+        runs = f"{len(self)} runs, " if self.many else ""
+        return f"<Session {', '.join(names)}, {self.fidelity}: {runs}at {self.time:.6g} s>"
+
+    def __len__(self) -> int:
+        return len(self.actuators)
+
+    @property
+    def time(self) -> float:
+        """Time in s since the start."""
+        return float(self._core.steps * self.step)
+
+    @property
+    def status(self) -> str | list[str]:
+        """`ok`, `tripped` or `diverged`; of many lanes a list. A diverged lane stands still."""
+        status = [self._core.status(run)[0] for run in range(len(self))]
+        return status if self.many else str(status[0])
+
+    @property
+    def messages(self) -> list[str]:
+        """What there is to say of each lane's status; empty where it is `ok`."""
+        return [self._core.status(run)[1] for run in range(len(self))]
+
+    def state_of(self, run: int) -> tuple[str, str]:
+        """Return status and message of one lane."""
+        status, message = self._core.status(run)
+        return status, message
+
+    def unit(self, port: str, run: int = 0) -> str:
+        """Return the SI unit of an input; that of the command goes with its mode."""
+        if port not in self._units[run]:
+            raise unknown("input", port, self._units[run], "session")
+        return self._units[run][port]
+
+    @property
+    def names(self) -> list[str]:
+        """The signals that exist."""
+        return list(self._index)
+
+    def advance(self, duration: float | str) -> None:
+        """Step on.
+
+        Parameters
+        ----------
+        duration : float or str
+            s, or with a unit (``"1 ms"``): a whole number of solver steps. What the drive does at
+            the instant reached waits for the next call: a command set now still reaches it.
+
+        Raises
+        ------
+        InputError
+            Not positive, or no whole number of steps.
+        """
+        seconds = parse_quantity(duration, "s", "advance")
+        steps = round(seconds / self.step)
+        if steps < 1 or abs(seconds - steps * self.step) > 1e-6 * self.step * max(steps, 1):
+            below = max(int(seconds / self.step), 1) * self.step
+            raise InputError(
+                f"advance: {seconds:.9g} s is no whole number of solver steps of {self.step:g} s; "
+                f"nearest: {below:.9g} s, {below + self.step:.9g} s"
+            )
+        self._core.advance(steps)
+
+    def read(self, *names: str) -> dict[str, Any]:
+        """Return signals as they stand now, SI: name to a number, or to an array of many lanes.
+
+        Raises
+        ------
+        UnknownNameError
+            No such signal, with the nearest names.
+        InputError
+            A signal that needs equations the session left out.
+        """
+        table = self._core.read([self._place(name) for name in names])
+        if self.many:
+            return {name: table[:, column] for column, name in enumerate(names)}
+        return {name: float(value) for name, value in zip(names, table[0], strict=True)}
+
+    def __getitem__(self, name: str) -> Any:
+        return self.read(name)[name]
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return self.names
+
+    def set(self, **inputs: Value | Mapping[str, Any]) -> None:
+        """Set inputs, held from now on: ``command``, ``supply``, ``user``, ``shaft``, ``brake``...
+
+        Parameters
+        ----------
+        **inputs : float, str, array_like of shape (runs,), or mapping
+            SI, or a text with a unit; a mapping is a waveform of a scenario file, in time from the
+            session's start.
+
+        Raises
+        ------
+        InputError
+            No such input, a unit of another kind, a value that is not a number.
+        """
+        for port, value in inputs.items():
+            self.unit(port)
+            if isinstance(value, Mapping):
+                done = self._set_waveform(port, value)
+            else:
+                given = zip(self._each(value), self._units, strict=True)
+                read = [parse_quantity(each, units[port] or "1", port) for each, units in given]
+                done = self._core.set_values(port, read)
+            if not done:
+                raise InputError(
+                    f"{port}: the equations in use leave this input out; announce it with a "
+                    "scenario that drives it from the start"
+                )
+
+    def _set_waveform(self, port: str, waveform: Mapping[str, Any]) -> bool:
+        term = validated(Term, waveform, Document(port, "", {}))
+        done = [
+            self._core.set_input(run, port, [compile_term(term, units[port], port)])
+            for run, units in enumerate(self._units)
+        ]
+        return all(done)
+
+    def set_parameter(self, path: str, value: Value) -> None:
+        """Give a parameter another value, from now on, beneath the faults that act on it.
+
+        Raises
+        ------
+        UnknownNameError, UnitError, RangeError
+            The message names the path, the value, the limit, the nearest paths.
+        InputError
+            A value no run may have with the others, or one that needs equations that the session
+            left out (see `tunable`).
+        """
+        record = record_of(self.wiring, path)
+        changed = list(self.actuators)
+        for run, given in enumerate(self._each(value)):
+            changed[run] = self.actuators[run].with_values({path: given}, source="set in a session")
+            number = record.number(changed[run].parameters[path].value)
+            done = self._checked(self._core.set_parameter, run, path, number)
+            if not done:
+                raise InputError(
+                    f"{path}: the equations in use leave it out; announce it: Session(..., "
+                    f"tunable=[{path!r}])"
+                )
+            self.actuators = tuple(changed)
+
+    def set_fault(self, name: str, severity: Value, **attributes: float | str) -> None:
+        """Set the severity of a fault, from now on; 0 clears it.
+
+        Parameters
+        ----------
+        name : str
+            ``KIND@PLACE``, such as ``"short@motor.phase_a"``.
+        severity : float, str or array_like of shape (runs,)
+            In the catalogue's unit, or with a unit.
+        **attributes : float or str
+            As in a scenario.
+
+        Raises
+        ------
+        InputError
+            No such fault, out of range, or one that needs equations the session left out.
+        """
+        kind, _, place = name.partition("@")
+        for run, given in enumerate(self._each(severity)):
+            table = {"kind": kind, "place": place, "severity": given, **attributes}
+            fault = Fault.from_dict(table, name).resolved(self.wiring, self.fidelity, name)
+            places = self._faults[run]
+            if not self._checked(self._core.set_fault, run, places.get(name, len(places)), fault):
+                raise InputError(
+                    f"{name}: the equations in use leave it out; announce it: Session(..., "
+                    f"faults=[{name!r}])"
+                )
+            places.setdefault(name, len(places))
+
+    def run(
+        self,
+        duration: float | str,
+        controller: Callable[[Session], Any] | None = None,
+        *,
+        period: float | str = "1 ms",
+        record: Iterable[str] = ("command", "user_position"),
+        progress: Progress | None = None,
+    ) -> list[Recording]:
+        """Run on, calling an own controller at each tick of `period`; see `run_loop`."""
+        from elevon.session.loop import run_loop
+
+        return run_loop(self, duration, controller, period=period, record=record, progress=progress)
+
+    def save(self) -> SessionState:
+        """Return the state as it is now; the session goes on without touching it."""
+        return SessionState(
+            self._core.copy(), self.actuators, tuple(dict(item) for item in self._faults)
+        )
+
+    def restore(self, state: SessionState) -> None:
+        """Go back (or forth) to a state that this session, or one made alike, saved."""
+        if not isinstance(state, SessionState):
+            raise ArgumentTypeError(f"state: a {type(state).__name__} is no SessionState")
+        wirings = {actuator.wiring for actuator in state.actuators}
+        if wirings != {self.wiring} or len(state.actuators) != len(self):
+            raise InputError("state: it was saved by a session of another wiring or number of runs")
+        self._core = state.core.copy()
+        self.actuators = state.actuators
+        self._faults = tuple(dict(item) for item in state.faults)
+
+    def _each(self, value: Value) -> list[float | str]:
+        """Return one value a run."""
+        if isinstance(value, (int, float, str, np.floating, np.integer)):
+            return [value if isinstance(value, str) else float(value)] * len(self)
+        values = np.asarray(value, dtype=np.float64)
+        if values.shape != (len(self),):
+            raise InputError(f"{values.shape} values for {len(self)} runs; one, or one a run")
+        return [float(item) for item in values]
+
+    def _checked(self, call: Any, *arguments: Any) -> bool:
+        try:
+            return bool(call(*arguments))
+        except ValueError as error:
+            raise InputError(str(error)) from error
+
+    def _known(self, name: str) -> str:
+        if name not in self._index:
+            raise unknown("signal", name, self._index, "session")
+        return name
+
+    def _place(self, name: str) -> int:
+        index = self._index[self._known(name)]
+        if name not in self._readable:
+            self._readable[name] = self._core.carries([name])
+        if not self._readable[name]:
+            raise InputError(
+                f"{name}: the equations in use leave it out; announce it: Session(..., "
+                f"signals=[{name!r}])"
+            )
+        return index
+
+    def _tunable(self, paths: Iterable[str]) -> list[str]:
+        return [record_of(self.wiring, path).path for path in paths]
+
+    def _moved(self, faults: Iterable[str]) -> list[str]:
+        moved: list[str] = []
+        for name in faults:
+            kind, _, place = name.partition("@")
+            moved += find_record(kind, place, self.wiring).targets[place]
+        return moved
+
+
+_POSITION = "user_position"
+
+
+def _runs(
+    given: ActuatorLike | Sequence[Run], scenario: ScenarioLike, mode: str | None, seed: int
+) -> list[Run]:
+    if isinstance(given, (Actuator, str, os.PathLike)):
+        actuator = as_actuator(given)
+        if scenario is None:
+            command = {} if mode is None else {"mode": mode}
+            scenario = {"duration": 1, "command": command}
+        elif mode is not None:
+            raise InputError(f"mode = {mode!r}: a scenario has its own (command.mode)")
+        return [Run(actuator, scenario, seed)]
+    if scenario is not None or mode is not None:
+        raise InputError("runs have scenarios and modes of their own")
+    runs: list[Any] = list(given)
+    kinds = [type(run).__name__ for run in runs if not isinstance(run, Run)]
+    if kinds or not runs:
+        raise ArgumentTypeError(
+            f"{f'a {kinds[0]}' if kinds else 'an empty list'} is no run; expected an actuator, or "
+            "a sequence of elevon.Run"
+        )
+    return runs
+
+
+def _placed(scenario: Scenario) -> dict[str, int]:
+    return {f"{fault.kind}@{fault.place}": i for i, fault in enumerate(scenario.fault)}
