@@ -96,6 +96,22 @@ def test_example(tmp_path):
     assert (tmp_path / "run.parquet").is_file()
 
 
+@pytest.mark.parametrize("page", ["docs/sessions.md"])
+def test_examples_of_a_page(page, tmp_path):
+    """The Python of a page, block by block, in one process: as a reader would paste it."""
+    blocks = _blocks(page, "python")
+    assert blocks
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", "\n".join(blocks)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout
+
+
 @pytest.mark.parametrize("page", PAGES)
 def test_links_and_pictures_are_there(page):
     text = (ROOT / page).read_text("utf-8")
