@@ -95,48 +95,94 @@ impl Carrier {
     /// winding is exact over a part, the controllers act at their ticks, the duties after their delay. The speed
     /// controller's integral action is slow against all this and left out.
     pub fn stable(&self, speed: &SpeedLoop) -> bool {
-        let part = self.sample / PARTS as f64;
-        let ticks = ((speed.tick / part).round() as usize).max(1);
-        let tick = ticks as f64 * part;
-        let decay = -libm::expm1(-speed.filter * tick / speed.derivative_time);
-        let derivative = speed.gain * speed.derivative_time / tick * decay;
-        let fade = libm::exp(-self.resistance * part / self.inductance);
-        let volt = -libm::expm1(-self.resistance * part / self.inductance) / self.resistance;
-        let update = (self.delay * PARTS as f64).round() as usize % PARTS;
-        let late = self.delay * PARTS as f64 >= 0.5;
-        let (mut torque, mut omega) = (0.0, 1.0);
-        let (mut slow, mut reference) = (0.0, 0.0);
-        let (mut sum, mut computed, mut acting) = (0.0, 0.0, 0.0);
+        let mut linear = LinearLoop::disturbed(self, speed);
         let mut largest = [0.0_f64; 3];
         for k in 0..PARTS * SAMPLES {
-            if k % ticks == 0 {
-                let error = -omega;
-                let difference = error - slow;
-                reference = speed.gain * error + derivative * difference;
-                slow += decay * difference;
-            }
-            if late && k % PARTS == update {
-                acting = computed;
-            }
-            if k % PARTS == 0 {
-                let error = reference - torque;
-                computed = self.proportional * error + sum;
-                sum += self.integral * self.sample * error;
-            }
-            if !late {
-                acting = computed;
-            }
-            // The current in the unit of its torque.
-            let after = fade * torque + volt * acting;
-            omega += part / speed.inertia * 0.5 * (torque + after);
-            torque = after;
-            if !torque.is_finite() {
+            linear.step(k);
+            if !linear.torque.is_finite() {
                 return false;
             }
             let third = &mut largest[3 * k / (PARTS * SAMPLES)];
-            *third = third.max(torque.abs());
+            *third = third.max(linear.torque.abs());
         }
         largest[2] < largest[1]
+    }
+}
+
+/// Speed and current loop in parts of a current sample; the current in the unit of its torque.
+struct LinearLoop<'a> {
+    carrier: &'a Carrier,
+    speed: &'a SpeedLoop,
+    /// Length of a part, s, and parts between the ticks of the speed controller.
+    part: f64,
+    ticks: usize,
+    /// The derivative: its gain, and how much of its filter's rest decays in a tick.
+    derivative: f64,
+    decay: f64,
+    /// The winding over a part: share of the current that is left, current per volt.
+    fade: f64,
+    volt: f64,
+    /// Part of a sample in which the duties are renewed, if not at once.
+    update: Option<usize>,
+    torque: f64,
+    omega: f64,
+    filtered: f64,
+    reference: f64,
+    sum: f64,
+    computed: f64,
+    acting: f64,
+}
+
+impl<'a> LinearLoop<'a> {
+    /// At rest but for a speed of one.
+    fn disturbed(carrier: &'a Carrier, speed: &'a SpeedLoop) -> Self {
+        let part = carrier.sample / PARTS as f64;
+        let ticks = ((speed.tick / part).round() as usize).max(1);
+        let tick = ticks as f64 * part;
+        let decay = -libm::expm1(-speed.filter * tick / speed.derivative_time);
+        let turn = -carrier.resistance * part / carrier.inductance;
+        let delay = carrier.delay * PARTS as f64;
+        Self {
+            carrier,
+            speed,
+            part,
+            ticks,
+            derivative: speed.gain * speed.derivative_time / tick * decay,
+            decay,
+            fade: libm::exp(turn),
+            volt: -libm::expm1(turn) / carrier.resistance,
+            update: (delay >= 0.5).then_some(delay.round() as usize % PARTS),
+            torque: 0.0,
+            omega: 1.0,
+            filtered: 0.0,
+            reference: 0.0,
+            sum: 0.0,
+            computed: 0.0,
+            acting: 0.0,
+        }
+    }
+
+    fn step(&mut self, k: usize) {
+        if k.is_multiple_of(self.ticks) {
+            let error = -self.omega;
+            let difference = error - self.filtered;
+            self.reference = self.speed.gain * error + self.derivative * difference;
+            self.filtered += self.decay * difference;
+        }
+        if self.update == Some(k % PARTS) {
+            self.acting = self.computed;
+        }
+        if k.is_multiple_of(PARTS) {
+            let error = self.reference - self.torque;
+            self.computed = self.carrier.proportional * error + self.sum;
+            self.sum += self.carrier.integral * self.carrier.sample * error;
+        }
+        if self.update.is_none() {
+            self.acting = self.computed;
+        }
+        let after = self.fade * self.torque + self.volt * self.acting;
+        self.omega += self.part / self.speed.inertia * 0.5 * (self.torque + after);
+        self.torque = after;
     }
 }
 

@@ -93,7 +93,7 @@ impl MotorStructure {
         }
     }
 
-    /// An unbalanced rotor leans into the gap.
+    /// An unbalanced rotor turns eccentrically.
     pub fn with_unbalance(self, unbalance: bool) -> Self {
         Self { dynamic_eccentricity: self.dynamic_eccentricity || unbalance, ..self }
     }
@@ -193,7 +193,7 @@ impl<S: Scalar> Star<S> {
     }
 
     /// Adds a dynamic eccentricity.
-    pub fn lean(&mut self, (eccentricity, phase): (S, S)) {
+    pub fn add_eccentricity(&mut self, (eccentricity, phase): (S, S)) {
         let (sin, cos) = phase.sin_cos();
         self.dynamic_cos = self.dynamic_cos + eccentricity * cos;
         self.dynamic_sin = self.dynamic_sin + eccentricity * sin;

@@ -26,7 +26,7 @@ pub struct Unbalance<S> {
     pub inertia: S,
     weight: S,
     /// Mass times eccentricity.
-    moment: S,
+    mass_eccentricity: S,
     phase: S,
     gap_share: S,
 }
@@ -38,7 +38,7 @@ impl<S: Scalar> Unbalance<S> {
         let (_, level) = g(P::ShaftTilt).sin_cos();
         Self {
             inertia: g(P::UnbalanceInertia),
-            moment: g(P::UnbalanceInertia) * g(P::UnbalanceRadius),
+            mass_eccentricity: g(P::UnbalanceInertia) * g(P::UnbalanceRadius),
             weight: g(P::UnbalanceInertia) * g(P::UnbalanceRadius) * S::splat(GRAVITY) * level,
             phase: g(P::UnbalancePhase),
             gap_share: g(P::UnbalanceGapShare),
@@ -60,7 +60,7 @@ impl<S: Scalar> Unbalance<S> {
     #[inline(always)]
     pub fn force(&self, angle: S, speed: S) -> S {
         let (_, cos) = (angle + self.phase).sin_cos();
-        self.moment * speed * speed * cos
+        self.mass_eccentricity * speed * speed * cos
     }
 
     /// Dynamic eccentricity and its phase, for a shaft whose whole inertia, the excess included, is `total`.

@@ -159,6 +159,12 @@ pub trait Scalar:
 /// 1.5 * 2^52: adding it rounds to an integer, which then stands in the low bits.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
+/// Runs a kernel as a function of its own, with its instruction set: for large code that is wanted in several places.
+#[inline(never)]
+pub(crate) fn apart<S: Scalar, K: Kernel>(kernel: K) -> K::Output {
+    S::vectorize(kernel)
+}
+
 /// Has this processor a fused multiply-add for single numbers, in the instruction sets that are used here?
 #[inline(always)]
 pub fn fused() -> bool {

@@ -34,7 +34,8 @@ pub struct Lever<S> {
     /// 1 / (D g)^2.
     per_product: S,
     product: S,
-    lean: S,
+    /// Of the line between the pivots.
+    inclination: S,
 }
 
 /// The lever at one ram position.
@@ -60,7 +61,7 @@ impl<S: Scalar> Lever<S> {
             half: S::splat(0.5) / product,
             per_product: S::one() / (product * product),
             product,
-            lean: S::atan2_right(y, x.maximum(S::splat(1e-12))),
+            inclination: S::atan2_right(y, x.maximum(S::splat(1e-12))),
         }
     }
 
@@ -85,7 +86,7 @@ impl<S: Scalar> Lever<S> {
     pub fn angle(&self, ram: S) -> S {
         let cos = self.cosine(self.retracted + ram);
         let sine = (S::one() - cos * cos).sqrt();
-        S::splat(std::f64::consts::FRAC_PI_2) - S::atan2_right(cos, sine) - self.lean
+        S::splat(std::f64::consts::FRAC_PI_2) - S::atan2_right(cos, sine) - self.inclination
     }
 }
 

@@ -5,6 +5,7 @@
 //! to that coefficient, and the efficiencies follow. With nothing added the set's own numbers are used unchanged.
 
 use crate::scalar::Scalar;
+use crate::three;
 use crate::variable::Own;
 use crate::variables;
 use std::f64::consts::{PI, TAU};
@@ -120,6 +121,24 @@ fn coefficients<S: Scalar>(t: S, eta: S, aiding: S) -> [S; 2] {
     [(one - eta) * t / (eta + t * t), (one - aiding) * t / (one + aiding * t * t)]
 }
 
+/// Spalls of groove, nut and ball: passes a turn of the fast shaft by the bearing's kinematics, width against the ball
+/// spacing, depth of the chord that a ball sinks into them.
+fn defects<S: Scalar>(raw: &[S], cos: S, spacing: S, gear: S) -> [Defect<S>; 3] {
+    use ScrewParameter as P;
+    let g = |p: P| raw[p as usize];
+    let (zero, one) = (S::zero(), S::one());
+    let spalls = [P::SpallGroove, P::SpallNut, P::SpallBall].map(g);
+    let gamma = g(P::BallDiameter) * cos / g(P::PitchDiameter);
+    let half = S::splat(0.5) * g(P::BallsPerTurn);
+    let passes = [half * (one + gamma), half * (one - gamma), g(P::PitchDiameter) / g(P::BallDiameter) * (one - gamma * gamma)];
+    three!(|i| {
+        let (length, present) = (spalls[i], zero.lt(spalls[i]));
+        let chord = length * length / (S::splat(4.0) * g(P::BallDiameter));
+        let per_width = spacing / (S::splat(PI) * S::select(present, length, spacing));
+        Defect { passes: passes[i] / gear, per_width, drop: chord.minimum(g(P::SpallDepth)) }
+    })
+}
+
 impl<S: Scalar> Screw<S> {
     /// No screw: nothing is lost in it.
     pub fn none() -> Self {
@@ -165,7 +184,7 @@ impl<S: Scalar> Screw<S> {
         let (sin, cos) = g(P::ContactAngle).sin_cos();
         let spacing = S::splat(PI) * g(P::PitchDiameter) / (g(P::BallsPerTurn) * level);
         let (balls, mu) = (g(P::BallsPerTurn) * g(P::Circuits), coefficients(slope, g(P::Efficiency), g(P::EfficiencyAiding)));
-        let spalls = [g(P::SpallGroove), g(P::SpallNut), g(P::SpallBall)];
+        let spalls = [P::SpallGroove, P::SpallNut, P::SpallBall].map(g);
         let sliding = g(P::BlockedCircuits).floor() / g(P::Circuits) + (spalls[0] + spalls[1] + spalls[2]) / (balls * spacing);
         let full = S::splat(-FULL_FILM).exp();
         let asperities = ((S::splat(-FULL_FILM) * (one - g(P::LubricantLost))).exp() - full) / (one - full);
@@ -175,15 +194,6 @@ impl<S: Scalar> Screw<S> {
         let (drive, back) = (mu[0] + worn[0], mu[1] + worn[1]);
         let efficiency = S::select(healthy, g(P::Efficiency), (one - drive * slope) / (one + drive / slope));
         let aiding = S::select(healthy, g(P::EfficiencyAiding), (one - back / slope) / (one + back * slope));
-        let gamma = g(P::BallDiameter) * cos / g(P::PitchDiameter);
-        let half = S::splat(0.5) * g(P::BallsPerTurn);
-        let passes = [half * (one + gamma), half * (one - gamma), g(P::PitchDiameter) / g(P::BallDiameter) * (one - gamma * gamma)];
-        let defect = |i: usize| {
-            let (length, present) = (spalls[i], zero.lt(spalls[i]));
-            let chord = length * length / (S::splat(4.0) * g(P::BallDiameter));
-            let per_width = spacing / (S::splat(PI) * S::select(present, length, spacing));
-            Defect { passes: passes[i] / gear, per_width, drop: chord.minimum(g(P::SpallDepth)) }
-        };
         Self {
             efficiency,
             efficiency_aiding: aiding,
@@ -195,7 +205,7 @@ impl<S: Scalar> Screw<S> {
             aiding: one - aiding,
             per_relief: S::select(zero.lt(g(P::Preload)), one / (S::splat(RELIEF) * g(P::Preload)), zero),
             per_balls: one / (balls * sin * level),
-            defects: [defect(0), defect(1), defect(2)],
+            defects: defects(raw, cos, spacing, gear),
             position: g(P::SpallPosition),
             reach: S::splat(0.5) * g(P::NutLength),
         }

@@ -265,32 +265,26 @@ impl<S: Scalar> Constants<S> {
 
     /// All signals but those of currents and phases.
     pub fn observe(&self, structure: &Structure, inputs: &Inputs<S>, s: &Body<S>, torque: S, t: S, out: &mut [S]) {
-        let mut set = |q: Q, x: S| out[q as usize] = x;
-        let m = &self.mechanics;
-        let user = inputs[USER].at(t);
-        let unit = |f: &dyn Fn(&Unit) -> f64| S::from_fn(|lane| f(&s.units[lane]));
-        let flag = |f: &dyn Fn(&Unit) -> bool| S::from_fn(|lane| f64::from(u8::from(f(&s.units[lane]))));
         // A repeated command differs by the number of commands.
         let command = inputs[COMMAND].at(t);
         let number = S::splat(COMMANDS.len() as f64);
-        set(Q::Command, S::select(number.le(command), command - number, command));
-        set(Q::State, unit(&|u| f64::from(u.sequence.phase as u8)));
-        set(Q::CommandRefused, unit(&|u| f64::from(u.sequence.refused)));
-        set(Q::FaultCode, unit(&|u| f64::from(u.sequence.fault)));
-        set(Q::WarningCode, unit(&|u| f64::from(u.sequence.warning)));
-        set(Q::SpeedRef, unit(&|u| u.speed.reference));
-        set(Q::SpeedMeas, unit(&|u| u.speed_meas));
-        set(Q::Proximity0, flag(&|u| u.switches.shown[0]));
-        set(Q::Proximity25, flag(&|u| u.switches.shown[1]));
-        set(Q::Proximity75, flag(&|u| u.switches.shown[2]));
-        set(Q::Proximity100, flag(&|u| u.switches.shown[3]));
-        set(Q::MotorPosition, s.motion.motor_position);
-        set(Q::MotorSpeed, s.motion.motor_speed);
-        set(Q::NutPosition, s.motion.nut_position);
-        let ram = m.ram(&s.motion, user);
-        set(Q::UserPosition, ram);
-        let moving = S::splat(0.5).lt(s.motion.carrying);
-        set(Q::UserSpeed, S::select(moving, s.motion.nut_speed, S::zero()));
+        out[Q::Command as usize] = S::select(number.le(command), command - number, command);
+        out[Q::MotorTorque as usize] = torque;
+        s.show_units(out);
+        self.show_electric(s, out);
+        self.show_motion(structure, s, inputs[USER].at(t), out);
+        for (i, x) in s.energy.iter().enumerate() {
+            out[Q::EnergySupply as usize + i] = *x;
+        }
+        for (i, x) in s.motion.energy.iter().enumerate() {
+            out[Q::EnergyMotor as usize + i] = *x;
+        }
+        out[Q::EnergyKinetic as usize] = self.mechanics.kinetic_energy(&s.motion, s.released);
+        out[Q::EnergyCapacitor as usize] = S::splat(0.5) * self.supply.capacitance * s.link * s.link;
+    }
+
+    fn show_electric(&self, s: &Body<S>, out: &mut [S]) {
+        let mut set = |q: Q, x: S| out[q as usize] = x;
         set(Q::VoltageRef, s.demand);
         set(Q::Duty, self.duty(s));
         set(Q::CurrentBus, s.bus);
@@ -301,11 +295,25 @@ impl<S: Scalar> Constants<S> {
         set(Q::HallA, s.hall.code[0]);
         set(Q::HallB, s.hall.code[1]);
         set(Q::HallC, s.hall.code[2]);
-        set(Q::MotorTorque, torque);
+        set(Q::WindingTemperature, self.temperature);
+        set(Q::SoftwareBrake, s.short);
+        set(Q::LoadCell, s.motion.rig_force + s.cell_noise);
+    }
+
+    /// Motor, nut, ram and lever under the force `user` on the ram.
+    fn show_motion(&self, structure: &Structure, s: &Body<S>, user: S, out: &mut [S]) {
+        let mut set = |q: Q, x: S| out[q as usize] = x;
+        let m = &self.mechanics;
+        set(Q::MotorPosition, s.motion.motor_position);
+        set(Q::MotorSpeed, s.motion.motor_speed);
+        set(Q::NutPosition, s.motion.nut_position);
+        let ram = m.ram(&s.motion, user);
+        set(Q::UserPosition, ram);
+        let moving = S::splat(0.5).lt(s.motion.carrying);
+        set(Q::UserSpeed, S::select(moving, s.motion.nut_speed, S::zero()));
         set(Q::DetentTorque, m.detent_torque(s.motion.motor_position));
         set(Q::BrakeTorque, m.brake_torque(s.brake_free));
         set(Q::BrakeReleased, m.brake_open(s.brake_free));
-        set(Q::SoftwareBrake, s.short);
         let forces = m.forces(&s.motion, user, structure.rig);
         set(Q::FrictionForce, m.friction_force(&s.motion, s.released));
         let locked = S::splat(0.5).lt(s.motion.locked);
@@ -318,16 +326,6 @@ impl<S: Scalar> Constants<S> {
         set(Q::LeverAngle, swing);
         set(Q::LeverArm, S::one() / forces.arm.per_square.sqrt());
         set(Q::Inertia, m.inertia(&s.motion, &forces.arm));
-        set(Q::LoadCell, s.motion.rig_force + s.cell_noise);
-        set(Q::WindingTemperature, self.temperature);
-        for (i, x) in s.energy.iter().enumerate() {
-            out[Q::EnergySupply as usize + i] = *x;
-        }
-        for (i, x) in s.motion.energy.iter().enumerate() {
-            out[Q::EnergyMotor as usize + i] = *x;
-        }
-        out[Q::EnergyKinetic as usize] = m.kinetic_energy(&s.motion, s.released);
-        out[Q::EnergyCapacitor as usize] = S::splat(0.5) * self.supply.capacitance * s.link * s.link;
     }
 
     #[inline(always)]
@@ -346,6 +344,23 @@ impl<S: Scalar> Body<S> {
         self.brake_free = flag(&|u| u.coil.free);
         self.short = flag(&|u| u.short);
         self.released = self.released.maximum(flag(&|u| u.sequence.released) * cable);
+    }
+
+    /// What the control units show.
+    fn show_units(&self, out: &mut [S]) {
+        let mut set = |q: Q, x: S| out[q as usize] = x;
+        let unit = |f: &dyn Fn(&Unit) -> f64| S::from_fn(|lane| f(&self.units[lane]));
+        let flag = |f: &dyn Fn(&Unit) -> bool| S::from_fn(|lane| f64::from(u8::from(f(&self.units[lane]))));
+        set(Q::State, unit(&|u| f64::from(u.sequence.phase as u8)));
+        set(Q::CommandRefused, unit(&|u| f64::from(u.sequence.refused)));
+        set(Q::FaultCode, unit(&|u| f64::from(u.sequence.fault)));
+        set(Q::WarningCode, unit(&|u| f64::from(u.sequence.warning)));
+        set(Q::SpeedRef, unit(&|u| u.speed.reference));
+        set(Q::SpeedMeas, unit(&|u| u.speed_meas));
+        set(Q::Proximity0, flag(&|u| u.switches.shown[0]));
+        set(Q::Proximity25, flag(&|u| u.switches.shown[1]));
+        set(Q::Proximity75, flag(&|u| u.switches.shown[2]));
+        set(Q::Proximity100, flag(&|u| u.switches.shown[3]));
     }
 
     /// Positive where something went otherwise than commanded.

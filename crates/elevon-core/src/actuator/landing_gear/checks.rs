@@ -76,36 +76,7 @@ fn tables(out: &mut Vec<Finding>, raw: &[f64]) {
 fn common(out: &mut Vec<Finding>, raw: &[f64]) {
     lever(out, raw);
     tables(out, raw);
-    ordered(
-        out,
-        raw,
-        (Screw::EfficiencyLoaded.at(), "screw.efficiency_loaded"),
-        (Screw::EfficiencyUnloaded.at(), "screw.efficiency_unloaded"),
-        true,
-        "",
-    );
-    ordered(out, raw, (Lock::ReleaseTravel.at(), "lock.release_travel"), (Lock::EngageTravel.at(), "lock.engage_travel"), false, "m");
-    ordered(out, raw, (Lock::EngageTravel.at(), "lock.engage_travel"), (Lock::Travel.at(), "lock.travel"), false, "m");
-    ordered(out, raw, (Lock::BlockTravel.at(), "lock.block_travel"), (Lock::EngageTravel.at(), "lock.engage_travel"), false, "m");
-    ordered(
-        out,
-        raw,
-        (Proximity::Position0.at(), "proximity.position_0"),
-        (Proximity::Position25.at(), "proximity.position_25"),
-        false,
-        "m",
-    );
-    ordered(
-        out,
-        raw,
-        (Proximity::Position25.at(), "proximity.position_25"),
-        (Proximity::Position75.at(), "proximity.position_75"),
-        false,
-        "m",
-    );
-    ordered(out, raw, (Proximity::Position75.at(), "proximity.position_75"), (LeverParameter::Stroke.at(), "lever.stroke"), false, "m");
-    ordered(out, raw, (Sequence::SpeedLow.at(), "control.speed_low"), (Sequence::SpeedHigh.at(), "control.speed_high"), true, "rad/s");
-    ordered(out, raw, (Sequence::SpeedHigh.at(), "control.speed_high"), (Sequence::Overspeed.at(), "control.overspeed"), false, "rad/s");
+    ways(out, raw);
     let (v, low, high) = (raw[Inverter::SupplyVoltage.at()], raw[Sequence::Undervoltage.at()], raw[Sequence::Overvoltage.at()]);
     if !(low..=high).contains(&v) {
         let limit = if v < low { low } else { high };
@@ -118,6 +89,33 @@ fn common(out: &mut Vec<Finding>, raw: &[f64]) {
             0.0,
             "motor.short_model: this actuator has the reduced model of shorted turns only".into(),
         ));
+    }
+}
+
+/// What must stand in one order: efficiencies, travels, switches along the stroke, speeds.
+fn ways(out: &mut Vec<Finding>, raw: &[f64]) {
+    let (loaded, unloaded) =
+        ((Screw::EfficiencyLoaded.at(), "screw.efficiency_loaded"), (Screw::EfficiencyUnloaded.at(), "screw.efficiency_unloaded"));
+    let (release, engage) = ((Lock::ReleaseTravel.at(), "lock.release_travel"), (Lock::EngageTravel.at(), "lock.engage_travel"));
+    let (travel, block) = ((Lock::Travel.at(), "lock.travel"), (Lock::BlockTravel.at(), "lock.block_travel"));
+    let first = (Proximity::Position0.at(), "proximity.position_0");
+    let second = (Proximity::Position25.at(), "proximity.position_25");
+    let third = (Proximity::Position75.at(), "proximity.position_75");
+    let stroke = (LeverParameter::Stroke.at(), "lever.stroke");
+    let (slow, fast) = ((Sequence::SpeedLow.at(), "control.speed_low"), (Sequence::SpeedHigh.at(), "control.speed_high"));
+    let over = (Sequence::Overspeed.at(), "control.overspeed");
+    for (low, high, equal, unit) in [
+        (loaded, unloaded, true, ""),
+        (release, engage, false, "m"),
+        (engage, travel, false, "m"),
+        (block, engage, false, "m"),
+        (first, second, false, "m"),
+        (second, third, false, "m"),
+        (third, stroke, false, "m"),
+        (slow, fast, true, "rad/s"),
+        (fast, over, false, "rad/s"),
+    ] {
+        ordered(out, raw, low, high, equal, unit);
     }
 }
 

@@ -6,7 +6,7 @@ use super::signals::{Quantity as Q, ALL};
 use crate::actuator::{Finding, Inputs, Port, Setup, Signals, Tick, Watch, Wiring, WATCHED};
 use crate::control::pi_rate::PiRateParameter;
 use crate::fault::FaultKind;
-use crate::inverter::bridge::{quench, Bridge, BridgeState, BridgeStructure, InverterParameter, Windings};
+use crate::inverter::bridge::{extinguish, Bridge, BridgeState, BridgeStructure, InverterParameter, Windings};
 use crate::inverter::six_step::{self, SixStepParameter};
 use crate::scalar::Scalar;
 use crate::three;
@@ -80,7 +80,7 @@ fn part<S: Scalar>(
         let slope = (terminal[j] - neutral - emf[j] - resistance[j] * i[j]) * m.c.star.per_inductance[j];
         dt.fma(slope, i[j])
     });
-    let current = quench(&state, i, free);
+    let current = extinguish(&state, i, free);
     // A phase that stopped conducting within the part conducted for a share of it.
     let tiny = S::splat(1e-30);
     let middle: [S; 3] = three!(|j| {

@@ -235,28 +235,16 @@ impl<S: Scalar> Bridge<S> {
         dt: S,
     ) -> Connection<S> {
         let current = w.currents();
-        let half = S::splat(0.5);
         let (mut gates, off) = self.gates(s, old, new, dt);
         if structure.switch_faults {
-            gates = three!(|j| [
-                (gates[j][0] & self.open[j][0].lt(half)) | half.le(self.shorted[j][0]),
-                (gates[j][1] & self.open[j][1].lt(half)) | half.le(self.shorted[j][1]),
-            ]);
+            gates = self.broken(gates);
         }
         if structure.trips {
             for j in 0..3 {
                 self.watch(s, gates[j][0] & gates[j][1], current[j]);
             }
         }
-        let mut legs = Legs {
-            voltage: three!(|j| {
-                let rail = S::select(gates[j][0], half_supply, -half_supply);
-                (-self.on_resistance).fma(current[j], rail)
-            }),
-            rail: three!(|j| S::select(gates[j][0], half_supply, -half_supply)),
-            connected: [S::mask(true); 3],
-            passive: three!(|j| !(gates[j][0] | gates[j][1])),
-        };
+        let mut legs = self.held(gates, half_supply, current);
         if let Some(off) = off {
             self.blank(&mut legs, off, half_supply, current);
         }
@@ -266,6 +254,28 @@ impl<S: Scalar> Bridge<S> {
         }
         let neutral = self.release(&mut legs, half_supply, w);
         Connection { legs, loose: Some(neutral) }
+    }
+
+    /// What the switches do, some of which stay open or closed.
+    #[inline(always)]
+    fn broken(&self, gates: [[S::Mask; 2]; 3]) -> [[S::Mask; 2]; 3] {
+        let half = S::splat(0.5);
+        three!(|j| [
+            (gates[j][0] & self.open[j][0].lt(half)) | half.le(self.shorted[j][0]),
+            (gates[j][1] & self.open[j][1].lt(half)) | half.le(self.shorted[j][1]),
+        ])
+    }
+
+    /// Every leg at the rail of its switch that conducts.
+    #[inline(always)]
+    fn held(&self, gates: [[S::Mask; 2]; 3], half_supply: S, current: [S; 3]) -> Legs<S> {
+        let rail = three!(|j| S::select(gates[j][0], half_supply, -half_supply));
+        Legs {
+            voltage: three!(|j| (-self.on_resistance).fma(current[j], rail[j])),
+            rail,
+            connected: [S::mask(true); 3],
+            passive: three!(|j| !(gates[j][0] | gates[j][1])),
+        }
     }
 
     /// Legs that no switch holds, or whose phase is interrupted: diodes by the current's sign, floating at zero.
@@ -364,7 +374,7 @@ impl<S: Scalar> BridgeState<S> {
 /// A passive leg's current stops at zero; what is left over is taken from the phases that still carry, so that the
 /// star's currents keep summing to zero.
 #[inline(always)]
-pub fn quench<S: Scalar>(legs: &Legs<S>, old: [S; 3], new: [S; 3]) -> [S; 3] {
+pub fn extinguish<S: Scalar>(legs: &Legs<S>, old: [S; 3], new: [S; 3]) -> [S; 3] {
     let zero = S::zero();
     let mut current = new;
     let mut carrying = [zero; 3];

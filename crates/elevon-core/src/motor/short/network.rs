@@ -269,39 +269,24 @@ impl<'a, S: Scalar> Network<'a, S> {
         factor: S,
     ) -> Account<S> {
         let half = S::splat(0.5);
-        let dt = self.shorts.dt;
-        let phase: [S; 3] = three!(|j| v[j] - neutral);
         let mut through = *before;
         self.move_on(&self.discrete.mean, v, neutral, &mut through);
         let conducts = self.discrete.per;
         let change = (new[0] - old[0]) + (new[1] - old[1]) + (new[2] - old[2]);
         let per = S::one() / (conducts[0] + conducts[1] + conducts[2]);
+        let step = Step { phase: three!(|j| v[j] - neutral), neutral, factor, change, per };
         let mut out = Account { legs: old, ground: S::zero(), copper: S::zero(), loops: S::zero(), contact: S::zero(), tap: S::zero() };
         let mut excess = S::zero();
         for kind in 0..KINDS {
             if self.structure[kind] {
                 for j in 0..3 {
-                    let (c, was, mean) = (after[kind][j], before[kind][j], through[kind][j]);
-                    let x = self.shorts.contact[kind][j];
-                    let imposed = loose(x.ratio, kind) * (half * (was + c) - mean);
-                    excess = excess + imposed;
-                    let given = dt * (self.drive(kind, j, phase, neutral) * mean + imposed * per * change);
-                    let heat = given - half * x.inductance * (c * c - was * was);
-                    let contact = heat * (x.base / (x.base + x.slope * factor));
-                    if kind == TAPPED {
-                        out.tap = out.tap + heat;
-                    } else {
-                        out.contact = out.contact + contact;
-                        out.copper = out.copper + (heat - contact);
-                    }
-                    if kind == GROUND {
-                        out.ground = out.ground + mean;
-                    }
+                    excess = excess + self.heat(kind, j, [before[kind][j], after[kind][j], through[kind][j]], &step, &mut out);
                 }
             }
         }
         let middle: [S; 3] = three!(|j| half * (old[j] + new[j]) + conducts[j] * (per * excess));
         out.legs = self.shorts.legs(&self.structure, middle, &through);
+        let dt = self.shorts.dt;
         let copper = three!(|j| dt * resistance[j] * middle[j] * middle[j]);
         out.copper = out.copper + (copper[0] + copper[1] + copper[2]);
         if self.structure[LOOP] {
@@ -313,6 +298,40 @@ impl<'a, S: Scalar> Network<'a, S> {
         }
         out
     }
+
+    /// Heat of one contact whose current goes from `was` to `is` with this mean; the current that it imposes on the
+    /// windings' sum.
+    #[inline(always)]
+    fn heat(&self, kind: usize, j: usize, [was, is, mean]: [S; 3], step: &Step<S>, out: &mut Account<S>) -> S {
+        let (half, dt) = (S::splat(0.5), self.shorts.dt);
+        let x = self.shorts.contact[kind][j];
+        let imposed = loose(x.ratio, kind) * (half * (was + is) - mean);
+        let given = dt * (self.drive(kind, j, step.phase, step.neutral) * mean + imposed * step.per * step.change);
+        let heat = given - half * x.inductance * (is * is - was * was);
+        let contact = heat * (x.base / (x.base + x.slope * step.factor));
+        if kind == TAPPED {
+            out.tap = out.tap + heat;
+        } else {
+            out.contact = out.contact + contact;
+            out.copper = out.copper + (heat - contact);
+        }
+        if kind == GROUND {
+            out.ground = out.ground + mean;
+        }
+        imposed
+    }
+}
+
+/// What a step's heat follows from.
+struct Step<S> {
+    /// Over the neutral.
+    phase: [S; 3],
+    neutral: S,
+    /// Of the copper's resistance.
+    factor: S,
+    /// Of the windings' sum of currents, and what a unit of imposed current takes from each.
+    change: S,
+    per: S,
 }
 
 impl<S: Scalar> Circuit<S> for Network<'_, S> {

@@ -10,7 +10,7 @@ use super::shorted::discrete;
 use super::step::{lose_switching, measured_current};
 use crate::actuator::servo::details::Structure;
 use crate::inverter::hysteresis::{count_transitions, crossing, six_step};
-use crate::scalar::{Kernel, Scalar};
+use crate::scalar::{apart, Kernel, Scalar};
 use crate::sensor::filter::low_pass;
 use crate::three;
 
@@ -53,68 +53,71 @@ pub(crate) struct Located<'a, S: Scalar> {
     pub seen: Seen<S>,
 }
 
-impl<S: Scalar> Located<'_, S> {
-    #[inline(never)]
-    pub(crate) fn step(self) -> ([S; 3], [S; 3]) {
-        S::vectorize(self)
-    }
-}
-
 impl<S: Scalar> Kernel for Located<'_, S> {
     type Output = ([S; 3], [S; 3]);
     #[inline(always)]
     fn run(self) -> Self::Output {
-        let Self { model, structure, state, coupling, half_supply, old_legs, seen } = self;
-        located_step(model, structure, state, coupling, half_supply, old_legs, &seen)
+        let Self { model: m, structure, state: s, coupling, half_supply, old_legs, seen } = self;
+        let circuit = Switched { structure, coupling, half_supply };
+        let before = *s;
+        let whole = circuit.step(m, s, old_legs);
+        let end = error_after(m, structure, s, whole.0, &seen);
+        s.extra.last_reference = s.current_ref;
+        let Some((share, which)) = crossing(m.half_band, s.legs, seen.error, end) else {
+            return whole;
+        };
+        let kept = *s;
+        *s = before;
+        let parts = circuit.step_in_two(m, s, old_legs, share, which);
+        s.star.current = before.star.current;
+        s.extra.last_reference = kept.extra.last_reference;
+        s.extra.contacts = kept.extra.contacts;
+        let split = which[0] | which[1] | which[2];
+        choose(s, split, &kept);
+        (three!(|j| S::select(split, parts.0[j], whole.0[j])), three!(|j| S::select(split, parts.1[j], whole.1[j])))
     }
 }
 
-#[inline(always)]
-fn located_step<S: Scalar>(
-    m: &Model<S>,
-    structure: &Structure,
-    s: &mut State<S>,
-    c: &Coupling<S>,
+/// Windings and bridge, and what feeds them during a step.
+struct Switched<'a, S: Scalar> {
+    structure: &'a Structure,
+    coupling: &'a Coupling<S>,
     half_supply: S,
-    old_legs: [S; 3],
-    x: &Seen<S>,
-) -> ([S; 3], [S; 3]) {
-    let electric =
-        |model: &Model<S>, state: &mut State<S>, old_legs| Detailed { model, structure, state, coupling: c, half_supply, old_legs }.step();
-    let part = |share: S, state: &mut State<S>, old_legs| {
-        let model = m.over(share);
-        if structure.shorted {
-            state.extra.contacts = discrete(&model, &state.star);
-        }
-        electric(&model, state, old_legs)
-    };
-    let before = *s;
-    let whole = electric(m, s, old_legs);
-    let end = error_after(m, structure, s, whole.0, x);
-    s.extra.last_reference = s.current_ref;
-    let Some((share, which)) = crossing(m.half_band, s.legs, x.error, end) else {
-        return whole;
-    };
-    let split = which[0] | which[1] | which[2];
-    let kept = *s;
-    *s = before;
-    let first = part(share, s, old_legs);
-    s.star.current = first.0;
-    let turned = three!(|j| S::select(which[j], -s.legs[j], s.legs[j]));
-    s.transitions = count_transitions(s.transitions, s.legs, turned);
-    if structure.switching {
-        lose_switching(m, s, half_supply + half_supply, s.legs, turned);
+}
+
+impl<S: Scalar> Switched<'_, S> {
+    #[inline(always)]
+    fn step(&self, model: &Model<S>, state: &mut State<S>, old_legs: [S; 3]) -> ([S; 3], [S; 3]) {
+        let Self { structure, coupling, half_supply } = *self;
+        apart::<S, _>(Detailed { model, structure, state, coupling, half_supply, old_legs })
     }
-    let legs = s.legs;
-    s.legs = turned;
-    let rest = S::one() - share;
-    let second = part(rest, s, legs);
-    s.star.current = before.star.current;
-    s.extra.last_reference = kept.extra.last_reference;
-    s.extra.contacts = kept.extra.contacts;
-    choose(s, split, &kept);
-    let mean: [S; 3] = three!(|j| share * first.1[j] + rest * second.1[j]);
-    (three!(|j| S::select(split, second.0[j], whole.0[j])), three!(|j| S::select(split, mean[j], whole.1[j])))
+
+    /// Over a share of the step.
+    #[inline(always)]
+    fn part(&self, m: &Model<S>, s: &mut State<S>, old_legs: [S; 3], share: S) -> ([S; 3], [S; 3]) {
+        let model = m.over(share);
+        if self.structure.shorted {
+            s.extra.contacts = discrete(&model, &s.star);
+        }
+        self.step(&model, s, old_legs)
+    }
+
+    /// Up to the crossing, where the relays of `which` turn, and from there on: currents at the end, mean voltages.
+    #[inline(always)]
+    fn step_in_two(&self, m: &Model<S>, s: &mut State<S>, old_legs: [S; 3], share: S, which: [S::Mask; 3]) -> ([S; 3], [S; 3]) {
+        let first = self.part(m, s, old_legs, share);
+        s.star.current = first.0;
+        let turned = three!(|j| S::select(which[j], -s.legs[j], s.legs[j]));
+        s.transitions = count_transitions(s.transitions, s.legs, turned);
+        if self.structure.switching {
+            lose_switching(m, s, self.half_supply + self.half_supply, s.legs, turned);
+        }
+        let legs = s.legs;
+        s.legs = turned;
+        let rest = S::one() - share;
+        let second = self.part(m, s, legs, rest);
+        (second.0, three!(|j| share * first.1[j] + rest * second.1[j]))
+    }
 }
 
 /// Lanes that were not split keep what the whole step made of them.

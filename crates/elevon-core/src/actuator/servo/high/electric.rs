@@ -3,7 +3,7 @@
 use super::model::*;
 use super::shorted::shorted_step;
 use crate::actuator::servo::details::Structure;
-use crate::inverter::bridge::{quench, Windings};
+use crate::inverter::bridge::{extinguish, Windings};
 use crate::scalar::{three_phase, Kernel, Scalar};
 use crate::three;
 
@@ -106,7 +106,7 @@ pub(crate) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
     if FULL {
         s.voltage = voltage;
         if let Some(legs) = &legs {
-            current = quench(legs, i, current);
+            current = extinguish(legs, i, current);
         }
         if structure.accounts {
             account_electric(m, s, i, current, rail, terminal, resistance);
@@ -127,13 +127,6 @@ pub(crate) struct Detailed<'a, S: Scalar> {
     pub coupling: &'a Coupling<S>,
     pub half_supply: S,
     pub old_legs: [S; 3],
-}
-
-impl<S: Scalar> Detailed<'_, S> {
-    #[inline(never)]
-    pub(crate) fn step(self) -> ([S; 3], [S; 3]) {
-        S::vectorize(self)
-    }
 }
 
 impl<S: Scalar> Kernel for Detailed<'_, S> {

@@ -18,7 +18,7 @@ use crate::actuator::servo::form::Form;
 use crate::actuator::servo::layout::*;
 use crate::actuator::{Finding, Inputs, Overheat, Port, Setup, Signals, Tick, Watch, Wiring, WATCHED};
 use crate::fault::FaultKind;
-use crate::scalar::Scalar;
+use crate::scalar::{apart, Scalar};
 use crate::time::Steps;
 use crate::variable::{Group, Signal};
 use std::marker::PhantomData;
@@ -85,7 +85,7 @@ impl<F: Form> Wiring for High<F> {
         t: S,
         noise: &mut dyn FnMut(u64) -> S,
     ) {
-        tick::Event { kind, structure, model, inputs, state, t, noise }.happen();
+        apart::<S, _>(tick::Event { kind, structure, model, inputs, state, t, noise });
     }
 
     #[inline(always)]
@@ -119,7 +119,7 @@ impl<F: Form> Wiring for High<F> {
         out: &mut [S],
     ) {
         // A row costs what a step does, and there are hundreds of steps to a row.
-        Observation { structure, model, inputs, state, t, linear: F::LINEAR }.write(out);
+        apart::<S, _>(Observation { structure, model, inputs, state, t, linear: F::LINEAR, out });
     }
 
     #[inline(always)]

@@ -113,7 +113,7 @@ impl<S: Scalar> Model<S> {
         let shaft = Shaft::derive::<F>(raw, &structure.shaft, dt);
         let mut star = Star::derive(view.motor(), &structure.motor, dt);
         if structure.shaft.unbalance {
-            star.lean(shaft.unbalance.eccentricity(shaft.whole_inertia));
+            star.add_eccentricity(shaft.unbalance.eccentricity(shaft.whole_inertia));
         }
         Self {
             dt,

@@ -22,30 +22,22 @@ pub(crate) struct Observation<'a, S: Scalar> {
     pub t: S,
     /// With the signals of a screw.
     pub linear: bool,
+    pub out: &'a mut [S],
 }
 
-impl<S: Scalar> Observation<'_, S> {
-    #[inline(never)]
-    pub(crate) fn write(self, out: &mut [S]) {
-        S::vectorize(Write(self, out));
-    }
-}
-
-struct Write<'a, 'b, S: Scalar>(Observation<'a, S>, &'b mut [S]);
-
-impl<S: Scalar> Kernel for Write<'_, '_, S> {
+impl<S: Scalar> Kernel for Observation<'_, S> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        let Observation { structure, model, inputs, state, t, linear } = self.0;
-        states(structure, model, state, self.1);
-        self.1[Q::Command as usize] = inputs[COMMAND].at(t) + state.command_noise;
-        electrical(structure, model, inputs, state, t, self.1);
+        let Self { structure, model, inputs, state, t, linear, out } = self;
+        states(structure, model, state, out);
+        out[Q::Command as usize] = inputs[COMMAND].at(t) + state.command_noise;
+        electrical(structure, model, inputs, state, t, out);
         let x = Instant::at(inputs, t);
-        let shown = mechanical(structure, model, &x, state, self.1);
-        energies(model, structure, state, self.1);
+        let shown = mechanical(structure, model, &x, state, out);
+        energies(model, structure, state, out);
         if linear {
-            screw(structure, model, &x, state, &shown, self.1);
+            screw(structure, model, &x, state, &shown, out);
         }
     }
 }

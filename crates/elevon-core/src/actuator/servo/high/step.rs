@@ -10,7 +10,7 @@ use crate::actuator::servo::details::Structure;
 use crate::actuator::servo::layout::DriveKind;
 use crate::inverter::hysteresis::{count_transitions, relays, six_step, transition};
 use crate::inverter::losses::switching_loss;
-use crate::scalar::{three_phase, Scalar};
+use crate::scalar::{apart, three_phase, Scalar};
 use crate::sensor::filter::low_pass;
 use crate::sensor::resolver::Reading;
 use crate::three;
@@ -172,7 +172,7 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     if EXTRA && structure.located {
         let rate = if structure.sensing.shows() && structure.sensing.commutated { reading.speed } else { s.shaft.motor_speed };
         let seen = Seen { error, sines: sin_phases, cosines: cos_phases, rate };
-        let (i, v) = Located { model: m, structure, state: &mut *s, coupling: &c, half_supply, old_legs, seen }.step();
+        let (i, v) = apart::<S, _>(Located { model: m, structure, state: &mut *s, coupling: &c, half_supply, old_legs, seen });
         (current, voltage) = (three!(|j| i[j]), three!(|j| v[j]));
     } else {
         let (i, v) = electric_step::<S, FULL, EXTRA>(m, structure, s, &c, half_supply, old_legs);

@@ -58,13 +58,6 @@ pub(super) struct Event<'a, S: Scalar> {
     pub noise: &'a mut dyn FnMut(u64) -> S,
 }
 
-impl<S: Scalar> Event<'_, S> {
-    #[inline(never)]
-    pub(super) fn happen(self) {
-        S::vectorize(self);
-    }
-}
-
 impl<S: Scalar> Kernel for Event<'_, S> {
     type Output = ();
     #[inline(always)]

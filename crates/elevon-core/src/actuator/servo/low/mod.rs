@@ -22,7 +22,7 @@ use crate::control::position_speed::ControlParameter;
 use crate::fault::FaultKind;
 use crate::motor::equivalent::LowParameter;
 use crate::motor::thermal::ThermalParameter;
-use crate::scalar::Scalar;
+use crate::scalar::{apart, Scalar};
 use crate::sensor::resolver::ResolverParameter;
 use crate::time::Steps;
 use crate::variable::{Group, Signal};
@@ -152,7 +152,7 @@ impl<F: Form> Wiring for Low<F> {
         asked: Signals,
         out: &mut [S],
     ) {
-        Observation { structure, model, inputs, state, t, asked, linear: F::LINEAR }.write(out);
+        apart::<S, _>(Observation { structure, model, inputs, state, t, asked, linear: F::LINEAR, out });
     }
 
     #[inline(always)]

@@ -217,7 +217,7 @@ impl<S: Scalar> Model<S> {
         // The turns outside the short; those inside are loops of their own.
         let outside = MotorStructure { shorted_loop: false, ..structure.motor };
         let mut star = Star::derive(Raw(raw).motor(), &outside, dt);
-        star.lean(shaft.unbalance.eccentricity(shaft.inertia));
+        star.add_eccentricity(shaft.unbalance.eccentricity(shaft.inertia));
         let circuits = Loops::derive(raw, dt);
         let control = Control::derive(raw, structure, shaft.gear.ratio, dt);
         let constant = S::splat(1.5) * at(MotorParameter::EmfConstant) * at(MotorParameter::FluxFraction);

@@ -24,22 +24,14 @@ pub(super) struct Observation<'a, S: Scalar> {
     pub asked: Signals,
     /// With the signals of a screw.
     pub linear: bool,
+    pub out: &'a mut [S],
 }
 
-impl<S: Scalar> Observation<'_, S> {
-    #[inline(never)]
-    pub(super) fn write(self, out: &mut [S]) {
-        S::vectorize(Write(self, out));
-    }
-}
-
-struct Write<'a, 'b, S: Scalar>(Observation<'a, S>, &'b mut [S]);
-
-impl<S: Scalar> Kernel for Write<'_, '_, S> {
+impl<S: Scalar> Kernel for Observation<'_, S> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        let (Observation { structure, model, inputs, state, t, asked, linear }, out) = (self.0, self.1);
+        let Self { structure, model, inputs, state, t, asked, linear, out } = self;
         states(structure, model, state, out);
         if asked.any(Signals::of(&[Q::Command as usize])) {
             out[Q::Command as usize] = inputs[COMMAND].at(t) + state.command_noise;

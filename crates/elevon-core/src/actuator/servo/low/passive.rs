@@ -5,7 +5,7 @@
 
 use super::model::{Model, State, Structure};
 use super::phase::{coefficients, Phase};
-use crate::inverter::bridge::{quench, Windings};
+use crate::inverter::bridge::{extinguish, Windings};
 use crate::motor::equivalent::quadrature;
 use crate::scalar::{three_phase, Scalar};
 use crate::three;
@@ -113,5 +113,5 @@ fn part_step<S: Scalar>(
         None => (g[0] * drop[0] + g[1] * drop[1] + g[2] * drop[2]) / (g[0] + g[1] + g[2]),
     };
     let next = three!(|j| i[j] + g[j] * (drop[j] - neutral));
-    (quench(&legs, i, next), legs.rail)
+    (extinguish(&legs, i, next), legs.rail)
 }
