@@ -22,7 +22,7 @@ ROWS = [
     ["logs"],
     ["simulate"],
     ["bench", "campaign", "calibrate", "compare", "session"],
-    ["lowfit", "analysis", "benchmark", "compare_loads"],
+    ["lowfit", "analysis", "benchmark", "compare_loads", "response", "environment"],
     ["diagnose"],
     ["prognose"],
     ["reproduce"],

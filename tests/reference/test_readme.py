@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = ["README.md", "docs/reproduce.md"]
+PAGES = ["README.md", "docs/reproduce.md", "docs/sessions.md"]
 LONG = (
     "reproduce torino-backlash",
     "reproduce torino-compliance",

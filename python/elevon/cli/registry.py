@@ -28,6 +28,7 @@ COMMANDS: dict[str, Command] = {
     "campaign": Command("elevon.cli.campaign", "Run plans of many labelled simulations."),
     "dataset": Command("elevon.cli.dataset", "Describe, verify, export, split a data set."),
     "compare": Command("elevon.cli.compare", "Compare the high and the low fidelity model."),
+    "response": Command("elevon.cli.response", "Measure a frequency response, with a Bode plot."),
     "fit-low": Command("elevon.cli.fit_low", "Tune the low model against the high one."),
     "bench": Command("elevon.cli.bench", "Run the virtual test bench's procedures."),
     "design": Command("elevon.cli.design", "Design experiments and parts."),

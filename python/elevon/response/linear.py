@@ -1,0 +1,228 @@
+"""Linear models of the low-fidelity actuator about an operating point."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.errors import InputError
+from elevon.session import Session
+from elevon.simulate.arguments import ActuatorLike
+from elevon.units import parse_quantity
+
+if TYPE_CHECKING:
+    from scipy.signal import StateSpace
+
+__all__ = ["LinearModel", "linearise"]
+
+Floats = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+_SMALLEST = 1e-4  # of the largest singular value: below it stands what is not linear
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """``x[k+1] = a x[k] + b u[k]``, ``y[k] = c x[k] + d u[k]``, deviations from an operating point.
+
+    The state is balanced: it has no physical names, and no part that input or output do not see.
+
+    Attributes
+    ----------
+    a, b, c, d : ndarray, shapes (n, n), (n, inputs), (outputs, n), (outputs, inputs)
+        SI.
+    period : float
+        s.
+    inputs, outputs : tuple of str
+        Ports and signals.
+    point : mapping
+        Outputs at the operating point, SI.
+    singular_values : ndarray
+        Of the Hankel matrix of impulse responses, relative to the largest.
+    error : float
+        Rms difference of the model's impulse responses from those simulated, relative to these.
+    nonlinearity : float
+        The same between the responses to the pulse and to one of half its height: what the linear
+        model cannot hold at this operating point.
+    """
+
+    a: Floats
+    b: Floats
+    c: Floats
+    d: Floats
+    period: float
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    point: Mapping[str, float]
+    singular_values: Floats
+    error: float
+    nonlinearity: float
+
+    @property
+    def order(self) -> int:
+        """Number of states."""
+        return len(self.a)
+
+    @property
+    def poles(self) -> Complex:
+        """Poles of the continuous model that a zero-order hold turns into this one, 1/s."""
+        return np.asarray(np.log(np.linalg.eigvals(self.a).astype(complex)) / self.period)
+
+    def response(self, frequency: npt.ArrayLike) -> Complex:
+        """Return the frequency response, shape (n, outputs, inputs), at frequencies in Hz."""
+        z = np.exp(2j * np.pi * np.atleast_1d(np.asarray(frequency, dtype=float)) * self.period)
+        eye = np.eye(self.order)
+        return np.array([self.c @ np.linalg.solve(x * eye - self.a, self.b) + self.d for x in z])
+
+    def to_scipy(self) -> StateSpace:
+        """Return it as a discrete `scipy.signal.StateSpace`."""
+        from scipy.signal import StateSpace
+
+        return StateSpace(self.a, self.b, self.c, self.d, dt=self.period)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form."""
+        poles = self.poles
+        return {
+            "a": self.a,
+            "b": self.b,
+            "c": self.c,
+            "d": self.d,
+            "period_s": self.period,
+            "inputs": list(self.inputs),
+            "outputs": list(self.outputs),
+            "point": dict(self.point),
+            "poles": [{"real": x.real, "imaginary": x.imag} for x in poles],
+            "error": self.error,
+            "nonlinearity": self.nonlinearity,
+        }
+
+
+def linearise(
+    actuator: ActuatorLike,
+    *,
+    inputs: Sequence[str] = ("command",),
+    outputs: Sequence[str] = ("user_position",),
+    mode: str = "position",
+    command: float | str = 0.0,
+    load: float | str = 0.0,
+    settle: float | str = "1 s",
+    period: float | str = "1 ms",
+    horizon: float | str = "0.5 s",
+    pulse: float = 1e-6,
+    order: int | None = None,
+) -> LinearModel:
+    """Linearise the low-fidelity model about an operating point.
+
+    The session is brought to the point and its state saved; from there each input gives a pulse of
+    one period, up and down. Half the difference of the answers is the impulse response, and its
+    Hankel matrix gives the balanced model (eigensystem realization: J.-N. Juang, R. S. Pappa,
+    Journal of Guidance 8(5), 1985).
+
+    Parameters
+    ----------
+    actuator : Actuator, str or path
+        What is linearised.
+    inputs, outputs : sequence of str
+        Ports of `Session.set` and signals.
+    mode : str
+        ``position``, ``speed`` or ``torque``.
+    command, load : float or str
+        Of the operating point: held from the start. A shaft at rest is held by its friction, and a
+        linear model of it says nothing; a speed has none to change sign.
+    settle : float or str
+        Time until the point is reached.
+    period, horizon : float or str
+        Sampling of the model, and length of the impulse responses.
+    pulse : float
+        Height in the input's SI unit: small enough that no limit is met.
+    order : int, optional
+        States; by default all whose singular value stands above 1e-4 of the largest.
+
+    Raises
+    ------
+    InputError
+        No such port or signal, nothing that answers, a horizon of fewer than four periods.
+    """
+    session = Session(actuator, mode=mode, fidelity="low", signals=outputs)
+    step = parse_quantity(period, "s", "period")
+    count = round(parse_quantity(horizon, "s", "horizon") / step)
+    if count < 4:
+        raise InputError(f"horizon = {horizon} is shorter than four periods ({step:g} s)")
+    unit = session.unit("command")
+    at = {"command": parse_quantity(command, unit or "1", "command")}
+    if load:
+        at["user"] = parse_quantity(load, session.unit("user"), "load")
+    session.set(**at)
+    session.advance(round(parse_quantity(settle, "s", "settle") / session.step) * session.step)
+    markov, half = (
+        np.stack([_impulse(session, name, at, outputs, (step, count, h)) for name in inputs], 2)
+        for h in (pulse, 0.5 * pulse)
+    )
+    if not np.any(markov[1:]):
+        raise InputError(
+            "nothing answers the pulses: friction holds the shaft at this operating point; give it "
+            "a speed (mode='speed', command=...), or a larger pulse"
+        )
+    a, b, c, values = _realised(markov, order)
+    return LinearModel(
+        a=a,
+        b=b,
+        c=c,
+        d=markov[0],
+        period=step,
+        inputs=tuple(inputs),
+        outputs=tuple(outputs),
+        point=session.read(*outputs),
+        singular_values=values,
+        error=_error(markov, a, b, c),
+        nonlinearity=float(np.sqrt(np.sum((half - markov) ** 2) / np.sum(markov**2))),
+    )
+
+
+def _impulse(
+    session: Session,
+    name: str,
+    at: Mapping[str, float],
+    outputs: Sequence[str],
+    sampling: tuple[float, int, float],
+) -> Floats:
+    """Return the response of the outputs to a unit pulse of one period, shape (count, outputs)."""
+    step, count, pulse = sampling
+    state = session.save()
+    held = at.get(name, 0.0)
+    answers = []
+    for sign in (1.0, -1.0):
+        rows = []
+        for k in range(count):
+            session.set(**{name: held + (sign * pulse if k == 0 else 0.0)})
+            rows.append(list(session.read(*outputs).values()))
+            session.advance(step)
+        answers.append(np.array(rows))
+        session.restore(state)
+    return np.asarray((answers[0] - answers[1]) / (2.0 * pulse))
+
+
+def _realised(markov: Floats, order: int | None) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return a, b, c and the relative singular values from ``markov[k]``, shape (k, p, m)."""
+    count, p, m = markov.shape
+    rows = (count - 1) // 2
+    blocks = [[markov[1 + i + j] for j in range(rows)] for i in range(rows)]
+    later = [[markov[2 + i + j] for j in range(rows)] for i in range(rows)]
+    left, values, right = np.linalg.svd(np.block(blocks), full_matrices=False)
+    relative = values / values[0]
+    n = int(np.sum(relative > _SMALLEST)) if order is None else order
+    root = np.sqrt(values[:n])
+    a = (left[:, :n] / root).T @ np.block(later) @ (right[:n].T / root)
+    return a, root[:, None] * right[:n, :m], left[:p, :n] * root, relative
+
+
+def _error(markov: Floats, a: Floats, b: Floats, c: Floats) -> float:
+    x, squares = b, 0.0
+    for answer in markov[1:]:
+        squares += float(np.sum((c @ x - answer) ** 2))
+        x = a @ x
+    return float(np.sqrt(squares / np.sum(markov[1:] ** 2)))
