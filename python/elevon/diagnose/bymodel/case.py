@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from elevon.diagnose.bymodel.candidates import Candidate
 from elevon.diagnose.bymodel.detection import Detector
-from elevon.diagnose.bymodel.evidence import SHARES, SIZES, Evidence
+from elevon.diagnose.bymodel.evidence import OWN_ERROR, SHARES, SIZES, Evidence
 from elevon.diagnose.bymodel.healthy import Elsewhere, Healthy, healthy
 from elevon.diagnose.bymodel.log import TestLog
 from elevon.diagnose.bymodel.replay import Replay, logged_evidence, modelled, replay
@@ -53,6 +53,11 @@ class Case:
     def covariance(self) -> Floats:
         """Of the healthy unit's evidence with this log's noise, shape (k, k)."""
         return self.unit.covariance + np.diag(self.shown.std**2)
+
+    @property
+    def errors(self) -> Floats:
+        """Model error of each number's shift on its own, as a share, shape (k,)."""
+        return np.array([OWN_ERROR.get(name, 0.0) for name in self.unit.names])
 
     def shift(self, key: str, severity: Floats) -> Floats:
         """Return what severities, shape (m,), do to this unit's evidence, shape (m, k)."""

@@ -6,6 +6,8 @@ import time as clock
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from elevon.diagnose.bymodel.answer import Diagnosis
 from elevon.diagnose.bymodel.candidates import Candidate, chosen
 from elevon.diagnose.bymodel.case import Case, case_of, detector_of, joined, shift_of
@@ -79,7 +81,10 @@ def _answer(
     ratio = float(detector.ratio((root @ rest)[None, :])[0])
     _, covariance = joined(cases)
     degrees = min(case.unit.degrees for case in cases)
-    result = posterior(rest, covariance, degrees, candidates, lambda k, s: shift_of(cases, k, s))
+    errors = np.concatenate([case.errors for case in cases])
+    result = posterior(
+        rest, covariance, degrees, candidates, lambda k, s: shift_of(cases, k, s), errors=errors
+    )
     faulty = ratio > detector.threshold(rate)
     best = next(h for h in result.hypotheses if bool(h.keys) or not faulty)
     blind, least = limits(cases, candidates, root)

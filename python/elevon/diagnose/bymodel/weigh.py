@@ -1,0 +1,249 @@
+"""Marginal likelihood of one fault or two: search on coarse grids, integration on fine ones.
+
+A fault's model error has two parts: one that scales the whole shift (`Candidate.error`), carried
+exactly by the matrix determinant lemma, and one of each number on its own (what the current loop
+makes of a ripple, say), carried at the best severities, which are searched again with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.diagnose.bymodel.candidates import Candidate
+
+__all__ = ["Frame", "Hypothesis", "healthy_alone", "one_fault", "two_faults"]
+
+Floats = npt.NDArray[np.float64]
+Shift = Callable[[str, Floats], Floats]
+_COARSE = 401
+_FINE = 121
+_PAIR = 41
+_REACH = 6.0  # deviations about the best point that a fine grid covers
+_TURNS = 4  # of the search along one severity, then the other
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A set of faults.
+
+    Attributes
+    ----------
+    keys : tuple of str
+        Faults; none for healthy.
+    evidence : float
+        Log of the marginal likelihood.
+    prior : float
+        Probability before.
+    grids : tuple of ndarray
+        Severities of each fault.
+    weights : tuple of ndarray
+        Marginal posterior of each fault's severity on its grid, summing to one.
+    best : tuple of float
+        Severities of the greatest posterior.
+    """
+
+    keys: tuple[str, ...]
+    evidence: float
+    prior: float
+    grids: tuple[Floats, ...] = ()
+    weights: tuple[Floats, ...] = ()
+    best: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Evidence less its healthy mean, and what whitens it.
+
+    Attributes
+    ----------
+    rest : ndarray, shape (k,)
+        As it is.
+    covariance : ndarray, shape (k, k)
+        Of it.
+    degrees : float
+        Of Student's distribution.
+    raw : callable
+        Key and severities, shape (m,), to shifts, shape (m, k).
+    errors : ndarray, shape (k,)
+        Deviation of each number's shift on its own, as a share of it.
+    """
+
+    rest: Floats
+    covariance: Floats
+    degrees: float
+    raw: Shift
+    errors: Floats
+    root: Floats = field(init=False)
+    y: Floats = field(init=False)
+    log_det: float = field(init=False)
+    lines: dict[str, tuple[Floats, Floats]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        lower = np.linalg.cholesky(self.covariance)
+        object.__setattr__(self, "root", np.linalg.inv(lower))
+        object.__setattr__(self, "y", self.root @ self.rest)
+        object.__setattr__(self, "log_det", 2.0 * float(np.sum(np.log(np.diag(lower)))))
+
+    def shift(self, key: str, severity: Floats) -> Floats:
+        """Whitened."""
+        return self.raw(key, severity) @ self.root.T
+
+    def line(self, c: Candidate) -> tuple[Floats, Floats]:
+        """Severities over the whole range, and their whitened shifts."""
+        if c.key not in self.lines:
+            grid = np.linspace(c.low, c.high, _COARSE)
+            self.lines[c.key] = (grid, self.raw(c.key, grid))
+        grid, raw = self.lines[c.key]
+        return grid, raw @ self.root.T
+
+    def loosened(self, faults: Sequence[tuple[Candidate, float]]) -> Frame:
+        """Return the frame with each number's own model error at these severities."""
+        extra = np.zeros(len(self.rest))
+        for c, severity in faults:
+            extra += (self.errors * self.raw(c.key, np.array([severity]))[0]) ** 2
+        return replace(self, covariance=self.covariance + np.diag(extra))
+
+    def log(self, rest: Floats, *errors: Floats) -> Floats:
+        """Log density of Student's distribution, shape (m,), but for a constant.
+
+        Each fault's model error, shape (m, k), adds its outer product to the unit covariance.
+        """
+        square = np.einsum("mk,mk->m", rest, rest)
+        log_det: Floats = np.full(len(rest), self.log_det)
+        if len(errors) == 1:
+            own = 1.0 + np.einsum("mk,mk->m", errors[0], errors[0])
+            square = square - np.einsum("mk,mk->m", rest, errors[0]) ** 2 / own
+            log_det = log_det + np.log(own)
+        elif len(errors) == 2:
+            a, b = (1.0 + np.einsum("mk,mk->m", e, e) for e in errors)
+            c = np.einsum("mk,mk->m", *errors)
+            p, q = (np.einsum("mk,mk->m", rest, e) for e in errors)
+            det = a * b - c**2
+            square = square - (b * p**2 - 2.0 * c * p * q + a * q**2) / det
+            log_det = log_det + np.log(det)
+        power = 0.5 * (self.degrees + rest.shape[1])
+        return np.asarray(
+            -0.5 * log_det - power * np.log1p(square / self.degrees), dtype=np.float64
+        )
+
+
+def healthy_alone(frame: Frame, prior: float) -> Hypothesis:
+    """Return the hypothesis of no fault."""
+    return Hypothesis((), float(frame.log(frame.y[None, :])[0]), prior)
+
+
+def one_fault(frame: Frame, c: Candidate, prior: float) -> Hypothesis:
+    """Return the hypothesis of one fault."""
+    at, own = 0.0, frame
+    for _ in range(2):
+        grid, moved = own.line(c)
+        at = float(grid[int(np.argmax(own.log(own.y - moved, c.error * moved)))])
+        own = frame.loosened([(c, at)])
+    fine = _around(at, _joint(own, [c], [at])[0], c, _FINE)
+    moved = own.shift(c.key, fine)
+    log = own.log(own.y - moved, c.error * moved)
+    top = float(log.max())
+    mass = np.exp(log - top) * np.gradient(fine)
+    total = float(mass.sum())
+    evidence = top + float(np.log(total / (c.high - c.low)))
+    best = float(fine[int(np.argmax(log))])
+    return Hypothesis((c.key,), evidence, prior, (fine,), (mass / total,), (best,))
+
+
+def two_faults(frame: Frame, pair: tuple[Candidate, Candidate], prior: float) -> Hypothesis:
+    """Return the hypothesis of two faults; their shifts add."""
+    first, second = pair
+    at = _start(frame, pair)
+    own = frame.loosened(list(zip(pair, at, strict=True)))
+    at = _along(own, pair, at)
+    own = frame.loosened(list(zip(pair, at, strict=True)))
+    widths = _joint(own, pair, at)
+    grids = [_around(b, 1.5 * w, c, _PAIR) for b, w, c in zip(at, widths, pair, strict=True)]
+    log = _of_both(own, pair, own.shift(first.key, grids[0]), own.shift(second.key, grids[1]))
+    top = float(log.max())
+    mass = np.exp(log - top) * np.outer(np.gradient(grids[0]), np.gradient(grids[1]))
+    total = float(mass.sum())
+    area = (first.high - first.low) * (second.high - second.low)
+    peak = np.unravel_index(int(np.argmax(log)), log.shape)
+    return Hypothesis(
+        (first.key, second.key),
+        top + float(np.log(total / area)),
+        prior,
+        tuple(grids),
+        (mass.sum(axis=1) / total, mass.sum(axis=0) / total),
+        (float(grids[0][peak[0]]), float(grids[1][peak[1]])),
+    )
+
+
+def _around(best: float, scale: float, c: Candidate, count: int) -> Floats:
+    low, high = max(c.low, best - _REACH * scale), min(c.high, best + _REACH * scale)
+    return np.linspace(low, high, count)
+
+
+def _of_both(
+    frame: Frame, pair: tuple[Candidate, Candidate], left: Floats, right: Floats
+) -> Floats:
+    """Log density at every pair of two faults' whitened shifts, shape (m, n)."""
+    shape = (len(left), len(right), len(frame.y))
+    first = np.broadcast_to(left[:, None, :], shape).reshape(-1, len(frame.y))
+    second = np.broadcast_to(right[None, :, :], shape).reshape(-1, len(frame.y))
+    rest = frame.y - first - second
+    log = frame.log(rest, pair[0].error * first, pair[1].error * second)
+    return log.reshape(shape[:2])
+
+
+def _start(frame: Frame, pair: tuple[Candidate, Candidate]) -> tuple[float, float]:
+    """Coarse search on a grid that is dense near zero, then along each severity in turn."""
+    lines = [frame.line(c) for c in pair]
+    picks = [_dense(grid) for grid, _ in lines]
+    log = _of_both(frame, pair, lines[0][1][picks[0]], lines[1][1][picks[1]])
+    at = np.unravel_index(int(np.argmax(log)), log.shape)
+    first, second = (float(lines[k][0][picks[k][at[k]]]) for k in (0, 1))
+    return _along(frame, pair, (first, second))
+
+
+def _along(
+    frame: Frame, pair: tuple[Candidate, Candidate], start: tuple[float, float]
+) -> tuple[float, float]:
+    """Search along each severity in turn."""
+    best = list(start)
+    lines = [frame.line(c) for c in pair]
+    for _ in range(_TURNS):
+        before = tuple(best)
+        for k in (0, 1):
+            grid, row = lines[k]
+            other = frame.shift(pair[1 - k].key, np.array([best[1 - k]]))
+            still = np.broadcast_to(pair[1 - k].error * other, row.shape)
+            log = frame.log(frame.y - row - other, pair[k].error * row, still)
+            best[k] = float(grid[int(np.argmax(log))])
+        if tuple(best) == before:
+            break
+    return best[0], best[1]
+
+
+def _dense(grid: Floats) -> npt.NDArray[np.intp]:
+    """Points of a line that lie denser near zero."""
+    steps = np.linspace(0.0, 1.0, 21) ** 2
+    low = grid[0] * steps[:0:-1] if grid[0] < 0.0 else np.zeros(0)
+    wanted = np.concatenate((low, grid[-1] * steps))
+    return np.unique(np.searchsorted(grid, wanted).clip(0, len(grid) - 1))
+
+
+def _joint(frame: Frame, faults: Sequence[Candidate], at: Sequence[float]) -> list[float]:
+    """Deviations of the severities when all are free; no more than each range."""
+    columns, own = [], 0.0
+    for c, b in zip(faults, at, strict=True):
+        step = 0.005 * (c.high - c.low)
+        ends = np.clip(np.array([b - step, b + step]), c.low, c.high)
+        low, high = frame.shift(c.key, ends)
+        columns.append((high - low) / (ends[1] - ends[0]))
+        own += c.error**2 * float(np.sum(frame.shift(c.key, np.array([b])) ** 2))
+    design = np.column_stack(columns)
+    scale = np.maximum(np.linalg.norm(design, axis=0), 1e-12)
+    inverse = np.linalg.pinv((design / scale).T @ (design / scale), rcond=1e-6, hermitian=True)
+    size = np.sqrt(np.maximum(np.diag(inverse), 1.0) * (1.0 + own)) / scale
+    return [min(float(s), c.high - c.low) for s, c in zip(size, faults, strict=True)]
