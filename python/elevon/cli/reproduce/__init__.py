@@ -6,6 +6,7 @@ import typer
 
 from elevon.cli.reproduce.case import add_command
 from elevon.cli.reproduce.cranfield import CASES as _CRANFIELD
+from elevon.cli.reproduce.diagnosis import CASES as _DIAGNOSIS
 from elevon.cli.reproduce.nasa import CASES as _NASA
 from elevon.cli.reproduce.optimisers import CASES as _OPTIMISERS
 from elevon.cli.reproduce.pisa import CASES as _PISA
@@ -23,5 +24,5 @@ def _group() -> None:
     """Recompute a published table or figure; exit code 1 when a check fails."""
 
 
-for _case in (*_TORINO, *_NASA, *_PISA, *_CRANFIELD, *_OPTIMISERS):
+for _case in (*_TORINO, *_NASA, *_PISA, *_CRANFIELD, *_DIAGNOSIS, *_OPTIMISERS):
     add_command(app, _case)

@@ -75,7 +75,7 @@ class Case:
 #: Evidence that only a measured torque current gives.
 _OF_THE_CURRENT = frozenset(
     ["dry_current", "viscous_current", "inertia_current", "brake_current", "current_order_1",
-     "current_order_2", "voltage_per_current"]
+     "current_order_2", "current_shaft", "voltage_per_current"]
 )  # fmt: skip
 
 

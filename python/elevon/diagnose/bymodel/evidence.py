@@ -28,6 +28,7 @@ UNITS: dict[str, tuple[str, str]] = {
     "brake_current": ("A/(N m)", "current by brake torque"),
     "current_order_1": ("1", "share of the current that turns with the electrical angle"),
     "current_order_2": ("1", "share of the current at twice the electrical angle"),
+    "current_shaft": ("A", "current that turns with the motor's shaft"),
     "voltage_per_speed": ("V s/rad", "voltage by speed"),
     "voltage_per_current": ("ohm", "voltage by current"),
     "voltage_order_1": ("1", "share of the EMF that turns with the electrical angle"),
@@ -36,7 +37,9 @@ UNITS: dict[str, tuple[str, str]] = {
     "following_gain": ("s", "following error over speed set point: 1/position gain"),
 }
 #: Amplitudes: what a unit has already and what a fault adds meet at an unknown angle.
-SIZES = frozenset(["current_order_1", "current_order_2", "voltage_order_1", "voltage_order_2"])
+SIZES = frozenset(
+    ["current_order_1", "current_order_2", "current_shaft", "voltage_order_1", "voltage_order_2"]
+)  # fmt: skip
 #: Rates and gains: a fault moves them by a share of the unit's own value.
 SHARES = frozenset(
     ["dry_current", "viscous_current", "inertia_current", "brake_current", "speed_gain",
@@ -48,6 +51,7 @@ SHARES = frozenset(
 OWN_ERROR: Mapping[str, float] = {
     "current_order_1": 0.10,
     "current_order_2": 0.25,
+    "current_shaft": 0.20,
     "voltage_order_1": 0.30,
     "voltage_order_2": 0.30,
     "voltage_per_speed": 0.50,
@@ -230,6 +234,10 @@ def _currents(
         rows["brake_current"] = _one(beta, cov, 8)
     rows["current_order_1"] = _size(beta, cov, 4)
     rows["current_order_2"] = _size(beta, cov, 6)
+    rest = signals.current - sum(b * column for b, column in zip(beta, columns, strict=True))
+    # The shaft's turn is sought in what is left: in a short motion it looks like the acceleration.
+    beta, cov = _fit([np.cos(signals.motor), np.sin(signals.motor)], rest, moving)
+    rows["current_shaft"] = _size(beta, cov, 0)
     return rows
 
 

@@ -27,6 +27,7 @@ MISMATCH: Mapping[str, tuple[float, float]] = {
     "brake_current": (0.03, 0.0),
     "current_order_1": (0.0, 0.006),
     "current_order_2": (0.0, 0.006),
+    "current_shaft": (0.0, 0.005),
     "voltage_per_speed": (0.30, 0.0),  # beside little current it takes what the switches drop
     "voltage_per_current": (1.0, 10.0),
     "voltage_order_1": (0.0, 0.006),
@@ -45,6 +46,7 @@ FLOOR: Mapping[str, tuple[float, float]] = {
     "brake_current": (0.01, 0.0),
     "current_order_1": (0.0, 0.003),
     "current_order_2": (0.0, 0.003),
+    "current_shaft": (0.0, 0.002),
     "voltage_per_speed": (0.005, 0.0),
     "voltage_per_current": (0.05, 0.0),
     "voltage_order_1": (0.0, 0.002),

@@ -17,6 +17,7 @@ _NAMES = {
     "short@motor.phase_a": "One phase has lost turns to a short:",
     "eccentricity_static@motor": "The rotor stands out of centre (static) by",
     "demagnetisation@motor": "The magnets have lost",
+    "unbalance@motor.rotor": "The rotor is out of balance by",
     "gain_drift@control.position": "The position gain has drifted by",
     "gain_drift@control.speed": "The speed gain has drifted by",
     "gain@sensor.encoder": "The encoder's gain is off by",

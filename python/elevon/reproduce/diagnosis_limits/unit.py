@@ -121,7 +121,7 @@ def of_the_day(unit: Unit, seed: int) -> Actuator:
     value = unit.actuator.parameters.value
     values: dict[str, float | str] = {}
     steps = {path: _factor(rng, spread) for path, spread in _DAILY.items()}
-    steps["friction.static"] = steps["friction.dynamic"]
+    steps["friction.static"] = steps["load.friction"] = steps["friction.dynamic"]
     for path, step in steps.items():
         values[path] = value(path) * step
     kelvin = value("motor.winding_temperature") + _WINDING * float(rng.standard_normal())
