@@ -17,6 +17,7 @@ LONG = (
     "--faults-table",
     "reproduce nasa-",
     "reproduce pisa-",
+    "reproduce diagnosis-limits",
 )
 """These take ten seconds and more; the short ones run with every `make test`, once."""
 
