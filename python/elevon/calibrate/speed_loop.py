@@ -21,7 +21,7 @@ Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 _COLUMNS = ("gain", "integral", "set_point", "ramp")
 _FEWEST = 100  # samples of a stretch
-_READING = 0.25  # of a tick, between the speed that the unit has read and the one that is shown
+_READING = 2.5e-4  # s between the speed that the unit has read and the one that is shown
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def speed_loop(parts: Sequence[Stretch], tick: float) -> Regression | None:
     return with_deviations(names, value, design, rest, np.ones(len(rest)), times=times)
 
 
-def gain_and_zero(fit: Regression, tick: float) -> tuple[Level, Level]:
+def gain_and_zero(fit: Regression) -> tuple[Level, Level]:
     """Return the gain and the zero (one over the integral time) of a fit."""
     gain, integral = fit["gain"], fit["integral"]
     zero = integral / gain
@@ -79,7 +79,7 @@ def gain_and_zero(fit: Regression, tick: float) -> tuple[Level, Level]:
     slope[0], slope[1] = -integral / gain**2, 1.0 / gain
     spread = float(np.sqrt(max(float(slope @ fit.covariance @ slope), 0.0)))
     # A speed read earlier or later than it is shown adds to the gain what the integral makes of it.
-    late = abs(integral) * _READING * tick
+    late = abs(integral) * _READING
     return (
         Level(gain, fit.std("gain"), fit.degrees).widened(late),
         Level(zero, spread, fit.degrees).widened(late * zero / gain),

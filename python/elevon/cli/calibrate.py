@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from elevon.cli.by_parts import calibrate_by_parts, way_by_parts
 from elevon.cli.calibrate_drops import is_drop_table, run_drops
 from elevon.cli.closed_loop import calibrate_closed_loop, read_loop_logs
 from elevon.cli.common import (
@@ -22,7 +23,6 @@ from elevon.cli.common import (
 )
 from elevon.cli.numbers import estimate_row, estimate_texts, written_unit
 from elevon.cli.output import print_json, print_table, progress_bar, say
-from elevon.cli.unit_logs import calibrate_unit, has_control_unit
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
@@ -149,10 +149,11 @@ def calibrate(
     model = read_actuator(actuator, settings)
     if len(logs) == 1 and is_drop_table(logs[0]):
         return _drops(logs[0], model, out, as_json=json, force=force)
-    if has_control_unit(model):
-        return calibrate_unit(
-            logs, model, column_map=column_map, free=_paths(free), out=out, report=report,
-            as_json=json, force=force, date=date,
+    way = way_by_parts(logs, model, column_map)
+    if way is not None:
+        return calibrate_by_parts(
+            way, model, free=_paths(free), out=out, report=report, as_json=json, force=force,
+            date=date,
         )  # fmt: skip
     data = direct_logs(model, logs, loadcell, command, column_map)
     if data is None:

@@ -48,7 +48,7 @@ def gains(logs: Sequence[GearLog], actuator: Actuator) -> tuple[dict[str, Level]
         if fit is None or not (fit["gain"] > 0.0 and fit["integral"] > 0.0):
             reasons |= dict.fromkeys(paths, "the demand is at the supply's limit throughout")
             continue
-        determined |= dict(zip(paths, gain_and_zero(fit, tick), strict=True))
+        determined |= dict(zip(paths, gain_and_zero(fit), strict=True))
     return determined, reasons
 
 

@@ -1,0 +1,115 @@
+"""A log of a screw's servo: its channels by role, smoothed alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.calibrate.role_log import RoleLog, role_channels
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.recording import Recording
+
+__all__ = ["CORNERS", "ScrewLog", "balanced", "preloaded", "screw_log"]
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+_NEEDED = ("motor_speed", "torque_current")
+_LOAD = ("load", "load_cell")
+_WIDTH = 0.05  # s of the polynomials that smooth all channels alike
+_SLOWEST = 0.01  # s between samples, from which a log shows temperatures only
+_MOVES = 0.05  # of the largest speed: below it the friction's sign is open
+CORNERS = (
+    0.06,
+    0.1,
+)  # s about a reversal or a limit that do not count; the second is a choice as good
+_LIMIT = 0.98  # of the largest set point of the current: the drive is limited
+
+
+@dataclass(frozen=True)
+class ScrewLog(RoleLog):
+    """A log on the clock of the motor's speed."""
+
+    @property
+    def quick(self) -> bool:
+        """Whether the motion is sampled quickly enough for balances."""
+        return self.period < _SLOWEST
+
+    @property
+    def loaded(self) -> bool:
+        """Whether the force on the ram was measured."""
+        return any(role in self.roles for role in _LOAD)
+
+    @cached_property
+    def smooth(self) -> dict[str, Floats]:
+        """All channels, and slopes of speed, position and current, through one smoother."""
+        shown = {role: _smoothed(values, self.period) for role, values in self.roles.items()}
+        for role, source in (
+            ("acceleration", "motor_speed"),
+            ("current_slope", "torque_current"),
+            ("output_speed", "output_position"),
+        ):
+            if source in self.roles:
+                shown[role] = _smoothed(self.roles[source], self.period, order=1)
+        if "output_position" in self.roles:
+            position = self.roles["output_position"]
+            shown["output_acceleration"] = _smoothed(position, self.period, order=2)
+        return shown
+
+    @cached_property
+    def moving(self) -> Bools:
+        """Samples that count in a balance: in motion, apart from reversals and limits."""
+        return self.apart(CORNERS[0])
+
+    def apart(self, corner: float) -> Bools:
+        """Return the samples in motion, so long apart from reversals and limits."""
+        speed = self.smooth["motor_speed"]
+        away = np.abs(speed) < _MOVES * float(np.max(np.abs(speed)))
+        if "current_ref" in self.roles:
+            size = np.abs(self.roles["current_ref"])
+            top = float(np.max(size))
+            away |= (size > _LIMIT * top) & (np.median(size) < 0.5 * top)
+        width = 2 * round(corner / self.period) + 1
+        near = np.convolve(away.astype(float), np.ones(width), mode="same") > 0.5
+        edge = (self.time < _WIDTH) | (self.time > self.time[-1] - _WIDTH)
+        return np.asarray(~near & ~edge)
+
+
+def _smoothed(values: Floats, period: float, *, order: int = 0) -> Floats:
+    from scipy.signal import savgol_filter
+
+    width = max(5, 2 * round(0.5 * _WIDTH / period) + 1)
+    return np.asarray(savgol_filter(values, width, 3, deriv=order, delta=period), dtype=np.float64)
+
+
+def screw_log(recording: Recording, name: str) -> ScrewLog:
+    """Return what the calibration needs of a recording, by the roles it states.
+
+    Raises
+    ------
+    InputError
+        No motor speed or torque current, or a log that is too short.
+    """
+    return ScrewLog(**role_channels(recording, name, _NEEDED))
+
+
+def preloaded(actuator: Actuator) -> bool:
+    """Whether the actuator has a preloaded screw with an efficiency each way."""
+    from elevon.parameters.records import records
+
+    return {"screw.preload", "screw.efficiency_aiding"} <= records(actuator.wiring).keys()
+
+
+def balanced(recordings: Sequence[Recording]) -> bool:
+    """Whether the balances suit: torque, motion and load in every log."""
+    return all(
+        {*_NEEDED, "motor_position"} <= set(recording.roles)
+        and any(role in recording.roles for role in _LOAD)
+        for recording in recordings
+    )

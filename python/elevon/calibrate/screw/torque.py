@@ -1,0 +1,202 @@
+"""Torque balance of a preloaded screw: friction, preload, efficiency each way, inertia.
+
+``k_T i = J dw/dt + C w + s (T_d + b(F) T_pr) + r F + s L(F)`` with ``s`` the sign of the motion,
+``T_pr = F_pr r (1/eta - eta')``, ``L = (1/eta - 1) r |F|`` where the force ``F`` on the nut opposes
+the motion and ``(1 - eta') r |F|`` where it aids. ``b`` is the relieved half's share of preload: 1
+without load, 0 from 2.83 F_pr on (docs/theory/ballscrew.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.calibrate.balance_fit import Balanced, Sought, fit_balance
+from elevon.calibrate.level import Level
+from elevon.calibrate.screw.log import CORNERS, ScrewLog
+from elevon.calibrate.screw.motor import flux_factor
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["TorqueBalance", "nut_force", "nut_loss", "relieved", "torque_balance"]
+
+Floats = npt.NDArray[np.float64]
+_NAMES = (
+    "motor.inertia", "friction.viscous", "friction.dynamic", "screw.preload",
+    "screw.efficiency", "screw.efficiency_aiding",
+)  # fmt: skip
+#: What the current's sensor adds: offset [A], and lag [s] behind the motion.
+_SENSOR = {"offset": 0.1, "lag": 1e-3}
+#: What is believed before the logs, as a share of the set's value or of `_SENSOR`.
+_BELIEF = (0.7, 3.0, 1.0, 1.0, 0.15, 0.15, 1.0, 3.0)
+_SURE = 0.15  # of the belief: a deviation below which the logs have determined a number
+_SPREAD = 0.05  # N m, first deviation of the residual
+_NUDGE = 1e-3  # of the torque, for what its deviation moves
+_RELIEF = 2.0 * np.sqrt(2.0)
+_SERIES = (1.53960, -1.19476, 1.13376, -0.67106, 0.19246)
+
+
+@dataclass(frozen=True)
+class TorqueBalance:
+    """What the balance determines, why it does not the rest, and its residual [N m]."""
+
+    levels: dict[str, Level]
+    reasons: dict[str, str]
+    residual: float
+
+
+def relieved(force: Floats, preload: float) -> Floats:
+    """Return the relieved half's share of the preload, as the core's series has it."""
+    y = np.clip(1.0 - np.abs(force) / (_RELIEF * preload), 0.0, 1.0)
+    root = np.sqrt(y)
+    series = sum(c * root**k for k, c in enumerate(_SERIES))
+    return np.asarray(y * root * series)
+
+
+@dataclass(frozen=True)
+class _Samples:
+    current: Floats
+    current_slope: Floats
+    acceleration: Floats
+    speed: Floats
+    force: Floats
+    travel: float
+    beside: float
+
+    def torque(self, value: Floats) -> Floats:
+        """Torque that the motor must make [N m], for values of `_NAMES` without the sensor's."""
+        inertia, viscous, dry, preload, opposing, aiding = value[: len(_NAMES)]
+        way, load = np.sign(self.speed), np.abs(self.force) * self.travel
+        lost = np.where(way * self.force > 0.0, 1.0 / opposing - 1.0, 1.0 - aiding) * load
+        drag = preload * self.travel * (1.0 / opposing - aiding) * relieved(self.force, preload)
+        smooth = (inertia + self.beside) * self.acceleration + viscous * self.speed
+        return np.asarray(smooth + self.travel * self.force + way * (dry + drag + lost))
+
+
+def torque_balance(
+    logs: Sequence[ScrewLog], actuator: Actuator, constant: Level | None, mass: float
+) -> TorqueBalance:
+    """Fit the screw to all logs.
+
+    Parameters
+    ----------
+    logs : sequence of ScrewLog
+        With motion, current and force; slow ones are passed over.
+    actuator : Actuator
+        First values, and what is not free; the load side's numbers where no cell is.
+    constant : Level or None
+        Torque of an ampere [N m/A]; None: as the set has it.
+    mass : float
+        Of the load side [kg], as it counts where no cell measures the force on the nut.
+    """
+    usable = [log for log in logs if log.quick and log.loaded]
+    names = _NAMES
+    if not usable:
+        why = "no log of a motion with current and force on the ram"
+        return TorqueBalance({}, dict.fromkeys(names, why), float("nan"))
+    given = 1.5 * actuator.parameters.value("motor.emf_constant")
+    scale = given if constant is None else constant.value
+    sought = _sought(actuator)
+
+    def fitted(torque: float, corner: float = CORNERS[0]) -> Balanced:
+        samples, times = _stacked(usable, actuator, mass, corner)
+
+        def model(value: Floats) -> Floats:
+            late = value[7] * samples.current_slope
+            return np.asarray(samples.torque(value) / torque + value[6] - late)
+
+        return fit_balance(sought, samples.current, model, times, scale=_SPREAD / torque)
+
+    fit = fitted(scale)
+    spread = np.hypot(fit.std, 0.5 * (fitted(scale, CORNERS[1]).x - fit.x))
+    if constant is not None:
+        moved = (fitted(scale * (1.0 + _NUDGE)).x - fit.x) / _NUDGE
+        spread = np.hypot(spread, moved * constant.std / constant.value)
+    return _judged(sought, fit, spread, _stacked(usable, actuator, mass, CORNERS[0])[0], scale)
+
+
+def _sought(actuator: Actuator) -> Sought:
+    value = actuator.parameters.value
+    first = [max(value(name), 1e-9) for name in _NAMES] + list(_SENSOR.values())
+    return Sought((*_NAMES, *_SENSOR), np.array(first), np.array(_BELIEF), signed=tuple(_SENSOR))
+
+
+def _stacked(
+    logs: Sequence[ScrewLog], actuator: Actuator, mass: float, corner: float
+) -> tuple[_Samples, list[tuple[Floats, Floats, float]]]:
+    value = actuator.parameters.value
+    travel = value("screw.lead") / value("gear.ratio")
+    rows: dict[str, list[Floats]] = {
+        "current": [], "current_slope": [], "acceleration": [], "speed": [], "force": [],
+    }  # fmt: skip
+    times = []
+    for log in logs:
+        s, used = log.smooth, log.apart(corner)
+        rows["current"].append((flux_factor(log, actuator) * s["torque_current"])[used])
+        rows["current_slope"].append(s["current_slope"][used])
+        rows["acceleration"].append(s["acceleration"][used])
+        rows["speed"].append(s["motor_speed"][used])
+        rows["force"].append(nut_force(log, actuator, mass)[used])
+        times.append((log.time[used], s["motor_speed"][used], log.period))
+    joined = {name: np.concatenate(parts) for name, parts in rows.items()}
+    beside = value("gear.inertia") + value("screw.inertia") / value("gear.ratio") ** 2
+    return _Samples(travel=travel, beside=beside, **joined), times
+
+
+def nut_force(log: ScrewLog, actuator: Actuator, mass: float) -> Floats:
+    """Force on the nut, positive against extension: the cell's, else the load and its side's."""
+    s, value = log.smooth, actuator.parameters.value
+    if log.has("load_cell"):
+        return s["load_cell"]
+    travel = value("screw.lead") / value("gear.ratio")
+    speed, acceleration = travel * s["motor_speed"], travel * s["acceleration"]
+    side = mass * acceleration + value("load.damping") * speed
+    return np.asarray(s["load"] + side + value("load.friction") * np.sign(speed))
+
+
+def nut_loss(speed: Floats, force: Floats, actuator: Actuator) -> Floats:
+    """Heat that the screw makes of its load and its preload [W]."""
+    value = actuator.parameters.value
+    travel = value("screw.lead") / value("gear.ratio")
+    opposing, aiding = value("screw.efficiency"), value("screw.efficiency_aiding")
+    lost = np.where(speed * force > 0.0, 1.0 / opposing - 1.0, 1.0 - aiding) * np.abs(force)
+    preload = value("screw.preload")
+    drag = preload * (1.0 / opposing - aiding) * relieved(force, preload)
+    return np.asarray(travel * (lost + drag) * np.abs(speed))
+
+
+def _judged(
+    sought: Sought, fit: Balanced, spread: Floats, samples: _Samples, scale: float
+) -> TorqueBalance:
+    levels: dict[str, Level] = {}
+    reasons: dict[str, str] = {}
+    for k, name in enumerate(sought.names):
+        first = float(sought.first[k])
+        level = Level(float(fit.x[k]) * first, float(spread[k]) * first, fit.degrees)
+        if name in _SENSOR:
+            continue
+        if spread[k] > _SURE * sought.belief[k]:
+            reasons[name] = _why(name, samples)
+            continue
+        levels[name] = level
+    opposing, aiding = levels.get("screw.efficiency"), levels.get("screw.efficiency_aiding")
+    if opposing is not None and aiding is not None and aiding.value > opposing.value:
+        # No screw gives back more than it takes: the difference is noise.
+        levels["screw.efficiency_aiding"] = replace(aiding, value=opposing.value)
+    return TorqueBalance(levels, reasons, fit.residual * scale)
+
+
+def _why(name: str, samples: _Samples) -> str:
+    way = np.sign(samples.speed) * samples.force
+    if name == "screw.efficiency" and float(np.max(way)) < 500.0:
+        return "no force that opposes the motion"
+    if name == "screw.efficiency_aiding" and float(np.min(way)) > -500.0:
+        return "no force that aids the motion"
+    if name in ("screw.preload", "friction.dynamic"):
+        return "drag and dry friction are told apart by forces on both sides of the relief only"
+    return "the logs' noise is larger than its effect"

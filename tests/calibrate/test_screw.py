@@ -1,0 +1,95 @@
+"""Ballscrew: what was put in comes out of the stand's logs, and the rest is said with a reason."""
+
+import numpy as np
+import pytest
+
+from elevon import Actuator
+from elevon.bench.procedure import Procedure
+from elevon.calibrate.screw import calibrate_screw
+from elevon.calibrate.screw.torque import relieved
+from tests.calibrate.screw_bench import drawn, make_logs
+
+SINE = {"kind": "sine", "amplitude": "50 mm", "frequency": "0.3 Hz"}
+TWO = Procedure.model_validate(
+    {
+        "name": "two",
+        "text": "a sine against a spring and one without load",
+        "stand": "load-actuator",
+        "step": [
+            {"kind": "trace", "name": "free", "duration": "7 s", "command": {"terms": [SINE]}},
+            {"kind": "force", "stiffness": "90 N/mm"},
+            {"kind": "trace", "name": "spring", "duration": "10 s", "command": {"terms": [SINE]}},
+        ],
+    }
+)
+
+
+@pytest.fixture(scope="module")
+def one(tmp_path_factory):
+    """Truth, logs and calibration of one draw: high fidelity, two short logs."""
+    values, model = drawn(5)
+    logs = make_logs(model, tmp_path_factory.mktemp("screw"), [TWO], seed=5, fidelity="high")
+    return values, logs, calibrate_screw(logs, Actuator.load("nasa-ballscrew"))
+
+
+def test_what_the_logs_determine_is_recovered(one):
+    values, _, result = one
+    for path in ("motor.emf_constant", "motor.inertia", "screw.efficiency", "friction.dynamic",
+                 "screw.efficiency_aiding", "screw.preload", "control.position_gain",
+                 "control.speed_gain", "control.integral_time", "load.damping"):  # fmt: skip
+        item, true = result[path], values[path]
+        share = 0.05 if path.startswith("friction.") else 0.02
+        assert abs(item.value - true) < max(share * true, 2.5 * item.std), path
+    covered = [e.interval[0] <= values[e.path] <= e.interval[1]
+               for e in result.estimates if e.path in values]  # fmt: skip
+    assert np.mean(covered) > 0.7
+
+
+def test_what_no_log_shows_is_listed_with_its_reason(one):
+    _, _, result = one
+    assert "temperature" in result.undetermined["thermal.housing_capacity"]
+    assert "nut" in result.undetermined["screw.nut_capacity"]
+    assert not set(result.undetermined) & {e.path for e in result.estimates}
+
+
+def test_without_the_voltage_torques_are_ratios(one):
+    values, logs, _ = one
+    blind = [
+        type(log)(log.name, log.time, {r: v for r, v in log.roles.items() if "voltage" not in r})
+        for log in logs
+    ]
+    before = Actuator.load("nasa-ballscrew")
+    result = calibrate_screw(blind, before)
+    assert "motor.emf_constant" in result.undetermined
+    assert "motor.emf_constant" in result["motor.inertia"].given
+    scale = before.parameters.value("motor.emf_constant") / values["motor.emf_constant"]
+    ratio = result["friction.dynamic"].value / values["friction.dynamic"]
+    assert ratio == pytest.approx(scale, rel=0.3)
+
+
+def test_the_relieved_half_is_the_law_of_hertz():
+    u = np.linspace(0.0, 1.0, 50)
+    bearing, free = (1.0 + u) ** 1.5, (1.0 - u) ** 1.5
+    assert np.max(np.abs(relieved(437.5 * (bearing - free), 437.5) - free)) < 5e-5
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "draws"), [("nasa-ballscrew", 20), ("nasa-dema", 5)])
+def test_truth_recovery_over_draws(name, draws, tmp_path):
+    """Profiles at high fidelity, 70 minutes of heating at low."""
+    before = Actuator.load(name)
+    errors, covered = {}, []
+    for seed in range(1, draws + 1):
+        values, truth = drawn(seed, name)
+        folder = tmp_path / str(seed)
+        logs = make_logs(truth, folder / "p", ["ballscrew-profiles"], seed=seed, fidelity="high")
+        logs += make_logs(truth, folder / "h", ["ballscrew-heating"], seed=seed, fidelity="low")
+        for item in calibrate_screw(logs, before).estimates:
+            if item.path in values:
+                true = values[item.path]
+                errors.setdefault(item.path, []).append(abs(item.value / true - 1.0))
+                covered.append(item.interval[0] <= true <= item.interval[1])
+    assert len(errors) > 18
+    for path, sizes in errors.items():
+        assert np.median(sizes) < (0.05 if path.startswith("friction.") else 0.02), path
+    assert 0.80 <= np.mean(covered) <= 0.97
