@@ -85,7 +85,8 @@ def note(trial, sensors, style, cell):
     unit = {"amplitude": "deg", "bias": "deg", "sweep_time": "s"}
     for key, value in trial.values.items():
         tail = f"_{unit.get(key, 'Hz')}".lower() if style.note_keys == "units" else ""
-        waveform[key + tail] = value
+        in_text = key in {"amplitude", "bias"} and not tail
+        waveform[key + tail] = f"{value!r} deg" if in_text else value
     if style.note_keys == "nested":
         waveform["kind"] = waveform.pop("waveform")
         waveform = {"command": waveform}

@@ -109,7 +109,7 @@ BAD = {
     "unknown unit": ((*RUN, "--set", "motor.inertia=1 kg cn2"), "did you mean 'kg cm2'"),
     "wrong kind": ((*RUN, "--set", "motor.inertia=1 N"), "expected an inertia"),
     "nan": ((*RUN, "--set", "motor.inertia=nan"), "not a finite number"),
-    "negative inertia": ((*RUN, "--set", "motor.inertia=-1"), "outside (0, inf)"),
+    "negative inertia": ((*RUN, "--set", "motor.inertia=-1 kg cm2"), "outside (0, inf)"),
     "no turns": ((*RUN, "--set", "motor.turns_a=0"), "outside (0, 1]"),
     "too many turns": ((*RUN, "--set", "motor.turns_a=1.1"), "outside (0, 1]"),
     "zero step": ((*RUN, "--set", "solver.step=0"), "outside [1e-12, 1] s"),
@@ -161,6 +161,7 @@ def test_bad_input(elevon_cli, tmp_path, name):
     (tmp_path / "unknown.toml").write_text("duraton = 1\n")
     (tmp_path / "table.toml").write_text(
         "duration = 1\n[[command.terms]]\nkind = 'table'\ntimes = [0, 0]\nvalues = [1, 2]\n"
+        "unit = 'deg'\n"
     )
     arguments, message = BAD[name]
     before = sorted(tmp_path.rglob("*"))

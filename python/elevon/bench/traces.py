@@ -15,6 +15,7 @@ from elevon.files import write_text
 from elevon.logs.command.guess import FREE
 from elevon.logs.formats.drive import DriveFormat, write_drive_csv
 from elevon.logs.formats.loadcell import write_loadcell
+from elevon.parameters.records import wirings
 from elevon.units import parse_quantity
 
 if TYPE_CHECKING:
@@ -136,7 +137,9 @@ def _note(setup: Setup, layout: DriveFormat) -> dict[str, Any]:
     if mode == "position" and len(terms) == 1 and terms[0].kind in FREE:
         note |= _waveform(terms[0])
     elif terms:
+        own = wirings()[setup.actuator.wiring]["mode_units"][mode]
         note["command"] = setup.trace.command.model_dump(exclude_unset=True, mode="json")
+        note["command"]["terms"] = [_stated(term, own) for term in note["command"]["terms"]]
     note["brake"] = "on" if setup.brake is not None else "off"
     rig = setup.rig
     if setup.brake is not None:
@@ -148,8 +151,24 @@ def _note(setup: Setup, layout: DriveFormat) -> dict[str, Any]:
     return note
 
 
+def _stated(term: dict[str, Any], own: str) -> dict[str, Any]:
+    """Return a term with the units of its numbers, which a note must not leave open."""
+    from elevon.waveforms import TABLE, unit_of, wave_records
+
+    record = wave_records()[term["kind"]]
+    stated = dict(term)
+    for parameter in record.parameters:
+        value = term.get(parameter.name)
+        unit = unit_of(parameter, own)
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and unit != "1":
+            stated[parameter.name] = f"{value!r} {unit}"
+    if record.kind == TABLE and not term.get("unit"):
+        stated["unit"] = own
+    return stated
+
+
 def _waveform(term: Any) -> dict[str, Any]:
-    from elevon.units import to_display
+    from elevon.units import format_quantity
     from elevon.waveforms import unit_of, wave_records
 
     shape: dict[str, Any] = {"waveform": term.kind}
@@ -161,5 +180,5 @@ def _waveform(term: Any) -> dict[str, Any]:
         unit = unit_of(parameter, "rad")
         shown = unit.replace("rad", "deg")
         value = parse_quantity(given, unit, name)
-        shape[name] = float(f"{to_display(value, shown) if unit != shown else value:.12g}")
+        shape[name] = format_quantity(value, shown, 12)
     return shape

@@ -22,6 +22,7 @@ from elevon.documents import Document, read_toml, validated
 from elevon.errors import InputError
 from elevon.faults import Fault
 from elevon.scenario import Scenario
+from elevon.scenario.bare import check_units, with_texts
 
 __all__ = ["resolve_plan"]
 
@@ -179,9 +180,8 @@ def _actuator(plan: Plan, document: Document) -> Actuator:
         near = document.folder / reference
         reference = str(near) if near.is_file() else reference
     actuator = Actuator.load(reference)
-    return actuator.with_values(
-        plan.parameters, source="plan", place=document.place(("parameters",))
-    )
+    values = with_texts(plan.parameters) if document.text else plan.parameters
+    return actuator.with_values(values, source="plan", place=document.place(("parameters",)))
 
 
 def _base_scenario(
@@ -190,6 +190,7 @@ def _base_scenario(
     if isinstance(plan.scenario, str):
         path = files.located(plan.scenario)
         own = read_toml(path)
+        check_units(own)
         inner = Embedder(own.folder)
         scenario = validated(Scenario, inner.scenario(own.data, own.place()), own)
         files.sources[str(path)] = hashlib.sha256(own.text.encode()).hexdigest()
@@ -199,6 +200,8 @@ def _base_scenario(
     if data is None:
         raise InputError(f"{document.place()}: 'scenario' is missing")
     place = document.place(("scenario",))
+    if document.text:
+        check_units(Document(document.origin, document.text, dict(data), prefix=("scenario",)))
     return Scenario.from_dict(files.scenario(data, place), place).to_dict()
 
 

@@ -16,6 +16,7 @@ from elevon.files import check_output
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
+    from elevon.parameters import Parameter
     from elevon.scenario import Scenario
 
 
@@ -125,12 +126,35 @@ def read_settings(settings: Sequence[str] | None) -> dict[str, str]:
 
 
 def read_actuator(reference: str, settings: Sequence[str] | None = None) -> Actuator:
-    """Load an actuator and apply ``--set`` options."""
+    """Load an actuator and apply ``--set`` options, each change said."""
     from elevon.actuator import Actuator
 
-    return Actuator.load(reference).with_values(
+    given = Actuator.load(reference)
+    changed = given.with_values(
         read_settings(settings), source="set on the command line", place="--set"
     )
+    for line in changes(given, changed):
+        say(line)
+    return changed
+
+
+def changes(before: Actuator, after: Actuator) -> list[str]:
+    """Return what differs, such as ``motor.inertia 7.7 -> 80000 kg cm2, x 10390``."""
+    return [
+        f"{path} {_change(old, after.parameters[path])}"
+        for path, old in before.parameters.items()
+        if old.value != after.parameters[path].value
+    ]
+
+
+def _change(old: Parameter, new: Parameter) -> str:
+    if isinstance(old.value, str) or isinstance(new.value, str):
+        return f"{old.text} -> {new.text}"
+    first = old.text.removesuffix(f" {new.unit}") if new.unit else old.text
+    if not old.value:
+        return f"{first} -> {new.text}"
+    ratio = float(f"{new.value / old.value:.4g}")  # 10390, not 1.039e+04
+    return f"{first} -> {new.text}, x {ratio:g}"
 
 
 def read_scenario(
@@ -148,6 +172,8 @@ def read_scenario(
         scenario = scenario.replaced(duration=_number(duration))
     if faults:
         scenario = scenario.with_faults([Fault.parse(text) for text in faults])
+    for line in changes(actuator, actuator.with_values(scenario.parameters, place=str(path or ""))):
+        say(f"scenario: {line}")
     return scenario
 
 

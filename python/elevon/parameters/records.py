@@ -54,8 +54,12 @@ class Record:
         high = ")" if self.maximum_open or math.isinf(self.maximum) else "]"
         return f"{low}{self.minimum:g}, {self.maximum:g}{high}"
 
-    def read(self, given: str | float, place: str | None = None) -> float | str:
-        """Read a value given with or without a unit; a bare number is in SI.
+    def read(
+        self, given: str | float, place: str | None = None, shown: str | None = None
+    ) -> float | str:
+        """Read a value; a number is in SI, a text has a unit.
+
+        A text may do without where the unit it is `shown` in is that of the SI.
 
         Returns
         -------
@@ -70,7 +74,7 @@ class Record:
         place = place or self.path
         if self.choices is not None:
             return self._choice(given, place)
-        value = parse_quantity(given, self.unit or "1", place)
+        value = parse_quantity(given, self.unit or "1", place, shown)
         self.check(value, place)
         return value
 

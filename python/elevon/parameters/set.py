@@ -140,8 +140,8 @@ class ParameterSet(Mapping[str, Parameter]):
         items = dict(self._items)
         for path, given in values.items():
             record = record_of(self.wiring, path, place or None)
-            value = record.read(given, f"{place}: {path}" if place else path)
             old = items[path]
+            value = record.read(given, f"{place}: {path}" if place else path, old.unit)
             items[path] = replace(
                 old,
                 value=value,

@@ -23,6 +23,7 @@ from pydantic import (
 from elevon.documents import Document, read_toml, validated
 from elevon.errors import InputError, did_you_mean
 from elevon.faults import Fault
+from elevon.scenario.bare import check_units, with_texts
 from elevon.series import check_series, read_series
 from elevon.units import parse_quantity
 from elevon.waveforms import TABLE, wave_records
@@ -259,13 +260,20 @@ class Scenario(_Frozen):
     def load(cls, path: str | os.PathLike[str]) -> Scenario:
         """Read a scenario file (TOML).
 
+        A number without a unit that could be degrees or radians, mm or m, is refused there; in
+        Python, in a dict too, a number is SI.
+
         Raises
         ------
         InputError
             The message lists every finding with file, line, key, limit and the nearest names.
         """
         document = read_toml(Path(path))
-        return validated(cls, located(document.data, document.folder), document)
+        check_units(document)
+        data = located(document.data, document.folder)
+        if "parameters" in data:
+            data["parameters"] = with_texts(data["parameters"])
+        return validated(cls, data, document)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], place: str = "scenario") -> Scenario:

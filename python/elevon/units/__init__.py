@@ -12,9 +12,11 @@ Decimal text and decimal units are combined exactly: ``"7.7 kg cm2"`` is the flo
 """
 
 from elevon.units.quantity import (
+    ambiguous,
     check_kind,
     convert,
     format_quantity,
+    is_ambiguous,
     kind_name,
     known_units,
     parse_quantity,
@@ -27,9 +29,11 @@ from elevon.units.unit import Unit, parse_unit
 
 __all__ = [
     "Unit",
+    "ambiguous",
     "check_kind",
     "convert",
     "format_quantity",
+    "is_ambiguous",
     "kind_name",
     "known_units",
     "parse_quantity",

@@ -13,9 +13,11 @@ from elevon.units.table import KINDS, SHOWN
 from elevon.units.unit import Unit, parse_unit, unit_names
 
 __all__ = [
+    "ambiguous",
     "check_kind",
     "convert",
     "format_quantity",
+    "is_ambiguous",
     "kind_name",
     "known_units",
     "parse_quantity",
@@ -29,7 +31,9 @@ _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?![\d.,])\
 _LONGEST = 100
 
 
-def parse_quantity(text: str | float, kind: str, place: str | None = None) -> float:
+def parse_quantity(
+    text: str | float, kind: str, place: str | None = None, shown: str | None = None
+) -> float:
     """Read a quantity such as ``"45 deg"`` as an SI float.
 
     Parameters
@@ -41,6 +45,9 @@ def parse_quantity(text: str | float, kind: str, place: str | None = None) -> fl
         kind is accepted.
     place : str, optional
         Where the quantity stands (``motor.inertia``); named in the errors.
+    shown : str, optional
+        The unit in which a person reads the place. Where it is not `kind` itself, a text without
+        a unit could mean either and is refused; a number is never.
 
     Returns
     -------
@@ -50,7 +57,7 @@ def parse_quantity(text: str | float, kind: str, place: str | None = None) -> fl
     Raises
     ------
     UnitError
-        Unknown unit (with the nearest names), or a unit of another kind.
+        Unknown unit (with the nearest names), a unit of another kind, or none where it needs one.
     RangeError
         NaN, infinite, or too large for a float.
     InputError
@@ -71,8 +78,31 @@ def parse_quantity(text: str | float, kind: str, place: str | None = None) -> fl
         raise _not_a_quantity(text, kind, place)
     number, unit_text = match[1], match[2]
     unit = check_kind(unit_text, kind, place) if unit_text else expected
+    if not unit_text and shown and is_ambiguous(float(number), kind, shown):
+        raise ambiguous(number, kind, shown, place)
     _finite(float(number), place, shown=number)
     return _finite(_exact_si(number, unit), place, shown=text)
+
+
+def is_ambiguous(number: float, kind: str, shown: str) -> bool:
+    """Tell whether a number without a unit means different things in two units.
+
+    Zero means the same in every unit but those of temperature.
+    """
+    own, other = parse_unit(kind), parse_unit(shown)
+    same = (own.scale, own.pi, own.offset) == (other.scale, other.pi, other.offset)
+    if same or not math.isfinite(number):
+        return False
+    return number != 0.0 or own.offset != other.offset
+
+
+def ambiguous(number: str, kind: str, shown: str, place: str | None = None) -> UnitError:
+    """Return the error of a number without a unit, with both of its readings."""
+    readings = [
+        f"'{number} {unit}' ({format_quantity(parse_unit(unit).to_si(float(number)), other, 4)})"
+        for unit, other in ((shown, kind), (kind, shown))
+    ]
+    return UnitError(f"{_at(place)}{number} has no unit; write {' or '.join(readings)}")
 
 
 def check_kind(unit_text: str, kind: str, place: str | None = None) -> Unit:

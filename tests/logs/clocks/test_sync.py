@@ -146,7 +146,7 @@ def test_a_load_cell_beside_the_log_is_joined(tmp_path, truth):
     force += np.random.default_rng(2).normal(0, 1.0, len(own))
     write_loadcell(tmp_path / "run_loadcell.csv", own, force)
     (tmp_path / "run_command.toml").write_text(
-        'waveform = "sine"\namplitude = 7\nfrequency = 0.2\nbrake = "on"\narm = 0.1\n'
+        'waveform = "sine"\namplitude = "7 deg"\nfrequency = 0.2\nbrake = "on"\narm = 0.1\n'
         'chain_ratio = 4\ncurrent = "rms"\nnote_by = "somebody"\n'
     )
     log = import_log(tmp_path / "run.csv")

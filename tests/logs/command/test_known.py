@@ -70,7 +70,10 @@ def test_a_sequence_of_actions_and_what_the_metadata_keep(tmp_path):
 REFUSED = {
     "key": ('[[command.terms]]\nkind = "sine"\namplitud = 1', "amplitud"),
     "kind": ('[[command.terms]]\nkind = "sinus"', "sine"),
-    "both": ('waveform = "sine"\n[[command.terms]]\nkind = "constant"\nvalue = 1', "both say"),
+    "both": (
+        'waveform = "sine"\n[[command.terms]]\nkind = "constant"\nvalue = "1 deg"',
+        "both say",
+    ),
     "elsewhere": ('[[command.terms]]\nkind = "table"\nfile = "/etc/passwd"', "beside the note"),
     "many": (
         "command = {terms = [" + ",".join(['{kind = "constant", value = 1}'] * 1001) + "]}",

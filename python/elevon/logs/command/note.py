@@ -1,10 +1,10 @@
 """What the operator knows, beside a log: the command, the brake, the load cell's arm.
 
-The command stands in one of two forms. The short one is a single waveform; its values are in
-degrees, Hz and s at the user side, and m, its keys are accepted in several spellings (other
+The command stands in one of two forms. The short one is a single waveform at the user side; its
+values are in Hz, s and m, angles need their unit. Its keys are accepted in several spellings (other
 software writes these files), and keys that mean nothing are reported, not refused. The full one is
 a table ``[command]`` with ``terms`` or ``steps`` by the grammar of scenario files: sums, tables,
-sequences of actions; its bare numbers are SI and unknown keys are errors.
+sequences of actions; unknown keys are errors.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ from elevon.documents import Document, check_depth, validated
 from elevon.errors import FormatError, InputError, did_you_mean, quoted
 from elevon.logs.command.guess import FREE
 from elevon.logs.formats.limits import Limits, existing_file
+from elevon.scenario.bare import check_units
 from elevon.scenario.scenario import Command, Scenario
-from elevon.units import parse_quantity
+from elevon.units import ambiguous, is_ambiguous, parse_quantity, si_unit
 from elevon.waveforms import wave_records
 
 __all__ = ["CommandNote", "read_command_note"]
@@ -143,8 +144,12 @@ def read_command_note(path: str | Path) -> CommandNote:
     document = dict(_document(file))
     command = None
     if _is_full(document.get("command")):
-        command = _command(document.pop("command"), place, file.parent)
+        given = document.pop("command")
+        command = _command(given, place, file.parent)
+    if command is not None:
+        check_units(Document(place, "", {"command": given}))
     flat = _flatten(document, place)
+    _check_units(flat, place)
     values: dict[str, Any] = {}
     ignored = []
     for key, value in flat.items():
@@ -217,8 +222,23 @@ def _flatten(document: Mapping[str, Any], place: str) -> dict[str, Any]:
     return flat
 
 
+def _check_units(flat: Mapping[str, Any], place: str) -> None:
+    """Refuse numbers that could be degrees or radians; a key such as ``amplitude_deg`` says it."""
+    for key, value in flat.items():
+        kind = _KINDS.get(_canonical(key) or "")
+        plain = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if kind is None or not plain or _SUFFIX.search(_spelt(key)):
+            continue
+        if is_ambiguous(float(value), si_unit(kind), kind):
+            raise ambiguous(str(value), si_unit(kind), kind, f"{place}: {key}")
+
+
+def _spelt(key: str) -> str:
+    return re.sub(r"[\s\-.]+", "_", key.strip()).lower()
+
+
 def _canonical(key: str) -> str | None:
-    text = re.sub(r"[\s\-.]+", "_", key.strip()).lower()
+    text = _spelt(key)
     for name in (text, _SUFFIX.sub("", text)):
         name = _SPELLINGS.get(name, name)  # noqa: PLW2901 - one spelling for each meaning
         if name in _KINDS or name in {"waveform", "brake", "chain_ratio", "current"}:

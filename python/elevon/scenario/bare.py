@@ -1,0 +1,126 @@
+"""Numbers without a unit in files: refused where a person reads the place in another unit.
+
+In Python a number is SI; in a file nobody can tell ``amplitude = 7`` to be degrees or radians.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from typing import Any
+
+from elevon.documents import Document
+from elevon.errors import UnitError
+from elevon.units import ambiguous, is_ambiguous, shown_unit
+from elevon.waveforms import TABLE, unit_of, wave_records
+
+__all__ = ["check_units", "with_texts"]
+
+_SPEED = {"rig_speed": "m/s"}
+_OF_MODE = {"position": ("rad", "m"), "speed": ("rad/s",), "torque": ("N m",)}
+Finding = tuple[tuple[str | int, ...], Any, tuple[str, ...], tuple[str, ...]]
+
+
+def check_units(document: Document) -> None:
+    """Refuse numbers without a unit that could mean two things, all of them at once.
+
+    Parameters
+    ----------
+    document : Document
+        A scenario file, or a note with the scenario's ``[command]``.
+
+    Raises
+    ------
+    UnitError
+        With the place and both readings of each.
+    """
+    findings: list[str] = []
+    for location, number, units, shown in _numbers(document.data):
+        pairs = [
+            (unit, other)
+            for unit, other in zip(units, shown, strict=True)
+            if is_ambiguous(float(number), unit, other)
+        ]
+        if pairs:
+            text = str(ambiguous(str(number), *pairs[0], document.place(location)))
+            linear = "".join(f"; linear: '{number} {b}' or '{number} {a}'" for a, b in pairs[1:])
+            findings.append(text + linear)
+    if findings:
+        raise UnitError("\n".join(findings))
+
+
+def with_texts(given: Any) -> Any:
+    """Return a file's parameters with their numbers as texts: the set knows which need a unit."""
+    if isinstance(given, dict):
+        return {key: with_texts(item) for key, item in given.items()}
+    return repr(given) if _is_number(given) else given
+
+
+def _numbers(data: Mapping[str, Any]) -> Iterator[Finding]:
+    """Yield place, number, its possible units in SI and the units a person reads."""
+    command = data.get("command")
+    if isinstance(command, Mapping):
+        mode = command.get("mode", "position")
+        yield from _of_terms(command, ("command",), _OF_MODE.get(str(mode), ()))
+    loads = data.get("load")
+    for name, load in loads.items() if isinstance(loads, Mapping) else ():
+        if isinstance(load, Mapping) and name in _SPEED:
+            yield from _of_terms(load, ("load", name), (_SPEED[name],))
+        elif isinstance(load, Mapping):
+            yield from _of_terms(load, ("load", name), ("N",))
+    if isinstance(data.get("supply"), Mapping):
+        yield from _of_terms(data["supply"], ("supply",), ("V",))
+    initial = data.get("initial")
+    for name, value in initial.items() if isinstance(initial, Mapping) else ():
+        units = tuple(unit for unit in _initial_units().get(str(name), ()) if unit)
+        if _is_number(value):
+            yield ("initial", name), value, units, tuple(shown_unit(unit) for unit in units)
+
+
+def _of_terms(
+    sum_: Mapping[str, Any], place: tuple[str | int, ...], own: tuple[str, ...]
+) -> Iterator[Finding]:
+    terms = sum_.get("terms")
+    for index, term in enumerate(terms if isinstance(terms, list) else ()):
+        record = wave_records().get(str(term.get("kind"))) if isinstance(term, Mapping) else None
+        if record is None:
+            continue
+        at = (*place, "terms", index)
+        for parameter in record.parameters:
+            value = term.get(parameter.name)
+            if _is_number(value):
+                units = tuple(unit_of(parameter, unit) or "1" for unit in own) or ("1",)
+                shown = tuple(unit_of(parameter, shown_unit(unit)) or "1" for unit in own) or ("1",)
+                if parameter.unit == "rad":
+                    shown = ("deg",) * len(units)
+                yield (*at, parameter.name), value, units, shown
+        if record.kind == TABLE and not term.get("unit"):
+            yield from _of_table(term, at, own)
+
+
+def _of_table(
+    term: Mapping[str, Any], at: tuple[str | int, ...], own: tuple[str, ...]
+) -> Iterator[Finding]:
+    """Yield the first value of a table that is not zero: its unit is missing."""
+    values = term.get("values")
+    for value in values if isinstance(values, list) else ():
+        if _is_number(value) and value:
+            yield (*at, "values"), value, own, tuple(shown_unit(unit) for unit in own)
+            return
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+@lru_cache(maxsize=1)
+def _initial_units() -> Mapping[str, tuple[str, ...]]:
+    """Return the units that each signal has in any wiring."""
+    from elevon import _core
+
+    units: dict[str, dict[str, None]] = {}
+    for wiring in _core.wirings():
+        for fidelity in wiring["fidelities"]:
+            for signal in _core.signals(wiring["name"], fidelity):
+                units.setdefault(signal["name"], {})[signal["unit"]] = None
+    return {name: tuple(each) for name, each in units.items()}
