@@ -44,7 +44,7 @@ $(STAMPS)/extension: $(STAMPS)/packages pyproject.toml $(RUST_SOURCES)
 	VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop --release --quiet --locked
 	@touch $@
 
-demo: setup ## a published table, then a bench found again from its logs: out/demo/report.html
+demo: setup ## a unit's life, its diagnoses, its end as foreseen: out/demo/report.html
 	$(DEMO)
 
 test: setup lint test-rust test-python ## every check but the long ones

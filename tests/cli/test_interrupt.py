@@ -73,7 +73,7 @@ HALF = {
     ),
     "demo": (
         "elevon.reproduce.backlash.reproduce_backlash",
-        ["demo", "--out", "OUT/demo", "--json"],
+        ["demo", "--part", "bench", "--out", "OUT/demo", "--json"],
     ),
     "campaign": (
         "elevon.campaign.execute.simulate_block",

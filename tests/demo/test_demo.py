@@ -23,7 +23,7 @@ def test_the_hidden_actuator_differs_and_is_drawn_by_the_seed():
 
 def test_what_is_there_is_not_replaced(tmp_path, capsys):
     (tmp_path / "report.html").write_text("mine")
-    assert main(["demo", "--out", str(tmp_path), "--json"]) == 2
+    assert main(["demo", "--part", "bench", "--out", str(tmp_path), "--json"]) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
     assert "--force" in captured.err
@@ -32,7 +32,7 @@ def test_what_is_there_is_not_replaced(tmp_path, capsys):
 
 @pytest.mark.long
 def test_the_whole_chain(tmp_path, capsys):
-    code = main(["demo", "--out", str(tmp_path / "demo"), "--json"])
+    code = main(["demo", "--part", "bench", "--out", str(tmp_path / "demo"), "--json"])
     result = json.loads(capsys.readouterr().out)
     assert [check["name"] for check in result["checks"] if not check["passed"]] == []
     assert code == 0

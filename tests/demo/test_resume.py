@@ -220,7 +220,9 @@ class Chain:
     def run(self, out, *arguments, stop=None):
         """Give the command; return its exit code and what was computed."""
         self.stop, self.calls = stop, []
-        return main(["demo", "--out", str(out), "--json", *arguments]), self.calls
+        return main(
+            ["demo", "--part", "bench", "--out", str(out), "--json", *arguments]
+        ), self.calls
 
 
 @pytest.fixture
@@ -337,7 +339,17 @@ def test_the_whole_chain_interrupted_by_signals(tmp_path):
         (has("before"), 0.3, "the calibration"),
         (has("after"), 0.5, "of the calibrated values"),
     ]
-    command = [sys.executable, "-m", "elevon.cli", "demo", "--out", str(out), "--json"]
+    command = [
+        sys.executable,
+        "-m",
+        "elevon.cli",
+        "demo",
+        "--part",
+        "bench",
+        "--out",
+        str(out),
+        "--json",
+    ]
     for condition, wait, text in [*moments, (lambda: False, 0.0, "")]:
         process = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,

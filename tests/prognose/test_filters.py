@@ -103,17 +103,30 @@ def test_a_diagnosis_far_off_is_an_outlier_and_is_noted():
 
 def test_a_diagnosis_becomes_an_inspection():
     item = law()
-    cause = {"kind": "play", "place": "gear", "probability": 0.9, "severity": 0.3,
-             "interval": [0.2, 0.35],
+    cause = {"kind": "play", "place": "gear", "probability": 0.9, "severity": 0.015,
+             "interval": [0.01, 0.0175],
              "equivalents": [{"kind": "play", "place": "transmission"}]}  # fmt: skip
-    data = {"faults": [cause], "detectable": {KEY: 0.06}}
+    data = {"faults": [cause], "detectable": {KEY: 0.003}}
     got = inspection(data, [item], usage=5.0).seen[KEY]
-    assert (got.severity, got.low, got.high) == pytest.approx((0.3, 0.0608, 0.0304), rel=1e-3)
-    unlikely = {"faults": [{**cause, "probability": 0.3}], "detectable": {KEY: 0.06}}
-    assert inspection(unlikely, [item], usage=5.0).seen[KEY] == Seen(None, 0.02, 0.02)
+    assert (got.severity, got.low, got.high) == pytest.approx((0.015, 0.00304, 0.00152), rel=1e-3)
+    edge = {
+        "faults": [
+            {
+                **cause,
+                "kind": "friction",
+                "place": "transmission",
+                "severity": 1.98,
+                "interval": [1.9, 2.0],
+            }
+        ]
+    }
+    more = inspection(edge, [law(kind="friction", highest=6.0)], usage=5.0)
+    assert more.seen["friction@transmission"].high > 2.0  # diagnosis looks up to 2
+    unlikely = {"faults": [{**cause, "probability": 0.3}], "detectable": {KEY: 0.003}}
+    assert inspection(unlikely, [item], usage=5.0).seen[KEY] == Seen(None, 0.001, 0.001)
     assert inspection({"faults": []}, [item], usage=5.0).seen == {}
     with pytest.raises(InputError, match="not within"):
-        inspection({"faults": [{**cause, "interval": [0.4, 0.5]}]}, [item], usage=5.0)
+        inspection({"faults": [{**cause, "interval": [0.016, 0.02]}]}, [item], usage=5.0)
 
 
 def test_use_and_dates_go_forward():

@@ -24,7 +24,7 @@ FLIGHT = {
     "requirement": [
         {"name": "error", "measure": "tracking_error", "limit": "1 deg", "after": 5},
     ],
-    "growth": [{"law": "gear_wear"}],
+    "growth": [{"law": "gear_wear", "dormant": 0}],
 }  # fmt: skip
 
 

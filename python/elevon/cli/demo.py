@@ -1,7 +1,8 @@
-"""``elevon demo``: a published table, then a bench with hidden values recovered from its logs."""
+"""``elevon demo``: a unit's life and its end as foreseen; or a bench with hidden values."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,8 +13,11 @@ from elevon.cli.common import ForceOption, JsonOption, SeedOption
 from elevon.cli.output import print_json, print_table, progress_bar, say
 
 if TYPE_CHECKING:
+    from elevon.demo.life.run import LifeDemo
     from elevon.demo.run import Demo
+    from elevon.report.checks import Check
 
+_PARTS = ("life", "bench")
 app = typer.Typer(rich_markup_mode=None)
 
 
@@ -23,20 +27,63 @@ def demo(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for reports and logs.")] = Path(
         "out/demo"
     ),
+    which: Annotated[
+        str,
+        typer.Option(
+            "--part",
+            help="life: a unit wears, is inspected, diagnosed, its end predicted. "
+            "bench: a published table, then a bench's hidden values from its logs.",
+        ),
+    ] = "life",
     seed: SeedOption = 0,
     force: ForceOption = False,
     json: JsonOption = False,
 ) -> int:
+    """Let a unit live and predict its end from bench logs; one page tells the story."""
+    from elevon.errors import unknown
+    from elevon.report.checks import all_passed
+
+    if which not in _PARTS:
+        raise unknown("part", which, _PARTS, "--part")
+    if which == "bench":
+        return _bench(out, seed, force=force, as_json=json)
+    from elevon.demo.life.run import run_life
+
+    with progress_bar("demo") as advance:
+        result = run_life(out, seed=seed, force=force, progress=advance)
+    if json:
+        print_json(result.to_dict())
+    else:
+        _print_life(result)
+    return 0 if all_passed(result.checks) else 1
+
+
+def _print_life(result: LifeDemo) -> None:
+    from elevon.demo.life.page import lead
+
+    say(lead(result))
+    values = result.to_dict()
+    rows = [
+        (f"{r['usage']:.0f}", " + ".join(r["faults"]) or r["status"], f"{r['rul']:.0f}",
+         f"{r['low']:.0f} to {r['high']:.0f}", f"{r['truth']:.0f}")
+        for r in values["rows"]
+    ]  # fmt: skip
+    print_table(("flights", "diagnosis", "remain", "90 %", "truth"), rows)
+    _print_steps(values["steps"], result.seconds)
+    _print_checks(result.checks, result.folder)
+
+
+def _bench(out: Path, seed: int, *, force: bool, as_json: bool) -> int:
     """Recompute a published table, then find a bench's hidden values from its logs.
 
-    An interrupted demonstration goes on where it was when the same command is given again.
+    Interrupted, it goes on where it was when the same command is given again.
     """
     from elevon.demo.run import run_demo
     from elevon.report.checks import all_passed
 
     with interrupt.telling(lambda: _story(out)), progress_bar("demo") as advance:
         result = run_demo(out, seed=seed, force=force, progress=advance)
-    if json:
+    if as_json:
         print_json(result.to_dict())
     else:
         _print(result)
@@ -71,11 +118,18 @@ def _print(result: Demo) -> None:
     rows = [_row(row, result) for row in result.rows()]
     columns = ("parameter", "before", "hidden truth", "estimate", "90 % interval", "unit")
     print_table(columns, rows, title="hidden values recovered from three logs")
-    steps = [(step.name, f"{step.seconds:.1f}", step.reused) for step in result.steps]
-    print_table(("step", "s", ""), [*steps, ("all", f"{result.seconds:.1f}", "")])
-    checks = result.checks
+    _print_steps([step.to_dict() for step in result.steps], result.seconds)
+    _print_checks(result.checks, result.folder)
+
+
+def _print_steps(steps: Sequence[Mapping[str, Any]], seconds: float) -> None:
+    rows = [(step["name"], f"{step['seconds']:.1f}", step["kept"]) for step in steps]
+    print_table(("step", "s", ""), [*rows, ("all", f"{seconds:.1f}", "")])
+
+
+def _print_checks(checks: Sequence[Check], folder: Path) -> None:
     failed = [check for check in checks if not check.passed]
     for check in failed:
         say(f"failed: {check.name}: {check.value:.4g} {check.unit}, limit {check.limit:.4g}")
     say(f"{len(checks) - len(failed)} of {len(checks)} checks passed")
-    say(f"report: {result.folder / 'report.html'}")
+    say(f"report: {folder / 'report.html'}")

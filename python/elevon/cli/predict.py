@@ -55,7 +55,7 @@ def predict(
     from elevon.prognose.history import diagnosed, read_history
     from elevon.prognose.mission import Mission
     from elevon.prognose.predict import predict as run
-    from elevon.prognose.response import respond
+    from elevon.prognose.respond import respond
 
     check_outputs([report], force=force)
     if any(not n >= 0.0 for n in survive or ()):

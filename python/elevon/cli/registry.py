@@ -44,6 +44,7 @@ COMMANDS: dict[str, Command] = {
     "diagnose-train": Command(
         "elevon.cli.diagnose_train", "Train the surrogate that diagnose --method surrogate asks."
     ),
+    "fleet": Command("elevon.cli.fleet", "Group the maintenance of several units."),
     "demo": Command("elevon.cli.demo", "Find a bench's hidden values from its logs; one report."),
     "reproduce": Command("elevon.cli.reproduce", "Recompute a published table or figure."),
 }

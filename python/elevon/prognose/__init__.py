@@ -14,7 +14,8 @@ from elevon.prognose.observation import Inspection, Seen, inspection
 from elevon.prognose.particle import ParticleFilter
 from elevon.prognose.predict import predict
 from elevon.prognose.process import Process
-from elevon.prognose.response import Response, respond
+from elevon.prognose.respond import respond
+from elevon.prognose.response import Response
 from elevon.prognose.unscented import UnscentedFilter
 
 __all__ = [

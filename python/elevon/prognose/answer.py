@@ -31,6 +31,8 @@ class Known:
         The unit's own factor on the law's rate.
     inspections : int
         Inspections that saw the fault.
+    growing : float
+        Probability that it grows; the factor is that of the futures in which it does.
     """
 
     kind: str
@@ -42,6 +44,7 @@ class Known:
     factor: float
     factor_interval: tuple[float, float]
     inspections: int
+    growing: float = 1.0
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
@@ -55,6 +58,7 @@ class Known:
             "factor": self.factor,
             "factor_interval": list(self.factor_interval),
             "inspections": self.inspections,
+            "p_growing": self.growing,
         }
 
 

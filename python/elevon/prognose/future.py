@@ -98,14 +98,16 @@ def _part(units: Population, keep: npt.NDArray[np.bool_]) -> Population:
         units,
         damage=units.damage[keep],
         growth=units.growth[keep],
+        form=units.form[keep],
         bias=units.bias[keep],
         weight=units.weight[keep],
+        active=units.active[keep],
     )
 
 
 def _step(process: Process, units: Population, load: Floats) -> float:
     """Repetitions in which the fastest units go a hundredth of the way to the greatest severity."""
-    rate = np.quantile(process.rate(units.damage, units.growth, load), 0.9, axis=0)
+    rate = np.quantile(process.rate(units, units.damage, load), 0.9, axis=0)
     way = np.array([law.damage(np.array([law.highest]))[0] - law.start for law in process.laws])
     with np.errstate(divide="ignore"):
         return float(min(np.min(_STEP * way / rate), 0.1 * _FARTHEST))

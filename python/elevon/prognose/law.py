@@ -73,12 +73,18 @@ class Law:
         Its numbers.
     spread : float
         Deviation of the logarithm of the unit's own factor before anything is known of it.
+    form_spread : float
+        Deviation of the exponent f in (1 + severity / (highest / 4))^f, by which the growth may
+        differ from the law's as the fault grows.
     grain : float
         Scale of the gamma process [damage]: growth by D has the variance D times `grain`.
     start : float
         Damage of a new unit. What a unit starts from spreads about it by `start_spread`.
     start_spread : float
         Deviation of the damage at the start (never below zero damage).
+    dormant : float
+        Share of new units in which the fault does not grow; it may begin to (`ONSET` of
+        `elevon.prognose.process`).
     severity, damage : callable
         Damage to severity and back, shape (n,) to (n,), both rising.
     highest : float
@@ -96,9 +102,11 @@ class Law:
     coefficients: Mapping[str, Coefficient]
     highest: float
     spread: float = 0.8
+    form_spread: float = 0.3
     grain: float = 0.0
     start: float = 0.0
     start_spread: float = 0.0
+    dormant: float = 0.0
     severity: Callable[[Floats], Floats] = field(default=_same)
     damage: Callable[[Floats], Floats] = field(default=_same)
 
@@ -106,8 +114,10 @@ class Law:
         for name in self.drivers:
             if name not in DRIVERS:
                 raise unknown("driver", name, DRIVERS, f"law {self.name}")
-        for name in ("spread", "grain", "start", "start_spread"):
+        for name in ("spread", "form_spread", "grain", "start", "start_spread"):
             _not_negative(f"law {self.name}: {name}", getattr(self, name))
+        if not 0.0 <= self.dormant <= 1.0:
+            raise RangeError(f"law {self.name}: dormant = {self.dormant:g} is outside 0 to 1")
         if not self.highest > 0.0:
             raise RangeError(f"law {self.name}: highest = {self.highest:g} must be above 0")
 

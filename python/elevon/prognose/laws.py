@@ -22,6 +22,9 @@ Drivers = Mapping[str, Floats]
 Values = Mapping[str, float]
 
 
+_DORMANT = 0.3  # ASSUMED: in as many units a fault does not grow to be seen
+
+
 def _archard(_damage: Floats, drivers: Drivers, c: Values) -> Floats:
     return c["wear"] * drivers["friction_work"]
 
@@ -45,7 +48,7 @@ _FIRST_TURN = 0.01  # share of a phase's turns; ASSUMED: one turn of a winding o
 def _shorted(damage: Floats) -> Floats:
     """Damage 1 is the first contact; from there each e-fold of turns is one more."""
     grown = _FIRST_TURN * np.exp(np.minimum(damage - 1.0, 50.0))
-    return np.where(damage < 1.0, 0.0, grown)
+    return np.where(damage < 1.0, 0.0, np.minimum(grown, 1.0))
 
 
 def _short_damage(severity: Floats) -> Floats:
@@ -86,6 +89,7 @@ _WEAR = Law(
         )
     },
     grain=4e-5,
+    dormant=_DORMANT,
 )  # fmt: skip
 
 LAWS: dict[str, Law] = {
@@ -102,7 +106,7 @@ LAWS: dict[str, Law] = {
                 "ASSUMED: 1e-15 m3/(N m), friction 0.05, balls and grooves of 10 cm2",
             )
         },
-        grain=1.5e-6,
+        grain=1.5e-6, dormant=_DORMANT,
     ),
     "lubricant_loss": Law(
         name="lubricant_loss",
@@ -116,7 +120,7 @@ LAWS: dict[str, Law] = {
             "threshold": Coefficient(343.15, "K", "bearing makers' rule: 70 C"),
             "halving": Coefficient(15.0, "K", "bearing makers' rule"),
         },
-        grain=4e-3,
+        grain=4e-3, dormant=_DORMANT,
     ),
     "insulation": Law(
         name="insulation",
@@ -136,10 +140,10 @@ LAWS: dict[str, Law] = {
                 20.0, "1", "ASSUMED: a short of a low-voltage winding that takes weeks, not minutes"
             ),
             "own_heat": Coefficient(
-                80.0, "K", "ASSUMED: rise of the spot's temperature per unit of shorted share"
+                40.0, "K", "ASSUMED: rise of the spot's temperature per unit of shorted share"
             ),
         },
-        grain=0.01, start=0.0, start_spread=0.3,
+        grain=0.01, start=0.0, start_spread=0.3, dormant=_DORMANT,
         severity=_shorted, damage=_short_damage,
     ),
     "demagnetisation": Law(
@@ -154,7 +158,7 @@ LAWS: dict[str, Law] = {
             "reference_temperature": Coefficient(393.15, "K", "ASSUMED: 120 C"),
             "activation": Coefficient(11600.0, "K", "ASSUMED: 1 eV"),
         },
-        grain=3e-4,
+        grain=3e-4, dormant=_DORMANT,
     ),
     "bearing_wear": Law(
         name="bearing_wear",
@@ -167,7 +171,7 @@ LAWS: dict[str, Law] = {
             "wear": Coefficient(1e-9, "1/rad", "ASSUMED: a tenth of the air gap in 1e8 rad"),
             "pull": Coefficient(3.0, "1", "ASSUMED: the pull at contact is three times the weight"),
         },
-        grain=5e-4,
+        grain=5e-4, dormant=_DORMANT,
     ),
     "spall": Law(
         name="spall",
@@ -183,7 +187,7 @@ LAWS: dict[str, Law] = {
             "seed": Coefficient(5e-5, "m", "ASSUMED: smallest spall that is not closed again"),
             "exponent": Coefficient(2.0, "1", "ASSUMED: Paris exponents of steel are 2 to 4"),
         },
-        start=5e-5, start_spread=2e-5, grain=4e-6,
+        start=5e-5, start_spread=2e-5, grain=4e-6, dormant=_DORMANT,
     ),
 }  # fmt: skip
 """Name to law."""

@@ -66,7 +66,7 @@ def run_to_failure(process: Process, unit: Population, rng: np.random.Generator)
     before = process.response.reserve(process.severity(unit.damage))[:, 0]
     one = np.ones(1)
     for _ in range(_MOST):
-        rate = process.rate(unit.damage, unit.growth, one)[0]
+        rate = process.rate(unit, unit.damage, one)[0]
         way = [law.damage(np.array([law.highest]))[0] - law.start for law in process.laws]
         with np.errstate(divide="ignore"):
             step = float(np.min(np.array(way) / (_STEPS * rate)))

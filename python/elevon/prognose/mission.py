@@ -29,6 +29,7 @@ from elevon.units import parse_quantity
 __all__ = ["UNITS_OF_USE", "Growth", "Mission", "Usage"]
 
 Quantity = StrictInt | StrictFloat | StrictStr
+_NUMBERS = ("spread", "form_spread", "grain", "start", "start_spread", "dormant")
 UNITS_OF_USE = ("flights", "landings", "cycles", "hours")
 
 
@@ -45,7 +46,7 @@ class Growth(_Frozen):
         Name of the law.
     place : str, optional
         Another place of the same kind of fault.
-    spread, grain, start, start_spread, highest : float, optional
+    spread, form_spread, grain, start, start_spread, dormant, highest : float, optional
         As in `elevon.prognose.law.Law`.
     coefficients : mapping of str to quantity
         Other values.
@@ -54,9 +55,11 @@ class Growth(_Frozen):
     law: StrictStr
     place: StrictStr | None = None
     spread: StrictFloat | StrictInt | None = None
+    form_spread: StrictFloat | StrictInt | None = None
     grain: StrictFloat | StrictInt | None = None
     start: StrictFloat | StrictInt | None = None
     start_spread: StrictFloat | StrictInt | None = None
+    dormant: StrictFloat | StrictInt | None = None
     highest: Quantity | None = None
     coefficients: dict[str, Quantity] = Field(default_factory=dict)
 
@@ -71,9 +74,7 @@ class Growth(_Frozen):
                 parse_quantity(given, known, f"{place}.{name}") if known else float(given)
             )
         fields = {
-            name: float(value)
-            for name in ("spread", "grain", "start", "start_spread")
-            if (value := getattr(self, name)) is not None
+            name: float(value) for name in _NUMBERS if (value := getattr(self, name)) is not None
         }
         if self.highest is not None:
             fields["highest"] = parse_quantity(self.highest, law.unit, f"{place}.highest")

@@ -19,7 +19,9 @@ __all__ = ["Inspection", "Seen", "inspection"]
 Floats = npt.NDArray[np.float64]
 _SIGMAS = 1.6449  # of a 90 % interval's half width
 _DETECTED = 3.0  # deviations at which a severity counts as seen
+_AT_EDGE = 0.98
 _OUTLIER = 0.02  # share of diagnoses that say nothing true; ASSUMED
+_MISSED = 1e-3  # share of diagnoses that do not see a fault that is well there; ASSUMED
 
 
 @dataclass(frozen=True)
@@ -43,8 +45,9 @@ class Seen:
         at = 0.0 if self.severity is None else self.severity
         off = severity - at
         score = off / np.where(off < 0.0, self.low, self.high)
-        wide = np.log(_OUTLIER / 30.0)  # evenly over thirty deviations
-        return np.asarray(np.logaddexp(np.log1p(-_OUTLIER) - 0.5 * score**2, wide))
+        stray = _MISSED if self.severity is None else _OUTLIER
+        wide = np.log(stray / 30.0)  # evenly over thirty deviations
+        return np.asarray(np.logaddexp(np.log1p(-stray) - 0.5 * score**2, wide))
 
 
 @dataclass(frozen=True)
@@ -129,6 +132,13 @@ def _detectable(data: Mapping[str, Any], law: Law) -> float | None:
     return float(kin[0]) if len(kin) == 1 else None
 
 
+def _edge(kind: str) -> float:
+    """Return the greatest severity that diagnosis looks at."""
+    from elevon.diagnose.bymodel.candidates import CANDIDATES
+
+    return max((c.high for c in CANDIDATES if c.kind == kind), default=np.inf)
+
+
 def _read(cause: Mapping[str, Any], limit: float | None, place: str) -> Seen:
     try:
         severity = float(cause["severity"])
@@ -137,6 +147,8 @@ def _read(cause: Mapping[str, Any], limit: float | None, place: str) -> Seen:
         raise InputError(f"{place}: severity and interval are not numbers") from error
     if not (np.isfinite([severity, low, high]).all() and low <= severity <= high):
         raise InputError(f"{place}: severity {severity:g} is not within {low:g} to {high:g}")
+    if high >= _AT_EDGE * _edge(str(cause["kind"])):  # it may be more than is looked at
+        high = max(high, severity) + 4.0 * abs(severity)
     floor = 0.02 * max(abs(severity), limit or 0.0) or 1e-9
     return Seen(
         severity,

@@ -90,7 +90,7 @@ class ParticleFilter:
 def resampled(
     units: Population, count: int, rng: np.random.Generator, *, shrink: float = 1.0
 ) -> Population:
-    """Draw units by their weights (systematic); `shrink` below 1 jitters growth and bias."""
+    """Draw units by their weights (systematic); `shrink` below 1 jitters growth, form and bias."""
     edges = np.cumsum(units.weight)
     at = (rng.random() + np.arange(count)) / count * edges[-1]
     index = np.minimum(np.searchsorted(edges, at), len(edges) - 1)
@@ -100,6 +100,7 @@ def resampled(
     return replace(
         out,
         growth=_kernel(units.growth, units.weight, out.growth, shrink, rng),
+        form=_kernel(units.form, units.weight, out.form, shrink, rng),
         bias=_kernel(units.bias, units.weight, out.bias, shrink, rng),
     )
 

@@ -15,7 +15,8 @@ from elevon.prognose.future import look_ahead
 from elevon.prognose.observation import Inspection
 from elevon.prognose.particle import BIAS, COUNT, ParticleFilter, resampled
 from elevon.prognose.process import Process
-from elevon.prognose.response import Response, check_start, respond
+from elevon.prognose.respond import respond
+from elevon.prognose.response import Response, check_start
 from elevon.units import to_display
 
 if TYPE_CHECKING:
@@ -170,7 +171,9 @@ def _known(
     out = []
     for k, law in enumerate(process.laws):
         low, middle, high = np.quantile(severity[:, k], [tail, 0.5, 1.0 - tail])
-        slow, own, fast = np.exp(np.quantile(units.growth[:, k], [tail, 0.5, 1.0 - tail]))
+        grows = units.active[:, k]
+        factors = np.exp(units.growth[grows, k]) if grows.any() else np.zeros(1)
+        slow, own, fast = np.quantile(factors, [tail, 0.5, 1.0 - tail])
         since = _since_reset(inspections, law.key)
         count = sum(
             1 for i in since if (s := i.seen.get(law.key)) is not None and s.severity is not None
@@ -186,6 +189,7 @@ def _known(
                 float(own),
                 (float(slow), float(fast)),
                 count,
+                float(grows.mean()),
             )
         )
     return tuple(out)

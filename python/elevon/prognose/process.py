@@ -16,11 +16,14 @@ __all__ = ["DRIFT", "Population", "Process"]
 
 Floats = npt.NDArray[np.float64]
 
-DRIFT = 0.08
+DRIFT = 0.05
 """Deviation by which the logarithm of a unit's growth factor wanders while its use grows e-fold.
 
 ASSUMED: no law is right for a whole life; a law's wrong exponent shows as a factor that drifts.
 """
+
+ONSET = 0.05
+"""Rate at which a dormant fault begins to grow, for each e-fold of use. ASSUMED."""
 
 
 @dataclass(frozen=True)
@@ -33,25 +36,37 @@ class Population:
         Of each law.
     growth : ndarray, shape (n, k)
         Logarithm of the unit's own factor on each law's rate.
+    form : ndarray, shape (n, k)
+        Exponent by which the unit's growth differs from the law's as the fault grows.
     bias : ndarray, shape (n, k)
         Logarithm of the factor by which diagnoses show each severity.
     weight : ndarray, shape (n,)
         Sum 1.
+    active : ndarray of bool, shape (n, k)
+        Whether the fault grows.
     usage : float
         Use so far, in the mission's unit.
     """
 
     damage: Floats
     growth: Floats
+    form: Floats
     bias: Floats
     weight: Floats
+    active: npt.NDArray[np.bool_]
     usage: float = 0.0
 
     def picked(self, index: npt.NDArray[np.intp]) -> Population:
         """Return those of an index, all with the same weight."""
         even = np.full(len(index), 1.0 / len(index))
-        return Population(
-            self.damage[index], self.growth[index], self.bias[index], even, self.usage
+        return replace(
+            self,
+            damage=self.damage[index],
+            growth=self.growth[index],
+            form=self.form[index],
+            bias=self.bias[index],
+            weight=even,
+            active=self.active[index],
         )
 
 
@@ -70,6 +85,7 @@ class Process:
         self.response = response
         self.laws: tuple[Law, ...] = response.laws
         self.drift = drift
+        self._quarter = np.array([0.25 * law.highest for law in self.laws])
 
     def start(self, count: int, rng: np.random.Generator, *, bias: float = 0.0) -> Population:
         """Draw new units; `bias` is the deviation of the diagnoses' common factor."""
@@ -79,11 +95,14 @@ class Process:
         start = np.array([law.start for law in self.laws])
         spread = np.array([law.start_spread for law in self.laws])
         growth = np.array([law.spread for law in self.laws])
+        form = np.array([law.form_spread for law in self.laws])
         return Population(
             np.maximum(start + spread * rng.standard_normal((count, size)), 0.0),
             growth * rng.standard_normal((count, size)),
+            form * rng.standard_normal((count, size)),
             bias * rng.standard_normal((count, size)),
             np.full(count, 1.0 / count),
+            rng.random((count, size)) >= np.array([law.dormant for law in self.laws]),
         )
 
     def severity(self, damage: Floats) -> Floats:
@@ -91,11 +110,23 @@ class Process:
         columns = [law.severity(damage[:, k]) for k, law in enumerate(self.laws)]
         return np.column_stack(columns)
 
-    def rate(self, damage: Floats, growth: Floats, load: Floats) -> Floats:
-        """Return the mean growth of each damage in one repetition, shape (n, k)."""
-        drivers = self.response.exposed(self.severity(damage), load)
+    def rate(self, units: Population, damage: Floats, load: Floats) -> Floats:
+        """Return the mean growth of each damage in one repetition, shape (n, k).
+
+        Parameters
+        ----------
+        units : Population
+            Whose growth it is.
+        damage : ndarray, shape (n, k)
+            Where it is asked: not always the units' own.
+        load : ndarray, shape (n,)
+            Factor on the mission's loads.
+        """
+        severity = self.severity(damage)
+        drivers = self.response.exposed(severity, load)
         columns = [law.growth(damage[:, k], drivers) for k, law in enumerate(self.laws)]
-        return np.column_stack(columns) * np.exp(growth)
+        factor = np.exp(units.growth + units.form * np.log1p(severity / self._quarter))
+        return np.asarray(np.column_stack(columns) * factor * units.active)
 
     def advance(
         self,
@@ -109,14 +140,24 @@ class Process:
         Without a random generator growth is the mean one.
         """
         ones = np.ones(len(units.weight)) if load is None else load
-        first = steps * self.rate(units.damage, units.growth, ones)
-        mean = steps * self.rate(units.damage + 0.5 * first, units.growth, ones)
+        first = steps * self.rate(units, units.damage, ones)
+        mean = steps * self.rate(units, units.damage + 0.5 * first, ones)
         grown = mean if rng is None else _gamma(mean, self.laws, rng)
-        growth = units.growth
-        if rng is not None and self.drift > 0.0 and units.usage > 0.0:
-            wander = self.drift * np.sqrt(np.log1p(steps / units.usage))
-            growth = growth + wander * rng.standard_normal(growth.shape)
-        return replace(units, damage=units.damage + grown, growth=growth, usage=units.usage + steps)
+        growth, active = units.growth, units.active
+        if rng is not None and units.usage > 0.0:
+            e_folds = float(np.log1p(steps / units.usage))
+            if self.drift > 0.0:
+                wander = self.drift * np.sqrt(e_folds)
+                growth = growth + wander * rng.standard_normal(growth.shape)
+            if not active.all():
+                active = active | (rng.random(active.shape) < 1.0 - np.exp(-ONSET * e_folds))
+        return replace(
+            units,
+            damage=units.damage + grown,
+            growth=growth,
+            active=active,
+            usage=units.usage + steps,
+        )
 
     def to(
         self,
@@ -139,9 +180,11 @@ class Process:
         """Return the units with parts made new; what replaces them has a growth of its own."""
         new = self.start(len(units.weight), rng)
         at = [k for k, law in enumerate(self.laws) if law.key in keys]
-        damage, growth = units.damage.copy(), units.growth.copy()
+        damage, growth, active = units.damage.copy(), units.growth.copy(), units.active.copy()
         damage[:, at], growth[:, at] = new.damage[:, at], new.growth[:, at]
-        return replace(units, damage=damage, growth=growth)
+        form = units.form.copy()
+        form[:, at], active[:, at] = new.form[:, at], new.active[:, at]
+        return replace(units, damage=damage, growth=growth, form=form, active=active)
 
 
 def _gamma(mean: Floats, laws: Sequence[Law], rng: np.random.Generator) -> Floats:

@@ -22,7 +22,8 @@ _ALPHA, _BETA, _KAPPA = 0.5, 2.0, 0.0
 class UnscentedFilter:
     """Mean and covariance of damages and growth factors, 2k numbers.
 
-    Damages are kept at zero or above by moving sigma points to the border.
+    Every law counts as acting and as right in its form. Damages are kept at zero or above by
+    moving sigma points to the border.
 
     Parameters
     ----------
@@ -73,7 +74,9 @@ class UnscentedFilter:
             np.maximum(points[:, :size], 0.0),
             points[:, size:],
             np.zeros((len(points), size)),
+            np.zeros((len(points), size)),
             np.full(len(points), 1.0 / len(points)),
+            np.ones((len(points), size), dtype=np.bool_),
             self.usage,
         )
         after = self.process.to(before, usage, None)

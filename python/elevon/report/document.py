@@ -175,6 +175,7 @@ class Report:
         self.date = date
         self.sections: list[Section] = []
         self.facts: list[tuple[str, str, str]] = []
+        self.opening: tuple[Markup, str] | None = None
         self._provenance: dict[str, str] = {}
 
     def section(self, title: str, *paragraphs: str) -> Section:
@@ -186,6 +187,12 @@ class Report:
     def fact(self, label: str, value: str, note: str = "") -> None:
         """Add one headline number, shown in a row of them under the lead."""
         self.facts.append((label, value, note))
+
+    def open_with(self, figure: Figure, caption: str) -> None:
+        """Put one picture under the lead, before everything else."""
+        from elevon.report.figures import inline_svg
+
+        self.opening = (inline_svg(figure, "opening", caption), caption)
 
     def provenance(self, entries: Mapping[str, object]) -> None:
         """Add what is needed to make the report again: version, hashes, seed, command."""

@@ -10,6 +10,7 @@ from elevon.cli.reproduce.diagnosis import CASES as _DIAGNOSIS
 from elevon.cli.reproduce.nasa import CASES as _NASA
 from elevon.cli.reproduce.optimisers import CASES as _OPTIMISERS
 from elevon.cli.reproduce.pisa import CASES as _PISA
+from elevon.cli.reproduce.prognosis import CASES as _PROGNOSIS
 from elevon.cli.reproduce.torino import CASES as _TORINO
 
 app = typer.Typer(
@@ -24,5 +25,14 @@ def _group() -> None:
     """Recompute a published table or figure; exit code 1 when a check fails."""
 
 
-for _case in (*_TORINO, *_NASA, *_PISA, *_CRANFIELD, *_DIAGNOSIS, *_OPTIMISERS):
+_CASES = (
+    *_TORINO,
+    *_NASA,
+    *_PISA,
+    *_CRANFIELD,
+    *_DIAGNOSIS,
+    *_OPTIMISERS,
+    *_PROGNOSIS,
+)
+for _case in _CASES:
     add_command(app, _case)

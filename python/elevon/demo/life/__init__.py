@@ -1,0 +1,1 @@
+"""The demonstration: a unit lives, is inspected, diagnosed, and its end is predicted."""

@@ -1,0 +1,96 @@
+"""The unit that nobody knows: its values, how it grows worse, and when it fails."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elevon.demo.hidden import hidden_actuator
+from elevon.faults import Fault
+from elevon.prognose import Mission, Process, respond
+from elevon.prognose.life import Life, run_to_failure
+from elevon.reproduce.prognosis.truth import other_law
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.progress import Progress
+
+__all__ = [
+    "INSPECTED",
+    "demo_mission",
+    "faults_at",
+    "hidden_unit",
+    "live",
+    "mission_file",
+    "of_day",
+]
+
+INSPECTED = 330.0
+"""Flights between inspections, about."""
+_FACTORS = (1.35, 0.7)
+"""Of wear and friction on the laws the prediction starts from: this unit wears faster."""
+
+
+def mission_file() -> Path:
+    """Return the file of the demonstration's mission."""
+    return Path(str(files("elevon.demo.life") / "mission.toml"))
+
+
+def demo_mission() -> Mission:
+    """Return the demonstration's mission."""
+    return Mission.load(mission_file())
+
+
+def hidden_unit(base: Actuator, seed: int) -> Actuator:
+    """Draw the unit: as on the bench with hidden values, with a gear of ordinary play."""
+    rng = np.random.default_rng([seed, 8])
+    play = base.parameters.value("play.total") + math.radians(rng.uniform(0.0, 0.1))
+    values: dict[str, str | float] = {"play.total": play}
+    return hidden_actuator(base, seed).with_values(values, source="hidden from everybody")
+
+
+def of_day(unit: Actuator, rng: np.random.Generator) -> Actuator:
+    """Return the unit as it is on one day: warmer or colder, freer or stiffer (ASSUMED)."""
+    value = unit.parameters.value
+    dry = float(np.exp(0.03 * rng.standard_normal()))
+    values: dict[str, str | float] = {
+        "motor.winding_temperature": value("motor.winding_temperature") + 8.0 * rng.normal(),
+        "friction.dynamic": dry * value("friction.dynamic"),
+        "friction.static": dry * value("friction.static"),
+        "friction.viscous": value("friction.viscous") * float(np.exp(0.05 * rng.standard_normal())),
+    }
+    return unit.with_values(values, source="of the day")
+
+
+def live(unit: Actuator, seed: int, progress: Progress | None = None) -> Life:
+    """Let the unit fly until it fails, on tables corrected by the high-fidelity model.
+
+    Its laws feed back on themselves and scatter more than those of the prediction.
+    """
+    mission = demo_mission()
+    laws = [other_law(law) for law in mission.laws()]
+    process = Process(
+        respond(unit, mission, laws=laws, snapshots=True, progress=progress), drift=0.0
+    )
+    rng = np.random.default_rng([seed, 9])
+    new = process.start(10, rng).picked(np.array([0]))
+    growth = np.log(np.array([_FACTORS])) + 0.05 * rng.standard_normal((1, 2))
+    every = np.ones((1, 2), dtype=np.bool_)
+    return run_to_failure(
+        process, replace(new, growth=growth, form=np.zeros((1, 2)), active=every), rng
+    )
+
+
+def faults_at(life: Life, usage: float) -> list[Fault]:
+    """Return the faults of the unit at a use."""
+    keys = [law.key for law in demo_mission().laws()]
+    return [
+        Fault.parse(f"{key}={float(value)!r}")
+        for key, value in zip(keys, life.at(usage), strict=True)
+        if value > 0.0
+    ]

@@ -1,0 +1,197 @@
+"""When to maintain a small fleet: each unit alone, or several at one visit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.errors import InputError, RangeError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from elevon.prognose.answer import Prognosis
+
+__all__ = ["Costs", "FleetPlan", "Visit", "fleet_figure", "plan_fleet"]
+
+Floats = npt.NDArray[np.float64]
+_INSTANTS = 400  # at which a visit may be
+
+
+@dataclass(frozen=True)
+class Costs:
+    """What is weighed, in one currency.
+
+    Attributes
+    ----------
+    early : float
+        Of one unit of use of a part's life that is thrown away.
+    late : float
+        Of a failure in service.
+    visit : float
+        Of a visit to the hangar, however many units are done at it.
+    """
+
+    early: float
+    late: float
+    visit: float
+
+    def __post_init__(self) -> None:
+        for name in ("early", "late", "visit"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= 0.0):
+                raise RangeError(f"cost {name} = {value:g} must be a finite number, 0 or more")
+
+
+@dataclass(frozen=True)
+class Visit:
+    """A visit at `use` from now, and the units done at it."""
+
+    use: float
+    units: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class FleetPlan:
+    """The cheapest visits.
+
+    Attributes
+    ----------
+    unit : str
+        Of use.
+    units : mapping of str to Prognosis
+        The fleet.
+    alone : mapping of str to float
+        When each unit would be done by itself.
+    visits : tuple of Visit
+        Together.
+    cost, cost_alone : float
+        Expected cost of both, all units.
+    """
+
+    unit: str
+    units: Mapping[str, Prognosis]
+    alone: Mapping[str, float]
+    visits: tuple[Visit, ...]
+    cost: float
+    cost_alone: float
+
+    def visit_of(self, name: str) -> float:
+        """Return when a unit is done."""
+        return next(visit.use for visit in self.visits if name in visit.units)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form."""
+        rows = []
+        for name, item in self.units.items():
+            use = self.visit_of(name)
+            rows.append(
+                {
+                    "unit": name,
+                    "rul": item.median,
+                    "interval": list(item.interval),
+                    "alone": self.alone[name],
+                    "visit": use,
+                    "p_failed_before": 1.0 - item.survives(use),
+                }
+            )
+        return {
+            "status": "ok",
+            "unit": self.unit,
+            "rows": rows,
+            "visits": [{"use": v.use, "units": list(v.units)} for v in self.visits],
+            "cost": self.cost,
+            "cost_alone": self.cost_alone,
+        }
+
+
+def plan_fleet(units: Mapping[str, Prognosis], costs: Costs) -> FleetPlan:
+    """Choose the visits of least expected cost.
+
+    All units are used alike from now on. Units are sorted by when they would be done alone; a
+    visit takes neighbours in that order, and the best split is found exactly (dynamic programming).
+
+    Parameters
+    ----------
+    units : mapping of str to Prognosis
+        Serial number to prediction, one unit of use for all.
+    costs : Costs
+        What is weighed.
+
+    Raises
+    ------
+    InputError
+        No unit, or several units of use.
+    """
+    if not units:
+        raise InputError("a fleet needs at least one unit")
+    kinds = {item.unit for item in units.values()}
+    if len(kinds) > 1:
+        raise InputError(f"the fleet is counted in several units: {', '.join(sorted(kinds))}")
+    far = max(float(np.quantile(_finite(item), 0.95)) for item in units.values())
+    instants = np.linspace(0.0, max(far, 1.0), _INSTANTS)
+    table = {name: _expected(item, instants, costs) for name, item in units.items()}
+    alone = {name: float(instants[cost.argmin()]) for name, cost in table.items()}
+    order = sorted(units, key=lambda name: alone[name])
+    visits, cost = _grouped(order, table, instants, costs.visit)
+    single = sum(float(c.min()) for c in table.values()) + costs.visit * len(units)
+    return FleetPlan(next(iter(kinds)), units, alone, visits, cost, single)
+
+
+def _finite(item: Prognosis) -> Floats:
+    """Remaining lives; those without end in sight count as the longest seen, or as none."""
+    rest = item.future.remaining
+    known = rest[np.isfinite(rest)]
+    return np.where(np.isfinite(rest), rest, known.max(initial=1.0))
+
+
+def _expected(item: Prognosis, instants: Floats, costs: Costs) -> Floats:
+    """Expected cost of doing a unit at each instant, shape (t,)."""
+    rest = _finite(item)[:, None]
+    lost = np.maximum(rest - instants, 0.0).mean(axis=0)
+    failed = (rest < instants).mean(axis=0)
+    return np.asarray(costs.early * lost + costs.late * failed)
+
+
+def _grouped(
+    order: Sequence[str], table: Mapping[str, Floats], instants: Floats, visit: float
+) -> tuple[tuple[Visit, ...], float]:
+    """Split the order into visits; the least cost of the first j units for each j."""
+    rows = np.array([table[name] for name in order])
+    sums = np.vstack((np.zeros(len(instants)), np.cumsum(rows, axis=0)))
+    best, since = [0.0], [0]
+    for j in range(1, len(order) + 1):
+        costs = [best[i] + visit + float((sums[j] - sums[i]).min()) for i in range(j)]
+        since.append(int(np.argmin(costs)))
+        best.append(min(costs))
+    out: list[Visit] = []
+    j = len(order)
+    while j > 0:
+        i = since[j]
+        use = float(instants[(sums[j] - sums[i]).argmin()])
+        out.append(Visit(use, tuple(order[i:j])))
+        j = i
+    return tuple(reversed(out)), best[-1]
+
+
+def fleet_figure(plan: FleetPlan) -> Figure:
+    """Draw each unit's remaining life and the visits."""
+    from elevon.report.figures import COLOURS, new_figure
+
+    names = sorted(plan.units, key=plan.visit_of, reverse=True)
+    with new_figure(width=8.5, height=1.2 + 0.42 * len(names)) as (figure, axis):
+        for k, name in enumerate(names):
+            item = plan.units[name]
+            low, high = np.minimum(item.interval, 1e7)
+            axis.plot([low, high], [k, k], color=COLOURS["orange"], lw=6, alpha=0.5)
+            axis.plot([item.median], [k], "o", color=COLOURS["orange"])
+            axis.plot([plan.visit_of(name)], [k], "|", color=COLOURS["blue"], ms=16, mew=2.5)
+        for visit in plan.visits:
+            axis.axvline(visit.use, color=COLOURS["blue"], lw=0.8, ls=":")
+        axis.set(xlabel=f"{plan.unit} from now", yticks=range(len(names)), yticklabels=names)
+        axis.set_xlim(left=0.0)
+    return figure

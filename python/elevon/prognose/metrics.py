@@ -1,0 +1,157 @@
+"""Metrics of a series of predictions against the end that came.
+
+Definitions: Saxena, Celaya, Saha, Saha, Goebel, "Metrics for offline evaluation of prognostic
+performance", IJPHM 1 (2010). Where that paper leaves a choice, the strict one is made and said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.errors import InputError
+
+__all__ = [
+    "Track",
+    "alpha_lambda",
+    "convergence",
+    "coverage",
+    "cumulative_relative_accuracy",
+    "prognostic_horizon",
+    "relative_accuracy",
+    "wilson",
+]
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Track:
+    """Predictions of one unit's remaining life, in the order of use.
+
+    Attributes
+    ----------
+    usage : ndarray, shape (m,)
+        When they were made, rising.
+    median, low, high : ndarray, shape (m,)
+        Of the remaining useful life.
+    end : float
+        The use at which life ended.
+    start : float
+        Use at which the life began; shares of life are counted from there.
+    """
+
+    usage: Floats
+    median: Floats
+    low: Floats
+    high: Floats
+    end: float
+    start: float = 0.0
+
+    def __post_init__(self) -> None:
+        sizes = {len(self.usage), len(self.median), len(self.low), len(self.high)}
+        if len(sizes) != 1 or not len(self.usage):
+            raise InputError("a track needs as many medians, lows and highs as uses, one at least")
+        if (np.diff(self.usage) <= 0.0).any():
+            raise InputError("the uses of a track must rise")
+        if not self.end > self.start:
+            raise InputError(f"life ends at {self.end:g}, not after its start at {self.start:g}")
+
+    @property
+    def true(self) -> Floats:
+        """True remaining life at each prediction."""
+        return self.end - self.usage
+
+    def at(self, share: float) -> int:
+        """Return the last prediction made at or before a share of life; -1: none."""
+        limit = self.start + share * (self.end - self.start)
+        return int(np.searchsorted(self.usage, limit * (1.0 + 1e-12), side="right")) - 1
+
+    def predicted(self, share: float) -> tuple[float, float, float]:
+        """Return median, low, high of the remaining life at a share of life.
+
+        From the last prediction, less what has been used since.
+        """
+        k = self.at(share)
+        if k < 0:
+            raise InputError(f"no prediction was made before {share:.0%} of life")
+        since = self.start + share * (self.end - self.start) - float(self.usage[k])
+        rows = (self.median, self.low, self.high)
+        return tuple(max(float(row[k]) - since, 0.0) for row in rows)  # type: ignore[return-value]
+
+
+def relative_accuracy(track: Track, share: float) -> float:
+    """Return 1 - |true - median| / true of the remaining life at a share of life; 1 is perfect."""
+    if not 0.0 <= share < 1.0:
+        raise InputError(f"share of life {share:g} is outside 0 to 1")
+    true = (1.0 - share) * (track.end - track.start)
+    return 1.0 - abs(track.predicted(share)[0] - true) / true
+
+
+def cumulative_relative_accuracy(track: Track, shares: Sequence[float]) -> float:
+    """Return the mean of the relative accuracy over shares of life, all with the same weight."""
+    return float(np.mean([relative_accuracy(track, share) for share in shares]))
+
+
+def prognostic_horizon(track: Track, alpha: float = 0.2) -> float:
+    """Return the share of life before its end from which on medians stay within the band.
+
+    The band is ``alpha`` of the whole life about the true remaining life. Strict: the horizon
+    begins where the LAST stretch inside begins, not where a median falls inside for the first
+    time; 0 where the last prediction is outside.
+    """
+    life = track.end - track.start
+    inside = np.abs(track.median - track.true) <= alpha * life
+    if not inside[-1]:
+        return 0.0
+    outside = np.flatnonzero(~inside)
+    first = int(outside[-1]) + 1 if len(outside) else 0
+    return float(track.true[first]) / life
+
+
+def alpha_lambda(track: Track, share: float, alpha: float = 0.2) -> bool:
+    """Return whether the median at a share of life is within ``alpha`` of what truly remains."""
+    return relative_accuracy(track, share) >= 1.0 - alpha - 1e-12
+
+
+def convergence(track: Track) -> float:
+    """Return how late the error's weight lies: distance of its centre from the first prediction.
+
+    The centre of the area under the absolute error over use; over the length of the track in use
+    and the error of the first prediction alike, so that small is fast. NaN with fewer than two
+    predictions or without error.
+    """
+    if len(track.usage) < 2:
+        return float("nan")
+    error = np.abs(track.median - track.true)
+    scale = float(error.max())
+    if scale == 0.0:
+        return float("nan")
+    way = (track.usage - track.usage[0]) / (track.usage[-1] - track.usage[0])
+    error = error / scale
+    area = np.trapezoid(error, way)
+    x = np.trapezoid(error * way, way) / area
+    y = 0.5 * np.trapezoid(error**2, way) / area
+    return float(np.hypot(x, y))
+
+
+def coverage(tracks: Sequence[Track], share: float) -> float:
+    """Return the share of units whose interval holds the true remaining life at a share of life."""
+    hits = []
+    for track in tracks:
+        _, low, high = track.predicted(share)
+        true = (1.0 - share) * (track.end - track.start)
+        hits.append(low <= true <= high)
+    return float(np.mean(hits))
+
+
+def wilson(hits: float, count: int, z: float = 1.959964) -> tuple[float, float]:
+    """Return the 95 % interval of a share of `count` units (Wilson 1927)."""
+    if count < 1:
+        raise InputError("an interval of a share needs at least one unit")
+    middle = (hits + z**2 / (2 * count)) / (1 + z**2 / count)
+    half = z / (1 + z**2 / count) * np.sqrt(hits * (1 - hits) / count + z**2 / (4 * count**2))
+    return float(middle - half), float(middle + half)

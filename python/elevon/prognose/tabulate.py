@@ -1,0 +1,251 @@
+"""Model runs over severities: the mission and the requirements' own runs, in blocks."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.errors import InputError, Interrupted, NotActingWarning
+from elevon.prognose.exposure import exposure, recorded_signals, shown
+from elevon.prognose.grid import Grid
+from elevon.prognose.law import Law
+from elevon.prognose.requirement import MEASURES, SEVERITY, Requirement, Shown
+from elevon.prognose.response import Response
+from elevon.progress import Progress
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.prognose.mission import Mission
+    from elevon.scenario import Scenario
+
+__all__ = ["severity_grid", "tabulate"]
+
+Floats = npt.NDArray[np.float64]
+_CHUNK = 128  # runs held in memory at once
+_LOADS = (0.5, 1.0, 2.0)  # factors on the mission's loads where the future may differ
+
+
+def severity_grid(laws: Sequence[Law], mission: Mission, count: int) -> Grid:
+    """Return the severities that are run, and loads where the future may differ."""
+    steps = np.linspace(0.0, 1.0, count) ** 1.5  # denser where life is spent
+    axes = [law.highest * steps for law in laws]
+    usage = mission.usage
+    if usage.load_spread > 0.0 or usage.load != 1.0:
+        axes.append(np.array(_LOADS))
+    return Grid(tuple(axes))
+
+
+def tabulate(
+    actuator: Actuator,
+    mission: Mission,
+    laws: tuple[Law, ...],
+    grid: Grid,
+    *,
+    fidelity: str,
+    progress: Progress | None,
+    points: Sequence[tuple[float, ...]] | None = None,
+) -> Response:
+    """Run every point of the grid, or those given."""
+    base = mission.scenarios()
+    requirements = mission.requirement
+    plans = [_own_runs(item, base) for item in requirements]
+    output, load = _units(actuator)
+    faults = {law.key: law.unit for law in laws}
+    _check_measures(actuator, requirements)
+    units = tuple(item.unit(output, load, faults) for item in requirements)
+    points = list(grid.points()) if points is None else points
+    own = [scenario for plan in plans for scenario in plan]
+    # Requirements are judged at the loads as stated: elsewhere only the mission is run.
+    jobs = [[base, *own] if _as_stated(laws, point) else [base] for point in points]
+    work = [[_scenario(s, laws, p) for s in job] for job, p in zip(jobs, points, strict=True)]
+    drivers: dict[str, list[float]] = {}
+    values = []
+    batches = _runs(actuator, work, fidelity, progress)
+    for k, (flown, *rest) in enumerate(batches):
+        if k == 0:
+            _check_capability(actuator, flown)
+        for name, value in exposure(flown, mission).items():
+            drivers.setdefault(name, []).append(value)
+        stated = _as_stated(laws, points[k])
+        values.append(_values(requirements, plans, flown, rest) if stated else [])
+    return Response(
+        laws,
+        requirements,
+        tuple(item.threshold(unit) for item, unit in zip(requirements, units, strict=True)),
+        units,
+        grid,
+        {name: np.array(column) for name, column in drivers.items()},
+        np.array(_filled(values)),
+        sum(map(len, work)),
+        fidelity,
+    )
+
+
+def _check_measures(actuator: Actuator, requirements: Sequence[Requirement]) -> None:
+    """Refuse a requirement that the actuator's signals cannot show."""
+    from elevon import _core
+
+    units = {s["role"]: s["unit"] for s in reversed(_core.signals(actuator.wiring, "low"))}
+    for item in requirements:
+        needed = () if item.measure == SEVERITY else MEASURES[item.measure].roles
+        lacking = next((role for role in needed if role not in units), None)
+        if lacking is not None:
+            raise InputError(
+                f"requirement {item.name}: {actuator.name} has no signal of the role {lacking!r}, "
+                f"which {item.measure} needs"
+            )
+        if "command" in needed and units["command"] != units["output_position"]:
+            raise InputError(
+                f"requirement {item.name}: {item.measure} compares command and output, and the "
+                f"command of {actuator.name} is no position"
+            )
+
+
+_FOLLOWED = 0.9  # share of the command's travel that a healthy unit must reach
+
+
+def _check_capability(actuator: Actuator, flown: Shown) -> None:
+    """Refuse a mission that the healthy unit trips on or does not follow."""
+    if not flown.complete:
+        raise InputError(
+            f"the mission is outside the capability of {actuator.name}: the healthy unit trips at "
+            f"{flown.time[-1]:.4g} s"
+        )
+    from elevon import _core
+
+    units = {s["role"]: s["unit"] for s in reversed(_core.signals(actuator.wiring, "low"))}
+    if units["command"] != units["output_position"]:
+        return
+    asked, done = (float(np.ptp(flown[role])) for role in ("command", "output_position"))
+    if done < _FOLLOWED * asked:
+        unit = units["output_position"]
+        raise InputError(
+            f"the mission is outside the capability of {actuator.name}: the healthy unit travels "
+            f"{done:.4g} {unit} of the {asked:.4g} {unit} asked for"
+        )
+
+
+def _as_stated(laws: Sequence[Law], point: Sequence[float]) -> bool:
+    return len(point) == len(laws) or point[-1] == 1.0
+
+
+def _filled(values: Sequence[list[float]]) -> list[list[float]]:
+    """Give points under other loads the values of the nearest point before or after, as stated.
+
+    The load is the last axis, so points of the same severities stand beside each other; of the
+    three loads the stated one is in the middle.
+    """
+    last = next(row for row in values if row)
+    out: list[list[float]] = []
+    for k, row in enumerate(values):
+        near = values[k + 1] if k + 1 < len(values) else []
+        last = row or near or last
+        out.append(last)
+    return out
+
+
+def _own_runs(requirement: Requirement, mission: Scenario) -> list[Scenario]:
+    from elevon.scenario import Scenario
+
+    if requirement.measure == SEVERITY:
+        return []
+    if requirement.scenario is not None:
+        place = f"requirement {requirement.name}: scenario"
+        return [Scenario.from_dict(requirement.scenario, place)]
+    make = MEASURES[requirement.measure].scenarios
+    return [] if make is None else make(requirement, mission)
+
+
+def _values(
+    requirements: Sequence[Requirement],
+    plans: Sequence[Sequence[Scenario]],
+    flown: Shown,
+    rest: Sequence[Shown],
+) -> list[float]:
+    out, at = [], 0
+    for requirement, plan in zip(requirements, plans, strict=True):
+        own = rest[at : at + len(plan)]
+        at += len(plan)
+        if requirement.measure == SEVERITY:
+            out.append(0.0)
+        else:
+            out.append(requirement.value(own or [flown]))
+    return out
+
+
+def _scenario(scenario: Scenario, laws: Sequence[Law], point: Sequence[float]) -> Scenario:
+    faults = [
+        f"{law.key}={value!r}" for law, value in zip(laws, point, strict=False) if value != 0.0
+    ]
+    load = point[len(laws)] if len(point) > len(laws) else 1.0
+    if load != 1.0:
+        scenario = _loaded(scenario, load)
+    return scenario.with_faults(faults) if faults else scenario
+
+
+def _loaded(scenario: Scenario, factor: float) -> Scenario:
+    """Return the scenario with every term of the user's load scaled."""
+    data = scenario.to_dict()
+    terms = data.get("load", {}).get("user", {}).get("terms", [])
+    scaled = [_scaled(term, factor) for term in terms]
+    load = {**data.get("load", {}), "user": {"terms": scaled}}
+    return scenario.replaced(load=load) if terms else scenario
+
+
+_SIZES = ("value", "amplitude", "bias", "slope", "initial", "final", "low", "high", "gain")
+
+
+def _scaled(term: Mapping[str, object], factor: float) -> dict[str, object]:
+    """Scale what of a term carries the load's unit; numbers with units keep them."""
+    out = dict(term)
+    if term["kind"] == "table":
+        out["gain"] = factor * float(str(term.get("gain", 1.0)))
+        return out
+    for name in _SIZES:
+        if name in term:
+            given = term[name]
+            if isinstance(given, str):
+                number, _, unit = given.strip().partition(" ")
+                out[name] = f"{factor * float(number)!r} {unit}"
+            else:
+                out[name] = factor * float(str(given))
+    return out
+
+
+def _units(actuator: Actuator) -> tuple[str, str]:
+    from elevon import _core
+
+    names = {s["role"]: s["unit"] for s in reversed(_core.signals(actuator.wiring, "low"))}
+    ports = {p["name"]: p["unit"] for p in _core.ports(actuator.wiring)}
+    return names["output_position"], ports.get("user", "")
+
+
+def _runs(
+    actuator: Actuator,
+    work: Sequence[Sequence[Scenario]],
+    fidelity: str,
+    progress: Progress | None,
+) -> Iterator[list[Shown]]:
+    """Yield the runs of each point, in blocks that fit in memory."""
+    from elevon.simulate import Run, simulate_batch
+
+    record = recorded_signals(actuator.wiring, fidelity)
+    step = max(1, _CHUNK // max(map(len, work)))
+    for first in range(0, len(work), step):
+        block = work[first : first + step]
+        runs = [Run(actuator, scenario) for point in block for scenario in point]
+        try:
+            with warnings.catch_warnings():
+                # What a set carries for another fidelity or drive is none of the user's doing here.
+                warnings.simplefilter("ignore", NotActingWarning)
+                results = iter(simulate_batch(runs, fidelity=fidelity, record=record))
+        except InputError as error:
+            raise InputError(f"the mission on {actuator.name}: {error}") from error
+        for point in block:
+            yield [shown(next(results), actuator.wiring, fidelity) for _ in point]
+        if progress is not None and progress((first + len(block)) / len(work)) is False:
+            raise Interrupted("interrupted while the tables were made")
