@@ -26,6 +26,7 @@ from elevon.cli.common import (
 from elevon.cli.output import print_json, print_table, progress_bar, say
 
 if TYPE_CHECKING:
+    from elevon.recording import Recording
     from elevon.simulate import Run
 
 app = typer.Typer(rich_markup_mode=None)
@@ -51,6 +52,12 @@ def simulate(
         Path | None, typer.Option(metavar="FILE", help="Plot it: .png, .svg, .pdf or .html.")
     ] = None,
     seed: SeedOption = 0,
+    compare: Annotated[
+        Path | None, typer.Option(metavar="REC", help="Another recording drawn over this one.")
+    ] = None,
+    spectra: Annotated[
+        bool, typer.Option("--spectra", help="Add spectra of error, current and speed to the plot.")
+    ] = False,
     force: ForceOption = False,
     strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
     json: JsonOption = False,
@@ -61,6 +68,7 @@ def simulate(
     from elevon.simulate import simulate as run
 
     _check_files(out, plot, force=force)
+    other = _read_other(compare, plot)
     loaded = read_actuator(actuator, settings)
     asked = read_scenario(loaded, scenario, duration, fault)
     if out is not None:
@@ -73,7 +81,7 @@ def simulate(
         recording.save(out, force=force)
         say(f"wrote {', '.join(str(file) for file in files_of(out))}")
     if plot is not None:
-        recording.plot(path=plot, force=force)
+        recording.plot(path=plot, compare=other, spectra=spectra, force=force)
         say(f"wrote {plot}")
     if json:
         print_json(_result(recording, loaded.wiring, out, plot))
@@ -93,6 +101,19 @@ def _check_files(out: Path | None, plot: Path | None, *, force: bool) -> None:
     if out is not None and plot is not None and out.absolute() == plot.absolute():
         raise InputError(f"{out}: --out and --plot name the same file")
     check_outputs([out, plot], force=force)
+
+
+def _read_other(compare: Path | None, plot: Path | None) -> Recording | None:
+    """Read the recording to compare with before simulating."""
+    from elevon.errors import InputError
+    from elevon.recording import Recording
+
+    if compare is None:
+        return None
+    if plot is None:
+        raise InputError("--compare draws over a plot: give its file with --plot")
+    other = Recording.load(compare)
+    return other if other.meta.get("label") else other.with_meta(label=compare.name)
 
 
 def _check_clocks(
@@ -145,7 +166,7 @@ def _print_result(recording: Any, wiring: str) -> None:
         f"{meta['sim_s']:g} s simulated in {meta['wall_s']:.3g} s "
         f"({speed:.3g} times real time, {meta['ns_per_step']:.3g} ns a step)\n"
     )
-    from elevon.simulate.timeline import code_names
+    from elevon.recording.states import code_names
 
     events = _events(recording, wiring).get("events")
     if events is not None:

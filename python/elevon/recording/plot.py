@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.errors import InputError, unknown
 from elevon.files import atomic_path, check_output, write_text
 from elevon.recording.channel import Channel
-from elevon.recording.clock import Clock
+from elevon.recording.overview import Band, Panel, bands, overlaid, overview, spectra
 from elevon.units import shown_unit
 
 if TYPE_CHECKING:
@@ -30,13 +28,6 @@ _MOST_POINTS = 100_000
 """On a picture of some thousand pixels the extremes of this many slices look like all samples."""
 
 
-@dataclass(frozen=True)
-class _Panel:
-    unit: str
-    clock: Clock
-    lines: dict[str, npt.NDArray[np.float64]]
-
-
 def plot(
     recording: Recording,
     names: Iterable[str] | None,
@@ -44,24 +35,28 @@ def plot(
     *,
     units: Mapping[str, str],
     title: str | None,
+    compare: tuple[str, Recording] | None,
+    with_spectra: bool,
     force: bool,
 ) -> Figure | Path:
     """See `Recording.plot`."""
-    chosen = recording.channels if names is None else [recording[name] for name in names]
-    if not chosen:
-        raise InputError("nothing to plot: the recording has no channel, or none was named")
-    for name in units:
-        recording[name]
-    heading = str(recording.meta.get("actuator", "Recording")) if title is None else title
     suffix = None if path is None else Path(path).suffix.lower()
     if suffix is not None and suffix not in (*PICTURES, ".html"):
         raise unknown("ending of a plot", suffix, (*PICTURES, ".html"), str(path))
     if path is not None:
         check_output(path, force=force)
-    panels = _panels(chosen, units)
+    heading = str(recording.meta.get("actuator", "Recording")) if title is None else title
+    panels = _chosen(recording, names, units)
+    marked = bands(recording)
+    if compare is not None:
+        name, other = compare
+        panels = overlaid(panels, _chosen(other, names, units), name)
+        marked += [item for item in bands(other) if item.kind == "fault" and item not in marked]
+    if with_spectra:
+        panels = panels + spectra(panels)
     if path is not None and suffix == ".html":
-        return write_text(path, _page(panels, heading), force=force)
-    figure = _figure(panels, heading)
+        return write_text(path, _page(panels, marked, heading), force=force)
+    figure = _figure(panels, marked, heading)
     if path is None:
         return figure
     with atomic_path(path, force=force) as temporary:
@@ -69,69 +64,124 @@ def plot(
     return Path(path).expanduser()
 
 
-def _panels(channels: list[Channel], units: Mapping[str, str]) -> list[_Panel]:
+def _chosen(
+    recording: Recording, names: Iterable[str] | None, units: Mapping[str, str]
+) -> list[Panel]:
+    """Return the panels of the channels named; without names the run's, or of every channel."""
+    for name in units:
+        recording[name]
+    panels = overview(recording) if names is None and not units else []
+    if panels:
+        return panels
+    chosen = recording.channels if names is None else [recording[name] for name in names]
+    if not chosen:
+        raise InputError("nothing to plot: the recording has no channel, or none was named")
+    return _panels(chosen, units)
+
+
+def _panels(channels: list[Channel], units: Mapping[str, str]) -> list[Panel]:
     """Group channels that share a clock and a unit."""
-    panels: dict[tuple[str, str], _Panel] = {}
+    panels: dict[tuple[str, str], Panel] = {}
     for channel in channels:
         unit = units.get(channel.name) or shown_unit(channel.unit)
-        key = (channel.clock.name, unit)
-        panel = panels.setdefault(key, _Panel(unit, channel.clock, {}))
+        clock = channel.clock
+        panel = panels.setdefault(
+            (clock.name, unit), Panel("", unit, clock.time, {}, tuple(clock.gaps), clock.name)
+        )
         panel.lines[channel.name] = channel.to(unit)
     return list(panels.values())
 
 
-def _page(panels: list[_Panel], heading: str) -> str:
+def _page(panels: list[Panel], marked: list[Band], heading: str) -> str:
     from elevon.report.uplot import chart, page
 
-    several = len({panel.clock.name for panel in panels}) > 1
+    several = len({panel.clock for panel in panels if panel.clock}) > 1
     charts = []
     for panel in panels:
         label = "" if panel.unit == "1" else f"[{panel.unit}]"
-        note = f"Clock: {panel.clock.name}." if several else ""
+        notes = [f"Clock: {panel.clock}."] if several and panel.clock else []
+        shaded = [] if panel.spectrum else marked
+        if panel is panels[0]:
+            notes += [f"{band.text}: {band.start:g} to {band.end:g} s." for band in shaded[:12]]
         charts.append(
             chart(
-                ", ".join(panel.lines),
-                panel.clock.time,
-                panel.lines,
+                panel.title or ", ".join(panel.lines),
+                panel.time,
+                panel.lines | panel.others,
+                dashed=list(panel.others),
+                x_label="frequency [Hz]" if panel.spectrum else "time [s]",
                 y_label=label,
-                note=note,
-                breaks=panel.clock.gaps,
+                note=" ".join(notes),
+                breaks=panel.gaps,
+                shaded=[(b.start, b.end, b.text, b.kind == "fault") for b in shaded],
+                logarithmic=panel.spectrum,
             )
         )
     return page(heading, "\n".join(charts))
 
 
-def _figure(panels: list[_Panel], heading: str) -> Figure:
+def _figure(panels: list[Panel], marked: list[Band], heading: str) -> Figure:
     from matplotlib.figure import Figure
 
     height = 1.0 + 2.2 * len(panels)
     figure = Figure(figsize=(9.0, min(height, 200.0)), layout="constrained")
     axes = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
-    shared = {panel.clock.name for panel in panels}
+    shared = {panel.clock for panel in panels if panel.clock}
+    timed = [axis for axis, panel in zip(axes, panels, strict=True) if not panel.spectrum]
     for axis, panel in zip(axes, panels, strict=True):
         _draw(axis, panel, len(shared) > 1)
-        axis.sharex(axes[0])
-    for axis in axes[:-1]:
+        if panel.spectrum:
+            axis.set(xscale="log", yscale="log", xlabel="frequency [Hz]")
+        else:
+            axis.sharex(timed[0])
+            _shade(axis, marked, named=axis is timed[0])
+    for axis in timed[:-1]:
         axis.tick_params(labelbottom=False)
-    axes[-1].set_xlabel("time [s]")
+    if timed:
+        timed[-1].set_xlabel("time [s]")
     figure.suptitle(heading.replace("$", r"\$"), fontsize=11)
     return figure
 
 
-def _draw(axis: Axes, panel: _Panel, name_clock: bool) -> None:
+def _shade(axis: Axes, marked: list[Band], *, named: bool) -> None:
+    """Shade stretches with a fault in red, states in turns of grey; name them on the top panel."""
+    states = 0
+    for level, band in enumerate(marked):
+        fault = band.kind == "fault"
+        states += not fault
+        alpha = 0.10 if fault else 0.10 * (states % 2)
+        colour = "#d1483c" if fault else "#8a929d"
+        axis.axvspan(band.start, band.end, color=colour, alpha=alpha, lw=0)
+        if named:
+            place = (band.start, 0.98 - 0.09 * (level % 3))
+            axis.annotate(
+                band.text.replace("$", r"\$"),
+                place,
+                xycoords=("data", "axes fraction"),
+                fontsize=7,
+                color=colour,
+                va="top",
+                clip_on=True,
+            )
+
+
+def _draw(axis: Axes, panel: Panel, name_clock: bool) -> None:
     from elevon.report.uplot import COLOURS, thinned
 
-    for k, (name, values) in enumerate(panel.lines.items()):
-        time, line = panel.clock.time, values
-        if panel.clock.gaps:
-            after = np.asarray(panel.clock.gaps, dtype=np.intp) + 1
+    for k, (name, values) in enumerate((panel.lines | panel.others).items()):
+        time, line = panel.time, values
+        if panel.gaps:
+            after = np.asarray(panel.gaps, dtype=np.intp) + 1
             time, line = np.insert(time, after, np.nan), np.insert(line, after, np.nan)
         elif time.size > _MOST_POINTS:
             time, thin_lines = thinned(time, {name: line}, _MOST_POINTS)
             line = thin_lines[name]
-        axis.plot(time, line, label=name, linewidth=1.1, color=COLOURS[k % len(COLOURS)])
-    clock = f" ({panel.clock.name})" if name_clock else ""
-    axis.set_ylabel(("" if panel.unit == "1" else f"[{panel.unit}]") + clock)
+        style = "--" if name in panel.others else "-"
+        colour = COLOURS[k % len(COLOURS)]
+        axis.plot(time, line, style, label=name, linewidth=1.1, color=colour)
+    clock = f" ({panel.clock})" if name_clock and panel.clock else ""
+    unit = "" if panel.unit == "1" else f"[{panel.unit}]"
+    axis.set_ylabel(f"{panel.title} {unit}".strip() + clock)
     axis.grid(alpha=0.3, linewidth=0.6)
     axis.spines[["top", "right"]].set_visible(False)
     axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=8)

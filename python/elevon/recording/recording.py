@@ -314,14 +314,18 @@ class Recording:
         *,
         units: Mapping[str, str] | None = None,
         title: str | None = None,
+        compare: "Recording | str | os.PathLike[str] | None" = None,
+        spectra: bool = False,
         force: bool = False,
     ) -> "Figure | Path":
-        """Plot channels over time, one panel for each unit and clock.
+        """Plot a run: command against output, error, current, speed, faults and states marked.
+
+        With names, or where nothing says what is what: one panel for each unit and clock.
 
         Parameters
         ----------
         names : iterable of str, optional
-            Channels; default all.
+            Channels; by default what shows how the run went, by the roles of the channels.
         path : path, optional
             ``.png``, ``.svg`` or ``.pdf`` for a picture, ``.html`` for one self-contained
             interactive page. Without it the matplotlib figure is returned and nothing written.
@@ -330,6 +334,10 @@ class Recording:
             and temperatures, else SI.
         title : str, optional
             Title; default the actuator's name.
+        compare : Recording or path, optional
+            Another run, drawn over this one: healthy beside faulty.
+        spectra : bool
+            Add the amplitude spectra of error, current and speed.
         force : bool
             Whether an existing file may be replaced.
 
@@ -347,7 +355,24 @@ class Recording:
         """
         from elevon.recording.plot import plot
 
-        return plot(self, names, path, units=units or {}, title=title, force=force)
+        names = None if names is None else list(names)
+        return plot(
+            self,
+            names,
+            path,
+            units=units or {},
+            title=title,
+            compare=None if compare is None else self._other(compare),
+            with_spectra=spectra,
+            force=force,
+        )
+
+    @staticmethod
+    def _other(given: "Recording | str | os.PathLike[str]") -> "tuple[str, Recording]":
+        """Return another recording and what it is called in a legend."""
+        if isinstance(given, Recording):
+            return str(given.meta.get("label") or "other"), given
+        return Path(given).name, Recording.load(given)
 
     def save(self, path: str | os.PathLike[str], *, force: bool = False) -> Path:
         """Write the recording to a file, whole or not at all.

@@ -7,7 +7,7 @@ slices when they are many, so that no peak is lost.
 
 import base64
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from html import escape
 from importlib.resources import files
@@ -45,11 +45,27 @@ _SCRIPT = """
     const axis = (label, size) => ({ label, stroke: ink, grid, ticks: grid, labelSize: 22, size });
     const width = () => Math.max(200, plot.clientWidth);
     const number = (u, v) => v == null ? "--" : Number(v.toPrecision(7)).toString();
+    const shade = u => spec.shaded.forEach(([start, end, text, alarming], k) => {
+      const [from, to] = [start, end].map(t => u.valToPos(t, "x", true));
+      const { left, top, width, height } = u.bbox;
+      const [a, b] = [Math.max(from, left), Math.min(to, left + width)];
+      if (b <= a) return;
+      u.ctx.save();
+      u.ctx.fillStyle = alarming ? "rgba(209,72,60,.12)" : `rgba(128,136,148,${k % 2 ? .05 : .14})`;
+      u.ctx.fillRect(a, top, b - a, height);
+      u.ctx.beginPath(); u.ctx.rect(a, top, b - a, height); u.ctx.clip();
+      u.ctx.fillStyle = alarming ? "#c0392b" : ink();
+      u.ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
+      u.ctx.fillText(text, a + 4, top + (13 + 13 * (k % 3)) * devicePixelRatio);
+      u.ctx.restore();
+    });
     const options = {
       width: width(), height: spec.height, cursor: { sync: { key: sync.key } },
-      scales: { x: { time: false } }, axes: [axis(spec.x, 34), axis(spec.y, 60)],
+      scales: { x: { time: false, distr: spec.log ? 3 : 1 }, y: { distr: spec.log ? 3 : 1 } },
+      hooks: { drawClear: [shade] }, axes: [axis(spec.x, 34), axis(spec.y, 60)],
       series: [{ label: spec.x, value: number }, ...spec.series.map(s => ({
-        label: s.name, stroke: s.colour, width: 1.4, value: number, points: { show: false } }))],
+        label: s.name, stroke: s.colour, dash: s.dash, width: 1.4, value: number,
+        points: { show: false } }))],
     };
     const data = [Array.from(new Float64Array(bytes(spec.time))),
       ...spec.series.map(s => known(new Float32Array(bytes(s.values))))];
@@ -92,6 +108,9 @@ def chart(
     height: int = 260,
     note: str = "",
     breaks: tuple[int, ...] = (),
+    shaded: Sequence[tuple[float, float, str, bool]] = (),
+    logarithmic: bool = False,
+    dashed: Sequence[str] = (),
 ) -> str:
     """Return one chart as an HTML element; the page needs `assets` in its head.
 
@@ -111,6 +130,12 @@ def chart(
         Small text below; that the data were thinned is added to it.
     breaks : tuple of int
         Indices k after which every line is interrupted (gaps of a clock).
+    shaded : sequence of (start, end, text, alarming)
+        Stretches of the abscissa that are shaded and named.
+    logarithmic : bool
+        Of both axes.
+    dashed : sequence of str
+        Lines that are drawn dashed.
 
     Returns
     -------
@@ -129,9 +154,16 @@ def chart(
         "x": x_label,
         "y": y_label,
         "height": int(height),
+        "shaded": [list(item) for item in shaded],
+        "log": bool(logarithmic),
         "time": _base64(shown),
         "series": [
-            {"name": name, "colour": COLOURS[k % len(COLOURS)], "values": _base64(_float32(line))}
+            {
+                "name": name,
+                "colour": COLOURS[k % len(COLOURS)],
+                "dash": [6, 4] if name in dashed else [],
+                "values": _base64(_float32(line)),
+            }
             for k, (name, line) in enumerate(drawn.items())
         ],
     }

@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import SimulationError
+from elevon.recording.states import code_names
 from elevon.report.checks import Check, all_passed
 from elevon.reproduce.pisa_gear import ACTUATOR
-from elevon.simulate.timeline import code_names
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elevon.recording.states import code_names
 from elevon.report import Report, Table
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.pisa_functional import FunctionalResult, FunctionalRow
 from elevon.reproduce.pisa_gear import COMMANDED
 from elevon.reproduce.provenance import provenance
-from elevon.simulate.timeline import code_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.recording.states import code_names
+
 if TYPE_CHECKING:
     from elevon.recording import Recording
 
-__all__ = ["Event", "code_names", "has_states", "timeline"]
+__all__ = ["Event", "has_states", "timeline"]
 
 _CODES = ("command", "command_refused", "state", "fault_code", "warning_code")
 
@@ -34,29 +34,6 @@ class Event:
     time: float
     signal: str
     text: str
-
-
-@lru_cache
-def code_names(wiring: str, signal: str) -> dict[int, str]:
-    """Return the words for the codes of a signal, read from the core's own record of it.
-
-    Parameters
-    ----------
-    wiring : str
-        Such as ``landing_gear``.
-    signal : str
-        Such as ``state``.
-
-    Returns
-    -------
-    dict
-        Word by code; empty for a signal without codes or one the wiring does not have.
-    """
-    from elevon import _core
-
-    texts = {item["name"]: item["text"] for item in _core.signals(wiring, "high")}
-    codes = re.findall(r"(\d+) ([^,;:]+)", texts.get(signal, ""))
-    return {int(code): word.strip() for code, word in codes}
 
 
 def has_states(wiring: str) -> bool:
