@@ -45,6 +45,9 @@ COMMANDS: dict[str, Command] = {
         "elevon.cli.diagnose_train", "Train the surrogate that diagnose --method surrogate asks."
     ),
     "fleet": Command("elevon.cli.fleet", "Group the maintenance of several units."),
+    "next-test": Command(
+        "elevon.cli.next_test", "Propose the test that tells most about what is ambiguous."
+    ),
     "demo": Command("elevon.cli.demo", "Find a bench's hidden values from its logs; one report."),
     "reproduce": Command("elevon.cli.reproduce", "Recompute a published table or figure."),
 }

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.diagnose.bymodel.replay import _RECENT
 from elevon.diagnose.optimisers import CAUSES, METHODS, Monitor, search
 from elevon.diagnose.optimisers.cost import limits
 from elevon.errors import Interrupted
@@ -235,6 +236,7 @@ def _one(
     runs = _model_runs(unit, log)
     out = []
     for method, run in _ours(unit, log, base).items():
+        _RECENT.clear()  # every log pays for its own model runs
         begin = clock.process_time()
         error = _error(_named(run()), case)
         seconds = clock.process_time() - begin

@@ -8,6 +8,7 @@ from elevon.cli.reproduce.case import add_command
 from elevon.cli.reproduce.cranfield import CASES as _CRANFIELD
 from elevon.cli.reproduce.diagnosis import CASES as _DIAGNOSIS
 from elevon.cli.reproduce.nasa import CASES as _NASA
+from elevon.cli.reproduce.next_test import CASES as _NEXT_TEST
 from elevon.cli.reproduce.optimisers import CASES as _OPTIMISERS
 from elevon.cli.reproduce.pisa import CASES as _PISA
 from elevon.cli.reproduce.prognosis import CASES as _PROGNOSIS
@@ -31,6 +32,7 @@ _CASES = (
     *_PISA,
     *_CRANFIELD,
     *_DIAGNOSIS,
+    *_NEXT_TEST,
     *_OPTIMISERS,
     *_PROGNOSIS,
 )

@@ -22,6 +22,7 @@ __all__ = ["Plan", "fitted", "judged"]
 Floats = npt.NDArray[np.float64]
 Progress = Callable[[float], object]
 FALSE_ALARM = 0.05
+HIGH = 0.25  # of a batch are runs of the high model, where there are low ones
 _KNOWN = 1500  # training runs kept to tell what is unlike them
 _FAR = 0.995  # of held-out runs lie nearer to a training run
 _ROOM = 0.1  # of the trained range beyond its ends
@@ -44,7 +45,7 @@ class Plan:
 
     folds: int = 4
     members: int = 2
-    rounds: int = 3000
+    rounds: int = 1500
     batch: int = 256
     seed: int = 0
 
@@ -119,11 +120,11 @@ def _head(
 def _sampler(
     high: Rows, rows: npt.NDArray[np.int64], low: Rows | None, view: View, size: int
 ) -> Callable[[np.random.Generator], Batch]:
-    """Batches of the high model's runs, half of them the low model's where there are any."""
+    """Batches of the high model's runs, most of them the low model's where there are any."""
     others = None if low is None else low.usable()
 
     def batch(rng: np.random.Generator) -> Batch:
-        count = size if others is None else size // 2
+        count = size if others is None else round(HIGH * size)
         first = high.batch(view, rng.choice(rows, count), rng)
         if others is None or low is None:
             return first

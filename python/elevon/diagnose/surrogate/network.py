@@ -20,7 +20,7 @@ Floats = npt.NDArray[np.float64]
 Weights = list[Floats]  # w1, b1, w2, b2, ...
 HIDDEN = (48, 48)
 _LEAST_LOG, _MOST_LOG = -5.0, 1.5  # of a deviation
-_DECAY = 1e-4  # of the weights
+DECAY = 3e-2  # of the weights, over the step's rate
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,7 @@ def _member(
             square[k] += 0.01 * (g * g - square[k])
             way = mean[k] / (1.0 - 0.9**step)
             size = np.sqrt(square[k] / (1.0 - 0.99**step)) + 1e-8
-            weights[k] = weights[k] - rate * (way / size + _DECAY * weights[k])
+            weights[k] = weights[k] - rate * (way / size + DECAY * weights[k])
     return weights
 
 

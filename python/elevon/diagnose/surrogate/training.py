@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["trained"]
 
-_LOW, _TEST = 100, 200  # added to the seed: units of the low model, and those that judge
+_LOW, _TEST = 100, 1  # added to the seed: units of the low model, and those that judge
 _RUNS = 0.7  # of the work
 
 

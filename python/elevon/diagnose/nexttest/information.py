@@ -1,0 +1,124 @@
+"""Information that a test is expected to give on which set of faults is there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.diagnose.bymodel.candidates import CANDIDATES, Candidate
+from elevon.diagnose.bymodel.case import Case
+from elevon.diagnose.bymodel.healthy import healthy
+from elevon.diagnose.bymodel.log import prepared
+from elevon.diagnose.bymodel.posterior import _log_t
+from elevon.diagnose.bymodel.replay import logged_evidence, replay
+from elevon.diagnose.nexttest.belief import Belief, Possible
+from elevon.diagnose.virtual import traced
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elevon.actuator import Actuator
+    from elevon.diagnose.nexttest.profiles import Profile
+
+__all__ = ["expected_information", "planned", "updated"]
+
+Floats = npt.NDArray[np.float64]
+_DRAWS = 200  # outcomes of a test
+_SAMPLES = 64  # severities of a set of faults
+_KNOWN = {c.key: c for c in CANDIDATES}
+
+
+def planned(profile: Profile, actuator: Actuator, candidates: Sequence[Candidate]) -> Case:
+    """Return a test before it is run, as diagnosis by the model will see its log.
+
+    A healthy log of a standard test is taken to be at hand; a variant's stands against the
+    model alone.
+    """
+    from elevon.bench.rig import setups
+    from elevon.bench.traces import recorded
+    from elevon.scenario.compile import signal_records
+    from elevon.simulate import Run, simulate_batch
+
+    setup = setups(profile.procedure, actuator, seed=0)[0]
+    record = recorded(list(signal_records(actuator.wiring, "low")))
+    run = Run(setup.actuator, setup.scenario)
+    shown = simulate_batch([run], fidelity="low", record=record)[0]
+    item = prepared(traced(setup, shown), actuator)
+    model = replay(item, actuator, candidates)
+    logged = logged_evidence(item, actuator)
+    names = [n for n in logged.names if n in model.healthy.names]
+    logged = logged.only(names)
+    unit = healthy(model, names, [logged] if profile.standard else [])
+    return Case(profile.name, replace(logged, values=unit.mean), unit, model)
+
+
+def _seen(case: Case, possible: Possible, count: int, seed: int) -> tuple[Floats, list[Floats]]:
+    """Whitened shift of drawn severities, shape (count, k), and the model's error of each fault."""
+    root = _root(case)
+    severity = possible.severities(count, np.random.default_rng([seed, len(possible.keys)]))
+    total, errors = np.zeros((count, len(root))), []
+    for k, key in enumerate(possible.keys):
+        moved = case.shift(key, severity[:, k]) @ root.T
+        total += moved
+        errors.append(_KNOWN[key].error * moved)
+    return total, errors
+
+
+@lru_cache(maxsize=64)
+def _root_of(data: bytes, size: int) -> Floats:
+    covariance = np.frombuffer(data).reshape(size, size)
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
+
+
+def _root(case: Case) -> Floats:
+    covariance = case.covariance
+    return _root_of(np.ascontiguousarray(covariance).tobytes(), len(covariance))
+
+
+def _likelihoods(case: Case, belief: Belief, outcomes: Floats) -> Floats:
+    """Log likelihood of whitened outcomes, shape (n, k), under each set, shape (n, sets)."""
+    columns = []
+    for number, possible in enumerate(belief.possible):
+        count = _SAMPLES if possible.keys else 1
+        shift, errors = _seen(case, possible, count, number)
+        rows = [_log_t(y[None, :] - shift, case.unit.degrees, *errors) for y in outcomes]
+        columns.append(np.logaddexp.reduce(np.array(rows), axis=1) - np.log(count))
+    return np.stack(columns, axis=1)
+
+
+def expected_information(case: Case, belief: Belief, seed: int = 0) -> float:
+    """Return the information [bit] that a test is expected to give on the set of faults.
+
+    Mutual information of set and outcome, by drawing outcomes: sets, severities, the unit's spread
+    and the model's error.
+    """
+    rng = np.random.default_rng([seed, 15])
+    weights = np.array([p.weight for p in belief.possible])
+    drawn = rng.choice(len(weights), _DRAWS, p=weights)
+    outcomes, sets = [], []
+    for number in np.unique(drawn):
+        count = int((drawn == number).sum())
+        own = int(rng.integers(2**31))
+        shift, errors = _seen(case, belief.possible[number], count, own)
+        chi = np.sqrt(rng.chisquare(case.unit.degrees, count) / case.unit.degrees)
+        noise = rng.standard_normal(shift.shape) / chi[:, None]
+        outcomes.append(shift + noise + sum(e * rng.standard_normal((count, 1)) for e in errors))
+        sets += [number] * count
+    log = _likelihoods(case, belief, np.vstack(outcomes))
+    mixed = np.logaddexp.reduce(log + np.log(weights), axis=1)
+    own_log = log[np.arange(len(sets)), sets]
+    return float(np.mean(own_log - mixed) / np.log(2.0))
+
+
+def updated(case: Case, belief: Belief, values: Floats) -> Belief:
+    """Return what is believed after a test that showed these values, by `case.unit.names`."""
+    outcome = (_root(case) @ (values - case.unit.mean))[None, :]
+    log = _likelihoods(case, belief, outcome)[0]
+    weights = np.array([p.weight for p in belief.possible]) * np.exp(log - log.max())
+    return Belief.of(
+        [replace(p, weight=float(w)) for p, w in zip(belief.possible, weights, strict=True)]
+    )

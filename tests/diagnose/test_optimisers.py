@@ -1,0 +1,84 @@
+"""Population searches, and the misfit they make small."""
+
+import json
+
+import numpy as np
+import pytest
+
+from elevon import Actuator
+from elevon.bench.procedure import load_procedure
+from elevon.bench.rig import setups
+from elevon.bench.traces import recorded
+from elevon.diagnose.optimisers import CAUSES, METHODS, Monitor, search
+from elevon.diagnose.optimisers.cost import limits
+from elevon.diagnose.virtual import first_trace, traced
+from elevon.errors import UnknownNameError
+from elevon.scenario.compile import signal_records
+from elevon.simulate import Run, simulate_batch
+from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
+
+pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
+FRICTION, PLAY, SHORT, ROUND, GAIN = CAUSES
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_search_finds_the_bottom_of_a_bowl(method):
+    bottom = np.array([0.3, 0.7, 0.5])
+    calls = []
+
+    def costs(x):
+        calls.append(len(x))
+        return np.sum((x - bottom) ** 2, axis=1)
+
+    best = search(method, costs, 3, budget=2000, seed=1)
+    np.testing.assert_allclose(best.vector, bottom, atol=0.03)
+    assert best.cost == pytest.approx(float(np.sum((best.vector - bottom) ** 2)))
+    assert sum(calls) <= 2040
+    again = search(method, costs, 3, budget=2000, seed=1)
+    np.testing.assert_array_equal(best.vector, again.vector)
+
+
+def test_no_such_search():
+    with pytest.raises(UnknownNameError):
+        search("gentic", lambda x: x[:, 0], 2, budget=40, seed=0)
+
+
+@pytest.fixture(scope="module")
+def monitor():
+    unit = Actuator.load("torino-rotary").with_values({"drive.kind": "pwm"})
+    faults = ["friction@transmission=0.5", "short@motor.phase_b=0.3"]
+    setup = setups(first_trace(load_procedure("backlash")), unit, faults=faults, seed=4)[0]
+    record = recorded(list(signal_records(unit.wiring, "low")))
+    run = Run(setup.actuator, setup.scenario, setup.conditions.seed)
+    shown = simulate_batch([run], fidelity="low", record=record)[0]
+    return Monitor(setup, traced(setup, shown))
+
+
+def _vector(**values):
+    """Friction, play, three phases, eccentricity and its phase, gain: 0 to 1 over the range."""
+    low, high = limits()[GAIN]
+    start = {"friction": 0.0, "short_b": 0.0, "gain": -low / (high - low)} | values
+    return np.array([start["friction"], 0.0, 0.0, start["short_b"], 0.0, 0.0, 0.0, start["gain"]])
+
+
+def test_the_misfit_is_least_at_the_truth(monitor):
+    truth = _vector(friction=0.25, short_b=0.5)
+    others = [_vector(), _vector(friction=0.25), _vector(short_b=0.5), truth + 0.05]
+    before = monitor.evaluations
+    cost = monitor.costs(np.array([truth, *others]))
+    assert monitor.evaluations == before + 5
+    assert cost[0] < 1e-4
+    assert (cost[1:] > 20 * cost[0]).all()
+    assert monitor.severities(truth) == pytest.approx(
+        {FRICTION: 0.5, PLAY: 0.0, SHORT: 0.3, ROUND: 0.0, GAIN: 0.0}, abs=1e-12
+    )
+
+
+@pytest.mark.long
+def test_the_table(elevon_cli):  # noqa: F811
+    result = elevon_cli(
+        "reproduce", "diagnosis-optimisers", "--seeds", "2", "--budget", "400", "--json"
+    )
+    document = json.loads(result.out)
+    assert {row["method"] for row in document["rows"]} >= set(METHODS)
+    assert all({"name", "value", "limit", "unit", "passed"} <= set(c) for c in document["checks"])
