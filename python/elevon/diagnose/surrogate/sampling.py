@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.diagnose.bymodel.healthy import FLOOR
 from elevon.diagnose.surrogate.campaign import Table
+from elevon.diagnose.surrogate.features import NAMES
 from elevon.diagnose.surrogate.network import Batch
 from elevon.diagnose.surrogate.population import learned
 from elevon.diagnose.surrogate.view import View, hidden
@@ -39,6 +41,15 @@ def severities(size: Floats) -> Floats:
     return np.asarray(np.sign(inside) * inside**2 * np.where(inside < 0.0, low, high))
 
 
+def _scattered(table: Table) -> Table:
+    """Add the least run-to-run deviation that diagnosis by the model allows for, drawn once."""
+    rng = np.random.default_rng([len(table.unit), int(table.unit.sum())])
+    share, least = (np.array([FLOOR[name][k] for name in NAMES]) for k in (0, 1))
+    deviation = np.hypot(share * np.abs(table.values), least)
+    values = table.values + deviation * rng.standard_normal(table.values.shape)
+    return replace(table, values=values)
+
+
 @dataclass(frozen=True)
 class Rows:
     """A table with, for every row, the other healthy days of its unit.
@@ -56,7 +67,8 @@ class Rows:
 
     @classmethod
     def of(cls, table: Table) -> Rows:
-        """Find the baselines; rows without any are left out."""
+        """Find the baselines of rows, and add what runs of a simulation lack (`FLOOR`)."""
+        table = _scattered(table)
         base = {int(u): np.flatnonzero(table.baseline & (table.unit == u)) for u in set(table.unit)}
         width = max((len(v) for v in base.values()), default=1)
         others = np.full((len(table.unit), width), -1, dtype=np.int64)
