@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,8 +12,8 @@ from elevon.diagnose.bymodel.candidates import CANDIDATES, Candidate
 from elevon.diagnose.bymodel.case import Case
 from elevon.diagnose.bymodel.healthy import healthy
 from elevon.diagnose.bymodel.log import prepared
-from elevon.diagnose.bymodel.posterior import _log_t
 from elevon.diagnose.bymodel.replay import logged_evidence, replay
+from elevon.diagnose.bymodel.weigh import Frame
 from elevon.diagnose.nexttest.belief import Belief, Possible
 from elevon.diagnose.virtual import traced
 
@@ -56,36 +55,41 @@ def planned(profile: Profile, actuator: Actuator, candidates: Sequence[Candidate
     return Case(profile.name, replace(logged, values=unit.mean), unit, model)
 
 
-def _seen(case: Case, possible: Possible, count: int, seed: int) -> tuple[Floats, list[Floats]]:
-    """Whitened shift of drawn severities, shape (count, k), and the model's error of each fault."""
-    root = _root(case)
+def _frame(case: Case, possible: Possible, severity: Floats) -> Frame:
+    """Return what whitens the evidence under a set of faults: the model's own errors with it."""
+    plain = Frame(
+        np.zeros(len(case.unit.names)), case.covariance, case.unit.degrees, case.shift, case.errors
+    )
+    typical = [
+        (_KNOWN[key], centre if np.isfinite(deviation) else float(np.mean(severity[:, k])))
+        for k, (key, centre, deviation) in enumerate(
+            zip(possible.keys, possible.centre, possible.deviation, strict=True)
+        )
+    ]
+    return plain.loosened(typical) if typical else plain
+
+
+def _seen(
+    case: Case, possible: Possible, count: int, seed: int
+) -> tuple[Frame, Floats, list[Floats]]:
+    """Frame, whitened shift of drawn severities, shape (count, k), and each fault's model error."""
     severity = possible.severities(count, np.random.default_rng([seed, len(possible.keys)]))
-    total, errors = np.zeros((count, len(root))), []
+    frame = _frame(case, possible, severity)
+    total, errors = np.zeros((count, len(case.unit.names))), []
     for k, key in enumerate(possible.keys):
-        moved = case.shift(key, severity[:, k]) @ root.T
+        moved = frame.shift(key, severity[:, k])
         total += moved
         errors.append(_KNOWN[key].error * moved)
-    return total, errors
-
-
-@lru_cache(maxsize=64)
-def _root_of(data: bytes, size: int) -> Floats:
-    covariance = np.frombuffer(data).reshape(size, size)
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
-
-
-def _root(case: Case) -> Floats:
-    covariance = case.covariance
-    return _root_of(np.ascontiguousarray(covariance).tobytes(), len(covariance))
+    return frame, total, errors
 
 
 def _likelihoods(case: Case, belief: Belief, outcomes: Floats) -> Floats:
-    """Log likelihood of whitened outcomes, shape (n, k), under each set, shape (n, sets)."""
+    """Log likelihood of outcomes off the healthy unit, shape (n, k), per set, shape (n, sets)."""
     columns = []
     for number, possible in enumerate(belief.possible):
         count = _SAMPLES if possible.keys else 1
-        shift, errors = _seen(case, possible, count, number)
-        rows = [_log_t(y[None, :] - shift, case.unit.degrees, *errors) for y in outcomes]
+        frame, shift, errors = _seen(case, possible, count, number)
+        rows = [frame.log((frame.root @ y)[None, :] - shift, *errors) for y in outcomes]
         columns.append(np.logaddexp.reduce(np.array(rows), axis=1) - np.log(count))
     return np.stack(columns, axis=1)
 
@@ -103,10 +107,11 @@ def expected_information(case: Case, belief: Belief, seed: int = 0) -> float:
     for number in np.unique(drawn):
         count = int((drawn == number).sum())
         own = int(rng.integers(2**31))
-        shift, errors = _seen(case, belief.possible[number], count, own)
+        frame, shift, errors = _seen(case, belief.possible[number], count, own)
         chi = np.sqrt(rng.chisquare(case.unit.degrees, count) / case.unit.degrees)
         noise = rng.standard_normal(shift.shape) / chi[:, None]
-        outcomes.append(shift + noise + sum(e * rng.standard_normal((count, 1)) for e in errors))
+        shown = shift + noise + sum(e * rng.standard_normal((count, 1)) for e in errors)
+        outcomes.append(np.linalg.solve(frame.root, shown.T).T)
         sets += [number] * count
     log = _likelihoods(case, belief, np.vstack(outcomes))
     mixed = np.logaddexp.reduce(log + np.log(weights), axis=1)
@@ -116,8 +121,7 @@ def expected_information(case: Case, belief: Belief, seed: int = 0) -> float:
 
 def updated(case: Case, belief: Belief, values: Floats) -> Belief:
     """Return what is believed after a test that showed these values, by `case.unit.names`."""
-    outcome = (_root(case) @ (values - case.unit.mean))[None, :]
-    log = _likelihoods(case, belief, outcome)[0]
+    log = _likelihoods(case, belief, (values - case.unit.mean)[None, :])[0]
     weights = np.array([p.weight for p in belief.possible]) * np.exp(log - log.max())
     return Belief.of(
         [replace(p, weight=float(w)) for p, w in zip(belief.possible, weights, strict=True)]
