@@ -1,6 +1,6 @@
 //! The wirings by name, and one entry for each thing a caller may ask of any of them.
 
-use crate::actuator::{ballscrew, landing_gear, rotary, Finding, Port, Wiring};
+use crate::actuator::{ballscrew, landing_gear, rotary, Finding, Machine, Port, Wiring};
 use crate::fault::{FaultKind, FaultSpec};
 use crate::solver::{self, Clock, Live, Monitor, RunOutput, RunSpec, Width};
 use crate::variable::acts::{Fidelity, Standing};
@@ -96,14 +96,14 @@ impl Model {
         dispatch!(self, W => W::INITIAL)
     }
     pub fn modes(self) -> &'static [&'static str] {
-        dispatch!(self, W => W::MODES)
+        dispatch!(self, W => <<W as Wiring>::Machine as Machine>::MODES)
     }
     /// Units of the command in each mode; empty: the command port's own.
     pub fn mode_units(self) -> &'static [&'static str] {
-        dispatch!(self, W => W::MODE_UNITS)
+        dispatch!(self, W => <<W as Wiring>::Machine as Machine>::MODE_UNITS)
     }
     pub fn actions(self) -> &'static [&'static str] {
-        dispatch!(self, W => W::ACTIONS)
+        dispatch!(self, W => <<W as Wiring>::Machine as Machine>::ACTIONS)
     }
     pub fn fidelity(self) -> Fidelity {
         match self {

@@ -7,10 +7,30 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::collections::HashMap;
-use std::sync::mpsc::{sync_channel, RecvTimeoutError};
+use std::sync::mpsc::{sync_channel, Receiver, RecvTimeoutError};
 use std::time::Duration;
 
 const POLL: Duration = Duration::from_millis(100);
+
+/// What the worker sends, if it lives to send it, and what `tell` raised, after which it is asked no more.
+fn awaited<T>(receiver: &Receiver<T>, monitor: &Monitor, tell: impl Fn(u64) -> PyResult<bool>) -> (Option<T>, Option<PyErr>) {
+    let mut raised = None;
+    loop {
+        match receiver.recv_timeout(POLL) {
+            Ok(outcome) => return (Some(outcome), raised),
+            Err(RecvTimeoutError::Disconnected) => return (None, raised),
+            Err(RecvTimeoutError::Timeout) if raised.is_some() => {}
+            Err(RecvTimeoutError::Timeout) => match tell(monitor.done()) {
+                Ok(true) => {}
+                Ok(false) => monitor.cancel(),
+                Err(error) => {
+                    monitor.cancel();
+                    raised = Some(error);
+                }
+            },
+        }
+    }
+}
 
 /// Runs `work` on a thread of its own and reports its progress about ten times a second. A callback that returns
 /// False, or raises (Ctrl-C), stops the work; an exception goes on to the caller.
@@ -31,25 +51,10 @@ fn polled<T: Send>(
                 // The receiver lives until the result has come: a failed send cannot happen.
                 let _ = sender.send(outcome);
             });
-            let mut raised = None;
-            loop {
-                match receiver.recv_timeout(POLL) {
-                    Ok(outcome) => return (Some(outcome), raised),
-                    Err(RecvTimeoutError::Disconnected) => return (None, raised),
-                    Err(RecvTimeoutError::Timeout) if raised.is_none() => {
-                        let fraction = monitor.done() as f64 / total.max(1) as f64;
-                        match Python::attach(|py| report(py, callback.as_ref(), fraction)) {
-                            Ok(true) => {}
-                            Ok(false) => monitor.cancel(),
-                            Err(error) => {
-                                monitor.cancel();
-                                raised = Some(error);
-                            }
-                        }
-                    }
-                    Err(RecvTimeoutError::Timeout) => {}
-                }
-            }
+            awaited(&receiver, &monitor, |done| {
+                let fraction = done as f64 / total.max(1) as f64;
+                Python::attach(|py| report(py, callback.as_ref(), fraction))
+            })
         })
     });
     if let Some(error) = raised {

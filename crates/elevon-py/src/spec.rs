@@ -168,13 +168,7 @@ impl Resolver {
         let array = need(d, "parameters")?.extract::<PyReadonlyArray1<'_, f64>>()?;
         let mut parameters = vector(self.model, &array)?;
         if let Some(mode) = d.get_item("command_mode")? {
-            let mode: String = mode.extract()?;
-            let modes = self.model.modes();
-            let choice =
-                modes.iter().position(|&m| m == mode).ok_or_else(|| bad(format!("command mode {mode:?}; modes: {}", modes.join(", "))))?;
-            if modes.len() > 1 {
-                parameters[self.parameter("control.mode")?] = choice as f64;
-            }
+            self.set_mode(&mode.extract::<String>()?, &mut parameters)?;
         }
         let inputs = need(d, "inputs")?.cast_into::<PyDict>()?;
         let (ports, driven) = self.ports(&parameters, &inputs)?;
@@ -189,11 +183,7 @@ impl Resolver {
         if let Some(message) = self.refused(&parameters, &faults, &names_of(&given)?) {
             return Err(bad(message));
         }
-        let duration: f64 = need(d, "duration")?.extract()?;
-        let steps = duration / self.model.step(&parameters);
-        if !(duration > 0.0 && steps < MOST_STEPS) {
-            return Err(bad(format!("duration: {duration} s is {steps:e} solver steps; above 0 and below {MOST_STEPS:e} of them")));
-        }
+        let duration = self.duration(d, &parameters)?;
         Ok(RunSpec {
             parameters,
             ports,
@@ -205,6 +195,26 @@ impl Resolver {
             seed: need(d, "seed")?.extract()?,
             run: need(d, "run")?.extract()?,
         })
+    }
+
+    /// What the command asks for, where there is a choice.
+    fn set_mode(&self, mode: &str, parameters: &mut [f64]) -> PyResult<()> {
+        let modes = self.model.modes();
+        let choice =
+            modes.iter().position(|&m| m == mode).ok_or_else(|| bad(format!("command mode {mode:?}; modes: {}", modes.join(", "))))?;
+        if modes.len() > 1 {
+            parameters[self.parameter("control.mode")?] = choice as f64;
+        }
+        Ok(())
+    }
+
+    fn duration(&self, d: &Bound<'_, PyDict>, parameters: &[f64]) -> PyResult<f64> {
+        let duration: f64 = need(d, "duration")?.extract()?;
+        let steps = duration / self.model.step(parameters);
+        if !(duration > 0.0 && steps < MOST_STEPS) {
+            return Err(bad(format!("duration: {duration} s is {steps:e} solver steps; above 0 and below {MOST_STEPS:e} of them")));
+        }
+        Ok(duration)
     }
 
     pub fn faults(&self, given: &Bound<'_, PyList>) -> PyResult<Vec<FaultSpec>> {

@@ -141,14 +141,10 @@ pub struct Overheat<S> {
     pub temperature: S,
 }
 
-pub trait Wiring: Clone + Send + Sync + 'static {
-    type Structure: Clone + Eq + Hash + Debug + Send + Sync;
-    type Model<S: Scalar>: Clone + Send + Sync;
-    type State<S: Scalar>: Clone + Send + Sync;
-
+/// What a machine is, whatever the fidelity.
+pub trait Machine: Clone + Send + Sync + 'static {
+    const GROUPS: &'static [Group];
     const PORTS: &'static [Port];
-    /// Signals whose initial value a scenario may set.
-    const INITIAL: &'static [&'static str];
     /// What a command may ask for.
     const MODES: &'static [&'static str] = Mode::NAMES;
     /// Units of the command in each mode; empty: the command port's own.
@@ -156,9 +152,26 @@ pub trait Wiring: Clone + Send + Sync + 'static {
     /// Names of the values of a command that is a sequence of actions (mode `gear`).
     const ACTIONS: &'static [&'static str] = &[];
 
-    fn groups() -> &'static [Group];
-    fn signals() -> &'static [Signal];
     fn faults() -> Vec<FaultKind>;
+}
+
+pub trait Wiring: Clone + Send + Sync + 'static {
+    type Structure: Clone + Eq + Hash + Debug + Send + Sync;
+    type Model<S: Scalar>: Clone + Send + Sync;
+    type State<S: Scalar>: Clone + Send + Sync;
+
+    type Machine: Machine;
+    const PORTS: &'static [Port] = Self::Machine::PORTS;
+    /// Signals whose initial value a scenario may set.
+    const INITIAL: &'static [&'static str];
+
+    fn groups() -> &'static [Group] {
+        Self::Machine::GROUPS
+    }
+    fn signals() -> &'static [Signal];
+    fn faults() -> Vec<FaultKind> {
+        Self::Machine::faults()
+    }
 
     /// Solver step, s.
     fn step(raw: &[f64]) -> f64;

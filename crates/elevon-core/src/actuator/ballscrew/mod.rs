@@ -6,7 +6,7 @@ mod faults;
 mod records;
 
 use super::servo::{layout, Form};
-use super::{Finding, Port, Setup};
+use super::{Finding, Machine, Port, Setup};
 use crate::fault::FaultKind;
 use crate::motor::thermal::ThermalParameter;
 use crate::scalar::Scalar;
@@ -20,16 +20,20 @@ use layout::At;
 #[derive(Clone)]
 pub struct Ballscrew;
 
-impl Form for Ballscrew {
-    const LINEAR: bool = true;
+impl Machine for Ballscrew {
     const GROUPS: &'static [Group] = records::GROUPS;
     const PORTS: &'static [Port] = records::PORTS;
-    const HIGH: &'static [Signal] = records::HIGH;
-    const LOW: &'static [Signal] = records::LOW;
 
     fn faults() -> Vec<FaultKind> {
         faults::catalogue()
     }
+}
+
+impl Form for Ballscrew {
+    const LINEAR: bool = true;
+    const HIGH: &'static [Signal] = records::HIGH;
+    const LOW: &'static [Signal] = records::LOW;
+
     fn ratio<S: Scalar>(raw: &[S]) -> S {
         raw[GearParameter::Ratio.at()] / raw[ScrewParameter::Lead.at()]
     }

@@ -4,15 +4,15 @@
 use super::body::{Body, Constants, Structure, E_COPPER, E_INVERTER};
 use super::layout::*;
 use super::signals::{Quantity as Q, ALL, PHASES};
-use crate::actuator::{Finding, Inputs, Port, Setup, Signals, Tick, Watch, Wiring, WATCHED};
+use super::LandingGear;
+use crate::actuator::{Finding, Inputs, Setup, Signals, Tick, Watch, Wiring, WATCHED};
 use crate::control::pi_rate::PiRateParameter;
-use crate::fault::FaultKind;
 use crate::inverter::bridge::InverterParameter;
 use crate::inverter::six_step::{self, Chopping, SixStepParameter};
 use crate::scalar::Scalar;
 use crate::three;
 use crate::time::Steps;
-use crate::variable::{Group, Signal};
+use crate::variable::Signal;
 
 /// The landing-gear actuator at low fidelity.
 #[derive(Clone)]
@@ -202,20 +202,11 @@ impl Wiring for Low {
     type Model<S: Scalar> = Model<S>;
     type State<S: Scalar> = State<S>;
 
-    const PORTS: &'static [Port] = PORTS;
+    type Machine = LandingGear;
     const INITIAL: &'static [&'static str] = super::INITIAL;
-    const MODES: &'static [&'static str] = super::MODES;
-    const MODE_UNITS: &'static [&'static str] = &[""];
-    const ACTIONS: &'static [&'static str] = super::ACTIONS;
 
-    fn groups() -> &'static [Group] {
-        GROUPS
-    }
     fn signals() -> &'static [Signal] {
         &ALL[..PHASES]
-    }
-    fn faults() -> Vec<FaultKind> {
-        super::faults::catalogue()
     }
     fn step(raw: &[f64]) -> f64 {
         raw[LowParameter::Step.at()]

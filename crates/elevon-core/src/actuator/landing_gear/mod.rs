@@ -11,17 +11,33 @@ mod mechanics;
 mod signals;
 mod unit;
 
-use crate::actuator::{Tick, Watch, WATCHED};
+use crate::actuator::{Machine, Port, Tick, Watch, WATCHED};
 use crate::control::sequence;
+use crate::fault::FaultKind;
 use crate::scalar::Scalar;
 use crate::time::Steps;
+use crate::variable::Group;
 
 pub use high::High;
 pub use low::Low;
 
 const INITIAL: &[&str] = &["nut_position", "motor_speed"];
-const MODES: &[&str] = &["gear"];
-const ACTIONS: &[&str] = sequence::COMMANDS;
+
+/// What both fidelities are.
+#[derive(Clone)]
+pub struct LandingGear;
+
+impl Machine for LandingGear {
+    const GROUPS: &'static [Group] = layout::GROUPS;
+    const PORTS: &'static [Port] = layout::PORTS;
+    const MODES: &'static [&'static str] = &["gear"];
+    const MODE_UNITS: &'static [&'static str] = &[""];
+    const ACTIONS: &'static [&'static str] = sequence::COMMANDS;
+
+    fn faults() -> Vec<FaultKind> {
+        faults::catalogue()
+    }
+}
 
 fn control_tick(period: f64, dt: f64) -> Vec<Tick> {
     vec![Tick::every(((period / dt).round() as Steps).max(1), 0)]

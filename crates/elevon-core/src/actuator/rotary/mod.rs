@@ -1,7 +1,7 @@
 //! The rotary actuator (Torino): a geared servo whose output turns.
 
 use super::servo::{faults, layout, signals, Form};
-use super::{Finding, Port, Setup};
+use super::{Finding, Machine, Port, Setup};
 use crate::fault::FaultKind;
 use crate::scalar::Scalar;
 use crate::transmission::gear::GearParameter;
@@ -14,16 +14,20 @@ use layout::At;
 #[derive(Clone)]
 pub struct Rotary;
 
-impl Form for Rotary {
-    const LINEAR: bool = false;
+impl Machine for Rotary {
     const GROUPS: &'static [Group] = layout::GROUPS;
     const PORTS: &'static [Port] = layout::PORTS;
-    const HIGH: &'static [Signal] = signals::HIGH;
-    const LOW: &'static [Signal] = signals::LOW;
 
     fn faults() -> Vec<FaultKind> {
         faults::catalogue(faults::ROTARY)
     }
+}
+
+impl Form for Rotary {
+    const LINEAR: bool = false;
+    const HIGH: &'static [Signal] = signals::HIGH;
+    const LOW: &'static [Signal] = signals::LOW;
+
     fn ratio<S: Scalar>(raw: &[S]) -> S {
         raw[GearParameter::Ratio.at()]
     }

@@ -1,27 +1,22 @@
 //! What distinguishes one servo from another.
 
-use crate::actuator::{Finding, Port, Setup};
-use crate::fault::FaultKind;
+use crate::actuator::{Finding, Machine, Setup};
 use crate::scalar::Scalar;
 use crate::transmission::nut_heat::NutHeat;
 use crate::transmission::screw::Screw;
 use crate::transmission::vibration::Vibration;
-use crate::variable::{Group, Signal};
+use crate::variable::Signal;
 
 /// A kind of servo: its records, and how its transmission follows from them.
 ///
 /// The groups begin with those of `layout::GROUPS`, in their order and of their lengths (units and names may differ), so
 /// that a parameter of a shared component stands at one place in every form.
-pub trait Form: Clone + Send + Sync + 'static {
+pub trait Form: Machine {
     /// The user's side travels: its coordinate is in metres, and the brake acts there.
     const LINEAR: bool;
-    const GROUPS: &'static [Group];
-    const PORTS: &'static [Port];
     /// Signals begin with those of `signals::HIGH` and `signals::LOW`, in their order.
     const HIGH: &'static [Signal];
     const LOW: &'static [Signal];
-
-    fn faults() -> Vec<FaultKind>;
 
     /// Motor angle over user coordinate.
     fn ratio<S: Scalar>(raw: &[S]) -> S;

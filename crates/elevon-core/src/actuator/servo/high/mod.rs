@@ -16,11 +16,10 @@ use crate::actuator::servo::advance::Stretch;
 use crate::actuator::servo::details::{Needs, Structure};
 use crate::actuator::servo::form::Form;
 use crate::actuator::servo::layout::*;
-use crate::actuator::{Finding, Inputs, Overheat, Port, Setup, Signals, Tick, Watch, Wiring, WATCHED};
-use crate::fault::FaultKind;
+use crate::actuator::{Finding, Inputs, Overheat, Setup, Signals, Tick, Watch, Wiring, WATCHED};
 use crate::scalar::{apart, Scalar};
 use crate::time::Steps;
-use crate::variable::{Group, Signal};
+use crate::variable::Signal;
 use std::marker::PhantomData;
 
 /// A servo at high fidelity.
@@ -32,17 +31,11 @@ impl<F: Form> Wiring for High<F> {
     type Model<S: Scalar> = Model<S>;
     type State<S: Scalar> = State<S>;
 
-    const PORTS: &'static [Port] = F::PORTS;
+    type Machine = F;
     const INITIAL: &'static [&'static str] = start::INITIAL;
 
-    fn groups() -> &'static [Group] {
-        F::GROUPS
-    }
     fn signals() -> &'static [Signal] {
         F::HIGH
-    }
-    fn faults() -> Vec<FaultKind> {
-        F::faults()
     }
     fn step(raw: &[f64]) -> f64 {
         raw[SolverParameter::Step.at()]

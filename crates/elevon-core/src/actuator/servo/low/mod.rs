@@ -17,15 +17,14 @@ use self::step::LowStep;
 use super::advance::Stretch;
 use super::form::Form;
 use super::layout::*;
-use crate::actuator::{Finding, Inputs, Overheat, Port, Setup, Signals, Tick, Watch, Wiring, WATCHED};
+use crate::actuator::{Finding, Inputs, Overheat, Setup, Signals, Tick, Watch, Wiring, WATCHED};
 use crate::control::position_speed::ControlParameter;
-use crate::fault::FaultKind;
 use crate::motor::equivalent::LowParameter;
 use crate::motor::thermal::ThermalParameter;
 use crate::scalar::{apart, Scalar};
 use crate::sensor::resolver::ResolverParameter;
 use crate::time::Steps;
-use crate::variable::{Group, Signal};
+use crate::variable::Signal;
 use std::marker::PhantomData;
 
 /// A servo at low fidelity.
@@ -41,18 +40,12 @@ impl<F: Form> Wiring for Low<F> {
     type Model<S: Scalar> = Model<S>;
     type State<S: Scalar> = State<S>;
 
-    const PORTS: &'static [Port] = F::PORTS;
+    type Machine = F;
     const INITIAL: &'static [&'static str] =
         &["motor_position", "motor_speed", "user_position", "winding_temperature", "surface_temperature"];
 
-    fn groups() -> &'static [Group] {
-        F::GROUPS
-    }
     fn signals() -> &'static [Signal] {
         F::LOW
-    }
-    fn faults() -> Vec<FaultKind> {
-        F::faults()
     }
     fn step(raw: &[f64]) -> f64 {
         raw[LowParameter::Step.at()]
