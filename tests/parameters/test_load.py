@@ -84,7 +84,8 @@ REFUSED = {
     "too many turns": (entry("motor.turns_a", "1.2", None), RangeError, r"outside \(0, 1\]"),
     "zero step": (entry("solver.step", "0.0", '"s"'), RangeError, r"outside \[1e-12, 1\] s"),
     "interval": (entry(interval="[9.5, 8.5]"), InputError, "ends before it starts"),
-    "loose key": ("[motor]\ninertia = 3\n", InputError, "a parameter is a table"),
+    "loose key": ("[motor]\ninertia = 3\n", UnitError, "'3 kg cm2' .*'3 kg m2'"),
+    "list": ("[motor]\ninertia = [3]\n", InputError, "a parameter is a number, a text with a unit"),
 }
 
 

@@ -24,6 +24,8 @@ COMMANDS: dict[str, Command] = {
         "elevon.cli.list", "List actuators, signals, parameters, faults, waveforms, features."
     ),
     "show": Command("elevon.cli.show", "Show an actuator: parameters, sources, block diagram."),
+    "new": Command("elevon.cli.new", "Write a commented file for an actuator of your own."),
+    "check": Command("elevon.cli.check", "Report all that is wrong with a set or scenario file."),
     "simulate": Command("elevon.cli.simulate", "Simulate one actuator and keep what it did."),
     "campaign": Command("elevon.cli.campaign", "Run plans of many labelled simulations."),
     "dataset": Command("elevon.cli.dataset", "Describe, verify, export, split a data set."),

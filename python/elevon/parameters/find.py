@@ -40,6 +40,7 @@ def find_set(reference: str | os.PathLike[str], folder: Path | None = None) -> P
         The name of a set, or a TOML file.
     folder : Path, optional
         Where a relative file is looked for first: the folder of the set that names it as `base`.
+        There, or where the program runs, ``mine`` is ``mine.toml`` too.
 
     Raises
     ------
@@ -52,9 +53,13 @@ def find_set(reference: str | os.PathLike[str], folder: Path | None = None) -> P
     if text.endswith(".toml") or os.sep in text:
         return _file(text, folder)
     known = set_paths()
-    if text not in known:
+    if text in known:
+        return known[text]
+    near = [place / f"{text}.toml" for place in (folder or Path(), Path())]
+    beside = next((path for path in near if path.is_file()), None)
+    if beside is None:
         raise unknown("actuator", text, known)
-    return known[text]
+    return beside
 
 
 def _file(text: str, folder: Path | None) -> Path:

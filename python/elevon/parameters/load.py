@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,11 +17,17 @@ from elevon.parameters.records import Record, records, wiring_names
 from elevon.parameters.set import ParameterSet
 from elevon.units import parse_quantity
 
-__all__ = ["SetFile", "load_set"]
+__all__ = ["SetFile", "load_set", "set_errors"]
 
 _HEADER_KEYS = (
     "name", "title", "wiring", "base", "references", "scenario", "compare", "validation",
 )  # fmt: skip
+
+
+_AMOUNT = re.compile(r"^\s*[+-]?[\d.]+(?:[eE][+-]?\d+)?")
+
+#: The source of a value that was written without one.
+GIVEN = "given by the user"
 
 
 @dataclass(frozen=True)
@@ -97,11 +104,11 @@ def load_set(reference: str | os.PathLike[str]) -> SetFile:
     entries: dict[str, Parameter] = {}
     references: dict[str, str] = {}
     for layer in reversed(layers):
-        entries.update(_marked(_parameters(layer, wiring), entries, layer, wiring))
+        entries.update(_marked(_parameters(layer, wiring, entries), entries, layer, wiring))
         references.update({item.key: item.text for item in layer.header.references})
     scenario = next((layer.header.scenario for layer in layers if layer.header.scenario), None)
     return SetFile(
-        name=top.header.name,
+        name=top.header.name or path.stem,
         title=next((layer.header.title for layer in layers if layer.header.title), ""),
         wiring=wiring,
         parameters=ParameterSet(wiring, entries, str(path)),
@@ -111,6 +118,42 @@ def load_set(reference: str | os.PathLike[str]) -> SetFile:
         validation=_table(layers, "validation"),
         compare=_table(layers, "compare"),
     )
+
+
+def set_errors(path: str | os.PathLike[str]) -> list[str]:
+    """Return everything that keeps a set file from loading, header and entries alike.
+
+    Returns
+    -------
+    list of str
+        Empty where it loads.
+    """
+    try:
+        load_set(path)
+    except InputError as error:
+        lines = str(error).splitlines()
+        return list(dict.fromkeys([*lines, *_entry_errors(Path(path))]))
+    return []
+
+
+def _entry_errors(path: Path) -> list[str]:
+    """Return what is wrong with the entries of a file whose header may be wrong, too."""
+    try:
+        document = read_toml(path)
+        base = document.data.get("base")
+        below = load_set(find_set(str(base), document.folder)) if base else None
+    except InputError:
+        return []
+    wiring = document.data.get("wiring") or (below and below.wiring)
+    if wiring not in wiring_names():
+        return []
+    entries = {k: v for k, v in document.data.items() if isinstance(v, dict)}
+    layer = _Layer(document, None, {k: v for k, v in entries.items() if k not in _HEADER_KEYS})
+    try:
+        _parameters(layer, str(wiring), {} if below is None else dict(below.parameters))
+    except InputError as error:
+        return str(error).splitlines()
+    return []
 
 
 def _marked(
@@ -161,35 +204,65 @@ def _chain(path: Path) -> Iterator[_Layer]:
         following = find_set(base, document.folder) if base else None
 
 
-def _parameters(layer: _Layer, wiring: str) -> dict[str, Parameter]:
-    from elevon.parameters.model import Entry
-
-    known = records(wiring)
+def _parameters(layer: _Layer, wiring: str, base: Mapping[str, Parameter]) -> dict[str, Parameter]:
+    """Read a layer's entries; one error lists all that is wrong with them."""
     parameters: dict[str, Parameter] = {}
-    for path, raw in _leaves(layer, layer.entries, ()):
-        place = layer.document.place(tuple(path.split(".")))
-        if path not in known:
-            raise unknown("parameter", path, known, place)
-        entry = validated(Entry, raw, layer.document.within(tuple(path.split("."))))
-        parameters[path] = _parameter(path, entry, known[path], place)
+    errors: list[InputError] = []
+    for path, raw in _leaves(layer.entries, ()):
+        try:
+            parameters[path] = _read(path, raw, layer.document, wiring, base.get(path))
+        except InputError as error:
+            errors.append(error)
+    if len(errors) == 1:
+        raise errors[0]
+    if errors:
+        raise InputError("\n".join(str(error) for error in errors))
     return parameters
 
 
-def _leaves(
-    layer: _Layer, table: Mapping[str, Any], prefix: tuple[str, ...]
-) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield each table that holds a value, with its dotted path."""
+def _read(
+    path: str, raw: Any, document: Document, wiring: str, below: Parameter | None
+) -> Parameter:
+    from elevon.parameters.model import Entry
+
+    known = records(wiring)
+    place = document.place(tuple(path.split(".")))
+    if path not in known:
+        raise unknown("parameter", path, known, place)
+    if not isinstance(raw, Mapping):
+        return _given(path, raw, known[path], place, below)
+    entry = validated(Entry, raw, document.within(tuple(path.split("."))))
+    return _parameter(path, entry, known[path], place)
+
+
+def _given(path: str, raw: Any, record: Record, place: str, below: Parameter | None) -> Parameter:
+    """Read ``gear.ratio = 50`` or ``motor.inertia = "9 kg cm2"``: a value and no more."""
+    if isinstance(raw, bool) or not isinstance(raw, (int, float, str)):
+        raise InputError(
+            f"{place}: a parameter is a number, a text with a unit, or a table with value, unit, "
+            "source, note, confidence"
+        )
+    unit = record.unit if below is None or not below.unit else below.unit
+    text = raw if isinstance(raw, str) else repr(raw)
+    value = record.read(text, place, unit)
+    written = "" if record.choices else _AMOUNT.sub("", text).strip()
+    return Parameter(
+        path=path,
+        value=value,
+        unit="" if record.choices else written or unit,
+        source=GIVEN,
+        confidence="unknown",
+    )
+
+
+def _leaves(table: Mapping[str, Any], prefix: tuple[str, ...]) -> Iterator[tuple[str, Any]]:
+    """Yield the dotted path of each value, or table that holds one."""
     for key, item in table.items():
         location = (*prefix, key)
-        if not isinstance(item, dict):
-            raise InputError(
-                f"{layer.document.place(location)}: a parameter is a table with "
-                "value, unit, source, note, confidence"
-            )
-        if "value" in item or "source" in item:
+        if not isinstance(item, dict) or "value" in item or "source" in item:
             yield ".".join(location), item
         else:
-            yield from _leaves(layer, item, location)
+            yield from _leaves(item, location)
 
 
 def _parameter(path: str, entry: Any, record: Record, place: str) -> Parameter:

@@ -37,7 +37,7 @@ class Entry(_Strict):
     unit: StrictStr = Field("", description="Unit of value, old and interval")
     source: StrictStr = Field(description="Where the number comes from; 'ASSUMED: reason' is legal")
     note: StrictStr = Field("", description="Derivation, or what to know before using it")
-    confidence: Literal["published", "derived", "assumed", "calibrated"]
+    confidence: Literal["published", "derived", "assumed", "calibrated", "unknown"]
     old: Number | StrictStr | None = Field(None, description="The value before calibration")
     interval: tuple[Number, Number] | None = Field(
         None, description="Interval of the calibrated value"
@@ -78,7 +78,9 @@ class Compare(_Strict):
 class Header(_Strict):
     """The keys of a set file that are not parameters."""
 
-    name: StrictStr = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
+    name: StrictStr | None = Field(
+        None, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", description="Of the file if absent"
+    )
     title: StrictStr = ""
     wiring: StrictStr | None = Field(
         None, description="Which wiring of the core; from the base if absent"

@@ -9,10 +9,12 @@ from elevon.units import format_quantity
 
 __all__ = ["CONFIDENCES", "Confidence", "Parameter"]
 
-Confidence = Literal["published", "derived", "assumed", "calibrated", "default", "override"]
+Confidence = Literal[
+    "published", "derived", "assumed", "calibrated", "unknown", "default", "override"
+]
 
 #: What a set file may say; `default` and `override` are given by the program.
-CONFIDENCES = ("published", "derived", "assumed", "calibrated")
+CONFIDENCES = ("published", "derived", "assumed", "calibrated", "unknown")
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +34,8 @@ class Parameter:
     note : str
         How it was derived, what to know before using it.
     confidence : str
-        published, derived, assumed, calibrated; ``default`` for a healthy value the model itself
-        gives, ``override`` for one set by the caller.
+        published, derived, assumed, calibrated, unknown (given without a word); ``default`` for a
+        healthy value the model itself gives, ``override`` for one set by the caller.
     old : float, optional
         SI value before calibration or override.
     interval : tuple of float, optional

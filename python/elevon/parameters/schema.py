@@ -36,7 +36,6 @@ def json_schema(wiring: str) -> dict[str, Any]:
         "title": f"Elevon parameter set, wiring {wiring}",
         "type": "object",
         "properties": properties,
-        "required": ["name"],
         "additionalProperties": False,
         "$defs": {**header.get("$defs", {}), "Entry": Entry.model_json_schema()},
     }
@@ -53,7 +52,7 @@ def _insert(properties: dict[str, Any], parts: list[str], leaf: dict[str, Any]) 
 
 def _leaf(record: Record) -> dict[str, Any]:
     leaf: dict[str, Any] = {
-        "$ref": "#/$defs/Entry",
+        "anyOf": [{"$ref": "#/$defs/Entry"}, {"type": ["number", "string"]}],
         "description": record.text,
         "x-symbol": record.symbol,
         "x-unit": record.unit,

@@ -99,7 +99,7 @@ def is_ambiguous(number: float, kind: str, shown: str) -> bool:
 def ambiguous(number: str, kind: str, shown: str, place: str | None = None) -> UnitError:
     """Return the error of a number without a unit, with both of its readings."""
     readings = [
-        f"'{number} {unit}' ({format_quantity(parse_unit(unit).to_si(float(number)), other, 4)})"
+        f"'{number} {unit}' ({format_quantity(parse_unit(unit).to_si(float(number)), other)})"
         for unit, other in ((shown, kind), (kind, shown))
     ]
     return UnitError(f"{_at(place)}{number} has no unit; write {' or '.join(readings)}")

@@ -1,0 +1,108 @@
+"""``elevon check``: everything that is wrong with a set or a scenario, at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from elevon.cli import completion
+from elevon.cli.common import JsonOption
+from elevon.cli.output import print_json, print_table, say
+
+app = typer.Typer(rich_markup_mode=None)
+
+
+@app.command()
+def check(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Parameter set or scenario (TOML).")],
+    *,
+    actuator: Annotated[
+        str | None,
+        typer.Option(
+            help="A scenario's actuator: its signals, faults and parameters are checked, too.",
+            autocompletion=completion.actuators,
+        ),
+    ] = None,
+    json: JsonOption = False,
+) -> int:
+    """Report every finding of a parameter set or a scenario file; nothing is simulated."""
+    from elevon.documents import read_toml
+
+    document = read_toml(file)  # a file that cannot be read is bad usage, not a finding
+    scenario = bool({"duration", "command", "load", "supply", "initial"} & document.data.keys())
+    rows = _of_scenario(file, actuator) if scenario else _of_set(file)
+    failed = any(row["severity"] == "error" for row in rows)
+    if json:
+        print_json(
+            {
+                "status": "fail" if failed else "pass",
+                "file": str(file),
+                "kind": "scenario" if scenario else "set",
+                "findings": rows,
+            }
+        )
+        return 1 if failed else 0
+    if rows:
+        print_table(("severity", "finding"), [(row["severity"], row["message"]) for row in rows])
+    errors = sum(row["severity"] == "error" for row in rows)
+    say(f"{file}: {errors} errors, {len(rows) - errors} warnings")
+    return 1 if failed else 0
+
+
+def _of_scenario(file: Path, reference: str | None) -> list[dict[str, Any]]:
+    from elevon.actuator import Actuator
+    from elevon.errors import InputError
+    from elevon.scenario import Scenario
+    from elevon.scenario.compile import compile_scenario
+
+    try:
+        scenario = Scenario.load(file)
+        if reference is not None:
+            base = Actuator.load(reference)
+            model = base.with_values(scenario.parameters, place=str(file))
+            compile_scenario(scenario, model.wiring, "high")
+    except InputError as error:
+        return [_row("error", line) for line in str(error).splitlines()]
+    return []
+
+
+def _of_set(file: Path) -> list[dict[str, Any]]:
+    """Return what loading says, or where it loads, what the core says of the values together."""
+    from elevon.errors import InputError
+    from elevon.parameters import set_errors
+
+    lines = set_errors(file)
+    if lines:
+        return [_row("error", line) for line in lines]
+    try:
+        return _together(file)
+    except InputError as error:
+        return [_row("error", line) for line in str(error).splitlines()]
+
+
+def _together(file: Path) -> list[dict[str, Any]]:
+    from elevon.actuator import Actuator
+    from elevon.parameters.records import wirings
+
+    actuator = Actuator.load(file)
+    rows: dict[str, dict[str, Any]] = {}
+    for fidelity in wirings()[actuator.wiring]["fidelities"]:
+        for item in actuator.findings(fidelity):
+            text = f"{item['path']}: {item['message']} ({fidelity} fidelity)"
+            rows.setdefault(item["message"], _row(str(item["severity"]), text))
+    rows |= {path: _row("warning", text) for path, text in _unsaid(actuator)}
+    return list(rows.values())
+
+
+def _unsaid(actuator: Any) -> list[tuple[str, str]]:
+    return [
+        (item.path, f"{item.path} = {item.text}: source not said, confidence unknown")
+        for item in actuator.parameters.values()
+        if item.confidence == "unknown"
+    ]
+
+
+def _row(severity: str, message: str) -> dict[str, Any]:
+    return {"severity": severity, "message": message}
