@@ -1,5 +1,8 @@
 """A variant of one's own is a base and what differs, as short as it can be."""
 
+import re
+from pathlib import Path
+
 import pytest
 
 import elevon
@@ -63,3 +66,14 @@ def test_a_single_error_keeps_its_kind(tmp_path):
     path.write_text('base = "torino-rotary"\nmotor.turns_a = 2\n')
     with pytest.raises(RangeError, match=r"a\.toml:2"):
         elevon.Actuator.load(path)
+
+
+def test_the_page_on_own_actuators_shows_sets_that_load(tmp_path):
+    page = Path(__file__).resolve().parents[2] / "docs" / "own-actuators.md"
+    blocks = re.findall(r"```toml\n(.*?)```", page.read_text("utf-8"), re.S)
+    assert len(blocks) == 3
+    for number, block in enumerate(blocks):
+        text = block if "base = " in block else f'base = "torino-rotary"\n{block}'
+        path = tmp_path / f"page-{number}.toml"
+        path.write_text(text)
+        assert elevon.Actuator.load(path).hash != BASE.hash
