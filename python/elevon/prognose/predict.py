@@ -81,11 +81,11 @@ def predict(
     check_order(inspections)
     for item in inspections:
         flt.update(item)
-    told = clock.perf_counter()
+    updated = clock.perf_counter()
     result = prognosis(flt, mission, inspections, level=level, seed=seed, serial=serial)
     done = clock.perf_counter()
     result.seconds.update(  # type: ignore[attr-defined]
-        {"tables": made - begin, "updates": told - made, "prediction": done - told}
+        {"tables": made - begin, "updates": updated - made, "prediction": done - updated}
     )
     return result
 

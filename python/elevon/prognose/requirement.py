@@ -160,33 +160,33 @@ class Requirement(BaseModel):
         return MEASURES[self.measure].value(runs, self)
 
 
-def _kept(run: Shown, requirement: Requirement) -> npt.NDArray[np.bool_]:
+def _counted(run: Shown, requirement: Requirement) -> npt.NDArray[np.bool_]:
     return run.time >= requirement.after
 
 
 def _tracking(runs: Sequence[Shown], requirement: Requirement) -> float:
     run = runs[0]
     error = np.abs(run["command"] - run["output_position"])
-    return float(error[_kept(run, requirement)].max())
+    return float(error[_counted(run, requirement)].max())
 
 
 def _tracking_rms(runs: Sequence[Shown], requirement: Requirement) -> float:
     run = runs[0]
-    error = (run["command"] - run["output_position"])[_kept(run, requirement)]
+    error = (run["command"] - run["output_position"])[_counted(run, requirement)]
     return float(np.sqrt(np.mean(error**2)))
 
 
 def _current(runs: Sequence[Shown], requirement: Requirement) -> float:
-    current = runs[0]["torque_current"][_kept(runs[0], requirement)]
+    current = runs[0]["torque_current"][_counted(runs[0], requirement)]
     return float(np.sqrt(np.mean(current**2)))
 
 
 def _current_peak(runs: Sequence[Shown], requirement: Requirement) -> float:
-    return float(np.abs(runs[0]["torque_current"][_kept(runs[0], requirement)]).max())
+    return float(np.abs(runs[0]["torque_current"][_counted(runs[0], requirement)]).max())
 
 
 def _temperature(runs: Sequence[Shown], requirement: Requirement) -> float:
-    return float(runs[0]["temperature"][_kept(runs[0], requirement)].max())
+    return float(runs[0]["temperature"][_counted(runs[0], requirement)].max())
 
 
 def _step_runs(requirement: Requirement, mission: Scenario) -> list[Scenario]:
@@ -267,14 +267,16 @@ def _slope(text: str, name: str) -> float:
 
 
 def _lock_time(runs: Sequence[Shown], requirement: Requirement) -> float:
-    locked = (runs[0]["locked"] > 0.5) & _kept(runs[0], requirement)
+    locked = (runs[0]["locked"] > 0.5) & _counted(runs[0], requirement)
     return float(runs[0].time[np.argmax(locked)]) if locked.any() else math.inf
 
 
 def _still(mission: Scenario, seconds: float, terms: list[dict[str, Any]]) -> Scenario:
     """Return a run of its own with the mission's parameters and supply, without its loads."""
-    kept = mission.to_dict()
-    data: dict[str, Any] = {key: kept[key] for key in ("parameters", "supply") if key in kept}
+    of_mission = mission.to_dict()
+    data: dict[str, Any] = {
+        key: of_mission[key] for key in ("parameters", "supply") if key in of_mission
+    }
     return Scenario.from_dict({**data, "duration": seconds, "command": {"terms": terms}})
 
 

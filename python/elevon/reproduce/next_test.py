@@ -215,10 +215,10 @@ class _Bench:
         def informed(number: int, belief: Belief) -> int:
             if number == 0 and pair in self._first:
                 return self._first[pair]
-            told = [expected_information(case, belief) for case in self._cases]
+            information = [expected_information(case, belief) for case in self._cases]
             if number == 0:
-                self._first[pair] = int(np.argmax(told))
-            return int(np.argmax(told))
+                self._first[pair] = int(np.argmax(information))
+            return int(np.argmax(information))
 
         return informed
 

@@ -163,8 +163,10 @@ def _joint(moved: Motion) -> str:
 
 def _tooth(x: float, y: float, r: float, angle: float) -> str:
     """Return a stop of the fork at an angle from the top [deg]."""
-    lean = math.radians(angle)
-    ends = [(x + k * r * math.sin(lean), y - k * r * math.cos(lean)) for k in (0.62, 1.28)]
+    inclination = math.radians(angle)
+    ends = [
+        (x + k * r * math.sin(inclination), y - k * r * math.cos(inclination)) for k in (0.62, 1.28)
+    ]
     (x1, y1), (x2, y2) = ends
     return (
         f'<path d="M{x1:.1f} {y1:.1f} L{x2:.1f} {y2:.1f}" stroke="#2f7fd1" stroke-width="6" '

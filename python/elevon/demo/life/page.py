@@ -28,7 +28,7 @@ __all__ = ["lead", "life_report", "moving_picture"]
 
 def lead(demo: LifeDemo) -> str:
     """Return the sentence to remember, from the inspection nearest to 70 % of life."""
-    visit = _told(demo)
+    visit = _late_visit(demo)
     low, high = visit.prognosis.interval
     left = demo.life.end - visit.usage
     return (
@@ -38,7 +38,7 @@ def lead(demo: LifeDemo) -> str:
     )
 
 
-def _told(demo: LifeDemo) -> Visit:
+def _late_visit(demo: LifeDemo) -> Visit:
     return min(demo.visits, key=lambda v: abs(v.usage - 0.7 * demo.life.end))
 
 

@@ -149,10 +149,10 @@ def _block_rows(
             result, item.trial.name, test=item.trial.test, group=item.group, unit=unit.number,
             truth=item.truth,
         )  # fmt: skip
-        _told(progress, 0.6 + 0.4 * (k + 1) / len(block))
+        _advance(progress, 0.6 + 0.4 * (k + 1) / len(block))
 
 
-def _told(progress: Callable[[float], Any] | None, fraction: float) -> None:
+def _advance(progress: Callable[[float], Any] | None, fraction: float) -> None:
     if progress is not None and progress(fraction) is False:
         raise Interrupted("diagnosis-limits was stopped; finished logs are noted in its folder")
 
