@@ -113,6 +113,7 @@ def test_a_shaft_at_rest_has_no_linear_model():
         ({"high": 1e6}, "resolves up to"),
         ({"amplitude": 0.0}, "positive"),
         ({"amplitude": "1 kg"}, "kg"),
+        ({"amplitude": "1"}, "'1 deg'"),
         ({"method": "multisin"}, "multisine"),
         ({"mode": "gear"}, "position"),
         ({"output": "motor_sped"}, "motor_speed"),

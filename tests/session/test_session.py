@@ -201,6 +201,7 @@ def test_own_controller_on_one_and_on_many():
     [
         (lambda s: s.set(comand=1.0), UnknownNameError, "command"),
         (lambda s: s.set(command="1 kg"), InputError, "kg"),
+        (lambda s: s.set(command="7"), InputError, "'7 deg'"),
         (lambda s: s.set(command=float("nan")), InputError, "nan"),
         (lambda s: s.set(command=[1.0, 2.0]), InputError, "one, or one a run"),
         (lambda s: s.set(command={"kind": "sinus"}), InputError, "sine"),

@@ -15,7 +15,7 @@ from elevon.scenario import Scenario
 from elevon.scenario.compile import signal_units
 from elevon.simulate import Run, check_fidelity, simulate_batch, solver_step
 from elevon.simulate.arguments import ActuatorLike, as_actuator
-from elevon.units import parse_quantity
+from elevon.units import parse_quantity, shown_unit
 
 __all__ = ["METHODS", "frequency_response"]
 
@@ -96,7 +96,7 @@ def frequency_response(
         raise unknown("signal", output, units, "output")
     unit = unit_of_command[mode] or units["user_position"]
     first, last = _range(low, high)
-    size = parse_quantity(amplitude, unit, "amplitude")
+    size = parse_quantity(amplitude, unit, "amplitude", shown_unit(unit))
     if not size > 0.0:
         raise InputError(f"amplitude = {amplitude} must be positive")
     if realisations < 1:
@@ -104,7 +104,7 @@ def frequency_response(
     design = (_Multisine if method == "multisine" else _Sweep)(
         first, last, solver_step(loaded, fidelity)
     )
-    mean = parse_quantity(bias, unit, "bias")
+    mean = parse_quantity(bias, unit, "bias", shown_unit(unit))
     generator = np.random.default_rng(seed)
     runs = []
     for number in range(realisations):

@@ -22,7 +22,7 @@ from elevon.scenario.compile import compile_term, port_units, signal_records
 from elevon.simulate.acting import report
 from elevon.simulate.arguments import ActuatorLike, ScenarioLike, as_actuator
 from elevon.simulate.prepare import Run, prepare, solver_step
-from elevon.units import parse_quantity
+from elevon.units import parse_quantity, shown_unit
 
 __all__ = ["Session", "SessionState", "Value"]
 
@@ -243,7 +243,7 @@ class Session:
                 done = self._set_waveform(port, value)
             else:
                 given = zip(self._each(value), self._units, strict=True)
-                read = [parse_quantity(each, units[port] or "1", port) for each, units in given]
+                read = [_quantity(each, units[port] or "1", port) for each, units in given]
                 done = self._core.set_values(port, read)
             if not done:
                 raise InputError(
@@ -409,6 +409,11 @@ def _runs(
             "a sequence of elevon.Run"
         )
     return runs
+
+
+def _quantity(given: float | str, unit: str, place: str) -> float:
+    """Return SI; a text without a unit is refused where a person reads another one."""
+    return parse_quantity(given, unit, place, shown_unit(unit))
 
 
 def _placed(scenario: Scenario) -> dict[str, int]:
