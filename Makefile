@@ -24,7 +24,7 @@ RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name 
 DEMO := $(BIN)/elevon demo --out out/demo --force
 
 .DELETE_ON_ERROR:
-.PHONY: help setup demo check test test-rust test-python test-long lint stubs bench format lock clean
+.PHONY: help setup demo check test test-rust test-python test-long lint stubs wheel bench format lock clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -74,6 +74,10 @@ lint: setup stubs ## formatting, style and types of both languages
 
 stubs: $(STAMPS)/extension ## the hand-written stub against the built extension
 	cd $(STAMPS) && ../$(BIN)/python -m mypy.stubtest elevon._core
+
+wheel: $(STAMPS)/packages ## the wheel for this system in dist/, checked where there is no compiler
+	$(BIN)/maturin build --release --quiet --locked --out dist
+	$(BIN)/python tools/check_wheel.py dist
 
 bench: setup ## the timed comparisons
 	$(BIN)/python -m pytest -q -m bench

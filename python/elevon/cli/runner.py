@@ -17,6 +17,7 @@ import typer.core
 from elevon.cli import completion, interrupt
 from elevon.cli.registry import COMMANDS
 from elevon.errors import ElevonError, ElevonWarning, Interrupted, nearest
+from elevon.extras import missing_package
 from elevon.files import journal
 
 USAGE = 2
@@ -128,6 +129,11 @@ def _code(arguments: list[str]) -> int:
         return _fail(str(error), error.exit_code)
     except BrokenPipeError:
         return _closed_pipe()
+    except ModuleNotFoundError as error:
+        needed = missing_package(error)
+        if needed is None:
+            raise
+        return _fail(needed, USAGE)
     except OSError as error:
         interrupt.check()
         return _fail(str(error), FAILED)

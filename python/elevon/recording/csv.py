@@ -18,6 +18,7 @@ import warnings
 from collections.abc import Iterable
 from dataclasses import replace
 from glob import escape
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -108,16 +109,29 @@ def _save_one(
 
 
 def _write(recording: Recording, path: Path) -> None:
+    channels = recording.channels
+    heads = ["time [s]", *(f"{c.name} [{c.unit}]" for c in channels)]
+    columns = [recording.clock().time, *(c.values for c in channels)]
+    with path.open("wb") as stream:
+        stream.write(f"{','.join(heads)}\n".encode())
+        if find_spec("pyarrow") is None:
+            _write_plain(columns, stream)
+        else:
+            _write_arrow(columns, heads, stream)
+
+
+def _write_arrow(columns: list[npt.NDArray[np.float64]], heads: list[str], stream: Any) -> None:
     import pyarrow as pa
     from pyarrow import csv
 
-    channels = recording.channels
-    heads = ["time [s]", *(f"{c.name} [{c.unit}]" for c in channels)]
-    arrays = [pa.array(recording.clock().time), *(pa.array(c.values) for c in channels)]
-    options = csv.WriteOptions(include_header=False, quoting_style="none")
-    with path.open("wb") as stream:
-        stream.write(f"{','.join(heads)}\n".encode())
-        csv.write_csv(pa.Table.from_arrays(arrays, heads), stream, options)
+    table = pa.Table.from_arrays([pa.array(column) for column in columns], heads)
+    csv.write_csv(table, stream, csv.WriteOptions(include_header=False, quoting_style="none"))
+
+
+def _write_plain(columns: list[npt.NDArray[np.float64]], stream: Any) -> None:
+    """Write without pyarrow: Python's own shortest text of a number, which gives back every bit."""
+    for row in zip(*(column.tolist() for column in columns), strict=True):
+        stream.write(f"{','.join(map(repr, row))}\n".encode())
 
 
 def joined_tables(path: Path) -> list[Path]:
@@ -222,12 +236,32 @@ def _heads(path: Path, line: str) -> dict[str, str]:
 
 
 def _numbers(path: Path, stream: Any, names: list[str]) -> dict[str, npt.NDArray[np.float64]]:
-    import pyarrow as pa
-    from pyarrow import csv
-
     rest = stream.read()
     if not rest.strip():
         return {name: np.empty(0) for name in names}
+    read = _read_plain if find_spec("pyarrow") is None else _read_arrow
+    return read(path, rest, names)
+
+
+def _read_plain(path: Path, rest: bytes, names: list[str]) -> dict[str, npt.NDArray[np.float64]]:
+    """Read without pyarrow: strictly numbers with commas between them, one row a line."""
+    rows = [line.split(b",") for line in rest.splitlines() if line.strip()]
+    wrong = next((k for k, row in enumerate(rows) if len(row) != len(names)), None)
+    if wrong is not None:
+        raise FormatError(
+            f"{path}: line {wrong + 2} has {len(rows[wrong])} columns, expected {len(names)}"
+        )
+    try:
+        table = np.array([[float(cell) for cell in row] for row in rows])
+    except ValueError as error:
+        raise FormatError(f"{path}: {error}") from error
+    return {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(names)}
+
+
+def _read_arrow(path: Path, rest: bytes, names: list[str]) -> dict[str, npt.NDArray[np.float64]]:
+    import pyarrow as pa
+    from pyarrow import csv
+
     kinds = dict.fromkeys(names, pa.float64())
     try:
         table = csv.read_csv(

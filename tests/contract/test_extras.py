@@ -1,0 +1,121 @@
+"""The core needs four packages; every other one belongs to an extra that the messages name."""
+
+import ast
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from elevon import Recording
+from elevon.cli import main
+from elevon.errors import FormatError
+from elevon.extras import EXTRAS, missing_package
+
+ROOT = Path(__file__).resolve().parents[2]
+CORE = {"numpy", "pydantic", "rich", "typer", "elevon"}
+IMPORTED_AS = {"scikit-learn": "sklearn"}
+BROUGHT = {
+    "cycler": "matplotlib",
+    "dask": "distributed",
+    "markupsafe": "jinja2",
+    "pydantic_core": "pydantic",
+}
+
+
+def _project():
+    return tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+
+
+def _name(requirement):
+    name = re.split(r"[<>=\[; ]", requirement)[0]
+    return IMPORTED_AS.get(name, name)
+
+
+def _imports(path):
+    """Packages a module imports when it runs; those of annotations only do not count."""
+    tree = ast.parse(path.read_text("utf-8"))
+    guarded = {
+        id(inner)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)
+        for part in node.body
+        for inner in ast.walk(part)
+    }
+    for node in ast.walk(tree):
+        if id(node) in guarded:
+            continue
+        if isinstance(node, ast.Import):
+            yield from (alias.name.split(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            yield node.module.split(".")[0]
+
+
+def test_every_import_is_of_the_core_or_of_an_extra():
+    known = CORE | {package for packages in EXTRAS.values() for package in packages}
+    known |= set(sys.stdlib_module_names) | set(BROUGHT)
+    for path in (ROOT / "python/elevon").rglob("*.py"):
+        assert set(_imports(path)) <= known, path
+
+
+def test_the_core_is_four_packages_and_the_table_is_that_of_the_project():
+    project = _project()
+    assert {_name(item) for item in project["dependencies"]} == CORE - {"elevon"}
+    optional = project["optional-dependencies"]
+    for extra, packages in EXTRAS.items():
+        brought = {_name(item) for item in optional[extra]}
+        for package in packages:
+            assert {package, BROUGHT.get(package)} & brought, (extra, package)
+    (everything,) = optional["all"]
+    assert set(re.findall(r"\w+", everything)) - {"elevon"} == set(EXTRAS) - {"progpy", "query"}
+
+
+@pytest.mark.parametrize("extra", EXTRAS)
+def test_a_missing_package_names_its_extra(extra):
+    for package in EXTRAS[extra]:
+        error = ModuleNotFoundError("none", name=f"{package}.sub")
+        assert f"elevon[{extra}]" in missing_package(error)
+    assert missing_package(ModuleNotFoundError("none", name="elevon.simulat")) is None
+
+
+def test_a_command_whose_extra_is_missing_says_which(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    for name in [name for name in sys.modules if name.startswith("matplotlib.")]:
+        monkeypatch.delitem(sys.modules, name)
+    out = ["--plot", str(tmp_path / "a.png")]
+    assert main(["simulate", "torino-rotary", "--duration", "0.01", *out]) == 2
+    said = capsys.readouterr()
+    assert "pip install 'elevon[reports]'" in said.err
+    assert said.out == ""
+
+
+def _recording():
+    time = np.arange(50) / 100
+    values = {"user_position": np.sin(time) / 3.0, "force": np.where(time > 0.2, np.nan, 1e300)}
+    return Recording.build(time, values, {"user_position": "rad", "force": "N"})
+
+
+@pytest.mark.parametrize("writes", [True, False])
+@pytest.mark.parametrize("reads", [True, False])
+def test_csv_needs_no_package(writes, reads, tmp_path, monkeypatch):
+    """Written and read with or without pyarrow: the same bits."""
+    import elevon.recording.csv as module
+
+    recording, path = _recording(), tmp_path / "a.csv"
+    monkeypatch.setattr(module, "find_spec", lambda _: writes or None)
+    recording.save(path)
+    monkeypatch.setattr(module, "find_spec", lambda _: reads or None)
+    assert Recording.load(path).equals(recording)
+
+
+@pytest.mark.parametrize(("row", "said"), [("1,2", "columns"), ("0.5,x,1", "x")])
+def test_a_wrong_csv_is_refused_without_pyarrow(row, said, tmp_path, monkeypatch):
+    import elevon.recording.csv as module
+
+    monkeypatch.setattr(module, "find_spec", lambda _: None)
+    path = tmp_path / "a.csv"
+    path.write_text(f"time [s],a [N],b [N]\n0,1,2\n{row}\n")
+    with pytest.raises(FormatError, match=said):
+        Recording.load(path)
