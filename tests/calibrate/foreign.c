@@ -15,6 +15,10 @@ struct bench {
     double dry;                /* N m, fast shaft, moving */
     double stick;              /* N m, fast shaft, at rest */
     double stribeck;           /* rad/s over which rest turns into motion; 0: at once */
+    double falling;            /* exponent of the fall from rest to motion */
+    double bristle;            /* N m/rad, stiffness of LuGre's bristles; 0: at rest the shaft is held */
+    double bristle_damping;    /* N m s/rad */
+    double load_share;         /* by which dry friction grows with the torque through the gear */
     double viscous;            /* N m s/rad */
     double cogging;            /* N m */
     double cogging_teeth;      /* periods a turn */
@@ -77,6 +81,17 @@ static double slide(double *w, double active, double stick, double dry, double j
     return friction;
 }
 
+/* One step of a body on LuGre's bristles; z is their deflection, the friction's torque comes back.
+   The deflection is solved implicitly in itself, so that stiff bristles bear the step. */
+static double bristled(const struct bench *b, double *w, double *z, double active, double level, double dt)
+{
+    const double before = *z;
+    *z = (before + *w * dt) / (1.0 + b->bristle * fabs(*w) / level * dt);
+    const double friction = b->bristle * *z + b->bristle_damping * (*z - before) / dt;
+    *w += (active - friction) / b->inertia * dt;
+    return friction;
+}
+
 /* command [rad at the user] and brake [N m on the fast shaft]: one value a position sample.
    rows: COLUMNS values a log row. Returns 1 where the motion runs away. */
 int run(const struct bench *b, const double *command, const double *brake, double *rows)
@@ -93,7 +108,7 @@ int run(const struct bench *b, const double *command, const double *brake, doubl
     double motor = b->ratio * (user + half * b->motor_start), w = 0.0;
     double i = 0.0, i_ref = 0.0, i_shown = 0.0, w_shown = 0.0, w_ref = 0.0;
     double sum = 0.0, rate = 0.0, last_error = 0.0, last_motor = counted(motor, b->motor_counts);
-    double load = 0.0;
+    double load = 0.0, z = 0.0;
     double *past = calloc((size_t)late + 1, sizeof(double));
     if (past == NULL)
         return 1;
@@ -134,10 +149,14 @@ int run(const struct bench *b, const double *command, const double *brake, doubl
                       - b->viscous * w - load / b->ratio;
         double moving = b->dry;
         if (b->stribeck > 0.0)
-            moving += (b->stick - b->dry) * exp(-fabs(w) / b->stribeck);
-        const double stick = b->stick + b_now;
+            moving += (b->stick - b->dry) * exp(-pow(fabs(w) / b->stribeck, b->falling));
+        const double pressed = 1.0 + b->load_share * (b_now + fabs(load) / b->ratio);
+        moving *= pressed;
+        const double stick = pressed * b->stick + b_now;
         const double share = b_now / (w == 0.0 ? stick : moving + b_now);
-        const double friction = slide(&w, active, stick, moving + b_now, b->inertia, dt);
+        const double friction = b->bristle > 0.0
+                                    ? bristled(b, &w, &z, active, moving + b_now, dt)
+                                    : slide(&w, active, stick, moving + b_now, b->inertia, dt);
         if (n % log == 0) {
             double *row = rows + n / log * COLUMNS;
             double seen = b->encoder_gain * past[(n + 1) % (late + 1)] + b->encoder_offset;

@@ -35,6 +35,10 @@ class Bench:
     dry: float = 0.3
     stick: float = 0.4
     stribeck: float = 0.0
+    falling: float = 1.0
+    bristle: float = 0.0
+    bristle_damping: float = 0.5
+    load_share: float = 0.0
     viscous: float = 3e-3
     cogging: float = 0.0
     cogging_teeth: float = 48.0
@@ -248,6 +252,22 @@ def draw(seed, bench=None, sensors=None):
         replace(Bench(**drawn), **(bench or {})),
         replace(Sensors(**{k: float(v) for k, v in seen.items()}), **(sensors or {})),
     )
+
+
+def draw_creeping(seed, bench=None):
+    """Draw a bench on LuGre's bristles, whose friction grows with its load, with elastic play."""
+    rng = np.random.default_rng([seed, 4])
+    creeping = {
+        "elastic": True,
+        "falling": float(rng.choice([1.0, 2.0])),
+        "stribeck": float(rng.uniform(0.2, 1.5)),
+        "bristle": float(np.exp(rng.uniform(np.log(100.0), np.log(5e3)))),
+        "bristle_damping": float(rng.uniform(0.1, 1.0)),
+        "load_share": float(rng.uniform(0.0, 0.02)),
+        "user_dry": float(rng.uniform(0.1, 2.0)),
+        "sample_time": float(rng.choice([125e-6, 250e-6])),
+    }
+    return draw(seed, {**creeping, **(bench or {})})
 
 
 def unrest(bench, sensors, seed=0):

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from elevon.calibrate.log import BenchLog
 
-__all__ = ["Breakaways", "breakaways", "static_friction"]
+__all__ = ["Breakaways", "breakaway_torque", "breakaways", "stuck_stretches"]
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -24,6 +24,7 @@ _MEDIAN = 1.2533  # deviation of a median over that of a mean
 _STUCK = 0.02  # s that the shaft stands still at least
 _CLIMB = 0.04  # s of the climb before the instant that are used, at most
 _TAIL = 5  # samples of the set point that are as good as straight
+_NOISY_TAIL = 0.02  # s of a measured current that are as good as straight: its noise averages out
 _SURE = 5.0  # deviations of the angle's noise that are motion
 _FINEST = 1e-6  # rad: motion smaller than this is none
 _AWAY = 0.05  # s after the instant in which the motion must have become clear
@@ -44,21 +45,25 @@ class Breakaways:
         Of the motion that follows, 1 or -1.
     slope : ndarray, shape (n,)
         Climb of the current towards that motion [A/s].
+    behind : float
+        Deviation of how far the measured current stays behind its set point: alike for all [A].
     """
 
     current: Floats
     brake: Floats
     direction: Floats
     slope: Floats
+    behind: float
 
 
-def static_friction(
+def breakaway_torque(
     logs: Sequence[BenchLog],
     keeps: Sequence[Bools],
     *,
     constant: float,
     offset: float,
     lag: float,
+    slow: float,
 ) -> tuple[float, float, float] | None:
     """Static friction from all breakaways: value, deviation [N m] and degrees of freedom.
 
@@ -70,23 +75,27 @@ def static_friction(
         Torque constant [N m/A].
     offset, lag : float
         Of the measured current [A, s].
+    slow : float
+        Speed [rad/s] below which the shaft counts as at rest.
 
     Returns
     -------
     (float, float, float) or None
-        Median; its deviation from the scatter, and from the climb within one sample, in which
-        the instant may be misplaced alike every time. None with fewer than four breakaways.
+        Median; its deviation from the scatter, from the climb within one sample, in which the
+        instant may be misplaced alike every time, and from the set point's own shift. None with
+        fewer than four breakaways.
     """
-    found = breakaways(logs, keeps, lag)
-    count = len(found.current)
+    every = breakaways(logs, keeps, lag, slow)
+    count = len(every.current)
     if count < _FEWEST:
         return None
-    torque = constant * found.direction * (found.current - offset) - found.brake
+    torque = constant * every.direction * (every.current - offset) - every.brake
     middle = float(np.median(torque))
     scatter = 1.4826 * float(np.median(np.abs(torque - middle)))
     period = max(log.period for log in logs)
-    climb = constant * float(np.median(found.slope)) * period / np.sqrt(3.0)
-    std = float(np.hypot(_MEDIAN * scatter / np.sqrt(count), climb))
+    climb = constant * float(np.median(every.slope)) * period / np.sqrt(3.0)
+    own = _MEDIAN * scatter / np.sqrt(count)
+    std = float(np.sqrt(own**2 + climb**2 + (constant * every.behind) ** 2))
     return middle, std, count - 1.0
 
 
@@ -100,15 +109,23 @@ class _Event:
     time: Floats
     target: Floats
     current: Floats
+    tail: int
+
+    def climbs(self) -> bool:
+        """Whether the set point climbs towards the motion, over the standstill that is used."""
+        slope = np.polyfit(self.time - self.when, self.target, 1)[0]
+        return bool(slope * self.way > 0.0)
 
     def line(self) -> tuple[float, float]:
         """Slope and level at the instant of the set point's last stretch."""
-        last = slice(-_TAIL, None)
+        last = slice(-self.tail, None)
         slope, level = np.polyfit(self.time[last] - self.when, self.target[last], 1)
         return float(slope), float(level)
 
 
-def breakaways(logs: Sequence[BenchLog], keeps: Sequence[Bools], lag: float) -> Breakaways:
+def breakaways(
+    logs: Sequence[BenchLog], keeps: Sequence[Bools], lag: float, slow: float
+) -> Breakaways:
     """Find every breakaway whose torque is known.
 
     The set point of the current gives the shape of the climb, free of noise; how far the measured
@@ -122,62 +139,70 @@ def breakaways(logs: Sequence[BenchLog], keeps: Sequence[Bools], lag: float) -> 
         Samples that may be used, one a log.
     lag : float
         Of the measured current behind the torque [s].
+    slow : float
+        Speed [rad/s] below which the shaft counts as at rest.
     """
     events = [
         event
         for log, keep in zip(logs, keeps, strict=True)
         if log.motor is not None and log.brake.known in {"off", "torque"}
-        for event in _events(log, log.motor, keep & log.good)
+        for event in _events(log, log.motor, keep & log.good, slow)
     ]
     lines = np.array([event.line() for event in events], dtype=np.float64).reshape(-1, 2)
     way = np.array([event.way for event in events], dtype=np.float64)
-    climbing = lines[:, 0] * way > 0.0
+    climbing = np.array([event.climbs() for event in events], dtype=np.bool_)
     events = [event for event, up in zip(events, climbing, strict=True) if up]
     lines, way = lines[climbing], way[climbing]
-    gap, offset = _behind(events)
+    gap, offset, behind = _behind(events)
     current = lines[:, 1] - offset - gap * way + lag * lines[:, 0]
     brake = np.array([event.brake for event in events], dtype=np.float64)
-    return Breakaways(current, brake, way, lines[:, 0] * way)
+    return Breakaways(current, brake, way, lines[:, 0] * way, behind)
 
 
-def _behind(events: Sequence[_Event]) -> tuple[float, float]:
-    """How far the measured current stays behind its set point in a climb, and its offset [A]."""
+def _behind(events: Sequence[_Event]) -> tuple[float, float, float]:
+    """How far the current stays behind its set point in a climb, its offset, a deviation [A]."""
     if not events:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     rest = np.concatenate([e.target - e.current for e in events])
     way = np.concatenate([np.full(len(e.time), e.way) for e in events])
-    found, *_ = np.linalg.lstsq(np.column_stack((way, np.ones_like(way))), rest, rcond=None)
-    return float(found[0]), float(found[1])
+    columns = np.column_stack((way, np.ones_like(way)))
+    (gap, offset), *_ = np.linalg.lstsq(columns, rest, rcond=None)
+    # One climb is one observation.
+    means = [float(np.mean(e.target - e.current)) - gap * e.way - offset for e in events]
+    return float(gap), float(offset), float(np.std(means) / np.sqrt(len(means)))
 
 
-def _events(log: BenchLog, motor: Floats, keep: Bools) -> list[_Event]:
+def _events(log: BenchLog, motor: Floats, keep: Bools, slow: float) -> list[_Event]:
     least, most = round(_STUCK / log.period), round(_CLIMB / log.period)
-    found = []
-    for begin, end in _stuck(motor, least):
+    noisy = log.current_target is log.current and log.current_signal == "current_q_meas"
+    tail = max(_TAIL, round(_NOISY_TAIL / log.period)) if noisy else _TAIL
+    events = []
+    for begin, end in stuck_stretches(motor, least, slow * log.period):
         instant = _instant(log, motor, end)
         part = slice(max(begin + 1, end - most), end + 1)
         if instant is None or not keep[part].all():
             continue
         brake = np.interp(instant[0], log.brake.time, log.brake.level)
-        found.append(
+        events.append(
             _Event(
                 *instant,
                 float(brake) if log.brake.measured else 0.0,
                 log.time[part],
                 log.current_target[part],
                 log.current[part],
+                tail,
             )
         )
-    return found
+    return events
 
 
-def _stuck(motor: Floats, least: int) -> list[tuple[int, int]]:
-    """First and last sample of every stretch without motion of at least so many samples."""
+def stuck_stretches(motor: Floats, least: int, small: float) -> list[tuple[int, int]]:
+    """First and last sample of every stretch that moves less a sample than is small [rad]."""
     moved = np.abs(np.diff(motor))
     jumps = np.abs(np.diff(motor, 3))
     noise = 1.4826 * float(np.median(jumps[jumps > 0.0])) / np.sqrt(20.0) if jumps.any() else 0.0
     # The noise of a smooth motion's third differences is far below its first ones.
-    still = np.concatenate(([False], moved <= max(_SURE * noise, _FINEST), [False]))
+    still = np.concatenate(([False], moved <= max(_SURE * noise, _FINEST, small), [False]))
     edges = np.flatnonzero(np.diff(still.astype(np.int8)))
     pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
     return [(begin, end) for begin, end in pairs if end - begin >= least and end < len(motor) - 3]

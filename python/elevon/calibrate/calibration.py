@@ -18,12 +18,11 @@ from elevon.calibrate.findings import amplitude_findings, plant_findings
 from elevon.calibrate.heldout import HeldOut, held_out
 from elevon.calibrate.kinematics import KINEMATIC, CommandFit
 from elevon.calibrate.log import BenchLog
-from elevon.calibrate.plant import (
-    Torque,
-)
+from elevon.calibrate.plant import Torque
+from elevon.calibrate.plays import PER_LOG
 from elevon.calibrate.regression import Regression
 from elevon.calibrate.signals import Signals, signal_stage
-from elevon.errors import InputError, Interrupted
+from elevon.errors import InputError, Interrupted, unknown
 from elevon.parameters.records import record_of
 from elevon.progress import Progress, part
 
@@ -90,8 +89,6 @@ class Calibration:
         for item in self.estimates:
             if item.path == path:
                 return item
-        from elevon.errors import unknown
-
         raise unknown("estimate", path, [item.path for item in self.estimates])
 
     def to_dict(self) -> dict[str, Any]:
@@ -142,6 +139,7 @@ def calibrate(
     actuator: Actuator,
     *,
     free: Sequence[str] | None = None,
+    per_log: Sequence[str] = (),
     fidelity: str = "low",
     transient: float | None = None,
     hold_out: bool = True,
@@ -158,6 +156,8 @@ def calibrate(
         Values before; those that are not estimated stay.
     free : sequence of str, optional
         Parameter paths to estimate; default: all that the logs determine.
+    per_log : sequence of str
+        Of `elevon.calibrate.plays.PER_LOG`: estimated for each log too, as ``PATH[LOG]``.
     fidelity : str
         Of the model runs: ``low`` or ``high``.
     transient : float, optional
@@ -169,7 +169,7 @@ def calibrate(
         Whether to rank and fit on model runs too: for what the regressions cannot see, and to name
         what absorbs the model's misfit.
     progress : callable, optional
-        Told the done fraction; returns False to stop.
+        Called with the done fraction; returns False to stop.
 
     Returns
     -------
@@ -185,68 +185,104 @@ def calibrate(
     begin = clock.perf_counter()
     if not logs:
         raise InputError("calibration needs at least one log")
-    _check(actuator, logs, free, fidelity)
+    _check(actuator, logs, free, per_log, fidelity)
     skipped = {log.name: _run_in(log, transient) for log in logs}
     keeps = [log.good & (log.time >= skipped[log.name]) for log in logs]
     _go(progress, 0.02)
-    signals = signal_stage(logs, keeps, actuator, lambda f: _go(progress, 0.02 + 0.33 * f))
-    plant, law, torque = signals.plant, signals.law, signals.torque
-    found = accept(signals.estimates, free, actuator)
-    direct = [p for p in free or () if p in KINEMATIC or p == "motor.emf_constant"]
-    missing(direct, found, torque)
-    dynamic = None
-    if model_runs or plant is None or law is None:
-        dynamic = dynamic_stage(
-            logs,
-            keeps,
-            _started(actuator, signals, found),
-            found,
-            free,
-            fidelity=fidelity,
-            progress=part(progress, 0.35, 0.8),
-        )
-    if dynamic is not None:
-        told = [item.path for item in signals.estimates if item.path not in (free or ())]
-        known = [*told, *(item.path for item in found)]
-        found += dynamic.estimates(actuator, known, free)
-    missing(free, found, torque)
-    if not any(item.in_set for item in found):
-        raise InputError("the logs determine no parameter: nothing in them moves enough")
-    fitted = with_values(actuator, found, signals.followed, torque, dynamic)
-    kept = held_out(logs, keeps, actuator, fitted, part(progress, 0.8, 1.0)) if hold_out else ()
-    findings = (
-        *shortened(actuator, found),
-        *undetermined(signals.estimates, found, free),
-        *plant_findings(logs, plant, torque, dynamic, actuator, found=found),
-        *amplitude_findings(signals.commands, found),
-    )
+    signals = signal_stage(logs, keeps, actuator, lambda f: _go(progress, 0.02 + 0.33 * f), per_log)
+    runs = part(progress, 0.35, 0.8)
+    task = _Task(logs, keeps, actuator, signals, free)
+    estimates, dynamic = _estimates(task, fidelity if model_runs else None, runs)
+    fitted = with_values(actuator, estimates, signals.followed, signals.torque, dynamic)
+    errors = held_out(logs, keeps, actuator, fitted, part(progress, 0.8, 1.0)) if hold_out else ()
+    findings = _findings(task, estimates, dynamic)
     _go(progress, 1.0)
     return Calibration(
         actuator=fitted,
         before=actuator,
         logs=tuple(logs),
         skipped=skipped,
-        estimates=tuple(found),
+        estimates=tuple(estimates),
         followed=signals.followed,
-        torque=torque,
-        plant=plant,
-        law=law,
+        torque=signals.torque,
+        plant=signals.plant,
+        law=signals.law,
         commands=signals.commands,
         dynamic=dynamic,
-        held_out=tuple(kept),
+        held_out=tuple(errors),
         findings=findings,
         wall_s=clock.perf_counter() - begin,
     )
 
 
-def _started(actuator: Actuator, signals: Signals, found: Sequence[Estimate]) -> Actuator:
+@dataclass(frozen=True)
+class _Task:
+    """What is calibrated from what, after the signals."""
+
+    logs: Sequence[BenchLog]
+    keeps: Sequence[Bools]
+    actuator: Actuator
+    signals: Signals
+    free: Sequence[str] | None
+
+
+def _estimates(
+    task: _Task, fidelity: str | None, progress: Progress | None
+) -> tuple[list[Estimate], Dynamic | None]:
+    """Estimates of the signals that are accepted, and those of model runs (a fidelity) beside."""
+    signals, free = task.signals, task.free
+    accepted = accept(signals.estimates, free, task.actuator)
+    direct = [p for p in free or () if p in KINEMATIC or p == "motor.emf_constant"]
+    missing(direct, accepted, signals.torque)
+    dynamic = None
+    if fidelity is not None or signals.plant is None or signals.law is None:
+        dynamic = dynamic_stage(
+            task.logs,
+            task.keeps,
+            _started(task.actuator, signals, accepted),
+            accepted,
+            free,
+            fidelity=fidelity or "low",
+            progress=progress,
+        )
+    if dynamic is not None:
+        by_signals = [item.path for item in signals.estimates if item.path not in (free or ())]
+        known = [*by_signals, *(item.path for item in accepted)]
+        accepted += dynamic.estimates(task.actuator, known, free)
+    missing(free, accepted, signals.torque)
+    if not any(item.in_set for item in accepted):
+        raise InputError("the logs determine no parameter: nothing in them moves enough")
+    return accepted, dynamic
+
+
+def _findings(
+    task: _Task, estimates: Sequence[Estimate], dynamic: Dynamic | None
+) -> tuple[str, ...]:
+    """Everything the calibration has to say."""
+    signals, actuator = task.signals, task.actuator
+    return (
+        *signals.findings,
+        *shortened(actuator, estimates),
+        *undetermined(signals.estimates, estimates, task.free),
+        *plant_findings(
+            task.logs, signals.plant, signals.torque, dynamic, actuator, found=estimates
+        ),
+        *amplitude_findings(signals.commands, estimates),
+    )
+
+
+def _started(actuator: Actuator, signals: Signals, estimates: Sequence[Estimate]) -> Actuator:
     """Return what model runs start from: what followed, and branches the signals do not show."""
-    none = {item.path: 0.0 for item in found if item.in_set and item.value == 0.0}
+    none = {item.path: 0.0 for item in estimates if item.in_set and item.value == 0.0}
     return actuator.with_values({**signals.followed, **none}, source="calibration")
 
 
 def _check(
-    actuator: Actuator, logs: Sequence[BenchLog], free: Sequence[str] | None, fidelity: str
+    actuator: Actuator,
+    logs: Sequence[BenchLog],
+    free: Sequence[str] | None,
+    per_log: Sequence[str],
+    fidelity: str,
 ) -> None:
     from elevon.simulate.prepare import check_fidelity
 
@@ -262,6 +298,9 @@ def _check(
     for path in free or ():
         if record_of(actuator.wiring, path, "--free").choices is not None:
             raise InputError(f"--free {path}: is a choice, not a number")
+    for path in per_log:
+        if path not in PER_LOG:
+            raise unknown("--per-log (what one bench changes between its logs)", path, PER_LOG)
 
 
 def _run_in(log: BenchLog, transient: float | None) -> float:

@@ -77,12 +77,12 @@ def kernel(log: BenchLog) -> float:
 
 
 def smoothed(values: Floats, sigma: float, order: int = 0) -> Floats:
-    """Pass values, shape (n,), or their derivative a sample, through the Gaussian."""
+    """Pass values (n,) or columns (n, k), or their derivative a sample, through the Gaussian."""
     from scipy.ndimage import correlate1d
 
     # Taken off the mean: an angle of many turns would leave its rounding in the derivatives.
-    level = values.mean()
-    fresh = correlate1d(values - level, _gaussian(sigma, order), mode="nearest")
+    level = values.mean(axis=0)
+    fresh = correlate1d(values - level, _gaussian(sigma, order), axis=0, mode="nearest")
     return np.asarray(fresh if order else fresh + level, dtype=np.float64)
 
 

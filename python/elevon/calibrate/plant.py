@@ -16,6 +16,7 @@ from elevon.parameters.relations import constant_is_tied, emf_constant, motor_to
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
+    from elevon.calibrate.static import StaticFriction
 
 __all__ = [
     "Torque",
@@ -195,10 +196,7 @@ def _lag(add: Callable[..., float], plant: Regression) -> None:
 
 
 def static_estimate(
-    actuator: Actuator,
-    found: tuple[float, float, float] | None,
-    dynamic: float | None,
-    torque: Torque,
+    actuator: Actuator, static: StaticFriction | None, dynamic: float | None, torque: Torque
 ) -> list[Estimate]:
     """Static friction as an estimate; no less than the dynamic one, which it cannot be.
 
@@ -206,32 +204,30 @@ def static_estimate(
     ----------
     actuator : Actuator
         Values before.
-    found : (float, float, float) or None
-        From `elevon.calibrate.breakaway.static_friction`.
+    static : StaticFriction or None
+        From `elevon.calibrate.static.static_friction`.
     dynamic : float or None
         Dynamic friction [N m], where it is estimated.
     torque : Torque
         Scale of every torque.
     """
-    if found is None:
+    if static is None:
         return []
-    value, scatter, degrees = found
-    std = float(np.hypot(scatter, torque.relative * value))
-    half = quantile(degrees) * std
-    low = max(value - half, 0.0)
+    std = float(np.hypot(static.std, torque.relative * static.value))
+    half = quantile(static.degrees) * std
     least = 0.0 if dynamic is None else dynamic
     return [
         Estimate(
             "friction.static",
-            max(value, least),
+            max(static.value, least),
             std,
-            (low, max(value + half, least)),
+            (max(static.value - half, 0.0), max(static.value + half, least) + static.unseen),
             "N m",
             "plant",
             actuator.parameters.value("friction.static"),
             "direct",
             () if torque.measured else _GIVEN,
-            "torque at which the shaft breaks away; ripple and noise of the torque lower it",
+            static.how,
         )
     ]
 

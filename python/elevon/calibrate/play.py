@@ -16,7 +16,7 @@ from elevon.calibrate.blocks import block_covariance, stroke_blocks
 from elevon.calibrate.estimate import quantile
 from elevon.calibrate.log import BenchLog
 
-__all__ = ["PlayFit", "fit_play", "through_play"]
+__all__ = ["PlayFit", "fit_play", "median_width", "through_play"]
 
 Floats = npt.NDArray[np.float64]
 _TRAVEL = 3.0  # plays (or counts) of travel both ways that a log must have
@@ -189,6 +189,13 @@ def _usable(log: BenchLog, ratio: float, count: float) -> bool:
     speed = np.abs(log.speed).max()
     both = min(float((log.speed > 0.1 * speed).mean()), float((log.speed < -0.1 * speed).mean()))
     return both > 0.02 and float(np.ptp(log.motor)) / ratio > _TRAVEL * count
+
+
+def median_width(log: BenchLog, ratio: float, count: float) -> float | None:
+    """Play of one log [rad at the user] by the medians of each direction; None without reversal."""
+    if not _usable(log, ratio, count) or log.motor is None or log.user is None:
+        return None
+    return _start([log], [log.motor / ratio], [log.user])[0]
 
 
 def _start(

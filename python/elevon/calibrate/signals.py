@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.calibrate.balance import torque_balance
-from elevon.calibrate.breakaway import static_friction
 from elevon.calibrate.estimate import Estimate
 from elevon.calibrate.kinematics import CommandFit, command_fit
 from elevon.calibrate.law import controller_law
@@ -23,6 +22,7 @@ from elevon.calibrate.plant import (
     torque_scale,
 )
 from elevon.calibrate.regression import Regression
+from elevon.calibrate.static import static_friction
 from elevon.calibrate.zeros import encoder_count, gain_estimate, position_estimates
 
 if TYPE_CHECKING:
@@ -50,6 +50,8 @@ class Signals:
         The two regressions; None where one explains nothing.
     commands : tuple of CommandFit
         Commands reconstructed.
+    findings : tuple of str
+        What the positions say in words.
     """
 
     estimates: tuple[Estimate, ...]
@@ -58,6 +60,7 @@ class Signals:
     plant: Regression | None
     law: Regression | None
     commands: tuple[CommandFit, ...]
+    findings: tuple[str, ...] = ()
 
 
 def signal_stage(
@@ -65,6 +68,7 @@ def signal_stage(
     keeps: Sequence[Bools],
     actuator: Actuator,
     advance: Callable[[float], object] = lambda _f: None,
+    per_log: Sequence[str] = (),
 ) -> Signals:
     """Estimate what the signals themselves tell.
 
@@ -77,36 +81,35 @@ def signal_stage(
     actuator : Actuator
         Values before.
     advance : callable
-        Told the done fraction; may raise to stop.
+        Called with the done fraction; may raise to stop.
+    per_log : sequence of str
+        Paths to estimate for each log: of `elevon.calibrate.plays.PER_LOG`.
     """
-    found = position_estimates(logs, actuator)
+    estimates, findings = position_estimates(logs, actuator, per_log)
     advance(0.25)
-    plant = _telling(torque_balance(logs, keeps))
+    plant = _explaining(torque_balance(logs, keeps))
     advance(0.5)
     lag = plant["lag"] if plant is not None else 0.0
-    law = _telling(controller_law(logs, keeps, lag))
+    law = _explaining(controller_law(logs, keeps, lag))
     if plant is not None and law is not None and "constant" in plant.names:
         plant = _sampled(plant, law, logs, keeps)
     advance(0.7)
     torque = torque_scale(actuator, plant)
     followed: dict[str, float] = {}
     if plant is not None:
-        estimates, followed = plant_estimates(actuator, plant, torque)
-        found += estimates
-        dry = next((i.value for i in estimates if i.path == "friction.dynamic"), None)
-        shift = plant["offset" if "offset" in plant.names else "constant"]
-        static = static_friction(
-            logs, keeps, constant=torque.constant, offset=shift, lag=plant["lag"]
-        )
-        found += static_estimate(actuator, static, dry, torque)
+        of_plant, followed = plant_estimates(actuator, plant, torque)
+        estimates += of_plant
+        dry = next((i.value for i in of_plant if i.path == "friction.dynamic"), None)
+        static = static_friction(logs, keeps, plant, torque.constant)
+        estimates += static_estimate(actuator, static, dry, torque)
     if law is not None:
-        found += controller_estimates(actuator, law, torque, [log.name for log in logs])
-    commands = _commands(logs, actuator, found)
+        estimates += controller_estimates(actuator, law, torque, [log.name for log in logs])
+    commands = _commands(logs, actuator, estimates)
     advance(1.0)
-    return Signals(tuple(found), followed, torque, plant, law, tuple(commands))
+    return Signals(tuple(estimates), followed, torque, plant, law, tuple(commands), findings)
 
 
-def _telling(regression: Regression | None) -> Regression | None:
+def _explaining(regression: Regression | None) -> Regression | None:
     """Drop a regression that explains nothing: its coefficients are noise."""
     return regression if regression and regression.explained > _DOUBTFUL else None
 
@@ -129,16 +132,17 @@ def _sampled(
 
 
 def _commands(
-    logs: Sequence[BenchLog], actuator: Actuator, found: list[Estimate]
+    logs: Sequence[BenchLog], actuator: Actuator, estimates: list[Estimate]
 ) -> list[CommandFit]:
     """Commands, and the position gain pooled over them."""
     value = actuator.parameters.value
     limit = next(
-        (i.value for i in found if i.path == "control.speed_limit"), value("control.speed_limit")
+        (i.value for i in estimates if i.path == "control.speed_limit"),
+        value("control.speed_limit"),
     )
     gain = value("control.position_gain")
     fits = [fit for log in logs if (fit := command_fit(log, gain, limit)) is not None]
     pooled = gain_estimate(fits, gain, encoder_count(actuator))
     if pooled is not None:
-        found.append(pooled)
+        estimates.append(pooled)
     return fits

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from elevon.calibrate.estimate import Estimate, quantile
 from elevon.calibrate.kinematics import CommandFit, speed_limit, speed_sensor
 from elevon.calibrate.log import BenchLog
 from elevon.calibrate.play import PlayFit, fit_play
+from elevon.calibrate.plays import differing_plays, plays_differ, pooled_play
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -23,48 +25,95 @@ _FLAT = 0.25  # counts: the same where the user stands still in the play, long a
 _LOOSE = 0.05  # relative deviation above which the position gain is not determined
 
 
-def position_estimates(logs: Sequence[BenchLog], actuator: Actuator) -> list[Estimate]:
-    """Return play, encoder, speed sensor and speed limit, as far as the logs tell them."""
+def position_estimates(
+    logs: Sequence[BenchLog], actuator: Actuator, per_log: Sequence[str] = ()
+) -> tuple[list[Estimate], tuple[str, ...]]:
+    """Return play, encoder, speed sensor and speed limit as far as the logs show them, and words.
+
+    Parameters
+    ----------
+    logs : sequence of BenchLog
+        The data.
+    actuator : Actuator
+        Values before.
+    per_log : sequence of str
+        Of `elevon.calibrate.plays.PER_LOG`: estimated for each log.
+    """
+    estimates, findings = _play_estimates(logs, actuator, "play.total" in per_log)
+    return [*estimates, *_speed_estimates(logs), *_limit_estimates(logs, actuator)], findings
+
+
+def _play_estimates(
+    logs: Sequence[BenchLog], actuator: Actuator, each: bool
+) -> tuple[list[Estimate], tuple[str, ...]]:
+    """Play and encoder; of logs whose plays differ the encoder alone, and each log's play."""
     value = actuator.parameters.value
-    count = encoder_count(actuator)
-    found: list[Estimate] = []
-    play = fit_play(logs, value("gear.ratio"), count)
-    if play is not None:
-        found += _play(play, count, actuator)
-        found += [_initial(log, play, count, value("gear.ratio")) for log in logs if _told(log)]
-    sensor = speed_sensor(logs)
-    if sensor is not None:
-        for name, unit in (("gain", "1"), ("offset", "rad/s")):
-            number, std = sensor[name]
-            found.append(
-                _made(
-                    f"sensor.speed_{name}",
-                    number,
-                    std,
-                    math.inf,
-                    unit=unit,
-                    register="sensor",
-                    old=None,
-                    note="of the logged speed against the motor's angle",
-                )
-            )
-    limit = speed_limit(logs)
-    if limit is not None and abs(limit / value("control.speed_limit") - 1.0) > _OTHER:
-        found.append(
-            Estimate(
-                "control.speed_limit",
-                limit,
-                1e-4 * limit,
-                (limit * (1 - 2e-4), limit * (1 + 2e-4)),
-                "rad/s",
-                "controller",
-                value("control.speed_limit"),
-                "direct",
-                (),
-                "held flat in the log",
-            )
+    ratio, count = value("gear.ratio"), encoder_count(actuator)
+    plays = differing_plays(logs, ratio, count)
+    play = pooled_play(plays) if plays else fit_play(logs, ratio, count)
+    if play is None:
+        return [], ()
+    estimates = _play(play, count, actuator)
+    estimates += [_initial(log, play, count, ratio) for log in logs if _both_positions(log)]
+    own = plays
+    if each and not plays:
+        fits = {log.name: fit_play([log], ratio, count) for log in logs}
+        own = {name: fit for name, fit in fits.items() if fit is not None}
+    if each:
+        estimates += [_own_play(name, fit, count, actuator) for name, fit in own.items()]
+    if not plays:
+        return estimates, ()
+    rest = [item for item in estimates if item.path != "play.total"]
+    return rest, (plays_differ(plays, value("play.extra")),)
+
+
+def _own_play(name: str, play: PlayFit, count: float, actuator: Actuator) -> Estimate:
+    """Play of one log."""
+    total = _play(play, count, actuator)[0]
+    return replace(total, path=f"play.total[{name}]", in_set=False, note="of this log alone")
+
+
+def _speed_estimates(logs: Sequence[BenchLog]) -> list[Estimate]:
+    """Gain and offset of the speed sensor."""
+    sensor = speed_sensor(logs) or {}
+    units = {"gain": "1", "offset": "rad/s"}
+    return [
+        _made(
+            f"sensor.speed_{name}",
+            number,
+            std,
+            math.inf,
+            unit=units[name],
+            register="sensor",
+            old=None,
+            note="of the logged speed against the motor's angle",
         )
-    return found
+        for name, (number, std) in sensor.items()
+    ]
+
+
+def _limit_estimates(logs: Sequence[BenchLog], actuator: Actuator) -> list[Estimate]:
+    """Limit of the speed, where a log holds it and it is not the set's."""
+    old = actuator.parameters.value("control.speed_limit")
+    limit = speed_limit(logs)
+    if limit is None or abs(limit / old - 1.0) <= _OTHER:
+        return []
+    ends = (limit * (1 - 2e-4), limit * (1 + 2e-4))
+    note = "held flat in the log"
+    return [
+        Estimate(
+            "control.speed_limit",
+            limit,
+            1e-4 * limit,
+            ends,
+            "rad/s",
+            "controller",
+            old,
+            "direct",
+            (),
+            note,
+        )
+    ]
 
 
 def encoder_count(actuator: Actuator) -> float:
@@ -110,7 +159,7 @@ def _play(play: PlayFit, count: float, actuator: Actuator) -> list[Estimate]:
     return rows if play.floats else [*rows, *_encoder(play, actuator, rounded)]
 
 
-def _told(log: BenchLog) -> bool:
+def _both_positions(log: BenchLog) -> bool:
     return log.motor is not None and log.user is not None
 
 

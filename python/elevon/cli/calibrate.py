@@ -130,6 +130,12 @@ def calibrate(
         list[str] | None,
         typer.Option(help="Parameter path to estimate, repeatable; or auto (the default)."),
     ] = None,
+    per_log: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--per-log", metavar="PATH", help="Estimated for each log too: play.total; repeatable."
+        ),
+    ] = None,
     fidelity: FidelityOption = "low",
     transient: TransientOption = None,
     settings: SetOption = None,
@@ -166,6 +172,7 @@ def calibrate(
             data,
             model,
             free=_paths(free),
+            per_log=per_log or (),
             fidelity=fidelity,
             transient=transient,
             progress=lambda f: advance(0.9 * f),

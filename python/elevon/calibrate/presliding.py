@@ -1,0 +1,316 @@
+"""Static friction of a shaft that creeps before it slides.
+
+A contact on bristles (LuGre; Canudas de Wit, Olsson, Astrom and Lischinsky 1995) gives way
+elastically: there is no instant at which the shaft breaks away, and the torque of the instant at
+which it seems to depends on how fast the torque climbs. The friction is therefore followed through
+each reversal along the motion as measured,
+
+    dz/dx = sgn w - sigma_0 z / g(w),   friction sigma_0 z + sigma_1 dz/dt,
+    g(w) = F_d + (F_s - F_d) exp(-|w/w_s|^n),
+
+and its five numbers are fitted to the torque that the current leaves after inertia and viscosity.
+No controller and no simulation in time enters: the motor's angle drives the bristles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.calibrate.blocks import block_covariance
+from elevon.calibrate.log import BenchLog
+from elevon.calibrate.motion import acceleration_of, delayed, kernel, lagged, motion_of, smoothed
+from elevon.calibrate.regression import Regression
+
+__all__ = ["Presliding", "presliding_friction", "reversals", "usable_logs"]
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+_FEWEST = 4  # reversals
+_MOST = 48  # reversals that are followed
+_FINE = 4  # steps of the bristles a sample
+_BEFORE, _AFTER = 0.03, 0.06  # s of clear motion before and after a reversal that count
+_MARGIN = 0.03  # s more at both ends, in which the bristles and the filters find their state
+_LONGEST = 0.5  # s of a reversal; a longer standstill is no turn of the motion
+_CLEAR = 0.02  # of the highest speed: the shaft slides
+_SMALL = 0.05  # of the dry friction
+_SCALE = 2.0  # residuals beyond so many of their deviations count less
+_EXPONENTS = (1.0, 2.0)
+
+
+@dataclass(frozen=True)
+class Presliding:
+    """Static friction [N m], its deviation, degrees of freedom; stiffness of bristles [N m/rad]."""
+
+    static: float
+    std: float
+    degrees: float
+    stiffness: float
+
+
+@dataclass(frozen=True)
+class _Windows:
+    """Reversals of the logs: rows are events, columns samples (or their parts) of a window."""
+
+    steps: Floats  # (n, m * _FINE): rad a part of a sample
+    torque: Floats  # (n, m): N m that the friction has to explain, as late as the current
+    brake: Floats  # (n, m): N m of the brake
+    way: Floats  # (n,): of the motion before, 1 or -1
+    counts: Bools  # (n, m): samples that count
+    period: float
+    sigma: float
+    lag: float
+    late: bool = False  # the current is late by a delay, not by a first-order lag
+
+
+def presliding_friction(
+    logs: Sequence[BenchLog], keeps: Sequence[Bools], plant: Regression, constant: float
+) -> Presliding | None:
+    """Fit the bristles to all reversals of the logs.
+
+    What no log settles enters the deviation as the difference it makes: the law of the fall from
+    static to dynamic friction, the shape of the current's lag, how the shaft moves between two
+    samples, and what rubs only beyond the play.
+
+    Parameters
+    ----------
+    logs, keeps
+        As `elevon.calibrate.breakaway.static_friction`.
+    plant : Regression
+        The torque balance.
+    constant : float
+        Torque constant [N m/A].
+
+    Returns
+    -------
+    Presliding or None
+        None with fewer than four reversals.
+    """
+    windows = _windows(logs, keeps, plant, constant)
+    if windows is None:
+        return None
+    dry = constant * plant["dry"]
+    fits = [_fit(windows, dry, exponent) for exponent in _EXPONENTS]
+    best = min(fits, key=lambda fit: fit.cost)
+    others = [fit.static for fit in fits if fit is not best]
+    even = windows.steps.reshape(*windows.torque.shape, _FINE).mean(axis=2)
+    for other in (
+        replace(windows, late=True),
+        replace(windows, steps=np.repeat(even, _FINE, axis=1)),
+    ):
+        others.append(_fit(other, dry, best.exponent, best.x).static)
+    # What rubs beyond the play rubs in the motion, not yet where the shaft moves off.
+    beyond = dry - float(best.x[4])
+    variance, degrees = best.variance(windows)
+    spread = sum((other - best.static) ** 2 for other in others) + beyond**2
+    std = float(np.sqrt(variance + spread))
+    return Presliding(best.static + beyond, std, degrees, float(np.exp(best.x[0])))
+
+
+def usable_logs(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> list[tuple[BenchLog, Bools]]:
+    """Return logs whose angle and brake are known; only those without brake where they suffice."""
+    known = [
+        (log, keep & log.good)
+        for log, keep in zip(logs, keeps, strict=True)
+        if log.motor is not None and log.brake.known in {"off", "torque"}
+    ]
+    free = [item for item in known if item[0].brake.known == "off"]
+    return free if sum(len(reversals(*item)) for item in free) >= _FEWEST else known
+
+
+def reversals(log: BenchLog, keep: Bools) -> list[tuple[int, int]]:
+    """Last sample that slides one way and first one that slides the other, of every reversal."""
+    speed = motion_of(log).speed
+    at = np.flatnonzero(np.abs(speed) > _CLEAR * float(np.abs(speed).max()))
+    around, longest = round((_AFTER + _MARGIN) / log.period), round(_LONGEST / log.period)
+    return [
+        (before, after)
+        for before, after in zip(at[:-1].tolist(), at[1:].tolist(), strict=True)
+        if speed[before] * speed[after] < 0.0
+        and after - before < longest
+        and around <= before
+        and after < len(speed) - around
+        and keep[before - around : after + around].all()
+    ]
+
+
+def _windows(
+    logs: Sequence[BenchLog], keeps: Sequence[Bools], plant: Regression, constant: float
+) -> _Windows | None:
+    """Cut the reversals of all logs into rows of one length."""
+    used = usable_logs(logs, keeps)
+    turns = [reversals(log, keep) for log, keep in used]
+    many = -(-sum(map(len, turns)) // _MOST)
+    turns = [turn[::many] for turn in turns]
+    spans = [after - before for turn in turns for before, after in turn]
+    if len(spans) < _FEWEST:
+        return None
+    period = used[0][0].period
+    around = round((_AFTER + _MARGIN) / period)
+    length = max(spans) + 2 * around
+    sigma = max(kernel(log) for log, _ in used)
+    balance = _Known(plant, constant, sigma, length)
+    rows = [balance.rows(log, turn) for (log, _), turn in zip(used, turns, strict=True) if turn]
+    steps, torque, brake, way, counts = (np.concatenate([row[k] for row in rows]) for k in range(5))
+    return _Windows(steps, torque, brake, way, counts > 0.0, period, sigma, plant["lag"])
+
+
+@dataclass(frozen=True)
+class _Known:
+    """What is known of the torque, and the length of a window in samples."""
+
+    plant: Regression
+    constant: float
+    sigma: float
+    length: int
+
+    def friction(self, log: BenchLog) -> tuple[Floats, Floats]:
+        """Torque [N m] that inertia and viscosity leave to the friction, and the speed [rad/s]."""
+        plant = self.plant
+        speed, acceleration = acceleration_of(log, self.sigma)
+        shift = plant["offset" if "offset" in plant.names else "constant"]
+        known = plant["inertia"] * acceleration + plant["viscous"] * speed
+        late = lagged(known[:, None], plant["lag"], log.period)[:, 0]
+        return self.constant * (smoothed(log.current, self.sigma) - shift - late), speed
+
+    def rows(
+        self, log: BenchLog, turns: list[tuple[int, int]]
+    ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+        """Windows of one log; a short reversal has more of the motion before it, uncounted."""
+        from scipy.interpolate import CubicSpline
+
+        assert log.motor is not None
+        torque, speed = self.friction(log)
+        last = len(torque) - 1
+        brake = np.zeros_like(torque)
+        if log.brake.measured:
+            brake = np.interp(log.time, log.brake.time, log.brake.level)
+        end = np.array([after for _, after in turns]) + round((_AFTER + _MARGIN) / log.period)
+        at = end[:, None] + np.arange(-self.length, 0)
+        inside = np.clip(at, 0, last)
+        part = np.arange(-_FINE * (self.length + 1), -_FINE + 1) / _FINE
+        path = CubicSpline(np.arange(last + 1), log.motor)
+        steps = np.diff(path(np.clip(end[:, None] + part, 0.0, last)), axis=1)
+        begin = np.array([before for before, _ in turns])
+        counts = at >= begin[:, None] - round(_BEFORE / log.period)
+        counts &= at < end[:, None] - round(_MARGIN / log.period)
+        return steps, torque[inside], brake[inside], np.sign(speed[begin]), counts.astype(float)
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Bristles fitted.
+
+    `x` holds the logarithm of their stiffness, what static exceeds dry friction by, the logarithm
+    of the Stribeck speed, their damping, dry friction near rest, a shift of the torque.
+    """
+
+    x: Floats
+    exponent: float
+    cost: float
+    rest: Floats  # (n, m), zero where nothing counts
+    jac: Floats  # (n, m, 6)
+
+    @property
+    def static(self) -> float:
+        return float(self.x[4] + self.x[1])
+
+    def variance(self, windows: _Windows) -> tuple[float, float]:
+        """Variance of the static friction from the reversals' scores, and degrees of freedom."""
+        jac, rest = self.jac[windows.counts], self.rest[windows.counts]
+        # A small excess does not show at which speed it is gone.
+        active = [k for k in range(6) if k != 2 or self.x[1] > _SMALL * self.x[4]]
+        jac = jac[:, active]
+        spread = 1.4826 * float(np.median(np.abs(rest))) or 1e-300
+        weight = 1.0 / np.sqrt(1.0 + (rest / (_SCALE * spread)) ** 2)
+        events = np.nonzero(windows.counts)[0]
+        covariance, degrees = block_covariance(
+            (jac * weight[:, None] ** 3).T @ jac, [jac * (weight * rest)[:, None]], [events]
+        )
+        gradient = np.isin(active, (1, 4)).astype(np.float64)
+        return float(gradient @ covariance @ gradient), degrees
+
+
+def _fit(windows: _Windows, dry: float, exponent: float, start: Floats | None = None) -> _Fit:
+    """Least robust squares from the best point of a grid, or from a start."""
+    from scipy.optimize import least_squares
+
+    if start is None:
+        start = _coarse(windows, dry, exponent)
+    low = np.array([np.log(10.0 * dry), 0.0, np.log(1e-2), 0.0, 0.5 * dry, -0.2 * dry])
+    high = np.array([np.log(1e7 * dry), 2.0 * dry, np.log(1e1), 1e2 * dry, 1.5 * dry, 0.2 * dry])
+
+    def residual(x: Floats) -> Floats:
+        rest: Floats = _residual(windows, x[None], exponent)[0][windows.counts]
+        return rest
+
+    def jacobian(x: Floats) -> Floats:
+        return _slopes(windows, x, exponent, dry)
+
+    scale = 1.4826 * float(np.median(np.abs(residual(start))))
+    best = least_squares(
+        residual,
+        np.clip(start, low + 1e-9, high - 1e-9),
+        jac=jacobian,
+        bounds=(low, high),
+        x_scale=np.array([0.5, 0.1 * dry, 0.5, 0.5, 0.1 * dry, 0.1 * dry]),
+        loss="soft_l1",
+        f_scale=_SCALE * max(scale, 1e-6),
+        max_nfev=40,
+    )
+    rest = np.zeros(windows.counts.shape)
+    jac = np.zeros((*rest.shape, 6))
+    rest[windows.counts], jac[windows.counts] = residual(best.x), jacobian(best.x)
+    return _Fit(best.x, exponent, float(np.sum(np.abs(rest))), rest, jac)
+
+
+def _coarse(windows: _Windows, dry: float, exponent: float) -> Floats:
+    """Best point of a grid over stiffness and Stribeck speed."""
+    grid = np.array(
+        [
+            [np.log(dry * stiff), 0.2 * dry, np.log(speed), 0.002 * dry * stiff, dry, 0.0]
+            for stiff in (1e2, 3e2, 1e3, 3e3, 1e4, 1e5)
+            for speed in (0.1, 0.5, 2.0)
+        ]
+    )
+    costs = np.sum(np.abs(_residual(windows, grid, exponent)), axis=(1, 2))
+    return np.asarray(grid[int(np.argmin(costs))], dtype=np.float64)
+
+
+def _slopes(windows: _Windows, x: Floats, exponent: float, dry: float) -> Floats:
+    """Derivatives of the residual by central differences, shape (samples, 6)."""
+    steps = np.array([1e-3, 1e-3 * dry, 1e-3, 1e-3, 1e-4 * dry, 1e-4 * dry])
+    both = np.vstack((x + np.diag(steps), x - np.diag(steps)))
+    values = _residual(windows, both, exponent)[:, windows.counts]
+    return np.asarray(((values[:6] - values[6:]) / (2.0 * steps[:, None])).T, dtype=np.float64)
+
+
+def _residual(windows: _Windows, x: Floats, exponent: float) -> Floats:
+    """Torque less friction of parameters (k, 6): (k, n, m), zero where nothing counts."""
+    friction = _bristles(windows, x, exponent)
+    late = delayed if windows.late else lagged
+    flat = smoothed(friction.reshape(len(friction), -1), windows.sigma)
+    friction = np.moveaxis(late(flat, windows.lag, windows.period).reshape(friction.shape), 0, 2)
+    return np.where(windows.counts, windows.torque - friction - x[:, 5, None, None], 0.0)
+
+
+def _bristles(windows: _Windows, x: Floats, exponent: float) -> Floats:
+    """Friction at the samples (m, k, n): the deflection is exact over each part of a sample."""
+    stiffness, stribeck = np.exp(x[:, 0, None]), np.exp(x[:, 2, None])
+    excess, damping, dry = (x[:, j, None] for j in (1, 3, 4))
+    part = windows.period / _FINE
+    steps = np.ascontiguousarray(windows.steps.T)[:, None, :]
+    size = np.abs(steps)
+    brake = np.repeat(windows.brake.T, _FINE, axis=0)[:, None, :]
+    level = dry + excess * np.exp(-((size / part / stribeck) ** exponent)) + brake
+    end = np.sign(steps) * level / stiffness
+    left = np.exp(-stiffness * size / level)
+    z = np.empty((len(steps) + 1, *level.shape[1:]))
+    z[0] = windows.way * (dry + windows.brake[:, 0]) / stiffness
+    for k in range(len(steps)):
+        z[k + 1] = end[k] + (z[k] - end[k]) * left[k]
+    rate = (z[_FINE::_FINE] - z[_FINE - 1 :: _FINE][: len(z[_FINE::_FINE])]) / part
+    return np.asarray(stiffness * z[_FINE::_FINE] + damping * rate)
