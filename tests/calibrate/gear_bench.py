@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from elevon import Actuator, Recording
+from elevon import Actuator
+from elevon.bench.loaded import run_loaded
 from elevon.bench.procedure import Procedure, load_procedure
-from elevon.bench.run import run_procedure
+from elevon.bench.run import stand_setups
 from elevon.calibrate.gear import gear_log
 
 #: Half range of the logarithm of each number that is drawn.
@@ -53,11 +54,10 @@ def chosen(name, traces):
     return Procedure.model_validate(document)
 
 
-def make_logs(model, folder, procedures, *, seed, fidelity="low"):
+def make_logs(model, procedures, *, seed, fidelity="low"):
     """Run procedures and return their logs as the calibration reads them."""
-    paths = []
-    for number, procedure in enumerate(procedures):
-        out = folder / str(number)
-        run_procedure(procedure, model, out, seed=seed, fidelity=fidelity)
-        paths += sorted(out.glob("*.csv"))
-    return [gear_log(Recording.load(path), path.name) for path in paths]
+    return [
+        gear_log(run_loaded(setup, fidelity)[0], f"{procedure.name}-{setup.trace.name}")
+        for procedure in procedures
+        for setup in stand_setups(procedure, model, seed=seed)
+    ]

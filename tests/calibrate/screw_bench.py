@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from elevon import Actuator, Recording
+from elevon import Actuator
+from elevon.bench.loaded import run_loaded
 from elevon.bench.procedure import load_procedure
-from elevon.bench.run import run_procedure
-from elevon.calibrate.screw import screw_log
+from elevon.bench.run import stand_setups
+from elevon.calibrate.screw import motor_ratio, screw_log
 
 #: Half range of the logarithm of each number that is drawn.
 SPREADS = {
@@ -40,12 +41,12 @@ def drawn(seed, name="nasa-ballscrew"):
     return values, base.with_values({**values, "friction.static": static})
 
 
-def make_logs(model, folder, procedures, *, seed, fidelity):
+def make_logs(model, procedures, *, seed, fidelity):
     """Run procedures, by name or as they are; return their logs as the calibration reads them."""
-    paths = []
-    for number, procedure in enumerate(procedures):
-        out = folder / str(number)
+    logs = []
+    for procedure in procedures:
         ready = load_procedure(procedure) if isinstance(procedure, str) else procedure
-        run_procedure(ready, model, out, seed=seed, fidelity=fidelity)
-        paths += sorted(out.glob("*.csv"))
-    return [screw_log(Recording.load(path), path.name) for path in paths]
+        for setup in stand_setups(ready, model, seed=seed):
+            name = f"{ready.name}-{setup.trace.name}"
+            logs.append(screw_log(run_loaded(setup, fidelity)[0], name, motor_ratio(model)))
+    return logs

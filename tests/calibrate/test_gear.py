@@ -16,11 +16,11 @@ DRAWS, HIGH = 20, 3
 
 
 @pytest.fixture(scope="module")
-def one(tmp_path_factory):
+def one():
     """Truth and calibration of one draw: half the rig's tests and one retraction."""
     values, model = drawn(3)
     procedures = [chosen("gear-friction", RIG), chosen("gear-cycles", ["retraction-normal"])]
-    logs = make_logs(model, tmp_path_factory.mktemp("gear"), procedures, seed=3)
+    logs = make_logs(model, procedures, seed=3)
     return values, logs, calibrate_gear(logs, Actuator.load("pisa-landing-gear"))
 
 
@@ -58,16 +58,14 @@ def test_free_takes_some_and_refuses_what_is_not_there(one):
 
 @pytest.mark.long
 @pytest.mark.parametrize(("fidelity", "draws"), [("low", DRAWS), ("high", HIGH)])
-def test_truth_recovery_over_draws(fidelity, draws, tmp_path):
+def test_truth_recovery_over_draws(fidelity, draws):
     """Motions at either fidelity; the rig's own runs at low (no current flows there)."""
     model = Actuator.load("pisa-landing-gear")
     errors, covered = {}, []
     for seed in range(1, draws + 1):
         values, truth = drawn(seed)
-        folder = tmp_path / str(seed)
-        logs = make_logs(truth, folder / "rig", [load_procedure("gear-friction")], seed=seed)
-        cycles = [load_procedure("gear-cycles")]
-        logs += make_logs(truth, folder / "run", cycles, seed=seed, fidelity=fidelity)
+        logs = make_logs(truth, [load_procedure("gear-friction")], seed=seed)
+        logs += make_logs(truth, [load_procedure("gear-cycles")], seed=seed, fidelity=fidelity)
         for item in calibrate_gear(logs, model).estimates:
             if item.path in values:
                 true = values[item.path]

@@ -25,10 +25,10 @@ TWO = Procedure.model_validate(
 
 
 @pytest.fixture(scope="module")
-def one(tmp_path_factory):
+def one():
     """Truth, logs and calibration of one draw: high fidelity, two short logs."""
     values, model = drawn(5)
-    logs = make_logs(model, tmp_path_factory.mktemp("screw"), [TWO], seed=5, fidelity="high")
+    logs = make_logs(model, [TWO], seed=5, fidelity="high")
     return values, logs, calibrate_screw(logs, Actuator.load("nasa-ballscrew"))
 
 
@@ -75,15 +75,14 @@ def test_the_relieved_half_is_the_law_of_hertz():
 
 @pytest.mark.long
 @pytest.mark.parametrize(("name", "draws"), [("nasa-ballscrew", 20), ("nasa-dema", 5)])
-def test_truth_recovery_over_draws(name, draws, tmp_path):
+def test_truth_recovery_over_draws(name, draws):
     """Profiles at high fidelity, 70 minutes of heating at low."""
     before = Actuator.load(name)
     errors, covered = {}, []
     for seed in range(1, draws + 1):
         values, truth = drawn(seed, name)
-        folder = tmp_path / str(seed)
-        logs = make_logs(truth, folder / "p", ["ballscrew-profiles"], seed=seed, fidelity="high")
-        logs += make_logs(truth, folder / "h", ["ballscrew-heating"], seed=seed, fidelity="low")
+        logs = make_logs(truth, ["ballscrew-profiles"], seed=seed, fidelity="high")
+        logs += make_logs(truth, ["ballscrew-heating"], seed=seed, fidelity="low")
         for item in calibrate_screw(logs, before).estimates:
             if item.path in values:
                 true = values[item.path]

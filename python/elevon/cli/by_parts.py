@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.calibrate.by_parts import PartsCalibration
     from elevon.calibrate.role_log import RoleLog
+    from elevon.calibrate.screw import ScrewLog
     from elevon.calibrate.validation import Validation
     from elevon.progress import Progress
     from elevon.recording import Recording
@@ -63,7 +64,7 @@ def way_by_parts(paths: Sequence[Path], model: Actuator, column_map: Path | None
     if not preloaded(model):
         return None
     recordings = _read(paths, column_map)
-    return _screw_way(recordings) if balanced(list(recordings.values())) else None
+    return _screw_way(recordings, model) if balanced(list(recordings.values())) else None
 
 
 def _read(paths: Sequence[Path], column_map: Path | None) -> dict[str, Recording]:
@@ -87,10 +88,10 @@ def _unit_way(recordings: Mapping[str, Recording]) -> Way:
     return Way(recordings, gear_log, calibrate_gear, validate, lambda log: bool(log.moves))
 
 
-def _screw_way(recordings: Mapping[str, Recording]) -> Way:
+def _screw_way(recordings: Mapping[str, Recording], model: Actuator) -> Way:
     from elevon.calibrate.closed_loop import loop_log
     from elevon.calibrate.closed_loop.held_out import validate_loop
-    from elevon.calibrate.screw import calibrate_screw, screw_log
+    from elevon.calibrate.screw import calibrate_screw, motor_ratio, screw_log
 
     def validate(
         some: Mapping[str, Recording], model: Actuator, _progress: Progress | None
@@ -100,7 +101,10 @@ def _screw_way(recordings: Mapping[str, Recording]) -> Way:
     def predicted(log: RoleLog) -> bool:
         return log.has("command") and log.duration < _LONG
 
-    return Way(recordings, screw_log, calibrate_screw, validate, predicted)
+    def read(recording: Recording, name: str) -> ScrewLog:
+        return screw_log(recording, name, motor_ratio(model))
+
+    return Way(recordings, read, calibrate_screw, validate, predicted)
 
 
 def calibrate_by_parts(

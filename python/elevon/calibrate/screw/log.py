@@ -11,16 +11,19 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.calibrate.role_log import RoleLog, role_channels
+from elevon.errors import InputError
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.recording import Recording
 
-__all__ = ["CORNERS", "ScrewLog", "balanced", "preloaded", "screw_log"]
+__all__ = ["CORNERS", "ScrewLog", "balanced", "motor_ratio", "preloaded", "screw_log"]
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
-_NEEDED = ("motor_speed", "torque_current")
+_NEEDED = ("torque_current",)
+#: What shows the motor's speed, the best first.
+MOTION = ("motor_speed", "motor_position", "output_speed", "output_position")
 _LOAD = ("load", "load_cell")
 _WIDTH = 0.05  # s of the polynomials that smooth all channels alike
 _SLOWEST = 0.01  # s between samples, from which a log shows temperatures only
@@ -88,15 +91,40 @@ def _smoothed(values: Floats, period: float, *, order: int = 0) -> Floats:
     return np.asarray(savgol_filter(values, width, 3, deriv=order, delta=period), dtype=np.float64)
 
 
-def screw_log(recording: Recording, name: str) -> ScrewLog:
+def screw_log(recording: Recording, name: str, ratio: float) -> ScrewLog:
     """Return what the calibration needs of a recording, by the roles it states.
+
+    Parameters
+    ----------
+    recording : Recording
+        With the role ``torque_current`` and one of the motion's.
+    name : str
+        Of the log.
+    ratio : float
+        Motor angle over the ram's travel [rad/m]: a log without the motor's speed has it from what
+        else it shows of the motion.
 
     Raises
     ------
     InputError
-        No motor speed or torque current, or a log that is too short.
+        No torque current, nothing of the motion, or a log that is too short.
     """
-    return ScrewLog(**role_channels(recording, name, _NEEDED))
+    parts = role_channels(recording, name, _NEEDED)
+    roles, time = parts["roles"], parts["time"]
+    shown = next((role for role in MOTION if role in roles), None)
+    if shown is None:
+        raise InputError(f"{name}: nothing of the motion was recorded; one of {', '.join(MOTION)}")
+    if shown != "motor_speed":
+        scale = 1.0 if shown == "motor_position" else ratio
+        slope = np.gradient(roles[shown], time) if shown.endswith("position") else roles[shown]
+        roles["motor_speed"] = scale * slope
+    return ScrewLog(**parts)
+
+
+def motor_ratio(actuator: Actuator) -> float:
+    """Return the motor's angle over the ram's travel, rad/m."""
+    value = actuator.parameters.value
+    return value("gear.ratio") / value("screw.lead")
 
 
 def preloaded(actuator: Actuator) -> bool:
@@ -109,7 +137,8 @@ def preloaded(actuator: Actuator) -> bool:
 def balanced(recordings: Sequence[Recording]) -> bool:
     """Whether the balances suit: torque, motion and load in every log."""
     return all(
-        {*_NEEDED, "motor_position"} <= set(recording.roles)
+        set(_NEEDED) <= set(recording.roles)
+        and any(role in recording.roles for role in MOTION)
         and any(role in recording.roles for role in _LOAD)
         for recording in recordings
     )
