@@ -1,5 +1,6 @@
 """Tables on a terminal: nothing is cut, whatever the width."""
 
+import math
 import os
 import pty
 import subprocess
@@ -7,7 +8,7 @@ import sys
 
 import pytest
 
-from elevon.cli.numbers import estimate_texts, interval_texts
+from elevon.cli.numbers import estimate_texts, interval_texts, severity_texts
 from elevon.cli.table import table_lines
 
 HEADS = ["parameter", "before", "after", "low", "high", "unit", "register", "holds for"]
@@ -84,6 +85,12 @@ def test_a_value_has_the_digits_that_its_interval_supports(numbers, texts):
 def test_an_estimate_is_shown_in_the_unit_of_the_set():
     assert estimate_texts(7.7e-4, (7.6e-4, 7.8e-4), "kg m2") == ("7.70", "7.60", "7.80", "kg cm2")
     assert estimate_texts(0.03, (0.02, 0.04), "H", "mH") == ("30", "20", "40", "mH")
+
+
+def test_a_severity_is_said_in_percent_and_degrees():
+    assert severity_texts(0.123, (0.1, 0.15), "1") == ("12.3 %", "10.0 %", "15.0 %")
+    assert severity_texts(math.radians(0.34), (math.radians(0.29), math.radians(0.41)), "rad") == (
+        "0.34 deg", "0.29 deg", "0.41 deg")  # fmt: skip
 
 
 @pytest.mark.parametrize("width", [80, 100])

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from elevon.cli.closed_loop import read_recording
+from elevon.cli.numbers import estimate_row
 from elevon.cli.output import print_json, print_table, progress_bar, say
 from elevon.errors import ElevonError, InputError
 
@@ -182,18 +183,7 @@ def _page(result: PartsCalibration, date: str | None, path: Path, *, force: bool
 def _print(result: PartsCalibration) -> None:
     print_table(
         ("parameter", "before", "after", "low", "high", "unit", "holds for"),
-        [
-            (
-                item.path,
-                "" if item.old is None else f"{item.old:.5g}",
-                f"{item.value:.5g}",
-                f"{item.interval[0]:.5g}",
-                f"{item.interval[1]:.5g}",
-                item.unit,
-                ", ".join(item.given),
-            )
-            for item in result.estimates
-        ],
+        [estimate_row(item, result.actuator) for item in result.estimates],
     )
     for reason in dict.fromkeys(result.undetermined.values()):
         names = [path for path, why in result.undetermined.items() if why == reason]

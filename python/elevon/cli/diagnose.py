@@ -24,6 +24,7 @@ from elevon.cli.common import (
     read_actuator,
     without_companions,
 )
+from elevon.cli.numbers import severity_texts
 from elevon.cli.output import print_json, print_table, say
 from elevon.errors import InputError, unknown
 
@@ -122,16 +123,14 @@ def _method(method: str, file: Path | None) -> Callable[..., Diagnosis]:
 
 
 def _print(result: Diagnosis) -> None:
-    from elevon.diagnose.bymodel.words import sentence, severity_text
+    from elevon.diagnose.bymodel.words import sentence
 
     say(sentence(result))
     rows = [
         (
             f"{c.kind}@{c.place}",
             f"{c.probability:.3f}",
-            severity_text(c.severity, c.unit),
-            severity_text(c.interval[0], c.unit),
-            severity_text(c.interval[1], c.unit),
+            *severity_texts(c.severity, c.interval, c.unit),
             ", ".join(f"{kind}@{place}" for kind, place in c.equivalents),
         )
         for c in result.faults

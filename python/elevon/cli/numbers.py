@@ -11,7 +11,14 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.calibrate.estimate import Estimate
 
-__all__ = ["estimate_row", "estimate_texts", "interval_texts", "quantity_text", "written_unit"]
+__all__ = [
+    "estimate_row",
+    "estimate_texts",
+    "interval_texts",
+    "quantity_text",
+    "severity_texts",
+    "written_unit",
+]
 
 _DIGITS = 5
 """Significant digits of a number whose interval is not known."""
@@ -71,6 +78,14 @@ def estimate_row(item: Estimate, actuator: Actuator, *more: str) -> tuple[str, .
     value, low, high, shown = estimate_texts(item.value, item.interval, item.unit, unit)
     old = "" if item.old is None else _plain(float(to_display(item.old, shown or "1")))
     return (item.path, old, value, low, high, shown, *more, ", ".join(item.given))
+
+
+def severity_texts(value: float, interval: tuple[float, float], unit: str) -> tuple[str, str, str]:
+    """Return a severity and its interval as a person says it: angles in deg, shares in %."""
+    shown = "%" if unit == "1" else shown_unit(unit)
+    texts = interval_texts(*(float(to_display(x, shown)) for x in (value, *interval)))
+    first, low, high = (f"{text} {shown}" for text in texts)
+    return first, low, high
 
 
 def written_unit(actuator: Actuator, path: str) -> str:
