@@ -12,7 +12,7 @@ import numpy.typing as npt
 from elevon.diagnose.surrogate.campaign import Table
 from elevon.diagnose.surrogate.features import NAMES, SCALES, changes
 from elevon.diagnose.surrogate.model import Head, Surrogate, TestModel
-from elevon.diagnose.surrogate.network import Batch, Ensemble, Opinion, train
+from elevon.diagnose.surrogate.network import Batch, Ensemble, Opinion, either, honest, train
 from elevon.diagnose.surrogate.population import FAULTS
 from elevon.diagnose.surrogate.sampling import Rows, sizes
 from elevon.diagnose.surrogate.view import VIEWS, View
@@ -178,12 +178,12 @@ def _calibrated(
     severity = high.table.severity[rows]
     there = severity != 0.0
     faulty = there.any(axis=1)
-    logits = np.column_stack((opinion.presence, opinion.faulty))
-    truth = np.column_stack((there, faulty))
-    scaling = np.array([_platt(logits[:, k], truth[:, k]) for k in range(truth.shape[1])])
+    own = [_calibration(opinion.presence[:, k], there[:, k]) for k in range(there.shape[1])]
+    union = either(honest(np.array(own), opinion.presence))
+    scaling = np.array([*own, _calibration(union, faulty)])
     score = np.abs(sizes(severity) - opinion.size) / opinion.deviation
     conformal = np.array([_quantile(score[there[:, k], k]) for k in range(there.shape[1])])
-    healthy = np.sort(opinion.faulty[~faulty])
+    healthy = np.sort(union[~faulty])
     change = _changes(high, view, rows, rng)
     known = _known(high, low, view, rng)
     head = Head(
@@ -226,19 +226,21 @@ def _ends(change: Floats) -> tuple[Floats, Floats]:
     return low - _ROOM * (high - low) - 1e-9, high + _ROOM * (high - low) + 1e-9
 
 
-def _platt(logit: Floats, truth: npt.NDArray[np.bool_]) -> tuple[float, float]:
-    """Factor and offset of the logit by logistic regression, with smoothed targets (Platt)."""
+def _calibration(logit: Floats, truth: npt.NDArray[np.bool_]) -> tuple[float, float, float]:
+    """Slopes and offset of `honest`, by likelihood, with Platt's smoothed targets."""
     from scipy.optimize import minimize
 
     count = float(truth.sum())
     target = np.where(truth, (count + 1.0) / (count + 2.0), 1.0 / (len(truth) - count + 2.0))
 
     def loss(x: Floats) -> float:
-        z = x[0] * logit + x[1]
-        return float(np.mean(np.logaddexp(0.0, z) - target * z))
+        z = honest(x[None, :], logit[:, None])[:, 0]
+        return float(np.mean(np.logaddexp(0.0, z) - target * z)) + 1e-3 * float(
+            np.sum((x[:2] - 1.0) ** 2)
+        )
 
-    best = minimize(loss, np.array([1.0, 0.0]), method="Nelder-Mead").x
-    return max(float(best[0]), 0.05), float(best[1])
+    best = minimize(loss, np.array([1.0, 1.0, 0.0]), bounds=[(0.05, 5.0)] * 2 + [(-5.0, 5.0)]).x
+    return float(best[0]), float(best[1]), float(best[2])
 
 
 def _quantile(score: Floats, level: float = 0.9) -> float:
@@ -251,7 +253,7 @@ def _quantile(score: Floats, level: float = 0.9) -> float:
 
 def _named(opinion: Opinion, scaling: Floats, severity: Floats) -> Floats:
     """Least severity from which on 95 % of the single faults are the most probable one."""
-    logit = opinion.presence * scaling[:-1, 0] + scaling[:-1, 1]
+    logit = honest(scaling[:-1], opinion.presence)
     single = (severity != 0.0).sum(axis=1) == 1
     out = np.full(severity.shape[1], np.nan)
     for k in range(severity.shape[1]):
@@ -269,9 +271,9 @@ def scores(head: Head, opinion: Opinion, severity: Floats) -> dict[str, Any]:
     """Return what an opinion of held-out runs is worth."""
     there = severity != 0.0
     faulty = there.any(axis=1)
-    logit = opinion.presence * head.scaling[:-1, 0] + head.scaling[:-1, 1]
+    logit = honest(head.scaling[:-1], opinion.presence)
     probability = 1.0 / (1.0 + np.exp(-logit))
-    above = len(head.healthy) - np.searchsorted(head.healthy, opinion.faulty)
+    above = len(head.healthy) - np.searchsorted(head.healthy, either(logit))
     alarm = (above + 1.0) / (len(head.healthy) + 1.0) <= FALSE_ALARM
     inside = np.abs(sizes(severity) - opinion.size) <= head.conformal * opinion.deviation
     single = there.sum(axis=1) == 1

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.diagnose.surrogate.features import NAMES, LogFeatures
-from elevon.diagnose.surrogate.network import Ensemble, packed, unpacked
+from elevon.diagnose.surrogate.network import Ensemble, either, honest, packed, unpacked
 from elevon.diagnose.surrogate.population import FAULTS
 from elevon.diagnose.surrogate.view import VIEWS, View
 from elevon.errors import FormatError
@@ -70,12 +70,12 @@ class Head:
         Features to inputs.
     ensemble : Ensemble
         Inputs to an opinion.
-    scaling : ndarray, shape (f + 1, 2)
-        Factor and offset that make the logits honest; the last row is for any fault.
+    scaling : ndarray, shape (f + 1, 3)
+        What makes the logits honest (`honest`); the last row is for that of any fault.
     conformal : ndarray, shape (f,)
         Deviations that hold 90 % of held-out sizes.
     healthy : ndarray, shape (h,)
-        Sorted logits (any fault) of held-out healthy runs.
+        Sorted logits of any fault (`either`) of held-out healthy runs.
     known : ndarray, shape (p, k)
         Changes of training runs, as arsinh.
     low, high : ndarray, shape (k,)
@@ -104,10 +104,12 @@ class Head:
         inputs = self.view.inputs(row, healthy, np.array([float(max(len(baselines), 1))]))
         opinion = self.ensemble.says(inputs)
         change = self.view.change(row, healthy)[0]
-        above = len(self.healthy) - int(np.searchsorted(self.healthy, opinion.faulty[0]))
+        presence = honest(self.scaling[:-1], opinion.presence)[0]
+        score = float(either(presence))
+        above = len(self.healthy) - int(np.searchsorted(self.healthy, score))
         return Said(
-            self.scaling[:-1, 0] * opinion.presence[0] + self.scaling[:-1, 1],
-            float(self.scaling[-1, 0] * opinion.faulty[0] + self.scaling[-1, 1]),
+            presence,
+            float(honest(self.scaling[-1:], np.array([score]))[0]),
             (above + 1.0) / (len(self.healthy) + 1.0),
             opinion.size[0],
             self.conformal * opinion.deviation[0],

@@ -14,7 +14,16 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Batch", "Ensemble", "Opinion", "loss_and_gradient", "packed", "train", "unpacked"]
+__all__ = [
+    "Batch",
+    "Ensemble",
+    "Opinion",
+    "honest",
+    "loss_and_gradient",
+    "packed",
+    "train",
+    "unpacked",
+]
 
 Floats = npt.NDArray[np.float64]
 Weights = list[Floats]  # w1, b1, w2, b2, ...
@@ -72,7 +81,11 @@ class Ensemble:
     weights: Weights
 
     def says(self, inputs: Floats) -> Opinion:
-        """Return the ensemble's opinion of inputs, shape (n, m): the members as one mixture."""
+        """Return the ensemble's opinion of inputs, shape (n, m): the members' means.
+
+        How far the members disagree does not enter the deviation: it depends on their number, and
+        calibration is made on some of them.
+        """
         out = _forward(self.weights, np.asarray(inputs)[None, :, :])[-1]
         count = (out.shape[2] - 1) // 3
         size, log = out[..., count : 2 * count], out[..., 2 * count : 3 * count]
@@ -81,7 +94,7 @@ class Ensemble:
             out[..., :count].mean(axis=0),
             out[..., -1].mean(axis=0),
             size.mean(axis=0),
-            np.sqrt(own + size.var(axis=0)),
+            np.sqrt(own),
         )
 
 
@@ -125,6 +138,27 @@ def loss_and_gradient(weights: Weights, batch: Batch) -> tuple[float, Weights]:
 
 def _entropy(logit: Floats, there: Floats) -> Floats:
     return np.asarray(np.logaddexp(0.0, logit) - there * logit)
+
+
+def honest(scaling: Floats, logit: Floats) -> Floats:
+    """Return calibrated logits, shape (..., k): one slope for each side, and an offset.
+
+    Parameters
+    ----------
+    scaling : ndarray, shape (k, 3)
+        Slope where the logit is negative, where it is positive, offset (beta calibration; Kull,
+        Silva Filho and Flach, 2017).
+    logit : ndarray, shape (..., k)
+        As the networks give it.
+    """
+    rest, there = -np.logaddexp(0.0, -logit), np.logaddexp(0.0, logit)
+    return np.asarray(scaling[:, 0] * rest + scaling[:, 1] * there + scaling[:, 2])
+
+
+def either(logit: Floats) -> Floats:
+    """Return the logit, shape (...), that any of independent faults, shape (..., f), is there."""
+    none = np.logaddexp(0.0, logit).sum(axis=-1)  # -log of the product of all absences
+    return np.asarray(none + np.log(-np.expm1(-none)))
 
 
 def _logistic(logit: Floats) -> Floats:
