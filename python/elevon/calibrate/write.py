@@ -156,8 +156,8 @@ def write_values(
 
 
 def _name(stem: str) -> str:
-    kept = "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in stem)
-    return kept if kept and kept[0].isalnum() else f"set-{kept.strip('-._')}"
+    plain = "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in stem)
+    return plain if plain and plain[0].isalnum() else f"set-{plain.strip('-._')}"
 
 
 def _base(before: Actuator, target: Path) -> str:

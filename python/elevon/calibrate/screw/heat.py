@@ -251,6 +251,9 @@ def nut_heat(
     fit = fit_balance(sought, data, _single(bins), times, scale=_spread(bins.surface))
     levels, reasons = _judged(sought, fit, NUT, "the log is too short or too cool to tell it")
     open_ = _heat_open(log["motor_speed"], force, actuator, known)
+    if open_ > _SURE:
+        why = "the screw's efficiencies as given leave too much of its heat open"
+        return {}, dict.fromkeys(NUT, why)
     return {path: item.widened(open_ * item.value) for path, item in levels.items()}, reasons
 
 
