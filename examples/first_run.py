@@ -1,14 +1,10 @@
-"""Simulate the Torino bench actuator following a sine, and look at what it did."""
+"""Simulate the Torino bench actuator following a sine, look at what it did, plot it."""
 
 import elevon
 
-actuator = elevon.Actuator.load("torino-rotary")
-scenario = elevon.Scenario.from_dict(
-    {
-        "duration": "2 s",
-        "command": {"terms": [{"kind": "sine", "amplitude": "7 deg", "frequency": "1 Hz"}]},
-    }
-)
-recording = elevon.simulate(actuator, scenario, record="drive_log,user_position@400 Hz")
+sine = {"kind": "sine", "amplitude": "7 deg", "frequency": "1 Hz"}
+scenario = {"duration": "2 s", "command": {"terms": [sine]}}
+recording = elevon.simulate("torino-rotary", scenario)
 print(recording)
 print("greatest position:", recording["user_position"].to("deg").max(), "deg")
+recording.plot(path="first_run.png", force=True)  # or first_run.html, to zoom

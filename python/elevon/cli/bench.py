@@ -19,13 +19,17 @@ from elevon.cli.common import (
     StrictOption,
     read_actuator,
 )
+from elevon.cli.groups import NamingGroup
 from elevon.cli.output import print_json, print_table, progress_bar, say
 
 if TYPE_CHECKING:
     from elevon.bench.procedure import Procedure
 
 app = typer.Typer(
-    no_args_is_help=True, rich_markup_mode=None, help="Run the virtual test bench's procedures."
+    no_args_is_help=True,
+    cls=NamingGroup,
+    rich_markup_mode=None,
+    help="Run the virtual test bench's procedures.",
 )
 
 

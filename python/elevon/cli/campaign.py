@@ -10,9 +10,10 @@ import typer
 
 from elevon.cli import campaign_analysis, interrupt
 from elevon.cli.common import JsonOption, StrictOption
+from elevon.cli.groups import NamingGroup
 from elevon.cli.output import print_json, print_table, progress_bar, say
 
-app = typer.Typer(rich_markup_mode=None, no_args_is_help=True)
+app = typer.Typer(rich_markup_mode=None, no_args_is_help=True, cls=NamingGroup)
 campaign_analysis.add_to(app)
 
 PlanArgument = Annotated[Path, typer.Argument(metavar="PLAN", help="The plan file (TOML).")]

@@ -9,9 +9,10 @@ import typer
 
 from elevon.cli import dataset_make
 from elevon.cli.common import ForceOption, JsonOption
+from elevon.cli.groups import NamingGroup
 from elevon.cli.output import print_json, print_table, progress_bar
 
-app = typer.Typer(rich_markup_mode=None, no_args_is_help=True)
+app = typer.Typer(rich_markup_mode=None, no_args_is_help=True, cls=NamingGroup)
 dataset_make.add_to(app)
 
 FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="The campaign's folder.")]

@@ -6,10 +6,16 @@ from typing import Annotated, Any
 
 import typer
 
+from elevon.cli.groups import NamingGroup
 from elevon.cli.output import print_json, print_table
 from elevon.units import parse_quantity
 
-app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Design experiments and parts.")
+app = typer.Typer(
+    no_args_is_help=True,
+    cls=NamingGroup,
+    rich_markup_mode=None,
+    help="Design experiments and parts.",
+)
 
 
 @app.callback()

@@ -15,13 +15,17 @@ from elevon.cli.common import (
     JsonOption,
     OnlyFidelityOption,
 )
+from elevon.cli.groups import NamingGroup
 from elevon.cli.output import print_json, print_table
 
 if TYPE_CHECKING:
     from elevon.faults import FaultRecord
 
 app = typer.Typer(
-    no_args_is_help=True, rich_markup_mode=None, help="List what there is, with units and sources."
+    no_args_is_help=True,
+    cls=NamingGroup,
+    rich_markup_mode=None,
+    help="List what there is, with units and sources.",
 )
 
 

@@ -12,25 +12,22 @@ from pathlib import Path
 from typing import Any
 
 import typer
-import typer.core
 
 from elevon.cli import completion, interrupt
+from elevon.cli.groups import NamingGroup, UsageError
 from elevon.cli.registry import COMMANDS
-from elevon.errors import ElevonError, ElevonWarning, Interrupted, nearest
+from elevon.errors import ElevonError, ElevonWarning, Interrupted
 from elevon.extras import missing_package
 from elevon.files import journal
 
 USAGE = 2
 FAILED = 1
 
-# The root of the argument errors (bad option, missing argument, ...) of whichever click typer uses.
-_UsageError: Any = typer.BadParameter.__mro__[1]
-
 
 _ROOT_ONLY = ("install_completion", "show_completion")
 
 
-class LazyGroup(typer.core.TyperGroup):
+class LazyGroup(NamingGroup):
     """A group that imports a command's module only when that command is run."""
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002 - click's signature
@@ -48,17 +45,6 @@ class LazyGroup(typer.core.TyperGroup):
         # Completion is installed for the program, not for one of its commands.
         loaded.params = [item for item in loaded.params if item.name not in _ROOT_ONLY]
         return loaded
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """As the base class, but an unknown command names the nearest ones."""
-        known = self.list_commands(ctx)
-        if args and not args[0].startswith("-") and args[0] not in known:
-            near = nearest(args[0], known)
-            hint = (
-                f" Did you mean {', '.join(near)}?" if near else f" Commands: {', '.join(known)}."
-            )
-            raise _UsageError(f"No such command '{args[0]}'.{hint}", ctx)
-        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the table of commands from the registry, importing none of them."""
@@ -122,7 +108,7 @@ def _code(arguments: list[str]) -> int:
         )
     except Interrupted:
         raise
-    except _UsageError as error:
+    except UsageError as error:
         return _usage(error)
     except (ElevonError, ElevonWarning) as error:
         interrupt.check()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import typer
 
+from elevon.cli.groups import NamingGroup
 from elevon.cli.reproduce.case import add_command
 from elevon.cli.reproduce.cranfield import CASES as _CRANFIELD
 from elevon.cli.reproduce.diagnosis import CASES as _DIAGNOSIS
@@ -16,6 +17,7 @@ from elevon.cli.reproduce.torino import CASES as _TORINO
 
 app = typer.Typer(
     no_args_is_help=True,
+    cls=NamingGroup,
     rich_markup_mode=None,
     help="Recompute a published table or figure; exit code 1 when a check fails.",
 )
