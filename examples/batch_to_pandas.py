@@ -11,5 +11,7 @@ scenario = elevon.Scenario.from_dict({"duration": "1 s", "command": {"terms": [s
 faults = [[f"short@motor.phase_a={s}", f"play@transmission={p} deg"] for s, p in draws]
 runs = [elevon.Run("torino-rotary", scenario.with_faults(each)) for each in faults]
 answers = elevon.simulate_batch(runs, fidelity="low", record=[], features="all@400 Hz")
-table = pd.DataFrame([r.meta["features"] for r in answers]).assign(short=draws[:, 0], play=draws[:, 1])
+table = pd.DataFrame([r.meta["features"] for r in answers]).assign(
+    short=draws[:, 0], play=draws[:, 1]
+)
 print(table.shape, table.corr(method="spearman")["play"].abs().nlargest(4).round(2).to_dict())

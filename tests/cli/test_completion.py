@@ -102,3 +102,16 @@ def test_a_command_does_not_offer_to_install():
     for name in COMMANDS:
         names = {item.name for item in group.get_command(None, name).params}
         assert not names & {"install_completion", "show_completion"}
+
+
+def test_groups_name_their_commands(capsys):
+    from elevon.cli import main
+
+    assert main(["reproduce", "xx"]) == 2
+    said = capsys.readouterr().err
+    assert "torino-backlash" in said
+    assert "nasa-baseline" in said
+    assert main(["reproduce", "nasa-basline"]) == 2
+    assert "Did you mean nasa-baseline?" in capsys.readouterr().err
+    assert main(["bench", "rnu"]) == 2
+    assert "Did you mean run?" in capsys.readouterr().err

@@ -3,12 +3,14 @@
 import ast
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from elevon import Actuator
 from elevon.cli import main
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -16,6 +18,9 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 SAYS = {
     "first_run.py": "greatest position: 6.",
     "short_in_a_phase.py": "shorted: ripple of the q voltage",
+    "own_variant.py": "light.toml reaches 4.5 deg after",
+    "batch_to_pandas.py": "(200, 52) {'play': 1.0",
+    "own_controller.py": "0.09",
     "many_runs.py": "play@transmission=0.9 deg lost motion",
 }
 
@@ -33,6 +38,51 @@ def test_script(name, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert SAYS[name] in done.stdout
+
+
+TASKS = [*SAYS, "bench_to_set.sh", "foreign_csv.sh"]
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_a_task_is_short(name):
+    lines = (EXAMPLES / name).read_text("utf-8").splitlines()
+    longest = 22 if name in ("many_runs.py", "short_in_a_phase.py") else 15
+    assert len([line for line in lines if line.strip() and not line.startswith("#")]) <= longest
+
+
+def _shell(name, folder, *arguments):
+    """Run a shell script with this environment's `elevon`."""
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    return subprocess.run(
+        ["sh", EXAMPLES / name, *arguments],
+        cwd=folder,
+        env={**os.environ, "PATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.mark.long
+def test_from_the_bench_to_a_validated_set(tmp_path):
+    done = _shell("bench_to_set.sh", tmp_path)
+    assert done.returncode == 0, done.stderr
+    fitted = Actuator.load(tmp_path / "unit.toml").parameters
+    assert fitted["friction.dynamic"].value == pytest.approx(0.36, rel=0.02)  # nobody told it
+    assert "after 10 s; pass" in done.stdout + done.stderr
+
+
+@pytest.mark.long
+def test_from_a_foreign_csv_to_a_validated_set(tmp_path):
+    from tests.calibrate.test_closed_loop import PID, log, square, sweep, write_csv
+
+    shutil.copy(EXAMPLES / "linear-drive" / "drive.toml", tmp_path)
+    trials = {"squares": square, "sweep": sweep, "another": square}
+    for seed, (name, demand) in enumerate(trials.items()):
+        write_csv(tmp_path / f"{name}.csv", log(PID, demand, 20.0, seed=seed))
+    done = _shell("foreign_csv.sh", tmp_path, *(f"{name}.csv" for name in trials))
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.rstrip().endswith("pass")
 
 
 def test_notebook(tmp_path, monkeypatch):

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from elevon.errors import InputError, unknown
 from elevon.parameters.parameter import Parameter
@@ -69,6 +69,10 @@ class ParameterSet(Mapping[str, Parameter]):
             return self._items[path]
         except KeyError:
             raise unknown("parameter", path, self._items) from None
+
+    def get(self, path: str, default: Any = None) -> Any:
+        """Return a parameter, or the default where the wiring has none of that path."""
+        return self._items.get(path, default)
 
     def __contains__(self, path: object) -> bool:
         return path in self._items
