@@ -72,3 +72,15 @@ def test_check_of_a_scenario(elevon_cli, tmp_path):
     (tmp_path / "s.toml").write_text("duration = 1\n[initial]\nspeed = 0\n")
     assert elevon_cli("check", "s.toml").code == 0
     assert elevon_cli("check", "s.toml", "--actuator", "torino-rotary").code == 1
+
+
+def test_check_of_a_set_reads_the_units_of_its_scenario(elevon_cli, tmp_path):
+    (tmp_path / "mine.toml").write_text(
+        'base = "torino-rotary"\n[scenario]\nduration = 1\n[[scenario.command.terms]]\n'
+        "kind = 'constant'\nvalue = 7\n"
+    )
+    result = elevon_cli("check", "mine.toml", "--json")
+    assert result.code == 1
+    (row,) = result.json["findings"]
+    assert "mine.toml:6" in row["message"]
+    assert "'7 deg'" in row["message"]

@@ -73,13 +73,34 @@ def _of_set(file: Path) -> list[dict[str, Any]]:
     from elevon.errors import InputError
     from elevon.parameters import set_errors
 
-    lines = set_errors(file)
+    lines = [*set_errors(file), *_own_scenarios(file)]
     if lines:
         return [_row("error", line) for line in lines]
     try:
         return _together(file)
     except InputError as error:
         return [_row("error", line) for line in str(error).splitlines()]
+
+
+def _own_scenarios(file: Path) -> list[str]:
+    """Return what is wrong with the units of the scenarios that a set brings."""
+    from elevon.documents import Document, read_toml
+    from elevon.errors import InputError
+    from elevon.scenario.bare import check_units
+
+    document = read_toml(file)
+    compare = document.data.get("compare")
+    given: dict[tuple[str, ...], Any] = {("scenario",): document.data.get("scenario")}
+    if isinstance(compare, dict):
+        given["compare", "scenario"] = compare.get("scenario")
+    lines: list[str] = []
+    for prefix, data in given.items():
+        try:
+            if isinstance(data, dict):
+                check_units(Document(document.origin, document.text, data, prefix=prefix))
+        except InputError as error:
+            lines += str(error).splitlines()
+    return lines
 
 
 def _together(file: Path) -> list[dict[str, Any]]:
