@@ -6,6 +6,8 @@ from hypothesis.extra import numpy as hnp
 
 from elevon import Channel, Clock, Recording
 
+ALL = [".parquet", ".nc", ".mat", ".csv"]
+MANY_CLOCKS = [".parquet", ".nc", ".mat"]  # of any numbers; .csv but for what a NaN can hide
 UNITS = ["rad", "rad/s", "N m", "1", "K", "A", "V"]
 
 
@@ -29,6 +31,11 @@ def ordinary():
         gaps=[2],
     )
     return drive.joined(cell)
+
+
+def one_clock():
+    """Its irregular clock alone."""
+    return ordinary().select(clock="cell")
 
 
 names = st.from_regex(r"[a-z][a-z0-9_]{3,30}", fullmatch=True).filter(
