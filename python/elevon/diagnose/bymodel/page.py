@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from elevon.diagnose.bymodel.words import sentence, severity_text
@@ -70,7 +71,15 @@ def _unit(key: str) -> str:
 def _evidence(report: Report, result: Diagnosis) -> None:
     ranked = sorted(result.moved, key=lambda item: -abs(item.score))
     rows = [
-        (m.log, m.name, m.unit, m.value, m.expected, m.score, m.explained / m.deviation)
+        (
+            m.log,
+            m.name,
+            m.unit,
+            m.value,
+            m.expected,
+            m.score,
+            None if math.isnan(m.explained) else m.explained / m.deviation,
+        )
         for m in ranked
     ]
     report.section("Evidence").table(
