@@ -44,8 +44,8 @@ CASES: Mapping[str, Mapping[str, float]] = {
     "play and friction": {"play@transmission": math.radians(0.13), "friction@transmission": 0.25},
 }
 OURS = ("model", "both", "surrogate")
-BUDGET = 4000
-"""Evaluations of a search: one hundred generations of forty. ASSUMED: of the literature's order."""
+BUDGET = 2000
+"""Evaluations of a search: fifty generations of forty. ASSUMED: of the literature's order."""
 _PROCEDURE = "backlash"
 
 
@@ -157,7 +157,7 @@ def _interval(values: Sequence[float]) -> tuple[float, float, float]:
 def reproduce_optimisers(
     *,
     seed: int = 0,
-    seeds: int = 3,
+    seeds: int = 4,
     budget: int = BUDGET,
     cases: Sequence[str] = tuple(CASES),
     progress: Progress | None = None,

@@ -36,6 +36,6 @@ CASES = (
         "searching",
         _work,
         _show,
-        options={"seeds": (_SEEDS, 3), "budget": (_BUDGET, 4000)},
+        options={"seeds": (_SEEDS, 4), "budget": (_BUDGET, 2000)},
     ),
 )
