@@ -4,7 +4,7 @@ from pathlib import Path
 
 import elevon
 
-Path("light.toml").write_text('base = "torino-rotary"\n[gear]\nratio = "50"\n', "utf-8")
+Path("light.toml").write_text('base = "torino-rotary"\n[gear]\nratio = 50\n', "utf-8")
 scenario = {"duration": "1 s", "command": {"terms": [{"kind": "step", "final": "5 deg"}]}}
 for name in ("torino-rotary", "light.toml"):
     recording = elevon.simulate(name, scenario, record="user_position@1 kHz")

@@ -7,6 +7,8 @@ import math
 import numpy as np
 import pytest
 
+import elevon
+from elevon.units import parse_quantity
 from tests.physics.rig import FREE_SHAFT, INERTIA, constant, run, term, values
 
 
@@ -102,3 +104,23 @@ def test_elastic_play_deflects_by_half_the_gap_plus_load_over_stiffness(sign: fl
     motor, user = values(rec, "motor_position", "user_position")
     assert motor[-1] == 0.0
     assert -user[-1] == pytest.approx(sign * (total / 2 + load / stiffness), rel=1e-6)
+
+
+@pytest.mark.parametrize("fidelity", ["high", "low"])
+@pytest.mark.parametrize(("name", "at"), [("torino-rotary", "2 deg"), ("nasa-ballscrew", "3 mm")])
+def test_a_run_starts_where_the_user_is_said_to_stand(name, at, fidelity):
+    """The motor stands mid-play with it; positions further apart than the play are refused."""
+    actuator = elevon.Actuator.load(name).with_values({"play.model": "operator"})
+    scenario = {"duration": "5 ms", "initial": {"user_position": at}}
+    record = "user_position,motor_position@400 Hz"
+    run = elevon.simulate(actuator, scenario, fidelity=fidelity, record=record)
+    wanted = parse_quantity(at, run["user_position"].unit)
+    assert run["user_position"].values[0] == pytest.approx(wanted)
+    turned = {"user_position": at, "motor_position": run["motor_position"].values[0]}
+    same = elevon.simulate(
+        actuator, {**scenario, "initial": turned}, fidelity=fidelity, record=record
+    )
+    assert np.array_equal(same["motor_position"].values, run["motor_position"].values)
+    apart = {**turned, "motor_position": 0.0}
+    with pytest.raises(elevon.InputError, match="more than half the play"):
+        elevon.simulate(actuator, {**scenario, "initial": apart}, fidelity=fidelity)

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+import elevon
+
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ["README.md", "docs/reproduce.md", "docs/sessions.md"]
 LONG = (
@@ -97,7 +99,16 @@ def test_example(tmp_path):
     assert (tmp_path / "run.parquet").is_file()
 
 
-@pytest.mark.parametrize("page", ["docs/sessions.md"])
+@pytest.mark.parametrize(
+    "page",
+    [
+        "docs/sessions.md",
+        "docs/scenarios.md",
+        "docs/recordings.md",
+        "docs/own-actuators.md",
+        "docs/python.md",
+    ],
+)
 def test_examples_of_a_page(page, tmp_path):
     """The Python of a page, block by block, in one process: as a reader would paste it."""
     blocks = _blocks(page, "python")
@@ -113,7 +124,39 @@ def test_examples_of_a_page(page, tmp_path):
     assert done.stdout
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize(
+    "page", ["docs/own-actuators.md", pytest.param("docs/tutorial.md", marks=pytest.mark.long)]
+)
+def test_commands_of_a_page_in_their_order(page, tmp_path):
+    """The commands of a page build on each other: all of them run in one folder, as written."""
+    for block in _blocks(page, "sh"):
+        for line in filter(None, map(str.strip, block.splitlines())):
+            words = shlex.split(line)
+            assert words[0] == "elevon"
+            done = subprocess.run(
+                [sys.executable, "-m", "elevon", *words[1:]],
+                cwd=tmp_path,
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+            assert done.returncode == 0, f"{line}\n{done.stderr}"
+            variant = tmp_path / "mine.toml"
+            if words[1] == "new" and page == "docs/own-actuators.md":
+                variant.write_text(_blocks(page, "toml")[0], "utf-8")
+
+
+def test_scenarios_page_holds_a_scenario(tmp_path):
+    (tmp_path / "a.toml").write_text(_blocks("docs/scenarios.md", "toml")[0], "utf-8")
+    scenario = elevon.Scenario.load(tmp_path / "a.toml")
+    run = elevon.simulate("torino-rotary", scenario, fidelity="low", record="user_position@100 Hz")
+    assert run.status == "ok"
+    assert run["user_position"].to("deg")[0] == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    "page", [*PAGES, *(f"docs/{p.name}" for p in (ROOT / "docs").glob("*.md"))]
+)
 def test_links_and_pictures_are_there(page):
     text = (ROOT / page).read_text("utf-8")
     for target in re.findall(r"\]\(([^)#]+)\)", text):

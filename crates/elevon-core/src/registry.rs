@@ -135,6 +135,10 @@ impl Model {
     pub fn check_faulted(self, raw: &[f64]) -> Vec<Finding> {
         dispatch!(self, W => W::check_faulted(raw))
     }
+    /// Why a run cannot start from these values together.
+    pub fn refuses_start(self, raw: &[f64], initial: &[f64]) -> Option<String> {
+        dispatch!(self, W => W::refuses_start(raw, initial))
+    }
     pub fn step(self, raw: &[f64]) -> f64 {
         dispatch!(self, W => W::step(raw))
     }

@@ -177,6 +177,10 @@ impl Resolver {
         if let Some(unknown) = initial.keys().find(|k| !names.contains(&k.as_str())) {
             return Err(bad(format!("no initial value {unknown:?}")));
         }
+        let initial: Vec<f64> = names.iter().map(|n| initial.get(*n).copied().unwrap_or(f64::NAN)).collect();
+        if let Some(message) = self.model.refuses_start(&parameters, &initial) {
+            return Err(bad(message));
+        }
         let given = need(d, "faults")?.cast_into::<PyList>()?;
         let faults = self.faults(&given)?;
         in_range(self.model, &whole(&parameters, &faults), WHOLE)?;
@@ -190,7 +194,7 @@ impl Resolver {
             driven,
             faults,
             tunable: Vec::new(),
-            initial: names.iter().map(|n| initial.get(*n).copied().unwrap_or(f64::NAN)).collect(),
+            initial,
             duration,
             seed: need(d, "seed")?.extract()?,
             run: need(d, "run")?.extract()?,

@@ -186,6 +186,10 @@ pub trait Wiring: Clone + Send + Sync + 'static {
     }
 
     fn derive<S: Scalar>(raw: &[S], structure: &Self::Structure) -> Self::Model<S>;
+    /// Why a run cannot start from these values for `INITIAL` together.
+    fn refuses_start(_raw: &[f64], _initial: &[f64]) -> Option<String> {
+        None
+    }
     /// State at the start; `initial` holds the values given for `INITIAL`, NaN where none was.
     fn start<S: Scalar>(model: &Self::Model<S>, raw: &[S], initial: &[S]) -> Self::State<S>;
     /// After a fault changed parameters.

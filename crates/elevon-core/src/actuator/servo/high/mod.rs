@@ -62,6 +62,9 @@ impl<F: Form> Wiring for High<F> {
     fn derive<S: Scalar>(raw: &[S], structure: &Structure) -> Model<S> {
         Model::derive::<F>(raw, structure)
     }
+    fn refuses_start(raw: &[f64], initial: &[f64]) -> Option<String> {
+        crate::actuator::servo::shaft::refuses_start::<F>(raw, [initial[0], initial[2]])
+    }
     fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
         start::start(model, raw, initial)
     }

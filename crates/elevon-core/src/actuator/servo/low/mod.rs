@@ -89,6 +89,9 @@ impl<F: Form> Wiring for Low<F> {
     fn derive<S: Scalar>(raw: &[S], structure: &Structure) -> Model<S> {
         Model::derive::<F>(raw, structure)
     }
+    fn refuses_start(raw: &[f64], initial: &[f64]) -> Option<String> {
+        crate::actuator::servo::shaft::refuses_start::<F>(raw, [initial[0], initial[2]])
+    }
     fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
         model.start(raw, initial)
     }

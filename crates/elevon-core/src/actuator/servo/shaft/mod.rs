@@ -21,7 +21,7 @@ use crate::scalar::Scalar;
 use crate::transmission::friction::Friction;
 use crate::transmission::gear::{Gear, GearParameter, LoadParameter};
 use crate::transmission::nut_heat::{NutHeat, NutState};
-use crate::transmission::play::{Play, PlayModel};
+use crate::transmission::play::{Play, PlayModel, PlayParameter};
 use crate::transmission::screw::Screw;
 use crate::transmission::vibration::{Vibration, VibrationState};
 
@@ -72,7 +72,6 @@ pub(super) struct ShaftNeeds<'a> {
 impl<'a> ShaftNeeds<'a> {
     /// The second mass behind an elastic play, where the set has one.
     pub(super) fn high(parts: Parts<'a>, accounts: bool) -> Self {
-        use crate::transmission::play::PlayParameter;
         let semi_implicit = Method::read(parts.solver().value(SolverParameter::Method)) == Method::SemiImplicit;
         let elastic = PlayModel::read(parts.play().value(PlayParameter::Model)) == PlayModel::Elastic;
         Self { parts, semi_implicit, elastic, accounts, low: false }
@@ -173,10 +172,11 @@ impl<S: Scalar> Shaft<S> {
     }
 
     /// At rest or moving as given; NaN where nothing is given.
+    /// From positions and speeds; NaN where not given. A user's position alone takes the motor with it, mid-play.
     pub(super) fn start(&self, motor: [S; 2], user: [S; 2]) -> ShaftState<S> {
         let or = |given: S, other: S| S::select(given.equals(given), given, other);
         let zero = S::zero();
-        let motor_position = or(motor[0], zero);
+        let motor_position = or(motor[0], or(user[0] * self.gear.ratio, zero));
         let driver = motor_position * self.gear.per_ratio;
         let user_position = self.play.drag(driver, or(user[0], driver));
         ShaftState {
@@ -193,6 +193,22 @@ impl<S: Scalar> Shaft<S> {
             work: Work { friction: zero, brake: zero, load: zero, impact: zero },
         }
     }
+}
+
+/// Why no shaft stands so: motor and user further apart than the play lets them. `at` holds both positions, NaN where not
+/// given.
+pub(super) fn refuses_start<F: Form>(raw: &[f64], at: [f64; 2]) -> Option<String> {
+    let ([motor, user], half) = (at, Play::derive(Raw(raw).play()).half);
+    let driver = motor / F::ratio(raw);
+    // What an elastic play is wound up by is for the caller to say.
+    let elastic = PlayModel::read(Raw(raw).play()[PlayParameter::Model as usize]) == PlayModel::Elastic;
+    let apart = (user - driver).abs();
+    (!elastic && apart > half * (1.0 + 1e-9) + 1e-12).then(|| {
+        format!(
+            "initial: user_position = {user} and motor_position = {motor}: the user is {apart} away from where the motor holds it, more \
+             than half the play, {half}; leave one of them out"
+        )
+    })
 }
 
 impl<S: Scalar> ShaftState<S> {
