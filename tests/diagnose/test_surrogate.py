@@ -18,7 +18,7 @@ from elevon.diagnose.surrogate import (
 from elevon.diagnose.surrogate.campaign import Table
 from elevon.diagnose.surrogate.features import NAMES, changes, log_features
 from elevon.diagnose.surrogate.fit import Plan, fitted, judged
-from elevon.diagnose.surrogate.network import Batch, loss_and_gradient, train
+from elevon.diagnose.surrogate.network import Batch, either, honest, loss_and_gradient, train
 from elevon.diagnose.surrogate.population import FAULTS, day_of, drawn_faults, learned, unit_of
 from elevon.diagnose.surrogate.sampling import Rows, severities, sizes
 from elevon.errors import FormatError, InputError
@@ -140,6 +140,34 @@ def test_two_logs_of_a_unit_are_surer_than_one(unit, logs):
     width = [r.faults[0].interval[1] - r.faults[0].interval[0] for r in (one, two)]
     assert width[1] < width[0]
     assert two.p_fault >= one.p_fault
+
+
+def test_a_faulty_baseline_is_named(unit, logs):
+    def named(item, name):
+        return replace(item, log=replace(item.log, name=name))
+
+    healthy = [logs["base"], logs["healthy"]]  # of one name, as files of two folders are
+    faulty = named(logs["play"], "third")
+    log = bench_logs(unit, [(9, [])])
+    result = diagnose_by_surrogate(log, unit, baselines=[*healthy, faulty])
+    assert result.status == "healthy"
+    said = [text for text in result.findings if "looks faulty itself" in text]
+    assert len(said) == 1
+    assert "third" in said[0]
+    assert "left out" in said[0]
+    sound = diagnose_by_surrogate(log, unit, baselines=healthy)
+    assert not any("looks faulty" in text for text in sound.findings)
+
+
+def test_calibrated_logits():
+    logit = np.array([[-3.0, 0.0, 2.0]])
+    same = np.tile([1.0, 1.0, 0.0], (3, 1))
+    np.testing.assert_allclose(honest(same, logit), logit)
+    steeper = honest(np.tile([1.0, 2.0, 0.0], (3, 1)), logit)
+    assert steeper[0, 2] > 2.0 * logit[0, 2]
+    present = 1.0 / (1.0 + np.exp(-logit))
+    none = np.prod(1.0 - present)
+    assert either(logit)[0] == pytest.approx(np.log((1.0 - none) / none))
 
 
 def test_what_was_not_trained_is_said(unit, logs):

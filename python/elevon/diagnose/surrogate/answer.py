@@ -15,7 +15,7 @@ from elevon.diagnose.bymodel.answer import Cause, Diagnosis, Moved
 from elevon.diagnose.bymodel.candidates import Candidate, chosen
 from elevon.diagnose.bymodel.evidence import UNITS
 from elevon.diagnose.surrogate.features import NAMES, SCALES, LogFeatures, log_features
-from elevon.diagnose.surrogate.model import Head, Said, Surrogate, shipped
+from elevon.diagnose.surrogate.model import Head, Said, Surrogate, TestModel, shipped
 from elevon.diagnose.surrogate.population import FAULTS, learned
 from elevon.diagnose.surrogate.sampling import severities
 from elevon.errors import ElevonError, InputError
@@ -29,6 +29,7 @@ __all__ = ["Proposal", "diagnose_by_both", "diagnose_by_surrogate", "proposed"]
 Floats = npt.NDArray[np.float64]
 LISTED = 0.02  # probability below which a cause is not listed, and not proposed to the model
 PRESENT, FAULTY = 0.09, 0.63  # shares of trained runs: of each fault, and of any
+SUSPECT = 0.01  # chance of a baseline below which it is called faulty
 LEAST_PROPOSED = 3  # causes that the model is given at least
 
 
@@ -73,6 +74,7 @@ class _Read:
     head: Head
     baselines: list[Floats]
     said: Said
+    doubted: tuple[LogFeatures, ...] = ()
 
 
 def proposed(
@@ -104,7 +106,7 @@ def proposed(
         _detectable(read),
         tuple(m for r in read for m in _moved(r)),
         tuple(f"{r.shown.name}: {text}" for r in read for text in r.said.outside),
-        tuple(_without_baseline(r) for r in read if not r.baselines),
+        tuple(text for r in read for text in _findings(r)),
     )
 
 
@@ -118,16 +120,43 @@ def _read(shown: LogFeatures, trained: Surrogate, healthy: Sequence[LogFeatures]
             "--method model serves any test"
         )
     test = trained.tests[name]
-    baselines = [b.values for b in healthy if test.matches(b)]
+    same = [b for b in healthy if test.matches(b)]
+    doubted = _doubted(test, same)
+    baselines = [b.values for b in same if b not in doubted or len(doubted) == len(same)]
     head = test.heads["relative" if baselines else "absolute"]
-    return _Read(shown, head, baselines, head.says(shown.values, baselines))
+    return _Read(shown, head, baselines, head.says(shown.values, baselines), tuple(doubted))
 
 
-def _without_baseline(read: _Read) -> str:
-    return (
-        f"{read.shown.name}: no baseline of this test: held against all units that were trained; "
-        "small faults are not seen"
-    )
+def _doubted(test: TestModel, same: Sequence[LogFeatures]) -> list[LogFeatures]:
+    """Return baselines that look faulty: against the others, or, alone, against all units."""
+    out = []
+    for item in same:
+        others = [b.values for b in same if b is not item]
+        said = test.heads["relative" if others else "absolute"].says(item.values, others)
+        if said.chance < SUSPECT and (said.presence > 0.0).any():
+            out.append(item)
+    if len(out) > 1 and len(out) == len(same):
+        # They contradict each other: those that all units make less likely are doubted.
+        alone = [test.heads["absolute"].says(b.values, []).faulty for b in out]
+        out = [b for b, faulty in zip(out, alone, strict=True) if faulty > min(alone)]
+    return out
+
+
+def _findings(read: _Read) -> list[str]:
+    out = []
+    if not read.baselines:
+        out.append(
+            f"{read.shown.name}: no baseline of this test: held against all units that were "
+            "trained; small faults are not seen"
+        )
+    for item in read.doubted:
+        alone = any(item.values is b for b in read.baselines)
+        used = "it is used, there is no other" if alone else "it is left out"
+        out.append(
+            f"baseline {item.name} looks faulty itself (a healthy unit does in less than "
+            f"{100 * SUSPECT:g} % of logs); {used}"
+        )
+    return out
 
 
 def _joint(logits: Sequence[Floats]) -> Floats:

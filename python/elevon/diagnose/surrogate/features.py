@@ -53,7 +53,7 @@ _STEPS = 2  # linear fits: at the noted frequency, then with its correction
 _FAR = 8.0  # median deviations
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LogFeatures:
     """What one log shows.
 
