@@ -25,6 +25,12 @@ def test_a_base_and_one_number_are_enough(tmp_path):
     assert all(mine.parameters[p].value == BASE.parameters[p].value for p in others)
 
 
+def test_a_files_name_becomes_a_name_that_can_be(tmp_path):
+    path = tmp_path / "my gear (2).toml"
+    path.write_text('base = "torino-rotary"\n')
+    assert elevon.Actuator.load(path).name == "my-gear-2"
+
+
 def test_choices_and_numbers_whose_unit_is_si_need_no_unit(tmp_path):
     path = tmp_path / "a.toml"
     path.write_text('base = "torino-rotary"\ndrive.kind = "pwm"\n[friction]\ndynamic = 0.4\n')

@@ -108,7 +108,7 @@ def load_set(reference: str | os.PathLike[str]) -> SetFile:
         references.update({item.key: item.text for item in layer.header.references})
     scenario = next((layer.header.scenario for layer in layers if layer.header.scenario), None)
     return SetFile(
-        name=top.header.name or path.stem,
+        name=top.header.name or _name_of(path),
         title=next((layer.header.title for layer in layers if layer.header.title), ""),
         wiring=wiring,
         parameters=ParameterSet(wiring, entries, str(path)),
@@ -118,6 +118,11 @@ def load_set(reference: str | os.PathLike[str]) -> SetFile:
         validation=_table(layers, "validation"),
         compare=_table(layers, "compare"),
     )
+
+
+def _name_of(path: Path) -> str:
+    """Return a set's name from its file's, of the characters that a name may have."""
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", path.stem).strip("-._") or "actuator"
 
 
 def set_errors(path: str | os.PathLike[str]) -> list[str]:
