@@ -138,3 +138,12 @@ def test_figure_files_have_dark_ink(tmp_path, ending):
         assert "Time [s]" in text
     else:
         assert data.startswith(b"\x89PNG")
+    short, long = ([[k, "x"] for k in range(n)] for n in (20, 21))
+    page = Report("t")
+    page.section("s").table(Table(["a", "b"], short))
+    assert "<details>" not in page.html()
+    page.section("more").table(Table(["a", "b"], long))
+    html = page.html()
+    assert html.count("<details>") == 1
+    assert "Table of 21 rows: a, b" in html
+    assert "beforeprint" in html

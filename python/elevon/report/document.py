@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Report", "Section", "Table"]
 
+_SHOWN_ROWS = 20
+
 
 @dataclass(frozen=True, slots=True)
 class Table:
@@ -37,7 +39,8 @@ class Table:
     formats : sequence of str, optional
         One format a column (such as ``+.4f``) for its numbers; an empty one means `digits`.
     folded : str
-        Heading under which a long table stands closed until it is opened; empty: shown.
+        Heading under which a table stands closed until it is opened; empty: shown, but for one of
+        over twenty rows, which folds under a heading of its own.
     """
 
     columns: Sequence[str]
@@ -58,6 +61,15 @@ class Table:
         if isinstance(value, float):
             return f"{value:#.{self.digits}g}".rstrip(".")
         return "" if value is None else str(value)
+
+    def heading(self) -> str:
+        """Return the heading under which the table stands closed; empty where it is shown.
+
+        Over twenty rows nobody reads before opening them: such a table folds by itself.
+        """
+        if self.folded or len(self.rows) <= _SHOWN_ROWS:
+            return self.folded
+        return f"Table of {len(self.rows)} rows: {', '.join(map(str, self.columns[:4]))} ..."
 
     def numeric(self, column: int) -> bool:
         """Tell whether a column holds numbers only, to be set to the right."""
@@ -210,6 +222,12 @@ class Report:
         if not self.checks:
             return None
         return "pass" if all_passed(self.checks) else "fail"
+
+    @property
+    def folds(self) -> bool:
+        """Whether a table is folded: on paper all of them are open."""
+        items = [item for section in self.sections for item in section.items]
+        return any(item["kind"] == "table" and item["table"].heading() for item in items)
 
     def html(self) -> str:
         """Return the whole page: no file, script or font is fetched from anywhere."""
