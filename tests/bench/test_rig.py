@@ -70,7 +70,7 @@ def test_it_writes_the_drives_columns_and_nothing_it_cannot_know(tmp_path, actua
     assert len(lines) == 1 + 3 * 400 + 1
     note = json.loads((tmp_path / "short_command.json").read_text())
     assert note == {
-        "waveform": "sine", "amplitude": 7.0, "frequency": 0.5, "bias": 3.0,
+        "waveform": "sine", "amplitude": "7 deg", "frequency": "0.5 Hz", "bias": "3 deg",
         "brake": "on", "load_cell_arm": 0.1, "chain_ratio": 4.5, "current": "rms",
     }  # fmt: skip
 

@@ -118,8 +118,9 @@ def write_logs(truth, folder, *, seed=0, cell=True, encoder_gain=1.0, noted=1.0,
         }
         paths.append(write_drive_csv(folder / f"{name}.csv", signals, force=True))
         note = {"waveform": command["kind"], "brake": "on" if brake else "off", "current": "rms"}
-        note |= {k: float(v.split()[0]) for k, v in command.items() if k != "kind"}
-        note["amplitude"] *= noted
+        note |= {k: v for k, v in command.items() if k != "kind"}
+        number, unit = note["amplitude"].split()
+        note["amplitude"] = f"{noted * float(number)!r} {unit}"
         if brake and cell:
             own = np.arange(0.0, 20.0 - trigger, 1 / 80)
             at = trigger + 1.0008 * own
