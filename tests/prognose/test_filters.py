@@ -39,7 +39,7 @@ def test_particles_and_sigma_points_agree_with_the_exact_posterior(prior):
     ]
     mean, spread = exact(observed, deviation, rate, prior)
     unit = process(law(rate, spread=prior), limits=(5.0,))
-    particles = ParticleFilter(unit, count=8000, seed=2, bias=0.0)
+    particles = ParticleFilter(unit, count=8000, seed=2)
     sigma = UnscentedFilter(unit)
     for usage, value in observed:
         particles.update(seen(usage, value, deviation))

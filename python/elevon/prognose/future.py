@@ -16,6 +16,7 @@ Floats = npt.NDArray[np.float64]
 _STEP = 0.01  # of the way to the greatest severity, for the fastest tenth of the units alive
 _MOST_STEPS = 1500
 _FARTHEST = 1e7  # repetitions: beyond, no end of life is in sight
+_FAR = 20.0  # times the median of the ends: the same
 _QUANTILES = (0.05, 0.5, 0.95)
 
 
@@ -77,7 +78,7 @@ def look_ahead(
     now = _part(units, ~dead)
     at, course = [units.usage], [_quantiles(process, damage)]
     for _ in range(_MOST_STEPS):
-        if not len(alive) or now.usage - units.usage > _FARTHEST:
+        if not len(alive) or _out_of_sight(now.usage - units.usage, end - units.usage):
             break
         step = _step(process, now, load[alive])
         later = process.advance(now, step, rng, load[alive])
@@ -93,13 +94,19 @@ def look_ahead(
     return Future(units.usage, end, first, np.array(at), np.array(course))
 
 
+def _out_of_sight(more: float, ends: Floats) -> bool:
+    """Whether most have failed long ago, so that the rest has no end in sight."""
+    median = float(np.median(ends))
+    long_ago = np.isfinite(median) and more > _FAR * max(median, 1e-12)
+    return bool(long_ago) or more > _FARTHEST
+
+
 def _part(units: Population, keep: npt.NDArray[np.bool_]) -> Population:
     return replace(
         units,
         damage=units.damage[keep],
         growth=units.growth[keep],
         form=units.form[keep],
-        bias=units.bias[keep],
         weight=units.weight[keep],
         active=units.active[keep],
     )

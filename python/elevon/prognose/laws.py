@@ -88,7 +88,7 @@ _WEAR = Law(
             "1e-14), friction 0.1, flanks of 6 cm2 at 44 mm from the axis",
         )
     },
-    grain=4e-5,
+    grain=2e-5,
     dormant=_DORMANT,
 )  # fmt: skip
 
@@ -120,7 +120,7 @@ LAWS: dict[str, Law] = {
             "threshold": Coefficient(343.15, "K", "bearing makers' rule: 70 C"),
             "halving": Coefficient(15.0, "K", "bearing makers' rule"),
         },
-        grain=4e-3, dormant=_DORMANT,
+        grain=2e-3, dormant=_DORMANT,
     ),
     "insulation": Law(
         name="insulation",
@@ -143,7 +143,7 @@ LAWS: dict[str, Law] = {
                 40.0, "K", "ASSUMED: rise of the spot's temperature per unit of shorted share"
             ),
         },
-        grain=0.01, start=0.0, start_spread=0.3, dormant=_DORMANT,
+        grain=3e-3, start=0.0, start_spread=0.3, dormant=_DORMANT,
         severity=_shorted, damage=_short_damage,
     ),
     "demagnetisation": Law(

@@ -77,7 +77,7 @@ def predict(
     tables = response or respond(actuator, mission, snapshots=snapshots)
     _check_new(tables)
     made = clock.perf_counter()
-    flt = ParticleFilter(Process(tables), count=particles, seed=seed, bias=BIAS)
+    flt = ParticleFilter(Process(tables), count=particles, seed=seed)
     check_order(inspections)
     for item in inspections:
         flt.update(item)
@@ -101,7 +101,7 @@ def prognosis(
 ) -> Prognosis:
     """Look ahead from where a filter stands."""
     rng = np.random.default_rng([17, seed])
-    units = resampled(flt.units, _SAMPLES, rng)
+    units = flt.process.scaled(resampled(flt.units, _SAMPLES, rng), BIAS, rng)
     future = look_ahead(flt.process, units, mission.usage, rng)
     response = flt.process.response
     known = _known(flt.process, units, inspections, level)

@@ -38,8 +38,6 @@ class Population:
         Logarithm of the unit's own factor on each law's rate.
     form : ndarray, shape (n, k)
         Exponent by which the unit's growth differs from the law's as the fault grows.
-    bias : ndarray, shape (n, k)
-        Logarithm of the factor by which diagnoses show each severity.
     weight : ndarray, shape (n,)
         Sum 1.
     active : ndarray of bool, shape (n, k)
@@ -51,7 +49,6 @@ class Population:
     damage: Floats
     growth: Floats
     form: Floats
-    bias: Floats
     weight: Floats
     active: npt.NDArray[np.bool_]
     usage: float = 0.0
@@ -64,7 +61,6 @@ class Population:
             damage=self.damage[index],
             growth=self.growth[index],
             form=self.form[index],
-            bias=self.bias[index],
             weight=even,
             active=self.active[index],
         )
@@ -87,8 +83,8 @@ class Process:
         self.drift = drift
         self._quarter = np.array([0.25 * law.highest for law in self.laws])
 
-    def start(self, count: int, rng: np.random.Generator, *, bias: float = 0.0) -> Population:
-        """Draw new units; `bias` is the deviation of the diagnoses' common factor."""
+    def start(self, count: int, rng: np.random.Generator) -> Population:
+        """Draw new units."""
         if count < 10:
             raise InputError(f"{count} particles: at least 10 are needed")
         size = len(self.laws)
@@ -100,7 +96,6 @@ class Process:
             np.maximum(start + spread * rng.standard_normal((count, size)), 0.0),
             growth * rng.standard_normal((count, size)),
             form * rng.standard_normal((count, size)),
-            bias * rng.standard_normal((count, size)),
             np.full(count, 1.0 / count),
             rng.random((count, size)) >= np.array([law.dormant for law in self.laws]),
         )
@@ -158,6 +153,28 @@ class Process:
             active=active,
             usage=units.usage + steps,
         )
+
+    def scaled(self, units: Population, deviation: float, rng: np.random.Generator) -> Population:
+        """Return the units with severities that differ by a factor common to all diagnoses.
+
+        What all diagnoses of a unit err by alike is not told by them: the filters follow the
+        severities as they are shown, and what they truly are is drawn before looking ahead.
+
+        Parameters
+        ----------
+        units : Population
+            As the diagnoses show them.
+        deviation : float
+            Of the logarithm of the factor.
+        rng : Generator
+            Of chance.
+        """
+        severity = self.severity(units.damage)
+        shape = (len(severity), len(self.laws))
+        true = severity * np.exp(-deviation * rng.standard_normal(shape))
+        damage = np.column_stack([law.damage(true[:, k]) for k, law in enumerate(self.laws)])
+        # Damage that shows no severity, such as ageing before the first contact, stays as it is.
+        return replace(units, damage=np.where(damage > 0.0, damage, units.damage))
 
     def to(
         self,

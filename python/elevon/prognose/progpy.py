@@ -118,7 +118,6 @@ def from_samples(samples: Any, process: Process, *, usage: float = 0.0) -> Popul
         damage=table[:, :, 0],
         growth=np.where(active, growth, 0.0),
         form=table[:, :, 2],
-        bias=np.zeros_like(growth),
         weight=np.full(len(table), 1.0 / len(table)),
         active=active,
         usage=usage,
@@ -140,7 +139,6 @@ def _units(x: Mapping[str, Any], keys: list[str]) -> Population:
         damage=np.maximum(rows[None, :, 0], 0.0),
         growth=growth,
         form=rows[None, :, 2],
-        bias=np.zeros_like(growth),
         weight=np.ones(1),
         active=np.ones_like(growth, dtype=np.bool_),
     )

@@ -74,7 +74,6 @@ class UnscentedFilter:
             np.maximum(points[:, :size], 0.0),
             points[:, size:],
             np.zeros((len(points), size)),
-            np.zeros((len(points), size)),
             np.full(len(points), 1.0 / len(points)),
             np.ones((len(points), size), dtype=np.bool_),
             self.usage,

@@ -73,11 +73,11 @@ def live(unit: Actuator, seed: int, progress: Progress | None = None) -> Life:
     Its laws feed back on themselves and scatter more than those of the prediction.
     """
     mission = demo_mission()
-    laws = [other_law(law) for law in mission.laws()]
+    rng = np.random.default_rng([seed, 9])
+    laws = [other_law(law, rng) for law in mission.laws()]
     process = Process(
         respond(unit, mission, laws=laws, snapshots=True, progress=progress), drift=0.0
     )
-    rng = np.random.default_rng([seed, 9])
     new = process.start(10, rng).picked(np.array([0]))
     growth = np.log(np.array([_FACTORS])) + 0.05 * rng.standard_normal((1, 2))
     every = np.ones((1, 2), dtype=np.bool_)

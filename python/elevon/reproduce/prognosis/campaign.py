@@ -26,7 +26,7 @@ from elevon.prognose.metrics import (
     relative_accuracy,
     wilson,
 )
-from elevon.prognose.particle import resampled
+from elevon.prognose.particle import BIAS, resampled
 from elevon.prognose.predict import LEVEL
 from elevon.progress import Progress
 from elevon.report.checks import Check, all_passed
@@ -36,7 +36,7 @@ __all__ = ["SHARES", "PrognosisResult", "UnitResult", "reproduce_prognosis"]
 
 Floats = npt.NDArray[np.float64]
 SHARES = (0.5, 0.6, 0.7, 0.8, 0.9)
-_INTERVAL = 0.03  # of the life that the model expects, between inspections
+_INTERVAL = 0.04  # of the life that the model expects, between inspections
 _SAMPLES = 1000
 _ACCURACY = 0.85
 _COVERAGE = (0.80, 0.97)
@@ -284,7 +284,7 @@ def tracked(
         begin = clock.process_time()
         flt.update(item)
         rng = np.random.default_rng([20, seed])
-        units = resampled(flt.units, _SAMPLES, rng)
+        units = flt.process.scaled(resampled(flt.units, _SAMPLES, rng), BIAS, rng)
         rows.append(_quantiles(look_ahead(flt.process, units, mission.usage, rng).remaining))
         longest = max(longest, clock.process_time() - begin)
     low, median, high = np.array(rows).T

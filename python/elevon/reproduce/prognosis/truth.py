@@ -33,15 +33,23 @@ _UNITS: Mapping[str, tuple[float, float]] = {
 }
 _FACTOR = (0.2, 0.5)  # median and deviation of the logarithm of a unit's growth over the law's
 _GRAIN = 1.5  # of the truth's scatter over the law's
-_FEEDBACK = 0.5  # relative rise of the truth's growth up to the greatest severity, linear
-_OWN_HEAT = 1.5  # of the law's
+_FEEDBACK = 0.5  # greatest relative rise of a truth's growth up to the greatest severity, linear
+_OWN_HEAT = (0.1, 0.3)  # median and deviation of the logarithm of a unit's over the law's
 
-#: What a diagnosis errs by: relative deviation, absolute deviation [the severity's unit], factor
-#: of its interval's half width on the true one. Measured: see docs/prognosis.md.
-_ERRORS: Mapping[str, tuple[float, float]] = {
-    "gear_wear": (0.03, 6e-5),
-    "lubricant_loss": (0.04, 0.06),
-    "insulation": (0.04, 0.008),
+#: What a diagnosis errs by: relative and absolute deviation [the severity's unit] from one log to
+#: the next, and absolute deviation common to all logs of a unit (its baselines). Measured on 32
+#: logs of the high model, PWM, a day's spread, three baselines (docs/prognosis.md); friction as
+#: from three logs an inspection and ten baselines, whose days are independent.
+_ERRORS: Mapping[str, tuple[float, float, float]] = {
+    "gear_wear": (0.01, 3e-5, 0.0),
+    "lubricant_loss": (0.02, 0.035, 0.02),
+    "insulation": (0.02, 0.003, 0.0),
+}
+#: Relative and absolute deviation that its intervals state: wider for play and shorts.
+_STATED: Mapping[str, tuple[float, float]] = {
+    "gear_wear": (0.04, 6e-5),
+    "lubricant_loss": (0.02, 0.035),
+    "insulation": (0.05, 0.005),
 }
 _SEEN: Mapping[str, float] = {"gear_wear": 2.5e-4, "lubricant_loss": 0.15, "insulation": 0.03}
 """Least severity that a diagnosis sees."""
@@ -84,7 +92,7 @@ def true_unit(base: Actuator, mission: Mission, law: str, number: int, seed: int
         ratio = values["friction.dynamic"] / base.parameters.value("friction.dynamic")
         values["friction.static"] = ratio * base.parameters.value("friction.static")
     believed = {item.name: item for item in mission.laws()}[law]
-    true = other_law(believed)
+    true = other_law(believed, rng)
     key = {"severity"}
     asked = mission.model_copy(
         update={
@@ -109,15 +117,15 @@ def true_unit(base: Actuator, mission: Mission, law: str, number: int, seed: int
     return UnitTruth(number, law, life, base.with_values(calibrated, source="calibration"))
 
 
-def other_law(law: Law) -> Law:
-    """Return the law as it truly is: another form, another scatter."""
+def other_law(law: Law, rng: np.random.Generator) -> Law:
+    """Return the law as it truly is in one unit: another form, another scatter."""
     if law.name == "insulation":
-        heat = law.coefficients["own_heat"].value * _OWN_HEAT
+        heat = law.coefficients["own_heat"].value * float(np.exp(rng.normal(*_OWN_HEAT)))
         return replace(law.with_values({"own_heat": heat}), grain=_GRAIN * law.grain)
-    believed = law.rate
+    believed, feedback = law.rate, rng.uniform(0.0, _FEEDBACK)
 
     def rate(damage: Floats, drivers: Mapping[str, Floats], c: Mapping[str, float]) -> Floats:
-        return believed(damage, drivers, c) * (1.0 + _FEEDBACK * damage / law.highest)
+        return believed(damage, drivers, c) * (1.0 + feedback * damage / law.highest)
 
     return replace(law, rate=rate, grain=_GRAIN * law.grain)
 
@@ -130,7 +138,7 @@ def inspections_of(
     Part of the error is the same at all inspections of a unit.
     """
     rng = np.random.default_rng([19, seed, truth.number])
-    common = {law.name: 0.5 * _ERRORS[law.name][0] * rng.standard_normal() for law in laws}
+    common = {law.name: _ERRORS[law.name][2] * rng.standard_normal() for law in laws}
     out: list[Inspection] = []
     usage = 0.0
     while True:
@@ -146,11 +154,11 @@ def inspections_of(
 
 
 def _seen(law: Law, severity: float, common: float, rng: np.random.Generator) -> Seen:
-    relative, absolute = _ERRORS[law.name]
+    relative, absolute, _ = _ERRORS[law.name]
     limit = _SEEN[law.name]
-    deviation = float(np.hypot(relative * severity, absolute))
-    own = float(np.hypot(np.sqrt(0.75) * relative * severity, absolute))
-    shown = severity * (1.0 + common) + own * float(rng.standard_normal())
+    own = float(np.hypot(relative * severity, absolute))
+    shown = severity + common + own * float(rng.standard_normal())
     if shown < limit:
         return Seen(None, limit / 3.0, limit / 3.0)
-    return Seen(shown, deviation, deviation)
+    stated = float(np.hypot(_STATED[law.name][0] * shown, _STATED[law.name][1]))
+    return Seen(shown, stated, stated)
