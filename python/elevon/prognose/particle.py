@@ -16,8 +16,8 @@ Floats = npt.NDArray[np.float64]
 COUNT = 2000
 BIAS = 0.01
 """Deviation of the diagnoses' common relative error. Measured: 0.3 to 1 % for play, about 1 % for
-shorts and for much friction; taken as the same for all faults (ASSUMED). The model behind them is one and the
-same at each inspection, so that part of its error does not average out."""
+shorts and for much friction; taken as the same for all faults (ASSUMED). The model behind them is
+one and the same at each inspection, so that part of its error does not average out."""
 SURPRISE = 4.0
 _SHRINK = 0.98  # of Liu and West: what is drawn is moved, its spread stays
 _FEWEST = 0.5  # effective particles, of all, below which they are drawn anew

@@ -1,0 +1,81 @@
+"""The run-to-failure histories: what inspections say of them, the figures, the command."""
+
+import json
+
+import numpy as np
+import pytest
+
+from elevon import Actuator
+from elevon.cli import main
+from elevon.errors import InputError
+from elevon.prognose.life import Life
+from elevon.prognose.metrics import Track
+from elevon.reproduce.prognosis.campaign import (
+    PrognosisResult,
+    UnitResult,
+    campaign_mission,
+    reproduce_prognosis,
+)
+from elevon.reproduce.prognosis.truth import FAULTS, UnitTruth, inspections_of, other_law
+
+
+def unit(law, error, number=0):
+    usage = np.arange(5.0, 100.0, 5.0)
+    true = 100.0 - usage
+    track = Track(usage, true * (1.0 + error), 0.8 * true, 1.2 * true, 100.0)
+    far = Track(usage, 3.0 * true, 2.0 * true, 4.0 * true, 100.0)
+    return UnitResult(number, law, "tracking error", track, far, 0.1)
+
+
+def test_inspections_err_as_said_and_name_what_they_do_not_see():
+    mission, base = campaign_mission(), Actuator.load("torino-rotary")
+    usage = np.linspace(0.0, 1e5, 50)
+    life = Life(usage, np.full((50, 1), 0.2), 1e5, 0)
+    truth = UnitTruth(2, "insulation", life, base)
+    seen = inspections_of(truth, mission.laws(), 100.0, seed=0)
+    uses = np.array([item.usage for item in seen])
+    assert np.diff(uses).min() >= 60.0
+    assert np.diff(uses).max() <= 140.0
+    shown = np.array([item.seen["short@motor.phase_a"].severity for item in seen])
+    assert shown.mean() == pytest.approx(0.2, abs=0.001)
+    assert shown.std() == pytest.approx(np.hypot(0.02 * 0.2, 0.003), rel=0.1)
+    assert all(item.seen["play@transmission"].severity is None for item in seen)
+
+
+def test_the_truth_has_other_laws_than_the_filter():
+    rng = np.random.default_rng(0)
+    for law in campaign_mission().laws():
+        other = other_law(law, rng)
+        assert other.grain > law.grain
+        damage = law.damage(np.array([0.5 * law.highest]))
+        drivers = {name: np.full(1, 420.0) for name in law.drivers}
+        assert other.growth(damage, drivers) != law.growth(damage, drivers)
+    assert [law.name for law in campaign_mission().laws()] == list(FAULTS)
+
+
+def test_the_figures_are_those_of_the_tracks():
+    good = PrognosisResult((unit("gear_wear", 0.1), unit("insulation", -0.05)), 0, 1.0)
+    assert good.accuracy() == pytest.approx(0.925, abs=1e-6)
+    assert good.accuracy("insulation") == pytest.approx(0.95, abs=1e-6)
+    assert good.accuracy(unaided=True) == pytest.approx(-1.0)
+    assert good.covered() == 1.0
+    failed = [check.name for check in good.checks if not check.passed]
+    assert failed == ["coverage of the 90 % interval, at most"]
+    values = good.to_dict()
+    assert values["status"] == "fail"
+    assert values["summary"][-1]["law"] == "all"
+    json.dumps(values)
+
+
+def test_too_few_histories_are_refused():
+    with pytest.raises(InputError, match="at least 3"):
+        reproduce_prognosis(histories=2)
+
+
+@pytest.mark.long
+def test_the_command(tmp_path, capsys):
+    code = main(["reproduce", "prognosis", "--histories", "3", "--out", str(tmp_path), "--json"])
+    values = json.loads(capsys.readouterr().out)
+    assert code in (0, 1)  # three lives decide nothing
+    assert [row["law"] for row in values["rows"]] == list(FAULTS)
+    assert (tmp_path / "report.html").is_file()
