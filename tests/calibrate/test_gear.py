@@ -75,4 +75,5 @@ def test_truth_recovery_over_draws(fidelity, draws):
     assert len(often) > 40
     for path, sizes in often.items():
         assert np.median(sizes) < (0.05 if path.startswith("friction.") else 0.02), path
-    assert 0.80 <= np.mean(covered) <= 0.97
+    # A few draws bound the coverage from below only.
+    assert 0.80 <= np.mean(covered) <= (0.97 if draws >= DRAWS else 1.0)
