@@ -225,3 +225,25 @@ def test_the_command_line(elevon_cli, tmp_path):  # noqa: F811
     bad = elevon_cli("predict", tmp_path / "none", *options)
     assert (bad.code, bad.out) == (2, "")
     assert "is not a folder" in bad.err
+
+
+@pytest.mark.long
+@pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
+def test_a_history_of_logs_is_diagnosed_on_the_way(elevon_cli, tmp_path):  # noqa: F811
+    place = tmp_path / "unit"
+    for k, use in enumerate((0, 500, 1000, 1500)):
+        fault = () if use == 0 else ("--fault", f"play@transmission={4e-6 * use!r}")
+        got = elevon_cli("bench", "run", "backlash", "--actuator", "torino-rotary", "--fidelity",
+                         "low", "--out", place / f"at{use}", "--seed", k, *fault)  # fmt: skip
+        assert got.code == 0, got.err
+        log = f"at{use}/backlash.csv"
+        stamp = {"usage": use, "unit": "flights", "logs": [log], "healthy": use == 0}
+        (place / f"{k}.json").write_text(json.dumps(stamp))
+    flight = tmp_path / "flight.toml"
+    flight.write_text(tomlkit.dumps(FLIGHT))
+    got = elevon_cli("predict", place, "--actuator", "torino-rotary", "--mission", flight, "--json")
+    assert got.code == 0, got.err
+    answer = json.loads(got.out)
+    (play,) = answer["faults"]
+    assert play["severity"] == pytest.approx(4e-6 * 1500, rel=0.1)
+    assert play["inspections"] == 3
