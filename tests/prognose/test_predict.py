@@ -10,6 +10,7 @@ from elevon import Actuator
 from elevon.errors import FormatError, InputError
 from elevon.prognose import LAWS, Inspection, Law, Mission, Seen, predict, respond
 from elevon.prognose.history import read_history, write_stamp
+from elevon.prognose.requirement import Requirement
 from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
 
 KEY = "play@transmission"
@@ -247,3 +248,46 @@ def test_a_history_of_logs_is_diagnosed_on_the_way(elevon_cli, tmp_path):  # noq
     (play,) = answer["faults"]
     assert play["severity"] == pytest.approx(4e-6 * 1500, rel=0.1)
     assert play["inspections"] == 3
+
+
+def test_a_ball_screw_and_its_stall_load():
+    actuator = Actuator.load("nasa-ballscrew")
+    asked = Mission.from_dict({
+        "unit": "cycles", "hours": 0.01,
+        "scenario": {
+            "duration": "4 s",
+            "command": {"terms": [{"kind": "sine", "amplitude": "20 mm", "frequency": "0.5 Hz"}]},
+            "load": {"user": {"terms": [
+                {"kind": "sine", "amplitude": "2000 N", "frequency": "0.5 Hz"}]}},
+        },
+        "requirement": [
+            {"name": "play", "measure": "severity", "fault": KEY, "limit": "0.5 mm"},
+            {"name": "stall", "measure": "stall_load", "limit": "3000 N", "slope": "20 mm/s",
+             "load_slope": "1500 N/s"},
+        ],
+        "growth": [{"law": "screw_wear", "dormant": 0}],
+    })  # fmt: skip
+    tables = respond(actuator, asked)
+    assert tables.units == ("m", "N")
+    assert tables.values[0, 1] > 3000.0
+    result = predict([], actuator, asked, response=tables)
+    mean = 0.5e-3 / (2e-11 * tables.drivers["friction_work"][0])
+    assert result.median == pytest.approx(mean, rel=0.2)
+
+
+def test_a_landing_gear_locks_in_time_until_its_bearings_are_worn():
+    actuator = Actuator.load("pisa-landing-gear")
+    scenario = dict(actuator.default_scenario)
+    lock = {"name": "lock", "measure": "lock_time", "limit": "20 s"}
+    bare = {"name": "rotor", "measure": "severity", "fault": "eccentricity_static@motor",
+            "limit": 0.3}  # fmt: skip
+    growth = [{"law": "bearing_wear", "dormant": 0, "coefficients": {"wear": 1e-8}}]
+    asked = Mission.from_dict({"unit": "landings", "hours": 0.02, "scenario": scenario,
+                               "requirement": [lock, bare], "growth": growth})  # fmt: skip
+    tables = respond(actuator, asked)
+    assert 2.0 < tables.values[0, 0] < 9.0
+    result = predict([], actuator, asked, response=tables)
+    assert result.first["rotor"] == 1.0
+    tracking = {"name": "error", "measure": "tracking_error", "limit": "1 mm"}
+    with pytest.raises(InputError, match="is no position"):
+        respond(actuator, asked.model_copy(update={"requirement": (Requirement(**tracking),)}))

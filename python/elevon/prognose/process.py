@@ -82,6 +82,8 @@ class Process:
         self.laws: tuple[Law, ...] = response.laws
         self.drift = drift
         self._quarter = np.array([0.25 * law.highest for law in self.laws])
+        # Beyond the greatest severity of the tables nothing is known; no state runs away there.
+        self._most = np.array([2.0 * law.damage(np.array([law.highest]))[0] for law in self.laws])
 
     def start(self, count: int, rng: np.random.Generator) -> Population:
         """Draw new units."""
@@ -117,6 +119,7 @@ class Process:
         load : ndarray, shape (n,)
             Factor on the mission's loads.
         """
+        damage = np.minimum(damage, self._most)
         severity = self.severity(damage)
         drivers = self.response.exposed(severity, load)
         columns = [law.growth(damage[:, k], drivers) for k, law in enumerate(self.laws)]
@@ -148,7 +151,7 @@ class Process:
                 active = active | (rng.random(active.shape) < 1.0 - np.exp(-ONSET * e_folds))
         return replace(
             units,
-            damage=units.damage + grown,
+            damage=np.minimum(units.damage + grown, self._most),
             growth=growth,
             active=active,
             usage=units.usage + steps,
