@@ -33,6 +33,9 @@ details! {
         linear: bool = F::LINEAR;
         /// Positions move with the new speed.
         semi_implicit: bool = x.semi_implicit;
+        /// Positions move with the mean of both speeds: exact for a torque held over a long step. A spring asks for the new
+        /// speed, which neither feeds nor damps its swing.
+        middle: bool = x.low && !x.parts.load().away(LoadParameter::Stiffness);
         train: TrainDetails = TrainDetails::read::<F>(x.parts);
     }
     full {

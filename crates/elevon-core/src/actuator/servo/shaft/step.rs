@@ -77,7 +77,7 @@ impl<S: Scalar> Shaft<S> {
     ) {
         let speed = s.motor_speed;
         let (new_speed, on_bristles) = self.new_speed::<EXTRA>(d, s, loads, torque);
-        let moved = self.dt.fma(if d.semi_implicit { new_speed } else { speed }, s.motor_position);
+        let moved = self.dt.fma(self.advancing(d, speed, new_speed), s.motor_position);
         let (position, held_speed) = if FULL && d.elastic { (moved, new_speed) } else { self.gear.motor_stop.hold(moved, new_speed) };
         if FULL && d.accounts {
             let dry = on_bristles.unwrap_or_else(|| Friction::dry_torque(torque - loads.load, speed, loads.static_limit, loads.dynamic));
@@ -100,6 +100,18 @@ impl<S: Scalar> Shaft<S> {
         }
         s.motor_position = position;
         s.motor_speed = held_speed;
+    }
+
+    /// Speed that moves the position in a step.
+    #[inline(always)]
+    fn advancing(&self, d: &ShaftDetails, speed: S, new_speed: S) -> S {
+        if d.middle {
+            S::splat(0.5) * (speed + new_speed)
+        } else if d.semi_implicit {
+            new_speed
+        } else {
+            speed
+        }
     }
 
     /// Force on the housing at the orders of its parts.
