@@ -120,3 +120,23 @@ def test_what_cannot_be_guessed_is_refused(tmp_path, capsys, motion):
     assert "--guess" in capsys.readouterr().err
     assert not (tmp_path / "m.toml").exists()
     assert math.isfinite(motion["current"].sum())
+
+
+@pytest.mark.parametrize(
+    ("header", "unit", "said"),
+    [
+        ("time,demand_mm,position_mm,speed_mm/s,current_A", "s", "the integral of its speed"),
+        ("time_ms,demand_mm,position_mm,speed_mm/s,current_A", "s", "the motion contradicts it"),
+        ("time_ms,demand,position,speed,current", "ms", "both are possible"),
+        ("time,demand,position,speed,current", "s", "both are possible"),
+    ],
+)
+def test_a_time_of_thousandths_is_no_ms_without_doubt(tmp_path, capsys, header, unit, said):
+    t = np.round(np.arange(0.0, 4.0, 1e-3), 3)
+    demand, position = (30.0 * np.sin(3.0 * (t - late)) for late in (0.0, 0.02))
+    table = np.column_stack((t, demand, position, np.gradient(position, t), np.cos(3.0 * t)))
+    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header=header, comments="", fmt="%.6f")
+    answer, _ = guessed(tmp_path, capsys, tmp_path / "log.csv")
+    column = answer["columns"][0]
+    assert column["unit"] == unit
+    assert any(said in reason for reason in column["reasons"]), column["reasons"]

@@ -7,16 +7,18 @@ the integral of another, one that leads another, a size that only one unit expla
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from elevon.errors import FormatError, quoted
 from elevon.logs.formats.table import FloatArray, RawTable
 from elevon.logs.maps.agreement import slope_and_fit
+from elevon.logs.maps.guess_column import GuessedColumn
 from elevon.logs.maps.hints import role_hint, unit_hint
 from elevon.logs.maps.motion import Motion, find_motion
 from elevon.logs.maps.signals import known_roles
+from elevon.logs.maps.time_unit import TIME_UNITS, settle_time_unit
 from elevon.units import parse_unit
 
 __all__ = ["Guess", "GuessedColumn", "guess_map"]
@@ -29,27 +31,6 @@ _DEFAULT_UNITS = {
     "supply_voltage": "V", "load_cell": "N", "temperature": "degC", "vibration": "m/s2",
     "speed_ref": "rpm",
 }  # fmt: skip
-
-
-@dataclass(slots=True)
-class GuessedColumn:
-    """A column: its role (empty: not known), its unit, and why."""
-
-    name: str
-    role: str = ""
-    unit: str = ""
-    sign: int = 1
-    reasons: list[str] = field(default_factory=list)
-
-    def to_dict(self) -> dict[str, object]:
-        """Return it as plain types."""
-        return {
-            "name": self.name,
-            "role": self.role or None,
-            "unit": self.unit or None,
-            "sign": self.sign,
-            "reasons": list(self.reasons),
-        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,12 +99,8 @@ def _time(table: RawTable, columns: Mapping[str, GuessedColumn]) -> FloatArray:
     entry = columns[name]
     entry.role = "time"
     entry.reasons.append("named as time" if named else "rises throughout, most evenly")
-    step = float(np.median(np.diff(table.columns[name])))
-    if not entry.unit:
-        # Logs are sampled at 1 Hz to 1 MHz: steps of 0.05 and more can only be ms.
-        entry.unit = "ms" if step >= 0.05 else "s"
-        entry.reasons.append(f"steps of {step:.4g}: {entry.unit}")
-    scale = {"ms": 1e-3, "us": 1e-6}.get(entry.unit, 1.0)
+    settle_time_unit(entry, table, columns)
+    scale = TIME_UNITS.get(entry.unit, 1.0)
     return np.asarray(table.columns[name] * scale, dtype=np.float64)
 
 

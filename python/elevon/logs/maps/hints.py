@@ -111,7 +111,8 @@ def unit_hint(header: str, stated: str) -> str:
     key = parameter_key(header)
     if name.lower() == "xms":
         return "ms"
-    if key is not None:
+    # A plain 'time' is no drive's column: its unit is not ms because the drive's is.
+    if key is not None and key != "time":
         return drive_columns()[key].unit or ""
     words = re.split(r"[^A-Za-z0-9]+", name)
     suffix = words[-1].lower()
