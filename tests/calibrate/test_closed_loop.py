@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from elevon import Actuator
 from elevon.calibrate.closed_loop import LoopLog, calibrate_loop, predict
 from elevon.calibrate.closed_loop.fit import Searched, choose, final_fit
 from elevon.calibrate.closed_loop.free import free_list, inner
 from elevon.calibrate.closed_loop.held_out import held_out_errors
 from elevon.calibrate.closed_loop.intervals import known
 from elevon.calibrate.closed_loop.result import agreement
+from elevon.cli.closed_loop import calibrate_closed_loop, check_loop_options
 from elevon.cli.runner import run as elevon
 from elevon.errors import InputError, UnknownNameError
 from tests.calibrate.linear import Linear, Logger, draw, log, square, sweep
@@ -97,6 +99,48 @@ def test_from_a_good_start_a_short_log_is_followed():
     assert not reasons["control.pid_derivative_time"]
     held = held_out_errors(fitted)
     assert {error.signal for error in held.errors} == {"position", "speed", "current"}
+
+
+@pytest.fixture(scope="module")
+def known_drive():
+    """A set whose controller is known, and a log of 7 s of it."""
+    gains = {path: value for path, value in truth(PID).items() if path != "whole inertia"}
+    base = datasheet(PID).with_values({"control.structure": "pid", **gains})
+    return base, loop("square", log(PID, square, 7.0))
+
+
+def test_only_what_was_asked_for_is_estimated(known_drive, tmp_path, capsys):
+    base, data = known_drive
+    wrong = base.with_values({"friction.dynamic": 0.01, "friction.static": 0.01})
+    out, page = tmp_path / "fitted.toml", tmp_path / "page.html"
+    code = calibrate_closed_loop(
+        [data], wrong, out, free=["friction.dynamic"], transient=0.5, report=page, as_json=True,
+        force=False, date=None,
+    )  # fmt: skip
+    parameters = json.loads(capsys.readouterr().out)["parameters"]
+    assert code == 0
+    assert {path for path, item in parameters.items() if item["in_set"]} == {"friction.dynamic"}
+    assert parameters["friction.dynamic"]["value"] > 0.02
+    gain = "control.pid_gain"
+    fitted = Actuator.load(str(out))
+    assert fitted.parameters.value(gain) == pytest.approx(base.parameters.value(gain))
+    assert "Logs against the model" in page.read_text()
+
+
+def test_options_without_a_meaning_in_closed_loop_are_refused():
+    check_loop_options("low", None)
+    with pytest.raises(InputError, match="low fidelity"):
+        check_loop_options("high", None)
+    with pytest.raises(InputError, match="two positions"):
+        check_loop_options("low", ["play.total"])
+
+
+def test_what_the_closed_loop_does_not_free_is_refused(known_drive):
+    base, data = known_drive
+    with pytest.raises(UnknownNameError, match=r"friction\.dynamic"):
+        calibrate_loop([data], base, free=["friction.dynamc"])
+    with pytest.raises(InputError, match="lasts"):
+        calibrate_loop([data], base, transient=8.0)
 
 
 @pytest.fixture(scope="module")

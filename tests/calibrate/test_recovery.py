@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from elevon import Actuator
+from elevon import Actuator, Scenario
 from elevon.calibrate import calibrate, read_logs
 from elevon.errors import InputError
-from tests.calibrate.bench import COUNT, make_truth, write_logs
+from elevon.simulate import simulate
+from tests.calibrate.bench import CASES, COUNT, make_truth, write_logs
 
 OFFSETS = ("sensor.current_offset", "sensor.speed_offset", "sensor.encoder.offset")
 
@@ -218,3 +219,16 @@ def test_a_two_mass_bench_fitted_with_the_low_model(tmp_path, before):
     absorbed = {path for path, *_ in result.dynamic.absorbed}
     assert absorbed
     assert all(any(path in text for text in result.findings) for path in absorbed)
+
+
+def test_the_low_models_own_log_shows_its_filter(tmp_path):
+    """Current and motion are of one instant."""
+    command, _ = CASES["noload"]
+    document = {"duration": "10 s", "command": {"mode": "position", "terms": [command]}}
+    base = Actuator.load("torino-rotary")
+    record = "drive_log,motor_position,encoder_position@400 Hz"
+    log = simulate(base, Scenario.from_dict(document), fidelity="low", record=record, seed=1)
+    path = log.save(tmp_path / "own.parquet")
+    result = calibrate(read_logs([path]), base, model_runs=False, hold_out=False)
+    cutoff = result["sensor.filter_cutoff"].value
+    assert cutoff == pytest.approx(base.parameters.value("sensor.filter_cutoff"), rel=0.02)

@@ -30,11 +30,11 @@ _LOOSEST = 0.25  # of the value, or of the one before: a larger deviation determ
 
 
 def accept(
-    found: Sequence[Estimate], free: Sequence[str] | None, actuator: Actuator
+    estimates: Sequence[Estimate], free: Sequence[str] | None, actuator: Actuator
 ) -> list[Estimate]:
     """Keep what was asked for, what no set holds, and only what a set can hold."""
     accepted = []
-    for item in found:
+    for item in estimates:
         if item.in_set and free is not None and item.path not in free:
             continue
         if item.in_set:
@@ -52,9 +52,9 @@ def accept(
     return accepted
 
 
-def missing(free: Sequence[str] | None, found: Sequence[Estimate], torque: Torque) -> None:
+def missing(free: Sequence[str] | None, estimates: Sequence[Estimate], torque: Torque) -> None:
     """Raise `InputError` for a path that was asked for and is not estimated."""
-    known = {item.path for item in found}
+    known = {item.path for item in estimates}
     for path in free or ():
         if path in known:
             continue
@@ -83,14 +83,14 @@ def undetermined(
 
 def with_values(
     actuator: Actuator,
-    found: Sequence[Estimate],
+    estimates: Sequence[Estimate],
     followed: Mapping[str, float],
     torque: Torque,
     dynamic: Dynamic | None,
 ) -> Actuator:
     """Return the actuator with what was estimated, and what has to follow from it."""
     values: dict[str, str | float] = dict(followed)
-    values |= {item.path: item.value for item in found if item.in_set}
+    values |= {item.path: item.value for item in estimates if item.in_set}
     if torque.measured and torque.tied and "motor.emf_constant" in values:
         values["control.torque_constant"] = torque.believed
     if dynamic is not None and dynamic.drive != actuator.parameters["drive.kind"].value:
@@ -101,7 +101,7 @@ def with_values(
     values |= within_inertia(actuator, values)
     offsets = {
         signal: item.value
-        for item in found
+        for item in estimates
         for path, signal in _OFFSETS.items()
         if item.path == path
     }
@@ -109,9 +109,9 @@ def with_values(
     return replace(fitted, validation={**(actuator.validation or {}), "offsets": offsets})
 
 
-def shortened(actuator: Actuator, found: Sequence[Estimate]) -> list[str]:
+def shortened(actuator: Actuator, estimates: Sequence[Estimate]) -> list[str]:
     """Say so where the set cannot hold the derivative time as estimated."""
-    values: dict[str, str | float] = {item.path: item.value for item in found if item.in_set}
+    values: dict[str, str | float] = {item.path: item.value for item in estimates if item.in_set}
     if "control.derivative_time" not in within_inertia(actuator, values):
         return []
     return [

@@ -71,14 +71,14 @@ def torque_balance(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
     design = np.column_stack((answer.design, problem.slope(answer)))
     times = [(log.time[m], log.speed[m], log.period) for log, m in zip(used, masks, strict=True)]
     value = np.append(answer.beta, answer.lag)
-    found = with_deviations(names, value, design, answer.rest, answer.weight, times=times)
-    if not np.isfinite(found.covariance).all():
-        return found
-    covariance = found.covariance
+    regression = with_deviations(names, value, design, answer.rest, answer.weight, times=times)
+    if not np.isfinite(regression.covariance).all():
+        return regression
+    covariance = regression.covariance
     for other in problem.variants(answer):
         gap = np.append(other.beta, other.lag) - value
         covariance = covariance + np.outer(gap, gap)
-    return replace(found, covariance=covariance)
+    return replace(regression, covariance=covariance)
 
 
 @dataclass(frozen=True)
@@ -125,13 +125,13 @@ class _Balance:
         """Find the lag of least robust cost."""
         from scipy.optimize import minimize_scalar
 
-        found = minimize_scalar(
+        least = minimize_scalar(
             lambda lag: robust_cost(self.at(lag, delay=delay).rest),
             bounds=_LAGS,
             method="bounded",
             options={"xatol": 1e-5},
         )
-        return self.at(float(found.x), delay=delay)
+        return self.at(float(least.x), delay=delay)
 
     def slope(self, answer: _Solved) -> Floats:
         """Derivative of the prediction by the lag, shape (n,)."""
@@ -149,13 +149,13 @@ class _Balance:
             mask & (np.abs(motion.speed) > _CLEARER * np.abs(motion.speed).max())
             for mask, motion in zip(self.masks, self.motions, strict=True)
         ]
-        found = [self.solve(delay=True)]
+        solved = [self.solve(delay=True)]
         if all(mask.sum() > 100 for mask in clear):
-            found.append(self.at(answer.lag, masks=clear))
+            solved.append(self.at(answer.lag, masks=clear))
         drift = max((log.brake.drift_std for log in self.logs if log.brake.measured), default=0.0)
         if drift > 0.0:
-            found.append(self.at(answer.lag, drift=drift))
-        return found
+            solved.append(self.at(answer.lag, drift=drift))
+        return solved
 
 
 def _moving(log: BenchLog, motion: Motion, keep: Bools) -> Bools:

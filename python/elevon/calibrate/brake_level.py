@@ -118,11 +118,11 @@ def _level(
     way = float(np.sign(value.mean())) or 1.0
     level = value * direction * turns if turns else value * way
     width = max(1, round(_SMOOTHING / max(float(np.median(np.diff(at))), 1e-6)))
-    smooth = _in_pieces(at, np.asarray(level, dtype=np.float64), width, uniform_filter1d)
+    smooth = _by_stretches(at, np.asarray(level, dtype=np.float64), width, uniform_filter1d)
     return at, np.maximum(smooth, 0.0), turns
 
 
-def _in_pieces(at: Floats, level: Floats, width: int, smooth: object) -> Floats:
+def _by_stretches(at: Floats, level: Floats, width: int, smooth: object) -> Floats:
     """Smooth within each stretch of motion: across a reversal there is nothing between."""
     out = level.copy()
     cuts = np.flatnonzero(np.diff(at) > 5.0 * np.median(np.diff(at))) + 1

@@ -265,7 +265,7 @@ def _findings(
         *shortened(actuator, estimates),
         *undetermined(signals.estimates, estimates, task.free),
         *plant_findings(
-            task.logs, signals.plant, signals.torque, dynamic, actuator, found=estimates
+            task.logs, signals.plant, signals.torque, dynamic, actuator, estimates=estimates
         ),
         *amplitude_findings(signals.commands, estimates),
     )

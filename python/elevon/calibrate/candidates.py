@@ -97,7 +97,7 @@ def candidates(
         paths = [path for path in AUTO if _sensible(path, actuator, logs)]
     else:
         paths = [path for path in free if path not in KINEMATIC]
-    found = [_parameter(path, actuator) for path in paths]
+    items = [_parameter(path, actuator) for path in paths]
     current = max(float(abs(log.current).max()) for log in logs)
     speed = max(float(abs(log.speed).max()) for log in logs)
     if not current > 0.0 or not speed > 0.0:
@@ -108,27 +108,27 @@ def candidates(
     ]
     if all(log.current_signal == "current_q_meas" for log in logs):
         offsets.insert(0, ("sensor.current_offset", "A", current, 0.01 * current))
-    found += [
+    items += [
         Candidate(path, "output", "sensor", unit, False, -reach, reach, size)
         for path, unit, reach, size in offsets
     ]
-    return found + _brakes(logs)
+    return items + _brakes(logs)
 
 
 def _brakes(logs: Sequence[BenchLog]) -> list[Candidate]:
     """Offset of the load cell where another log shows the friction alone; unknown brakes."""
-    found = []
+    items = []
     measured = [log for log in logs if log.brake.measured]
     if measured and any(log.brake.known == "off" for log in logs):
         top = max(float(log.brake.level.max()) for log in measured)
-        found.append(
+        items.append(
             Candidate(
                 "sensor.load_cell_offset", "input", "sensor", "N m", False, -top, top, 0.01 * top
             )
         )
     for k, log in enumerate(logs):
         if log.brake.known in {"on", "force"}:
-            found += [
+            items += [
                 Candidate(
                     f"load.brake[{log.name}][{j}]",
                     "input",
@@ -142,7 +142,7 @@ def _brakes(logs: Sequence[BenchLog]) -> list[Candidate]:
                 )
                 for j in range(_KNOTS)
             ]
-    return found
+    return items
 
 
 def _sensible(path: str, actuator: Actuator, logs: Sequence[BenchLog]) -> bool:
@@ -175,34 +175,34 @@ def _parameter(path: str, actuator: Actuator) -> Candidate:
 
 def start_values(actuator: Actuator, logs: Sequence[BenchLog]) -> dict[str, float]:
     """Return first values in the model's parameters; those that make no sense are left out."""
-    found = direct_estimate(logs)
-    kt = found.torque_constant or motor_torque_constant(actuator.parameters)
+    starts = direct_estimate(logs)
+    kt = starts.torque_constant or motor_torque_constant(actuator.parameters)
     values: dict[str, float] = {}
-    if found.torque_constant is not None:
+    if starts.torque_constant is not None:
         flux = actuator.parameters.value("motor.flux_fraction")
         values["motor.emf_constant"] = emf_constant(kt, flux)
-    if found.dry > 0.0:
-        values["friction.dynamic"] = kt * found.dry
-        values["friction.static"] = static_following(actuator.parameters, kt * found.dry)
-    if found.viscous > 0.0:
-        values["friction.viscous"] = kt * found.viscous
+    if starts.dry > 0.0:
+        values["friction.dynamic"] = kt * starts.dry
+        values["friction.static"] = static_following(actuator.parameters, kt * starts.dry)
+    if starts.viscous > 0.0:
+        values["friction.viscous"] = kt * starts.viscous
     rest = _other_inertia(actuator)
-    if kt * found.inertia > 1.05 * rest:
-        values["motor.inertia"] = kt * found.inertia - rest
-    values |= _controller(actuator, found, kt)
+    if kt * starts.inertia > 1.05 * rest:
+        values["motor.inertia"] = kt * starts.inertia - rest
+    values |= _controller(actuator, starts, kt)
     old = actuator.parameters.value
     near = {p: v for p, v in values.items() if 1.0 / _FAR < v / max(old(p), 1e-12) < _FAR}
     return near | within_inertia(actuator, near)
 
 
-def _controller(actuator: Actuator, found: DirectEstimate, kt: float) -> dict[str, float]:
-    if not found.proportional > 0.0:
+def _controller(actuator: Actuator, starts: DirectEstimate, kt: float) -> dict[str, float]:
+    if not starts.proportional > 0.0:
         return {}
-    values = {"control.speed_gain": kt * found.proportional}
-    if found.integral > 0.0 and actuator.parameters.value("control.integral_time") > 0.0:
-        values["control.integral_time"] = found.proportional / found.integral
-    if found.derivative > 0.0 and actuator.parameters.value("control.derivative_time") > 0.0:
-        values["control.derivative_time"] = found.derivative / found.proportional
+    values = {"control.speed_gain": kt * starts.proportional}
+    if starts.integral > 0.0 and actuator.parameters.value("control.integral_time") > 0.0:
+        values["control.integral_time"] = starts.proportional / starts.integral
+    if starts.derivative > 0.0 and actuator.parameters.value("control.derivative_time") > 0.0:
+        values["control.derivative_time"] = starts.derivative / starts.proportional
     return values
 
 

@@ -102,7 +102,7 @@ def calibrate_compliance(
     # The compliance has the even interval; its inverse, the stiffness, an uneven one.
     low = 1.0 / float(beta[0] + half[0])
     high = 1.0 / float(beta[0] - half[0]) if beta[0] > half[0] else math.inf
-    found = [
+    estimates = [
         Estimate(
             "play.stiffness",
             stiffness,
@@ -117,7 +117,7 @@ def calibrate_compliance(
         )
     ]
     names = ["derived.dead_zone", *(f"derived.group_offset[{k}]" for k in labels)]
-    found += [
+    estimates += [
         Estimate(
             name,
             float(b),
@@ -132,7 +132,7 @@ def calibrate_compliance(
         for k, (name, b, s, h) in enumerate(zip(names, beta[1:], std[1:], half[1:], strict=True))
     ]
     outliers = tuple(int(k) for k in np.flatnonzero(trust < 0.5))
-    return ComplianceCalibration(tuple(found), rest, outliers)
+    return ComplianceCalibration(tuple(estimates), rest, outliers)
 
 
 def _check(

@@ -84,7 +84,7 @@ class Dynamic:
     ) -> list[Estimate]:
         """Estimates of what has no direct one."""
         std = np.sqrt(np.maximum(np.diag(self.fit.covariance), 0.0))
-        found = []
+        estimates = []
         for item, x, s in zip(self.fit.free, self.fit.x, std, strict=True):
             if item.path in known or (item.kind == "parameter" and not _wanted(item.path, free)):
                 continue
@@ -92,7 +92,7 @@ class Dynamic:
             value = item.outer(float(x))
             ends = (item.outer(float(x) - half), item.outer(float(x) + half))
             in_set = item.kind == "parameter"
-            found.append(
+            estimates.append(
                 Estimate(
                     item.path,
                     value,
@@ -107,7 +107,7 @@ class Dynamic:
                     in_set,
                 )
             )
-        return [item for item in found if np.isfinite(item.std)]
+        return [item for item in estimates if np.isfinite(item.std)]
 
 
 def _wanted(path: str, free: Sequence[str] | None) -> bool:
@@ -146,9 +146,9 @@ def dynamic_stage(
     state[0] = 0.1
     residual = problem.residual(problem.simulate([values_of(chosen, x)])[0])
     jac = problem.jacobian(chosen, x, step_sizes(chosen))
-    kept, ranking = choose(chosen, jac, residual, blocks_of(problem, residual), required)
+    determined, ranking = choose(chosen, jac, residual, blocks_of(problem, residual), required)
     state[0] = 0.3
-    if not kept:
+    if not determined:
         return None
 
     def advance(fraction: float) -> None:
@@ -158,10 +158,10 @@ def dynamic_stage(
 
     fit = fit_dynamic(
         problem,
-        [chosen[k] for k in kept],
-        x[kept],
+        [chosen[k] for k in determined],
+        x[determined],
         most=_MOST,
-        finite=[part[:, :, kept] for part in jac],
+        finite=[part[:, :, determined] for part in jac],
         advance=advance,
     )
     return Dynamic(
@@ -233,14 +233,14 @@ def _fixed(
         static = static_following(actuator.parameters, start["friction.dynamic"])
         values.setdefault("friction.static", static)
         values.setdefault("friction.dynamic", start["friction.dynamic"])
-    kept = {p: v for p, v in values.items() if p not in {"play.total", "sensor.encoder.offset"}}
-    return kept | within_inertia(actuator, kept)
+    fixed = {p: v for p, v in values.items() if p not in {"play.total", "sensor.encoder.offset"}}
+    return fixed | within_inertia(actuator, fixed)
 
 
 def _absorbed(fit: DynamicFit, known: Sequence[Estimate]) -> tuple[tuple[str, float, float], ...]:
     direct = {item.path: item for item in known}
     std = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    found = []
+    absorbed = []
     for item, x, s in zip(fit.free, fit.x, std, strict=True):
         other = direct.get(item.path)
         if other is None or not item.log_scale or not other.value > 0.0:
@@ -248,8 +248,8 @@ def _absorbed(fit: DynamicFit, known: Sequence[Estimate]) -> tuple[tuple[str, fl
         gap = float(x) - item.inner(other.value)
         noise = float(np.hypot(s, other.std / other.value))
         if abs(gap) > _ABSORBS and abs(gap) > _SIGMAS * noise:
-            found.append((item.path, item.outer(float(x)), other.value))
-    return tuple(sorted(found, key=lambda row: -abs(np.log(row[1] / row[2]))))
+            absorbed.append((item.path, item.outer(float(x)), other.value))
+    return tuple(sorted(absorbed, key=lambda row: -abs(np.log(row[1] / row[2]))))
 
 
 def _rms(problem: Problem, fit: DynamicFit) -> tuple[tuple[str, float, float], ...]:

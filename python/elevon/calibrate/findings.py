@@ -31,7 +31,7 @@ def plant_findings(
     dynamic: Dynamic | None,
     actuator: Actuator,
     *,
-    found: Sequence[Estimate],
+    estimates: Sequence[Estimate],
 ) -> list[str]:
     """Sentences on torque scale, brakes, drive and misfit."""
     says = []
@@ -71,7 +71,7 @@ def plant_findings(
             for path, a, b in dynamic.absorbed
         ]
         says += [f"{path}: the model runs end at its bound" for path in dynamic.fit.at_bound]
-        known = {item.path for item in found}
+        known = {item.path for item in estimates}
         says += [
             f"{path} is not determined: {why}"
             for path, why in dynamic.ranking.dropped.items()
@@ -97,10 +97,10 @@ def _convention(torque: Torque, actuator: Actuator) -> list[str]:
     return []
 
 
-def amplitude_findings(commands: Sequence[CommandFit], found: Sequence[Estimate]) -> list[str]:
+def amplitude_findings(commands: Sequence[CommandFit], estimates: Sequence[Estimate]) -> list[str]:
     """Name a constant amplitude factor between the bench and the model, and where it sits."""
     says = []
-    play = next((item for item in found if item.path == "play.total"), None)
+    play = next((item for item in estimates if item.path == "play.total"), None)
     if play is not None and "floats" in play.note:
         says.append(
             "the user is not dragged through the play but moves within it on its own (its inertia "
@@ -109,7 +109,7 @@ def amplitude_findings(commands: Sequence[CommandFit], found: Sequence[Estimate]
             "cannot be told; a model whose user has no inertia will miss the user's position by "
             "up to half the play"
         )
-    gain = next((item for item in found if item.path == "sensor.encoder.gain"), None)
+    gain = next((item for item in estimates if item.path == "sensor.encoder.gain"), None)
     if gain is not None and abs(gain.value - 1.0) > max(_FACTOR, 3.0 * gain.std):
         says.append(
             f"amplitude factor {gain.value:.4f} between the encoder and the motor over the "

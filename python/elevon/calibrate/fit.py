@@ -74,12 +74,12 @@ def step_sizes(free: Sequence[Candidate]) -> Floats:
 
 def blocks_of(problem: Problem, residual: Sequence[Floats]) -> list[npt.NDArray[np.int64]]:
     """Number the blocks of each log's samples, longer than the residual's memory."""
-    found = []
+    blocks = []
     for log, rest, mask in zip(problem.logs, residual, problem.masks, strict=True):
         used = rest[mask]
         lengths = [block_length(np.clip(used[:, c], -_SOFT, _SOFT), log.period) for c in range(2)]
-        found.append(np.floor(log.time / max(lengths)).astype(np.int64))
-    return found
+        blocks.append(np.floor(log.time / max(lengths)).astype(np.int64))
+    return blocks
 
 
 def refresh_scales(problem: Problem, values: dict[str, float]) -> None:
@@ -165,12 +165,6 @@ def fit_dynamic(
     )
     x = np.asarray(best.x, dtype=np.float64)
     covariance, degrees = _covariance(problem, free, x)
-    close = 1e-3 * np.array([item.size for item in free])
-    ends = [
-        item.path
-        for item, v, a, b, e in zip(free, x, low, high, close, strict=True)
-        if v - a < e or b - v < e
-    ]
     count = 2 * sum(int(mask.sum()) for mask in problem.masks)
     advance(1.0)
     return DynamicFit(
@@ -182,8 +176,15 @@ def fit_dynamic(
         exact=tuple(free[k].path for k in exact),
         evaluations=int(best.nfev),
         converged=bool(best.success),
-        at_bound=tuple(ends),
+        at_bound=_at_bound(free, x, low, high),
     )
+
+
+def _at_bound(free: Sequence[Candidate], x: Floats, low: Floats, high: Floats) -> tuple[str, ...]:
+    """Paths that ended at a bound."""
+    close = 1e-3 * np.array([item.size for item in free])
+    ends = (x - low < close) | (high - x < close)
+    return tuple(item.path for item, end in zip(free, ends, strict=True) if end)
 
 
 def _bound(item: Candidate, value: float) -> float:
@@ -255,7 +256,7 @@ def _exact(
     paths = [free[k].path for k in chosen]
     tied = "control.torque_constant"
     asked = [*paths, tied] if problem.tied and "motor.emf_constant" in paths else paths
-    found = []
+    jacobians = []
     for index, (log, scale, mask) in enumerate(
         zip(problem.logs, problem.scales, problem.masks, strict=True)
     ):
@@ -268,8 +269,8 @@ def _exact(
             inner = values[path] if free[chosen[j]].log_scale else 1.0
             part[:, :, j] = column * inner / np.array(scale)
         part[~mask] = 0.0
-        found.append(part)
-    return found
+        jacobians.append(part)
+    return jacobians
 
 
 def _mixed(
@@ -313,10 +314,10 @@ def _covariance(problem: Problem, free: Sequence[Candidate], x: Floats) -> tuple
     size = len(free)
     normal = np.zeros((size, size))
     scores: list[Floats] = []
-    kept: list[Any] = []
+    inner: list[Any] = []
     for part, rest, block, mask in zip(jac, residual, blocks, problem.masks, strict=True):
         weight = 1.0 / np.sqrt(1.0 + (rest / _SOFT) ** 2)
         normal += np.einsum("ncp,nc,ncq->pq", part, weight**3, part)
         scores.append(np.einsum("ncp,nc->np", part, weight * rest)[mask])
-        kept.append(block[mask] - block[mask].min())
-    return block_covariance(normal, scores, kept)
+        inner.append(block[mask] - block[mask].min())
+    return block_covariance(normal, scores, inner)

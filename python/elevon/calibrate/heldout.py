@@ -70,7 +70,7 @@ def held_out(
     progress: Progress | None,
 ) -> tuple[HeldOut, ...]:
     """Refit without each log in turn, or without the last quarter of a single one."""
-    found = []
+    errors = []
     for k, log in enumerate(logs):
         if progress is not None and not progress(k / len(logs)):
             raise Interrupted("calibration stopped")
@@ -82,8 +82,8 @@ def held_out(
             train, test, span = [keeps[0] & ~late], keeps[0] & late, "last quarter"
         row = _one(logs, train, k, test, span=span, before=before, fitted=fitted)
         if row is not None:
-            found.append(row)
-    return tuple(found)
+            errors.append(row)
+    return tuple(errors)
 
 
 def _one(

@@ -103,11 +103,11 @@ def choose(
     InputError
         A required parameter that nothing in the logs excites, or that cannot be told from others.
     """
-    kept = list(range(len(free)))
+    left = list(range(len(free)))
     dropped: dict[str, str] = {}
     whole = np.vstack([part.reshape(-1, len(free)) for part in jac])
     strength = np.linalg.norm(whole, axis=0) * [item.size for item in free]
-    for k in list(kept):
+    for k in list(left):
         if not strength[k] > 1e-6 * np.sqrt(len(whole)):
             if free[k].path in required:
                 raise InputError(
@@ -115,32 +115,32 @@ def choose(
                     f"{free[k].size:g} moves no signal); leave it out or add a log that does"
                 )
             dropped[free[k].path] = "nothing in the logs excites it"
-            kept.remove(k)
-    while kept:
-        covariance = _covariance([part[:, :, kept] for part in jac], residual, blocks)
-        loose = _looseness([free[k] for k in kept], covariance)
-        optional = [j for j, k in enumerate(kept) if free[k].path not in required]
+            left.remove(k)
+    while left:
+        covariance = _covariance([part[:, :, left] for part in jac], residual, blocks)
+        loose = _looseness([free[k] for k in left], covariance)
+        optional = [j for j, k in enumerate(left) if free[k].path not in required]
         # Of two that cannot be told apart, the looser one goes, even where both look tight.
-        blind = np.array([_twin(covariance, j) > _SAME for j in range(len(kept))])
+        blind = np.array([_twin(covariance, j) > _SAME for j in range(len(left))])
         worst = max(optional, key=lambda j: (blind[j], loose[j]), default=None)
         if worst is None or not (blind[worst] or loose[worst] > _LOOSEST):
             break
-        index = kept[worst]
+        index = left[worst]
         dropped[free[index].path] = _reason(
-            [free[k] for k in kept], covariance, worst, loose[worst]
+            [free[k] for k in left], covariance, worst, loose[worst]
         )
-        kept.remove(index)
-    if not kept:
+        left.remove(index)
+    if not left:
         return [], Identifiability(np.empty(0), (), {}, (), dropped)
-    _refuse(free, kept, jac, residual, blocks, required=required)
-    chosen = [free[k] for k in kept]
-    ranking = rank(chosen, [part[:, :, kept] for part in jac], residual, blocks, dropped)
-    return kept, ranking
+    _refuse(free, left, jac, residual, blocks, required=required)
+    chosen = [free[k] for k in left]
+    ranking = rank(chosen, [part[:, :, left] for part in jac], residual, blocks, dropped)
+    return left, ranking
 
 
 def _refuse(
     free: Sequence[Candidate],
-    kept: Sequence[int],
+    left: Sequence[int],
     jac: Sequence[Floats],
     residual: Sequence[Floats],
     blocks: Sequence[npt.NDArray[np.int64]],
@@ -148,8 +148,8 @@ def _refuse(
     required: Sequence[str],
 ) -> None:
     """Raise where a required parameter is hopeless, or the twin of another one."""
-    covariance = _covariance([part[:, :, list(kept)] for part in jac], residual, blocks)
-    items = [free[k] for k in kept]
+    covariance = _covariance([part[:, :, list(left)] for part in jac], residual, blocks)
+    items = [free[k] for k in left]
     loose = _looseness(items, covariance)
     for j, item in enumerate(items):
         if item.path in required and (loose[j] > _HOPELESS or _twin(covariance, j) > _SAME):
@@ -209,10 +209,10 @@ def _pairs(
     if not np.isfinite(std).all():
         return ()
     correlation = covariance / np.outer(np.where(std > 0, std, 1.0), np.where(std > 0, std, 1.0))
-    found = [
+    pairs = [
         (names[i], names[j], float(correlation[i, j]))
         for i in range(len(names))
         for j in range(i)
         if abs(correlation[i, j]) > _CORRELATED
     ]
-    return tuple(sorted(found, key=lambda item: -abs(item[2])))
+    return tuple(sorted(pairs, key=lambda item: -abs(item[2])))

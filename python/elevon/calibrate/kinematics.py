@@ -19,6 +19,7 @@ from elevon.calibrate.direct import saturated_speed
 from elevon.calibrate.log import BenchLog
 from elevon.errors import InputError
 from elevon.logs.command.fit import FREE, WaveformFit, best_waveform, fit_waveform
+from elevon.logs.command.known import NotedCommand, align_noted
 from elevon.logs.command.reconstruct import reconstruct
 from elevon.logs.covariance import robust_covariance
 from elevon.waveforms import evaluate
@@ -35,6 +36,7 @@ KINEMATIC = (
     "control.position_gain",
     "control.speed_limit",
 )
+_LEAST = 200  # samples inside the limit
 _SMALL = 0.02  # RMS of the command's misfit over its spread, above which no waveform explains it
 
 
@@ -87,6 +89,8 @@ class CommandFit:
 def command_fit(log: BenchLog, gain: float, limit: float) -> CommandFit | None:
     """Fit the command's waveform and the position gain of one log.
 
+    A command noted in full counts as noted; only its instant is fitted.
+
     Parameters
     ----------
     log : BenchLog
@@ -105,6 +109,8 @@ def command_fit(log: BenchLog, gain: float, limit: float) -> CommandFit | None:
         return None
     try:
         trace = reconstruct(log.time, log.speed_ref, log.user, gain=gain, limit=limit)
+        if log.note is not None and log.note.command is not None and log.note.command.terms:
+            return _noted_with_gain(log, align_noted(trace, log.note), gain, limit)
         kind = log.note.waveform if log.note else None
         if kind == "chirp" and log.note is not None:
             known = {n: v for n, v in log.note.parameters.items() if n in {"sweep_time", "start"}}
@@ -117,6 +123,40 @@ def command_fit(log: BenchLog, gain: float, limit: float) -> CommandFit | None:
     if not spread > 0.0 or fit.rms > 3.0 * _SMALL * spread:
         return None
     return _with_gain(log, fit, gain, limit)
+
+
+def _noted_with_gain(
+    log: BenchLog, noted: NotedCommand, gain: float, limit: float
+) -> CommandFit | None:
+    """Gain under a command noted in full: noted = set point / gain + position, its instant free."""
+    assert log.user is not None
+    inside = log.good & (np.abs(log.speed_ref) < 0.999 * limit) & (log.time >= noted.start)
+    t, ref, user = log.time[inside], log.speed_ref[inside] / gain, log.user[inside]
+    if inside.sum() < _LEAST:
+        return None
+    slope = np.gradient(noted.values, log.time)[inside]
+    design = np.column_stack((ref, slope))
+    data = noted.values[inside] - user
+    (inverse, shift), *_ = np.linalg.lstsq(design, data, rcond=None)
+    rest = data - design @ np.array([inverse, shift])
+    if float(rest.std()) > _SMALL * float(np.std(user)) or not inverse > 0.0:
+        return None
+    std = np.sqrt(np.maximum(np.diag(robust_covariance(design, rest)), 0.0))
+    start, rms = noted.start + float(shift), float(np.sqrt(np.mean(rest**2)))
+    waveform = WaveformFit(
+        "noted", {"start": start}, {"start": float(std[1])}, np.array([[std[1] ** 2]]), rms,
+        len(t), (noted.start, float(log.time[-1])), True,
+    )  # fmt: skip
+    return CommandFit(
+        log=log.name,
+        waveform=waveform,
+        gain=gain / float(inverse),
+        gain_std=gain * float(std[0]) / float(inverse) ** 2,
+        amplitude=math.nan,
+        amplitude_std=math.nan,
+        factor=None,
+        reach=math.sqrt(2.0) * float(np.std(ref)),
+    )
 
 
 def _with_gain(log: BenchLog, fit: WaveformFit, gain: float, limit: float) -> CommandFit | None:

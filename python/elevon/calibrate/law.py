@@ -111,11 +111,11 @@ def controller_law(
         return None
     names = (*_TERMS, *(f"start[{k}]" for k in present))
     beta, rest, weight, design = law.set_point()
-    found = with_deviations(names, beta, design, rest, weight, times=times)
-    if not np.isfinite(found.covariance).all():
-        return found
+    regression = with_deviations(names, beta, design, rest, weight, times=times)
+    if not np.isfinite(regression.covariance).all():
+        return regression
     sloped = np.isin(names, ("derivative", "slope"))
-    covariance = found.covariance
+    covariance = regression.covariance
     for other in (
         np.where(sloped, beta, law.without(_TERMS.index("motion"))),
         np.where(sloped, law.joint(), beta),
@@ -124,7 +124,7 @@ def controller_law(
     ):
         gap = other - beta
         covariance = covariance + np.outer(gap, gap)
-    return replace(found, covariance=covariance)
+    return replace(regression, covariance=covariance)
 
 
 def _ready(

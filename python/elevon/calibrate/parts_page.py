@@ -10,17 +10,18 @@ from elevon.report import Report, Table
 
 if TYPE_CHECKING:
     from elevon.calibrate.by_parts import PartsCalibration
+    from elevon.calibrate.closed_loop import LoopCalibration
 
 __all__ = ["parts_report"]
 
 
 def parts_report(
-    result: PartsCalibration,
+    result: PartsCalibration | LoopCalibration,
     *,
     provenance: Mapping[str, object] | None = None,
     date: str | None = None,
 ) -> Report:
-    """Return the report of a calibration put together from parts."""
+    """Return the report of a calibration put together from parts, or in closed loop."""
     names = ", ".join(log.name for log in result.logs)
     report = Report(f"Calibration of {result.before.name}", f"From {names}.", date=date)
     report.fact("Parameters determined", str(len(result.estimates)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -70,6 +70,41 @@ def torque_scale(actuator: Actuator, plant: Regression | None) -> Torque:
     return Torque(old, 0.0, False, tied, own)
 
 
+@dataclass
+class _Sheet:
+    """Estimates made of the torque balance, one after the other."""
+
+    actuator: Actuator
+    plant: Regression
+    given: tuple[str, ...]
+    estimates: list[Estimate] = field(default_factory=list)
+
+    def add(
+        self,
+        path: str,
+        unit: str,
+        function: Callable[[Floats], float],
+        note: str = "",
+        *,
+        given: tuple[str, ...] | None = None,
+        register: str = "plant",
+        in_set: bool = True,
+        floor: float = -np.inf,
+    ) -> float:
+        """Add a function of the coefficients and return its value."""
+        number, std = _delta(self.plant, function)
+        half = quantile(self.plant.degrees) * std
+        ends = (max(number - half, floor), number + half)
+        old = self.actuator.parameters.value(path) if in_set else None
+        stands_on = self.given if given is None else given
+        self.estimates.append(
+            Estimate(
+                path, number, std, ends, unit, register, old, "direct", stands_on, note, in_set
+            )
+        )
+        return number
+
+
 def plant_estimates(
     actuator: Actuator, plant: Regression, torque: Torque
 ) -> tuple[list[Estimate], dict[str, float]]:
@@ -80,51 +115,41 @@ def plant_estimates(
     (list of Estimate, dict)
         Estimates, and values of other parameters that had to follow (path to value).
     """
-    value = actuator.parameters.value
-    rest = value("gear.inertia") + value("load.inertia") / value("gear.ratio") ** 2
-    given = () if torque.measured else _GIVEN
-    found: list[Estimate] = []
-
-    def add(
-        path: str,
-        unit: str,
-        function: Callable[[Floats], float],
-        note: str = "",
-        *,
-        given: tuple[str, ...] = given,
-        register: str = "plant",
-        in_set: bool = True,
-        floor: float = -np.inf,
-    ) -> float:
-        number, std = _delta(plant, function)
-        half = quantile(plant.degrees) * std
-        low, high = max(number - half, floor), number + half
-        old = value(path) if in_set else None
-        found.append(
-            Estimate(
-                path, number, std, (low, high), unit, register, old, "direct", given, note, in_set
-            )
-        )
-        return number
-
+    sheet = _Sheet(actuator, plant, () if torque.measured else _GIVEN)
     scale = _scale(plant, torque)
     if torque.measured:
-        add(
-            "motor.emf_constant",
-            "V s/rad",
-            lambda b: emf_constant(scale(b), value("motor.flux_fraction")),
-            "from the load cell: torque constant over 1.5",
-            given=(),
-        )
-        add("derived.torque_constant", "N m/A", scale, "per peak ampere", given=(), in_set=False)
-    total = add(
+        _constant(sheet, scale)
+    follow = _inertia(sheet, scale, _whole_inertia(sheet, scale))
+    sheet.add("friction.dynamic", "N m", lambda b: scale(b) * b[2], floor=0.0)
+    sheet.add("friction.viscous", "N m s/rad", lambda b: scale(b) * b[1], floor=0.0)
+    _offsets(sheet, scale)
+    _lag(sheet)
+    return sheet.estimates, follow
+
+
+def _constant(sheet: _Sheet, scale: Callable[[Floats], float]) -> None:
+    """The torque constant, from the load cell."""
+    share = sheet.actuator.parameters.value("motor.flux_fraction")
+    sheet.add(
+        "motor.emf_constant",
+        "V s/rad",
+        lambda b: emf_constant(scale(b), share),
+        "from the load cell: torque constant over 1.5",
+        given=(),
+    )
+    sheet.add("derived.torque_constant", "N m/A", scale, "per peak ampere", given=(), in_set=False)
+
+
+def _whole_inertia(sheet: _Sheet, scale: Callable[[Floats], float]) -> float:
+    """All inertia on the fast shaft, and what the current alone tells of it."""
+    total = sheet.add(
         "derived.inertia",
         "kg m2",
         lambda b: scale(b) * b[0],
         "all inertia on the fast shaft",
         in_set=False,
     )
-    add(
+    sheet.add(
         "derived.inertia_per_torque",
         "A s2/rad",
         lambda b: float(b[0]),
@@ -132,12 +157,15 @@ def plant_estimates(
         given=(),
         in_set=False,
     )
-    follow = _inertia(add, actuator, scale, total, rest)
-    add("friction.dynamic", "N m", lambda b: scale(b) * b[2], floor=0.0)
-    add("friction.viscous", "N m s/rad", lambda b: scale(b) * b[1], floor=0.0)
-    if "offset" in plant.names:
-        offset = plant.names.index("offset")
-        add(
+    return total
+
+
+def _offsets(sheet: _Sheet, scale: Callable[[Floats], float]) -> None:
+    """Offsets of the current's sensor and of the load cell."""
+    names = sheet.plant.names
+    if "offset" in names:
+        offset = names.index("offset")
+        sheet.add(
             "sensor.current_offset",
             "A",
             lambda b: float(b[offset]),
@@ -146,9 +174,9 @@ def plant_estimates(
             register="sensor",
             in_set=False,
         )
-    if "cell" in plant.names:
-        cell = plant.names.index("cell")
-        add(
+    if "cell" in names:
+        cell = names.index("cell")
+        sheet.add(
             "sensor.load_cell_offset",
             "N m",
             lambda b: scale(b) * float(b[cell]),
@@ -156,12 +184,11 @@ def plant_estimates(
             register="sensor",
             in_set=False,
         )
-    _lag(add, plant)
-    return found, follow
 
 
-def _lag(add: Callable[..., float], plant: Regression) -> None:
+def _lag(sheet: _Sheet) -> None:
     """The measured current's lag behind the torque, or the torque's behind its set point."""
+    plant, add = sheet.plant, sheet.add
     lag = len(plant.names) - 1
     if "constant" in plant.names:
         add(
@@ -232,17 +259,12 @@ def static_estimate(
     ]
 
 
-def _inertia(
-    add: Callable[..., float],
-    actuator: Actuator,
-    scale: Callable[[Floats], float],
-    total: float,
-    rest: float,
-) -> dict[str, float]:
+def _inertia(sheet: _Sheet, scale: Callable[[Floats], float], total: float) -> dict[str, float]:
     """The motor's own inertia carries the sum, unless the others alone exceed it."""
-    value = actuator.parameters.value
+    value = sheet.actuator.parameters.value
+    rest = value("gear.inertia") + value("load.inertia") / value("gear.ratio") ** 2
     if total > 1.05 * rest:
-        add(
+        sheet.add(
             "motor.inertia",
             "kg m2",
             lambda b: scale(b) * b[0] - rest,
@@ -251,7 +273,7 @@ def _inertia(
         )
         return {}
     share = value("motor.inertia") / (value("motor.inertia") + rest)
-    add(
+    sheet.add(
         "motor.inertia",
         "kg m2",
         lambda b: share * scale(b) * b[0],
@@ -287,16 +309,36 @@ def controller_estimates(
     actuator: Actuator, law: Regression, torque: Torque, logs: Sequence[str]
 ) -> list[Estimate]:
     """Turn the controller's law into gain and times."""
-    value = actuator.parameters.value
     extra = torque.relative if torque.tied else 0.0
     given = () if torque.measured and torque.tied else ("control.torque_constant",)
     gain, gain_std = _delta(law, lambda b: torque.believed * float(b[0]))
-    gain_std = float(np.hypot(gain_std, extra * gain))
-    rows = [("control.speed_gain", gain, gain_std, given, "")]
-    none = "no {} action is seen in " + ", ".join(logs)
+    rows = [("control.speed_gain", gain, float(np.hypot(gain_std, extra * gain)), given, "")]
+    rows += _times(actuator, law, ", ".join(logs))
+    estimates = [_of_controller(actuator, law, *row) for row in rows]
+    gains, gains_std = _delta(law, lambda b: torque.believed * float(b[1]))
+    gains_std = float(np.hypot(gains_std, extra * gains))
+    half = quantile(law.degrees) * gains_std
+    note = "speed gain over integral time"
+    return [
+        *estimates,
+        Estimate(
+            "derived.integral_gain", gains, gains_std, (gains - half, gains + half), "N m/rad",
+            "controller", None, "direct", given, note, False,
+        ),
+    ]  # fmt: skip
+
+
+_Row = tuple[str, float, float, tuple[str, ...], str]
+
+
+def _times(actuator: Actuator, law: Regression, logs: str) -> list[_Row]:
+    """Integral and derivative time: path, value, deviation, what it stands on, note."""
+    value = actuator.parameters.value
+    none = f"no {{}} action is seen in {logs}"
+    rows: list[_Row] = []
     if law["integral"] > _SEEN * law.std("integral"):
-        found_time = _delta(law, lambda b: float(b[0] / b[1]))
-        rows.append(("control.integral_time", *found_time, (), ""))
+        time, std = _delta(law, lambda b: float(b[0] / b[1]))
+        rows.append(("control.integral_time", time, std, (), ""))
     elif value("control.integral_time") > 0.0:
         rows.append(("control.integral_time", 0.0, 0.0, (), none.format("integral")))
     late, late_std = _delta(law, lambda b: float(b[2] / b[0]))
@@ -304,40 +346,20 @@ def controller_estimates(
         rows.append(("control.derivative_time", late, late_std, (), ""))
     elif value("control.derivative_time") > 0.0:
         rows.append(("control.derivative_time", 0.0, late_std, (), none.format("derivative")))
-    gains, gains_std = _delta(law, lambda b: torque.believed * float(b[1]))
-    found = []
-    for path, number, std, condition, note in rows:
-        half = quantile(law.degrees) * std
-        unit = record_of(actuator.wiring, path).unit
-        found.append(
-            Estimate(
-                path,
-                number,
-                std,
-                (max(number - half, 0.0), number + half),
-                unit,
-                "controller",
-                value(path),
-                "direct",
-                condition,
-                note,
-            )
-        )
-    gains_std = float(np.hypot(gains_std, extra * gains))
-    half = quantile(law.degrees) * gains_std
-    found.append(
-        Estimate(
-            "derived.integral_gain",
-            gains,
-            gains_std,
-            (gains - half, gains + half),
-            "N m/rad",
-            "controller",
-            None,
-            "direct",
-            given,
-            "speed gain over integral time",
-            False,
-        )
-    )
-    return found
+    return rows
+
+
+def _of_controller(  # noqa: PLR0917 - a row of estimates
+    actuator: Actuator,
+    law: Regression,
+    path: str,
+    number: float,
+    std: float,
+    given: tuple[str, ...],
+    note: str,
+) -> Estimate:
+    """One number of the controller, which cannot be negative."""
+    half = quantile(law.degrees) * std
+    unit, old = record_of(actuator.wiring, path).unit, actuator.parameters.value(path)
+    ends = (max(number - half, 0.0), number + half)
+    return Estimate(path, number, std, ends, unit, "controller", old, "direct", given, note)

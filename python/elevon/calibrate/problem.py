@@ -181,10 +181,10 @@ class Problem:
     def _read(
         self, result: Mapping[str, Any], index: int, values: Mapping[str, float]
     ) -> Simulated | None:
-        kept = result["clocks"]["every_step"]
-        if result["status"] not in {"ok", "tripped"} or not np.isfinite(kept["values"]).all():
+        rows = result["clocks"]["every_step"]
+        if result["status"] not in {"ok", "tripped"} or not np.isfinite(rows["values"]).all():
             return None
-        return self.output(index, kept["time"], kept["values"], values)
+        return self.output(index, rows["time"], rows["values"], values)
 
     def output(
         self, index: int, time: Floats, signals: Floats, values: Mapping[str, float]
@@ -246,18 +246,18 @@ class Problem:
             [],
             lambda _fraction: self.check(),
         )
-        found = {}
+        columns = {}
         count = _core.derivatives_per_pass()
         for number, item in enumerate(passes):
             chosen = paths[count * number : count * (number + 1)]
-            kept = item["clocks"]["every_step"]
-            array = kept["values"].reshape(len(kept["time"]), -1, 1 + len(chosen))
+            rows = item["clocks"]["every_step"]
+            array = rows["values"].reshape(len(rows["time"]), -1, 1 + len(chosen))
             for k, path in enumerate(chosen):
                 at = self.logs[index].time
-                found[path] = np.column_stack(
-                    [np.interp(at, kept["time"], array[:, c, 1 + k]) for c in range(2)]
+                columns[path] = np.column_stack(
+                    [np.interp(at, rows["time"], array[:, c, 1 + k]) for c in range(2)]
                 )
-        return found
+        return columns
 
 
 def values_of(free: Sequence[Candidate], x: Floats) -> dict[str, float]:

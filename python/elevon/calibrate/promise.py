@@ -64,21 +64,21 @@ def held_out_agreement(
             fitted = calibrate(
                 rest, before, free=free, hold_out=False, model_runs=False, progress=share
             )
-            found = validate([log], fitted.actuator, transient=like.transient)
+            held = validate([log], fitted.actuator, transient=like.transient)
         except InputError:
             continue
-        rows += found.errors
+        rows += held.errors
     return replace(like, errors=tuple(rows)) if rows else None
 
 
 def outliers(validation: Validation) -> list[str]:
     """Return the logs that are far worse than the others: no measure of a healthy machine."""
-    found = set()
+    names = set()
     for rows in _by_signal(validation).values():
         middle = float(np.median([row.of_range for row in rows]))
         if len(rows) > 2:
-            found |= {row.log for row in rows if row.of_range > max(_APART * middle, _BAD)}
-    return sorted(found)
+            names |= {row.log for row in rows if row.of_range > max(_APART * middle, _BAD)}
+    return sorted(names)
 
 
 def thresholds(validation: Validation) -> dict[str, float]:
@@ -87,20 +87,20 @@ def thresholds(validation: Validation) -> dict[str, float]:
     Of three logs or more those that are far worse than the others do not count.
     """
     apart = outliers(validation)
-    found = {}
+    limits = {}
     for name, rows in _by_signal(validation).items():
         largest = max((row.of_range for row in rows if row.log not in apart), default=0.0)
         if largest > 0.0:
-            found[name] = _up(_MARGIN * largest)
-    return found
+            limits[name] = _up(_MARGIN * largest)
+    return limits
 
 
 def _by_signal(validation: Validation) -> dict[str, list[SignalError]]:
-    found: dict[str, list[SignalError]] = {}
+    groups: dict[str, list[SignalError]] = {}
     for row in validation.errors:
         if math.isfinite(row.of_range) and row.log not in validation.notes:
-            found.setdefault(row.signal, []).append(row)
-    return found
+            groups.setdefault(row.signal, []).append(row)
+    return groups
 
 
 def _up(value: float) -> float:

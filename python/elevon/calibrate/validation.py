@@ -206,11 +206,11 @@ def validate(
 
 def _promised(actuator: Actuator, key: str) -> dict[str, float]:
     """One table of the set's ``[validation]``, its signals checked."""
-    found = dict((actuator.validation or {}).get(key, {}))
-    for name in found:
+    limits = dict((actuator.validation or {}).get(key, {}))
+    for name in limits:
         if name not in SIGNALS:
             raise unknown("signal", name, SIGNALS, f"{actuator.name}: validation.{key}")
-    return found
+    return limits
 
 
 def _trace(
@@ -325,13 +325,13 @@ def _command(log: BenchLog, actuator: Actuator) -> tuple[Floats, str]:
 
 
 def _errors(trace: Trace, limits: Mapping[str, float]) -> list[SignalError]:
-    found = []
+    errors = []
     for name, unit in SIGNALS.items():
         data, model = trace.measured[name][trace.used], trace.simulated[name][trace.used]
         error = model - data
         rms, largest = float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
         spread, reach = float(np.std(data)), float(np.ptp(data))
-        found.append(
+        errors.append(
             SignalError(
                 trace.log,
                 name,
@@ -344,4 +344,4 @@ def _errors(trace: Trace, limits: Mapping[str, float]) -> list[SignalError]:
                 limits.get(name),
             )
         )
-    return found
+    return errors

@@ -10,7 +10,7 @@ import typer
 
 from elevon.cli.by_parts import calibrate_by_parts, way_by_parts
 from elevon.cli.calibrate_drops import is_drop_table, run_drops
-from elevon.cli.closed_loop import calibrate_closed_loop, read_loop_logs
+from elevon.cli.closed_loop import calibrate_closed_loop, check_loop_options, read_loop_logs
 from elevon.cli.common import (
     ActuatorOption,
     ForceOption,
@@ -163,10 +163,12 @@ def calibrate(
         )  # fmt: skip
     data = direct_logs(model, logs, loadcell, command, column_map)
     if data is None:
-        if free is not None and _paths(free) is not None:
-            raise InputError("--free: in closed loop everything is freed and ranked; leave it out")
+        check_loop_options(fidelity, per_log)
         few = read_loop_logs(logs, column_map)
-        return calibrate_closed_loop(few, model, out, as_json=json, force=force)
+        return calibrate_closed_loop(
+            few, model, out, free=_paths(free), transient=transient, report=report, as_json=json,
+            force=force, date=date,
+        )  # fmt: skip
     with progress_bar("calibrating") as advance:
         result = run(
             data,

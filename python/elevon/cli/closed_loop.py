@@ -15,8 +15,15 @@ if TYPE_CHECKING:
     from elevon.calibrate.closed_loop import LoopCalibration, LoopLog
     from elevon.calibrate.validation import Validation
     from elevon.recording import Recording
+    from elevon.report import Report
 
-__all__ = ["calibrate_closed_loop", "read_loop_logs", "read_recording", "validate_closed_loop"]
+__all__ = [
+    "calibrate_closed_loop",
+    "check_loop_options",
+    "read_loop_logs",
+    "read_recording",
+    "validate_closed_loop",
+]
 
 
 def read_loop_logs(paths: Sequence[Path], column_map: Path | None) -> list[LoopLog]:
@@ -44,8 +51,12 @@ def calibrate_closed_loop(
     model: Actuator,
     out: Path | None,
     *,
+    free: Sequence[str] | None,
+    transient: float | None,
+    report: Path | None,
     as_json: bool,
     force: bool,
+    date: str | None,
 ) -> int:
     """Calibrate, write the set with thresholds from held-out data, print."""
     from elevon.calibrate.closed_loop import calibrate_loop
@@ -53,11 +64,13 @@ def calibrate_closed_loop(
     from elevon.calibrate.write import write_calibration
 
     with progress_bar("calibrating in closed loop") as advance:
-        result = calibrate_loop(logs, model, progress=advance)
+        result = calibrate_loop(logs, model, free=free, transient=transient, progress=advance)
         advance(1.0)
     if out is not None:
         say(f"set: {write_calibration(out, result, validation=result.held_out, force=force)}")
-    after = validate_loop(logs, result.actuator)
+    after = validate_loop(logs, result.actuator, transient)
+    if report is not None:
+        say(f"report: {_page(result, after, date).save(report, force=force)}")
     if as_json:
         document = result.to_dict()
         document["out"] = None if out is None else str(out)
@@ -66,6 +79,41 @@ def calibrate_closed_loop(
         return 0
     _print(result, after)
     return 0
+
+
+def check_loop_options(fidelity: str, per_log: Sequence[str] | None) -> None:
+    """Refuse what the closed loop has no meaning for."""
+    from elevon.simulate.prepare import check_fidelity
+
+    check_fidelity("rotary", fidelity)
+    if fidelity != "low":
+        raise InputError(
+            f"--fidelity {fidelity}: the closed loop is searched over some 10 000 runs, which are "
+            "of the low fidelity; leave it out, and validate the set with elevon compare"
+        )
+    if per_log:
+        raise InputError(
+            "--per-log: these logs have no two positions and set points to estimate each log's "
+            "play from; leave it out"
+        )
+
+
+def _page(result: LoopCalibration, after: Validation, date: str | None) -> Report:
+    """The page: parameters, what is not determined, errors of each log."""
+    import elevon
+    from elevon.calibrate.parts_page import parts_report
+    from elevon.report import Table
+
+    page = parts_report(result, date=date)
+    page.fact("Controller", f"{result.structure} ({result.why})")
+    rows: list[list[object]] = [
+        [error.log, error.signal, error.rms, error.unit, error.of_rms, error.of_range]
+        for error in after.errors
+    ]
+    columns = ["Log", "Signal", "RMS error", "Unit", "% of RMS", "% of range"]
+    page.section("Logs against the model").table(Table(columns, rows, digits=4))
+    page.provenance({"Elevon": elevon.__version__})
+    return page
 
 
 def _print(result: LoopCalibration, after: Validation) -> None:

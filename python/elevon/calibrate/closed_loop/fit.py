@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from elevon.calibrate.closed_loop.free import Free, free_list, outer
+from elevon.calibrate.closed_loop.free import Free, asked_for, free_list, inner, outer
 from elevon.calibrate.closed_loop.log import LoopLog
 from elevon.calibrate.closed_loop.model import LoopModel
 from elevon.calibrate.closed_loop.objective import Objective
@@ -19,7 +20,7 @@ from elevon.calibrate.closed_loop.start import cloud, first_values, windows
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["Fitted", "Searched", "choose", "final_fit", "search"]
+__all__ = ["Fitted", "Searched", "as_given", "choose", "final_fit", "search"]
 
 Floats = npt.NDArray[np.float64]
 Check = Callable[[], bool]
@@ -96,6 +97,13 @@ def search(
     return Searched(structure, tuple(free), best, score, model.runs + runs)
 
 
+def as_given(actuator: Actuator, logs: Sequence[LoopLog], names: Sequence[str]) -> Searched:
+    """Begin at the set's own values, with its own structure: what some numbers are fitted from."""
+    structure = str(actuator.parameters["control.structure"].value)
+    free = asked_for(free_list(actuator, logs, structure, {}), names)
+    return Searched(structure, tuple(free), inner(free), math.nan, 0)
+
+
 def _folds(parts: Sequence[LoopLog]) -> list[tuple[list[LoopLog], list[LoopLog]]]:
     """Pairs of windows kept and left out: one log left out, or of a single one every other."""
     names = list(dict.fromkeys(part.name for part in parts))
@@ -147,9 +155,9 @@ def _likelihood(objective: Objective, x: Floats) -> float:
     return float(total)
 
 
-def choose(found: Sequence[Searched]) -> tuple[Searched, str]:
+def choose(searched: Sequence[Searched]) -> tuple[Searched, str]:
     """Return the structure that predicts best what was left out, and why, in words."""
-    order = sorted(found, key=lambda item: item.held_out, reverse=True)
+    order = sorted(searched, key=lambda item: item.held_out, reverse=True)
     best = order[0]
     if len(order) == 1:
         return best, "as given"

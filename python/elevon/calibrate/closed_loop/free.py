@@ -11,11 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.calibrate.closed_loop.log import LoopLog
+from elevon.errors import unknown
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["STRUCTURES", "Free", "free_list", "in_set", "inner", "outer"]
+__all__ = ["STRUCTURES", "Free", "asked_for", "free_list", "in_set", "inner", "outer"]
 
 Floats = npt.NDArray[np.float64]
 
@@ -92,8 +93,25 @@ def free_list(
     channels = {name for log in logs for name in log.signals}
     items = [*_plant(actuator), *_controller(actuator, structure)]
     items += _limits(channels)
-    found = [_started(item, actuator, starts) for item in items]
-    return found + _shown(logs, channels)
+    return [_started(item, actuator, starts) for item in items] + _shown(logs, channels)
+
+
+def asked_for(free: Sequence[Free], names: Sequence[str]) -> list[Free]:
+    """Return what was asked for by name, with the logger's own delays and offsets.
+
+    Static friction is fitted as its share of the dynamic one, which goes with it.
+
+    Raises
+    ------
+    InputError
+        A name that the closed loop does not free.
+    """
+    paths = ["friction.static" if item.path == STICK else item.path for item in free]
+    for name in names:
+        if name not in paths:
+            raise unknown("--free, in closed loop", name, paths)
+    chosen = set(names) | ({"friction.dynamic", STICK} if "friction.static" in names else set())
+    return [item for item in free if item.path in chosen or not in_set(item.path)]
 
 
 def _row(path: str, unit: str, register: str, spread: float, bounds: tuple[float, float]) -> Free:

@@ -117,7 +117,7 @@ def validate_loop(
 
 def _errors(trace: Trace, limits: Mapping[str, float], wiring: str) -> list[SignalError]:
     """Error of every channel of one log, in percent as elsewhere."""
-    found = []
+    errors = []
     for name, simulated in trace.simulated.items():
         mask = trace.used & np.isfinite(trace.measured[name])
         if not mask.any():
@@ -129,7 +129,7 @@ def _errors(trace: Trace, limits: Mapping[str, float], wiring: str) -> list[Sign
         unit = _UNITS[name] if wiring == "ballscrew" else _UNITS[name].replace("m", "rad", 1)
         unit = "rad" if name == "motor_position" else unit
         unit = "rad/s" if name == "motor_speed" else unit
-        found.append(
+        errors.append(
             SignalError(
                 trace.log,
                 name,
@@ -142,7 +142,7 @@ def _errors(trace: Trace, limits: Mapping[str, float], wiring: str) -> list[Sign
                 limits.get(name),
             )
         )
-    return found
+    return errors
 
 
 def _over(value: float, size: float) -> float:

@@ -92,12 +92,12 @@ def known(fitted: Fitted) -> tuple[list[Known], float]:
 
 
 def _slices(objective: Objective) -> dict[tuple[int, str], slice]:
-    begin, found = 0, {}
+    begin, slices = 0, {}
     for key in objective.keys:
         count = int(objective.masks[key].sum())
-        found[key] = slice(begin, begin + count)
+        slices[key] = slice(begin, begin + count)
         begin += count
-    return found
+    return slices
 
 
 def _block_sums(objective: Objective, jac: Floats, weighted: Floats) -> Floats:
@@ -173,21 +173,21 @@ def _reasons(objective: Objective, x: Floats, covariance: Floats, strength: Floa
     """Why each number is not determined; empty where it is."""
     spread = np.sqrt(np.diag(covariance))
     together = covariance / np.outer(spread, spread)
-    found = []
+    reasons = []
     for k, f in enumerate(objective.free):
         wide = spread[k] * f.spread > _SHARE if f.log_scale else spread[k] > _TENTH
         bound = min(x[k] - objective.low[k], objective.high[k] - x[k]) < 1e-6
         if not wide and not bound:
-            found.append("")
+            reasons.append("")
         elif strength[k] < _SILENT and f.path in _LIMITS:
-            found.append(SILENT[1])
+            reasons.append(SILENT[1])
         elif strength[k] < _SILENT:
-            found.append(SILENT[0])
+            reasons.append(SILENT[0])
         elif bound and f.path != "friction.stick":
-            found.append(f"ends at its bound, {f.outer(float(x[k])):.4g} {f.unit}")
+            reasons.append(f"ends at its bound, {f.outer(float(x[k])):.4g} {f.unit}")
         else:
-            found.append(_confounded(objective.free, together[k], k, wide))
-    return found
+            reasons.append(_confounded(objective.free, together[k], k, wide))
+    return reasons
 
 
 def _confounded(free: Sequence[Free], row: Floats, k: int, wide: bool) -> str:

@@ -186,9 +186,9 @@ def loop_log(recording: Recording, name: str, *, magnitude: bool | None = None) 
     clock = recording[command].time
     served = {key: channel(words) for key, words in ROLES.items()}
     signals = {
-        key: np.interp(clock, recording[found].time, recording[found].values)
-        for key, found in served.items()
-        if found is not None
+        key: np.interp(clock, recording[name].time, recording[name].values)
+        for key, name in served.items()
+        if name is not None
     }
     if magnitude is None:
         magnitude = _unsigned(signals)

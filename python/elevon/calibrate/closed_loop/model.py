@@ -60,6 +60,7 @@ class LoopModel:
         self.structure = structure
         self.check = check
         self.runs = 0
+        self._own_gain = self.actuator.parameters.value("control.speed_gain")
         self._place = positions(actuator.wiring)
         value = actuator.parameters.value
         lead = value("screw.lead") if actuator.wiring == "ballscrew" else 1.0
@@ -125,6 +126,9 @@ class LoopModel:
     def vector(self, values: Mapping[str, float]) -> Floats:
         """Return the core's parameter vector with some values changed."""
         vector = np.array(self._cores[0]["parameters"])
+        if "control.speed_gain" not in values:
+            # Not searched: the set's own.
+            vector[self._place["control.speed_gain"]] = self._own_gain
         for path, value in values.items():
             if path in self._place:
                 vector[self._place[path]] = value

@@ -60,15 +60,15 @@ class Objective:
 
     def parts(self, shown: Sequence[Shown]) -> dict[tuple[int, str], Floats]:
         """Residual of each log and channel in deviations, samples that count only."""
-        found = {}
+        residuals = {}
         for k, name in self.keys:
             mask, run = self.masks[k, name], shown[k]
             if run is None:
-                found[k, name] = np.full(int(mask.sum()), _BIG)
+                residuals[k, name] = np.full(int(mask.sum()), _BIG)
                 continue
             rest = (run[name] - self.model.logs[k].signals[name])[mask] / self.scales[k, name]
-            found[k, name] = np.clip(rest, -_BIG, _BIG)
-        return found
+            residuals[k, name] = np.clip(rest, -_BIG, _BIG)
+        return residuals
 
     def residual(self, x: Floats) -> Floats:
         """Stacked residuals of points, shape (m, n)."""

@@ -43,18 +43,18 @@ class Agreement:
 
 def errors_of(log: LoopLog, shown: Mapping[str, Floats]) -> list[Agreement]:
     """Return the error of each channel over the samples that count."""
-    found = []
+    rows = []
     for name, values in shown.items():
         mask = log.used & np.isfinite(log.signals[name])
         data = log.signals[name][mask]
         rms = float(np.sqrt(np.mean((values[mask] - data) ** 2)))
         size, span = float(np.sqrt(np.mean(data**2))), float(np.ptp(data))
-        found.append(
+        rows.append(
             Agreement(
                 log.name, name, rms, rms / span if span else np.inf, rms / size if size else np.inf
             )
         )
-    return found
+    return rows
 
 
 def predict(

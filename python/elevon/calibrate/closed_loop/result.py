@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elevon.calibrate.closed_loop.fit import Fitted, Searched, choose, final_fit, search
+from elevon.calibrate.closed_loop.fit import (
+    Fitted,
+    Searched,
+    as_given,
+    choose,
+    final_fit,
+    search,
+)
 from elevon.calibrate.closed_loop.free import STICK, STRUCTURES, in_set
 from elevon.calibrate.closed_loop.held_out import held_out_errors
 from elevon.calibrate.closed_loop.intervals import SILENT, Known, known
@@ -17,6 +24,7 @@ from elevon.calibrate.closed_loop.log import LoopLog
 from elevon.calibrate.closed_loop.predict import Agreement, errors_of
 from elevon.calibrate.estimate import Estimate, quantile
 from elevon.errors import InputError, Interrupted
+from elevon.parameters.relations import static_following
 from elevon.progress import Progress
 
 if TYPE_CHECKING:
@@ -97,7 +105,11 @@ class LoopCalibration:
             "structure": {
                 "chosen": self.structure,
                 "why": self.why,
-                "held_out": {item.structure: item.held_out for item in self.searched},
+                "held_out": {
+                    item.structure: item.held_out
+                    for item in self.searched
+                    if np.isfinite(item.held_out)
+                },
             },
             "agreement": [item.to_dict() for item in self.agreement],
             "held_out": [item.to_dict() for item in self.held_out.errors],
@@ -110,6 +122,8 @@ def calibrate_loop(
     actuator: Actuator,
     *,
     structure: str | None = None,
+    free: Sequence[str] | None = None,
+    transient: float | None = None,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> LoopCalibration:
@@ -123,35 +137,39 @@ def calibrate_loop(
         A servo with the numbers of its datasheets; what they do not say is a first guess.
     structure : str, optional
         ``cascade`` or ``pid``; default: whichever predicts held-out data better.
+    free : sequence of str, optional
+        Parameter paths to estimate, from the set's values and under the set's structure; all others
+        stay as given. Default: everything, searched over all bandwidths, and ranked.
+    transient : float, optional
+        Seconds at the beginning of each log that do not count; default: none.
     seed : int
         Of the search's starts.
     progress : callable, optional
-        Told the done fraction; returns False to stop.
+        Called with the done fraction; returns False to stop.
 
     Raises
     ------
     InputError
-        No log, an actuator that is no servo, or nothing determined.
+        No log, an actuator that is no servo, a transient longer than a log, a path that the closed
+        loop does not free, or nothing determined (of what was asked for).
     Interrupted
         `progress` returned False.
     """
     begin = clock.perf_counter()
     _check(logs, actuator, structure)
     say = _Reporter(progress)
-    tried = [structure] if structure else list(STRUCTURES)
-    each = 0.6 / len(tried)
-    searched = []
-    for k, name in enumerate(tried):
-
-        def share(fraction: float, k: int = k) -> None:
-            say(each * (k + fraction))
-
-        searched.append(search(actuator, logs, name, seed=seed, check=say.go, advance=share))
+    logs = _late(logs, transient)
+    if free is not None:
+        searched = [as_given(actuator, logs, free)]
+    else:
+        searched = _searched(actuator, logs, structure, seed, say)
     chosen, why = choose(searched)
     fitted = final_fit(actuator, logs, chosen, check=say.go, advance=lambda f: say(0.6 + 0.35 * f))
     rows, degrees = known(fitted)
     held = held_out_errors(fitted)
     estimates, missing = _estimates(rows, degrees, actuator)
+    if free is not None:
+        estimates = _asked(estimates, missing, free)
     if not estimates:
         raise InputError("the logs determine no parameter: nothing in them moves enough")
     say(1.0)
@@ -169,6 +187,46 @@ def calibrate_loop(
         held_out=held,
         wall_s=clock.perf_counter() - begin,
     )
+
+
+def _late(logs: Sequence[LoopLog], transient: float | None) -> list[LoopLog]:
+    """Return the logs without their first seconds."""
+    if transient is None:
+        return list(logs)
+    for log in logs:
+        if not 0.0 <= transient < log.duration:
+            raise InputError(f"transient of {transient:g} s: {log.name} lasts {log.duration:g} s")
+    return [log.restricted(log.time >= transient) for log in logs]
+
+
+def _searched(
+    actuator: Actuator,
+    logs: Sequence[LoopLog],
+    structure: str | None,
+    seed: int,
+    say: _Reporter,
+) -> list[Searched]:
+    """Search one structure, or each."""
+    tried = [structure] if structure else list(STRUCTURES)
+    each = 0.6 / len(tried)
+
+    def share(k: int) -> Callable[[float], None]:
+        return lambda fraction: say(each * (k + fraction))
+
+    return [
+        search(actuator, logs, name, seed=seed, check=say.go, advance=share(k))
+        for k, name in enumerate(tried)
+    ]
+
+
+def _asked(
+    estimates: Sequence[Estimate], missing: Mapping[str, str], free: Sequence[str]
+) -> list[Estimate]:
+    """Return what was asked for, and what no set holds."""
+    for path in free:
+        if path in missing:
+            raise InputError(f"--free {path}: {missing[path]}")
+    return [item for item in estimates if item.path in free or not item.in_set]
 
 
 class _Reporter:
@@ -203,7 +261,7 @@ def _estimates(
     rows: Sequence[Known], degrees: float, actuator: Actuator
 ) -> tuple[list[Estimate], dict[str, str]]:
     width = quantile(degrees)
-    found, missing = [], {}
+    estimates, missing = [], {}
     by_path = {row.free.path: row for row in rows}
     for row in rows:
         path = row.free.path
@@ -215,7 +273,7 @@ def _estimates(
             seen = _static(row, by_path["friction.dynamic"])
             path = "friction.static"
         old = actuator.parameters.value(path) if in_set(path) else None
-        found.append(
+        estimates.append(
             Estimate(
                 path=path, value=seen.value, std=seen.deviation, interval=seen.interval(width),
                 unit=row.free.unit, register=row.free.register, old=old, method="simulation",
@@ -223,7 +281,7 @@ def _estimates(
                 in_set=in_set(path),
             )
         )  # fmt: skip
-    return found, missing
+    return estimates, missing
 
 
 def _static(stick: Known, dynamic: Known) -> Known:
@@ -247,6 +305,10 @@ def _with(
             values["friction.static"] = value * fitted.values["friction.dynamic"]
         elif in_set(path) and not (silent and path not in _loops(structure)):
             values[path] = value
+    if "friction.dynamic" in values and "friction.static" not in values:
+        values["friction.static"] = static_following(
+            actuator.parameters, float(values["friction.dynamic"])
+        )
     return actuator.with_values(values, source="calibration")
 
 

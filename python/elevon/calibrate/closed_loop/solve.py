@@ -50,11 +50,11 @@ def jacobian(objective: Objective, points: list[Point], *, central: bool = False
         rows.append(moved)
         if central:
             rows.append(point.x - np.diag(h * sign))
-    found = objective.residual(np.vstack(rows))
+    residuals = objective.residual(np.vstack(rows))
     width = size * (2 if central else 1)
     jacs = []
     for k, (point, sign) in enumerate(zip(points, signs, strict=True)):
-        part = found[k * width : (k + 1) * width]
+        part = residuals[k * width : (k + 1) * width]
         if central:
             jacs.append(((part[:size] - part[size:]) / (2.0 * h * sign)[:, None]).T)
         else:
@@ -99,11 +99,11 @@ def _round(objective: Objective, points: list[Point], central: bool) -> None:
     trials = np.vstack(
         [_trials(objective, point, jac) for point, jac in zip(points, jacs, strict=True)]
     )
-    found = objective.residual(trials)
+    residuals = objective.residual(trials)
     width = len(_LADDER)
     for k, point in enumerate(points):
         part = slice(k * width, (k + 1) * width)
-        costs = [objective.cost(r, x) for r, x in zip(found[part], trials[part], strict=True)]
+        costs = [objective.cost(r, x) for r, x in zip(residuals[part], trials[part], strict=True)]
         best = int(np.argmin(costs))
         if not costs[best] < point.cost:
             point.settled = point.damping >= 1e6
@@ -114,7 +114,7 @@ def _round(objective: Objective, points: list[Point], central: bool) -> None:
         point.settled = small and point.slow
         point.slow = small
         point.damping = min(max(point.damping * _LADDER[best] * 0.3, 1e-8), 1e6)
-        point.x, point.residual = trials[part][best], found[part][best]
+        point.x, point.residual = trials[part][best], residuals[part][best]
         point.cost = costs[best]
 
 

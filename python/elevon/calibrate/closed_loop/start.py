@@ -23,10 +23,10 @@ _SPEED, _POSITION, _INTEGRAL = (10.0, 1500.0), (1.0, 80.0), (0.05, 20.0)
 
 def windows(logs: Sequence[LoopLog], per_output: float) -> list[LoopLog]:
     """Return short stretches of the logs: a busy one and a calmer one of each."""
-    found = []
+    parts = []
     for log in logs:
         if log.duration <= 2.0 * _WINDOW:
-            found.append(log)
+            parts.append(log)
             continue
         speed = log.motion(per_output)[0]
         begins = np.arange(0.0, log.duration - _WINDOW, 0.5 * _WINDOW)
@@ -36,23 +36,23 @@ def windows(logs: Sequence[LoopLog], per_output: float) -> list[LoopLog]:
             unrest.append(float(np.sqrt(np.nanmean(speed[inside] ** 2))))
         order = np.argsort(unrest)
         chosen = {int(order[round(q * (len(order) - 1))]) for q in _PLACES}
-        found += [log.window(begins[k], begins[k] + _WINDOW, _SETTLE) for k in sorted(chosen)]
-    return found
+        parts += [log.window(begins[k], begins[k] + _WINDOW, _SETTLE) for k in sorted(chosen)]
+    return parts
 
 
 def first_values(model: LoopModel) -> dict[str, float]:
     """Return what currents and speeds suggest; only paths the signals speak of."""
     constant = model.actuator.parameters.value("control.torque_constant")
     top = max(float(np.nanmax(np.abs(log.motion(model.per_output)[0]))) for log in model.logs)
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     if top > 0.0 and np.isfinite(top):
-        found["control.speed_limit"] = 1.05 * top
+        values["control.speed_limit"] = 1.05 * top
     current = [log.signals["current"][log.used] for log in model.logs if "current" in log.signals]
     if current:
         peak = float(np.nanmax(np.abs(np.concatenate(current))))
-        found["control.current_limit"] = max(1.05 * peak, 1e-3)
-        found.update(_friction(model, constant))
-    return found
+        values["control.current_limit"] = max(1.05 * peak, 1e-3)
+        values.update(_friction(model, constant))
+    return values
 
 
 def _friction(model: LoopModel, constant: float) -> dict[str, float]:
@@ -70,11 +70,11 @@ def _friction(model: LoopModel, constant: float) -> dict[str, float]:
         return {}
     a, b = constant * float(np.nanmedian(forth)), constant * float(np.nanmedian(back))
     signed = not any(log.magnitude for log in model.logs)
-    found = {"friction.dynamic": max(0.5 * (abs(a) + abs(b)), 1e-6)}
+    values = {"friction.dynamic": max(0.5 * (abs(a) + abs(b)), 1e-6)}
     if signed:
-        found["friction.dynamic"] = max(0.5 * (a - b), 0.1 * found["friction.dynamic"])
-        found["load.constant"] = 0.5 * (a + b) * model.per_output
-    return found
+        values["friction.dynamic"] = max(0.5 * (a - b), 0.1 * values["friction.dynamic"])
+        values["load.constant"] = 0.5 * (a + b) * model.per_output
+    return values
 
 
 def cloud(free: Sequence[Free], model: LoopModel, number: int, seed: int) -> Floats:
