@@ -30,6 +30,8 @@ Floats = npt.NDArray[np.float64]
 _TIED = 0.01  # relative: closer than this the controller is taken to know the motor
 _SEEN = 3.0  # deviations a controller branch must stand off zero to exist
 _GIVEN = ("motor.emf_constant",)
+#: Path, value, deviation, what it stands on, note.
+_Row = tuple[str, float, float, tuple[str, ...], str]
 
 
 @dataclass(frozen=True)
@@ -312,7 +314,8 @@ def controller_estimates(
     extra = torque.relative if torque.tied else 0.0
     given = () if torque.measured and torque.tied else ("control.torque_constant",)
     gain, gain_std = _delta(law, lambda b: torque.believed * float(b[0]))
-    rows = [("control.speed_gain", gain, float(np.hypot(gain_std, extra * gain)), given, "")]
+    std = float(np.hypot(gain_std, extra * gain))
+    rows: list[_Row] = [("control.speed_gain", gain, std, given, "")]
     rows += _times(actuator, law, ", ".join(logs))
     estimates = [_of_controller(actuator, law, *row) for row in rows]
     gains, gains_std = _delta(law, lambda b: torque.believed * float(b[1]))
@@ -326,9 +329,6 @@ def controller_estimates(
             "controller", None, "direct", given, note, False,
         ),
     ]  # fmt: skip
-
-
-_Row = tuple[str, float, float, tuple[str, ...], str]
 
 
 def _times(actuator: Actuator, law: Regression, logs: str) -> list[_Row]:
