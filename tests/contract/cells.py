@@ -23,6 +23,8 @@ from elevon.simulate.prepare import prepare
 from tests.contract import sets
 
 Values = Mapping[str, Any]
+#: Parameters that are choices, and what is chosen.
+Choices = tuple[tuple[str, str], ...]
 RATE = "1 kHz"
 
 
@@ -65,7 +67,7 @@ class Cell:
 
     name: str
     fidelity: str
-    choices: tuple[tuple[str, str], ...] = ()
+    choices: Choices = ()
     load: float = 0.0
     onwards: bool = False
 
@@ -166,7 +168,7 @@ def severe(record: Values) -> float:
 
 
 @cache
-def drives(name: str) -> list[tuple[tuple[str, str], ...]]:
+def drives(name: str) -> list[Choices]:
     """Own drive of a set, then each other choice of each choice of the group ``drive``.
 
     A choice under which the set does not move (no drive) can show no fault.
@@ -181,7 +183,7 @@ def drives(name: str) -> list[tuple[tuple[str, str], ...]]:
     return [(), *(choices for choices in others if _moves(name, choices))]
 
 
-def _moves(name: str, choices: tuple[tuple[str, str], ...]) -> bool:
+def _moves(name: str, choices: Choices) -> bool:
     ways = []
     for chosen in ((), choices):
         cell = Cell(name, "low", chosen)

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from elevon.parameters import records
 from tests.contract import sets
 from tests.contract.cells import Cell, Outcome, Variant, drives, fault, load, severe
 
@@ -24,12 +23,6 @@ ONSET, CLEARED, LOOKED = 0.05, 0.15, 0.9
 SWING_S = 2.0
 #: Largest distance from the healthy way then, of its range: what relays in another phase make.
 FORGOTTEN = 0.02
-
-#: High and low: agreement in sign and within this factor ...
-FACTOR = 1.5
-#: ... where the high model's change is this many of its own floors (two steps, no fault) and this
-#: part of the healthy value.
-FLOORS, SEEN = 5.0, 0.05
 
 
 def cells(*, every: bool) -> list[Cell]:
@@ -233,59 +226,4 @@ def _latched(outcome: Outcome) -> bool:
     )
 
 
-def apart(name: str, choices: tuple[tuple[str, str], ...], push: float) -> Iterator[str]:
-    """Faults that both models carry and in which they part: sign, or a factor of 1.5."""
-    choices = (*choices, *_shared(name))
-    high, low = (Cell(name, fidelity, choices, push) for fidelity in ("high", "low"))
-    healthy, found = rows(high, FEW)
-    healthy_low, found_low = rows(low, FEW)
-    lows = {row.name: row for row in found_low if not row.rests}
-    other = high.run([Variant(values=_other_step(high))])[0]
-    before, before_low = features(healthy), features(healthy_low)
-    floors = {key: abs(value - before[key]) for key, value in features(other).items()}
-    for row in found:
-        if row.name not in lows or row.rests:
-            continue
-        broken, broken_low = row.outcomes[-1], lows[row.name].outcomes[-1]
-        if broken.status != broken_low.status:
-            yield f"{row.name}: high ends as {broken.status}, low as {broken_low.status}"
-            continue
-        if broken.status != "ok":
-            continue
-        after, after_low = features(broken), features(broken_low)
-        for key in before.keys() & before_low.keys():
-            change, change_low = after[key] - before[key], after_low[key] - before_low[key]
-            if abs(change) <= max(FLOORS * floors[key], SEEN * abs(before[key])):
-                continue
-            ratio = change_low / change
-            if not 1.0 / FACTOR <= ratio <= FACTOR:
-                yield f"{row.name}: {key} {change:+.3g} high, {change_low:+.3g} low ({ratio:.2f})"
-
-
-def _shared(name: str) -> tuple[tuple[str, str], ...]:
-    """Choices that the low model declines, at their defaults: both then have the same model."""
-    actuator = sets.actuator(name)
-    return tuple(
-        (path, record.choices[int(record.default)])
-        for path, record in records(actuator.wiring).items()
-        if record.choices and "low" not in record.fidelities and "high" in record.fidelities
-        and record.default is not None
-        and actuator.parameters[path].value != record.choices[int(record.default)]
-    )  # fmt: skip
-
-
-def features(outcome: Outcome) -> dict[str, float]:
-    """The mean size of each mechanical signal and of the torque current, over the whole run."""
-    wanted = ("user_position", "motor_speed", "motor_torque", "current_q", "current_mean")
-    return {
-        name: float(np.mean(np.abs(outcome.signals[name])))
-        for name in wanted
-        if name in outcome.signals
-    }
-
-
-def _other_step(cell: Cell) -> dict[str, float]:
-    return {"solver.step": 0.5 * cell.actuator().parameters.value("solver.step")}
-
-
-__all__ = ["FEW", "PARTS", "apart", "cells", "lasting", "of_one_drive", "rows", "silent", "wrong"]
+__all__ = ["FEW", "PARTS", "cells", "lasting", "of_one_drive", "rows", "silent", "wrong"]

@@ -126,10 +126,10 @@ impl<S: Scalar> Resolver<S> {
         Self::derive(&own)
     }
 
-    /// Does it ever show an angle far from the shaft's, or one that stands still?
-    pub fn misplaces(own: &Own<ResolverParameter>) -> bool {
+    /// Does its reading ever stand still?
+    pub fn stands(own: &Own<ResolverParameter>) -> bool {
         use ResolverParameter as P;
-        own.any_away([P::Offset, P::PowerOff, P::Stuck, P::ExcitationShort])
+        own.any_away([P::PowerOff, P::Stuck, P::ExcitationShort])
     }
 
     /// Does it ever show another angle than the shaft's?

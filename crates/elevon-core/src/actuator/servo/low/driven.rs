@@ -51,6 +51,8 @@ struct Part<S> {
     free: [S; 3],
     /// Current per volt held over the part; none of an interrupted phase.
     per_volt: [S; 3],
+    /// How far each current would decay between the rails' pushes: to what its EMF drives.
+    drift: [S; 3],
     sines: [S; 3],
     cosines: [S; 3],
     /// Speed that the drive believes.
@@ -77,27 +79,30 @@ pub(super) fn driven_step<S: Scalar>(
     let per_volt = three!(|j| S::select(half.le(m.star.open[j]), zero, held[j]));
     let mut x = Driven { phases: i, torque: zero, copper: zero, drawn: zero, voltage: zero, quadrature: zero, seen: zero };
     let mut k = zero;
+    // The shaft's position takes the new speed: speed and currents stand half a step before it.
+    let middle = half * parts;
     // Lanes that have all their parts wait for the others.
     while S::any(k.lt(parts)) {
         let running = k.lt(parts);
-        let at = |instant: S| (instant * dt).fma(speed, s.shaft.motor_position);
+        let at = |instant: S| ((instant - middle) * dt).fma(speed, s.shaft.motor_position);
         let along: [S; 3] = coefficients(m, structure, at(k + half));
         let emf: [S; 3] = three!(|j| along[j] * s.flux_factor * speed);
         let (sin, cos) = m.star.electrical_angle(shown(m, structure, s, at(k + one))).sin_cos();
         let (sines, cosines) = three_phase(sin, cos);
         let free = three!(|j| x.phases[j] - per_volt[j] * (emf[j] + resistance[j] * x.phases[j]));
-        let part = Part { dt, half_supply: half * supply, free, per_volt, sines, cosines, speed: p.believed[1] };
+        let drift = three!(|j| emf[j] / resistance[j] + x.phases[j]);
+        let part = Part { dt, half_supply: half * supply, free, per_volt, drift, sines, cosines, speed: p.believed[1] };
         let mut memory = s.driven;
         let after = match structure.drive {
-            DriveKind::Pwm => carried(m, &part, &mut memory, wanted, x.phases),
-            DriveKind::Hysteresis | DriveKind::Off => relayed(m, structure, &part, &mut memory, wanted),
+            DriveKind::Pwm => Carrier::of(m).step(&part, &mut memory, wanted, x.phases),
+            DriveKind::Hysteresis | DriveKind::Off => Relays::of(m, structure).step(&part, &mut memory, wanted),
         };
-        let middle: [S; 3] = three!(|j| half * (x.phases[j] + after[j]));
+        let mean: [S; 3] = three!(|j| half * (x.phases[j] + after[j]));
         let sum = |total: S, value: S| S::select(running, share.fma(value, total), total);
         for j in 0..3 {
-            x.torque = sum(x.torque, along[j] * s.flux_factor * middle[j]);
-            x.copper = sum(x.copper, resistance[j] * middle[j] * middle[j]);
-            x.drawn = sum(x.drawn, memory.legs[j] * middle[j]);
+            x.torque = sum(x.torque, along[j] * s.flux_factor * mean[j]);
+            x.copper = sum(x.copper, resistance[j] * mean[j] * mean[j]);
+            x.drawn = sum(x.drawn, memory.legs[j] * mean[j]);
         }
         x.voltage = sum(x.voltage, quadrature(memory.legs, sines));
         x.phases = three!(|j| S::select(running, after[j], x.phases[j]));
@@ -107,7 +112,7 @@ pub(super) fn driven_step<S: Scalar>(
         x.seen = S::select(running, seen, x.seen);
         k = k + one;
     }
-    let (sin, cos) = m.star.electrical_angle(speed.fma(m.dt, s.shaft.motor_position)).sin_cos();
+    let (sin, cos) = m.star.electrical_angle((half * m.dt).fma(speed, s.shaft.motor_position)).sin_cos();
     x.quadrature = quadrature(x.phases, three_phase(sin, cos).0);
     x
 }
@@ -122,52 +127,119 @@ fn shown<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, position:
     }
 }
 
-/// Mean legs of the relays: each leaves its voltage until its phase's error is out of the band, then gives what brings it
-/// back to the edge, within the rails. A turned reference sweeps the band: no error is left over a cycle.
-#[inline(always)]
-fn relayed<S: Scalar>(m: &Model<S>, structure: &Structure, part: &Part<S>, memory: &mut DrivenState<S>, wanted: S) -> [S; 3] {
-    let reference = if structure.six_step { six_step(part.sines) } else { part.sines };
-    let edge = if structure.turned { S::zero() } else { m.drive.band };
-    let mut after = settled(part, memory.legs);
-    for _ in 0..ROUNDS {
-        for j in 0..3 {
-            let others = part.per_volt[(j + 1) % 3] + part.per_volt[(j + 2) % 3];
-            let total = part.per_volt[j] + others;
-            // Per volt of this leg, the neutral following.
-            let reach = part.per_volt[j] * others / S::select(total.equals(S::zero()), S::one(), total) * m.drive.gain[j];
-            let error = wanted * reference[j] - m.drive.gain[j] * after[j];
-            let none = reach.equals(S::zero());
-            let beyond = error - error.clamp_abs(edge);
-            let change = S::select(none, S::zero(), beyond / S::select(none, S::one(), reach));
-            memory.legs[j] = (memory.legs[j] + change).clamp_abs(part.half_supply);
-            after = settled(part, memory.legs);
+/// Mean legs of the relays: each gives what brings its phase to the edge of its band, within the rails. The mean of a band
+/// is on the side to which the current decays between the pushes. With an interrupted phase the edges are those of a play: a leg keeps
+/// its voltage until the error has left the band.
+struct Relays<S> {
+    gain: [S; 3],
+    weight: [S; 3],
+    edge: S,
+    play: S,
+    six_step: bool,
+}
+
+impl<S: Scalar> Relays<S> {
+    #[inline(always)]
+    fn of(m: &Model<S>, structure: &Structure) -> Self {
+        let (zero, open) = (S::zero(), &m.star.open);
+        let open = S::splat(0.5).le(open[0].maximum(open[1]).maximum(open[2]));
+        // Square waves of the three edges have 4/pi of them as their quadrature component. Blocks by an angle that is not the
+        // shaft's, and references that stand apart from the rotor, leave no error in the mean.
+        let exact = structure.turned || (structure.six_step && structure.misled);
+        let edge = if exact || structure.uneven { zero } else { S::splat(std::f64::consts::FRAC_PI_4) * m.drive.band };
+        let play = if structure.uneven { m.drive.band } else { zero };
+        let kept = if exact { zero } else { m.drive.band };
+        Self {
+            gain: m.drive.gain,
+            weight: m.drive.weight,
+            edge: S::select(open, zero, edge),
+            play: S::select(open, kept, play),
+            six_step: structure.six_step,
         }
     }
-    after
+
+    /// Currents to which the phases are brought: the star has no error that all share.
+    #[inline(always)]
+    fn aims(&self, part: &Part<S>, wanted: S) -> [S; 3] {
+        let reference = if self.six_step { six_step(part.sines) } else { part.sines };
+        let edges: [S; 3] = three!(|j| part.drift[j].clamp_abs(self.edge));
+        let weight = &self.weight;
+        let uneven = weight[0] * edges[0] + weight[1] * edges[1] + weight[2] * edges[2];
+        let sum = weight[0] + weight[1] + weight[2];
+        let common = uneven / S::select(sum.equals(S::zero()), S::one(), sum);
+        three!(|j| wanted * reference[j] - (edges[j] - common))
+    }
+
+    #[inline(always)]
+    fn step(&self, part: &Part<S>, memory: &mut DrivenState<S>, wanted: S) -> [S; 3] {
+        let (zero, one) = (S::zero(), S::one());
+        let aims = self.aims(part, wanted);
+        let mut after = settled(part, memory.legs);
+        for _ in 0..ROUNDS {
+            for j in 0..3 {
+                let others = part.per_volt[(j + 1) % 3] + part.per_volt[(j + 2) % 3];
+                let total = part.per_volt[j] + others;
+                // Per volt of this leg, the neutral following.
+                let reach = part.per_volt[j] * others / S::select(total.equals(zero), one, total) * self.gain[j];
+                let error = aims[j] - self.gain[j] * after[j];
+                let none = reach.equals(zero);
+                let beyond = error - error.clamp_abs(self.play);
+                let change = S::select(none, zero, beyond / S::select(none, one, reach));
+                memory.legs[j] = (memory.legs[j] + change).clamp_abs(part.half_supply);
+                after = settled(part, memory.legs);
+            }
+        }
+        after
+    }
 }
 
 /// The PI of a carrier drive with its zero on the winding's pole, decoupled, on the currents that the sensors show.
-#[inline(always)]
-fn carried<S: Scalar>(m: &Model<S>, part: &Part<S>, memory: &mut DrivenState<S>, wanted: S, i: [S; 3]) -> [S; 3] {
-    let (zero, one) = (S::zero(), S::one());
-    let (resistance, inductance) = (m.cold[1], m.cold[2]);
-    let shown: [S; 3] = three!(|j| m.drive.gain[j] * i[j]);
-    let (q, d) = (quadrature(shown, part.sines), -quadrature(shown, part.cosines));
-    let error = [-d, wanted - q];
-    // As a first-order lag looked at by parts.
-    let bandwidth = m.drive.bandwidth;
-    let gain = inductance / part.dt * (one - (-(bandwidth * part.dt)).exp());
-    let electrical = m.drive.electrical_inductance * part.speed;
-    let emf = m.cold[0] * S::splat(2.0 / 3.0) * part.speed;
-    let asked = [gain.fma(error[0], memory.integral[0]) - electrical * q, gain.fma(error[1], memory.integral[1]) + electrical * d + emf];
-    let size = (asked[0] * asked[0] + asked[1] * asked[1]).sqrt();
-    let largest = m.drive.voltage_ratio * S::splat(2.0) * part.half_supply;
-    let limited = largest.lt(size);
-    let scale = S::select(limited, largest / S::select(limited, size, one), one);
-    let step = S::select(limited, zero, bandwidth * resistance * part.dt);
-    memory.integral = [0, 1].map(|a| step.fma(error[a], memory.integral[a]));
-    memory.legs = three!(|j| scale * (asked[1] * part.sines[j] - asked[0] * part.cosines[j]));
-    settled(part, memory.legs)
+struct Carrier<S> {
+    gain: [S; 3],
+    emf_constant: S,
+    resistance: S,
+    inductance: S,
+    bandwidth: S,
+    electrical_inductance: S,
+    voltage_ratio: S,
+}
+
+impl<S: Scalar> Carrier<S> {
+    #[inline(always)]
+    fn of(m: &Model<S>) -> Self {
+        let [constant, resistance, inductance] = m.cold;
+        Self {
+            gain: m.drive.gain,
+            emf_constant: constant * S::splat(2.0 / 3.0),
+            resistance,
+            inductance,
+            bandwidth: m.drive.bandwidth,
+            electrical_inductance: m.drive.electrical_inductance,
+            voltage_ratio: m.drive.voltage_ratio,
+        }
+    }
+
+    #[inline(always)]
+    fn step(&self, part: &Part<S>, memory: &mut DrivenState<S>, wanted: S, i: [S; 3]) -> [S; 3] {
+        let (zero, one) = (S::zero(), S::one());
+        let shown: [S; 3] = three!(|j| self.gain[j] * i[j]);
+        let (q, d) = (quadrature(shown, part.sines), -quadrature(shown, part.cosines));
+        let error = [-d, wanted - q];
+        // As a first-order lag looked at by parts.
+        let gain = self.inductance / part.dt * (one - (-(self.bandwidth * part.dt)).exp());
+        let electrical = self.electrical_inductance * part.speed;
+        let emf = self.emf_constant * part.speed;
+        let asked =
+            [gain.fma(error[0], memory.integral[0]) - electrical * q, gain.fma(error[1], memory.integral[1]) + electrical * d + emf];
+        let size = (asked[0] * asked[0] + asked[1] * asked[1]).sqrt();
+        let largest = self.voltage_ratio * S::splat(2.0) * part.half_supply;
+        let limited = largest.lt(size);
+        let scale = S::select(limited, largest / S::select(limited, size, one), one);
+        let step = S::select(limited, zero, self.bandwidth * self.resistance * part.dt);
+        memory.integral = [0, 1].map(|a| step.fma(error[a], memory.integral[a]));
+        memory.legs = three!(|j| scale * (asked[1] * part.sines[j] - asked[0] * part.cosines[j]));
+        settled(part, memory.legs)
+    }
 }
 
 /// Currents after a part under leg voltages; the neutral keeps their sum at zero.
@@ -182,4 +254,138 @@ fn settled<S: Scalar>(part: &Part<S>, legs: [S; 3]) -> [S; 3] {
     // One closed phase alone carries nothing.
     let alone = (closed[0] + closed[1] + closed[2]).lt(S::splat(1.5));
     three!(|j| S::select(alone, zero, closed[j] * (raised[j] - g[j] * neutral)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const R: f64 = 2.0;
+    const L: f64 = 1e-2;
+    const DT: f64 = 5e-5;
+
+    /// A part of the star at rest with the currents `i`, phases interrupted where `open`.
+    fn part(i: [f64; 3], open: [bool; 3], angle: f64) -> Part<f64> {
+        let held = (1.0 - (-DT * R / L).exp()) / R;
+        let per_volt = open.map(|gone| if gone { 0.0 } else { held });
+        let (sines, cosines) = three_phase(angle.sin(), angle.cos());
+        Part {
+            dt: DT,
+            half_supply: 24.0,
+            free: three!(|j| i[j] - per_volt[j] * R * i[j]),
+            per_volt,
+            drift: [0.0; 3],
+            sines,
+            cosines,
+            speed: 0.0,
+        }
+    }
+
+    fn charging(parts: i32) -> f64 {
+        1.0 - (-f64::from(parts) * DT * R / L).exp()
+    }
+
+    #[test]
+    fn held_legs_charge_a_star_as_its_exponential() {
+        let legs = [10.0, -2.0, 1.0];
+        let mut i = [0.0; 3];
+        for _ in 0..100 {
+            i = settled(&part(i, [false; 3], 0.0), legs);
+        }
+        for j in 0..3 {
+            assert!((i[j] - (legs[j] - 3.0) / R * charging(100)).abs() < 1e-12, "{i:?}");
+        }
+    }
+
+    #[test]
+    fn two_phases_are_one_loop_and_one_is_none() {
+        let legs = [10.0, -2.0, 1.0];
+        let (mut i, mut alone) = ([0.0; 3], [0.0; 3]);
+        for _ in 0..100 {
+            i = settled(&part(i, [false, false, true], 0.0), legs);
+            alone = settled(&part(alone, [true, false, true], 0.0), legs);
+        }
+        let around = 12.0 / (2.0 * R) * charging(100);
+        assert!((i[0] - around).abs() < 1e-12 && (i[1] + around).abs() < 1e-12, "{i:?}");
+        assert_eq!(i[2], 0.0);
+        assert_eq!(alone, [0.0; 3]);
+    }
+
+    #[test]
+    fn the_emf_holds_every_current_at_the_edge_of_its_band() {
+        let relays = Relays { gain: [1.0; 3], weight: [1.0; 3], edge: 0.1, play: 0.0, six_step: false };
+        let (mut i, mut memory, wanted) = ([0.0; 3], DrivenState::rest(), 3.0);
+        let turns = 400;
+        let (mut mean, mut worst) = (0.0, 0.0_f64);
+        for k in 0..2 * turns {
+            let mut x = part(i, [false; 3], std::f64::consts::TAU * f64::from(k) / f64::from(turns));
+            x.drift = three!(|j| 50.0 * x.sines[j]);
+            i = relays.step(&x, &mut memory, wanted);
+            if k >= turns {
+                mean += quadrature(i, x.sines) / f64::from(turns);
+                worst = (0..3).map(|j| (wanted * x.sines[j] - i[j]).abs()).fold(worst, f64::max);
+            }
+        }
+        // The star has no common error: a square wave less a third of itself at three times the frequency.
+        assert!((mean - (wanted - 0.1 * 4.0 / std::f64::consts::PI)).abs() < 0.02, "{mean}");
+        assert!(worst < 0.15, "{worst}");
+    }
+
+    #[test]
+    fn a_leg_in_its_play_keeps_its_voltage() {
+        let relays = Relays { gain: [1.0; 3], weight: [1.0; 3], edge: 0.0, play: 0.5, six_step: false };
+        let mut memory = DrivenState::rest();
+        relays.step(&part([0.0; 3], [false, false, true], 0.3), &mut memory, 0.4);
+        assert_eq!(memory.legs, [0.0; 3]);
+    }
+
+    #[test]
+    fn relays_out_of_reach_are_six_step() {
+        let relays = Relays { gain: [1.0; 3], weight: [1.0; 3], edge: 0.1, play: 0.0, six_step: false };
+        let mut memory = DrivenState::rest();
+        let x = part([0.0; 3], [false; 3], 0.3);
+        relays.step(&x, &mut memory, 1e3);
+        for j in 0..3 {
+            assert_eq!(memory.legs[j], 24.0 * x.sines[j].signum());
+        }
+    }
+
+    #[test]
+    fn relays_of_an_open_phase_carry_half_the_difference_of_the_references() {
+        let relays = Relays { gain: [1.0; 3], weight: [1.0; 3], edge: 0.0, play: 0.0, six_step: false };
+        let (mut i, mut memory) = ([0.0; 3], DrivenState::rest());
+        // Between the two references: whose leg has room left decides.
+        let x = |i| part(i, [false, false, true], 0.5 * std::f64::consts::PI - std::f64::consts::PI / 3.0);
+        for _ in 0..200 {
+            i = relays.step(&x(i), &mut memory, 3.0);
+        }
+        let sines = x(i).sines;
+        assert!(i[0] >= 3.0 * sines[0].min(-sines[1]) - 1e-9 && i[0] <= 3.0 * sines[0].max(-sines[1]) + 1e-9, "{i:?} {sines:?}");
+        assert_eq!((i[2], i[1]), (0.0, -i[0]));
+    }
+
+    #[test]
+    fn a_carrier_drive_follows_as_a_lag_within_its_circle() {
+        let drive = Carrier {
+            gain: [1.0; 3],
+            emf_constant: 0.1,
+            resistance: R,
+            inductance: L,
+            bandwidth: 500.0,
+            electrical_inductance: 0.04,
+            voltage_ratio: 0.5,
+        };
+        let (mut i, mut memory, angle) = ([0.0; 3], DrivenState::rest(), 0.7);
+        for k in 1..100 {
+            let x = part(i, [false; 3], angle);
+            i = drive.step(&x, &mut memory, 3.0, i);
+            let lag = 1.0 - (-500.0 * DT * f64::from(k)).exp();
+            assert!((quadrature(i, x.sines) - 3.0 * lag).abs() < 0.03, "{k}");
+            assert!(quadrature(i, x.cosines).abs() < 1e-9);
+        }
+        drive.step(&part(i, [false; 3], angle), &mut memory, 300.0, i);
+        let x = part(i, [false; 3], angle);
+        let (q, d) = (quadrature(memory.legs, x.sines), quadrature(memory.legs, x.cosines));
+        assert!((q.hypot(d) - 24.0).abs() < 1e-9);
+    }
 }

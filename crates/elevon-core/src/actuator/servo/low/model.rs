@@ -22,7 +22,7 @@ use crate::motor::thermal::{Network, NetworkState, ThermalModel, ThermalParamete
 use crate::scalar::Scalar;
 use crate::sensor::current::CurrentSensorParameter;
 use crate::sensor::filter::closing;
-use crate::sensor::resolver::Resolver;
+use crate::sensor::resolver::{Resolver, ResolverParameter};
 use crate::three;
 
 details! {
@@ -56,6 +56,8 @@ details! {
         ]);
         /// Shorted turns have currents of their own.
         loops = shorted && ShortModel::read(parts.motor().value(MotorParameter::ShortModel)) == ShortModel::Loop;
+        /// The reading is lost or stands still: the drive comes to its voltage limit, where currents lag.
+        unseen = sensing.resolver && Resolver::<f64>::stands(&parts.resolver());
         /// Coefficients vary with the rotor angle.
         angle = (sensing.resolver && sensing.commutated)
             || motor.dynamic_eccentricity
@@ -66,17 +68,22 @@ details! {
             || six_step
             || passive
             || gains
+            || unseen
             || interrupted(&parts.motor())
             || shorted;
-        /// The references stand far from the rotor's angle, or still.
-        turned = sensing.resolver && sensing.commutated && Resolver::<f64>::misplaces(&parts.resolver());
-        /// One current does not stand for three: references that stand apart from the rotor, relays whose references the
-        /// star's currents cannot have all, integrals that no current follows.
+        /// The drive places its references by a reading that is not the shaft's angle.
+        misled = sensing.resolver && sensing.commutated;
+        /// One current does not stand for three: references that are not the rotor's or no sines, relays whose
+        /// references the star's currents cannot have all, integrals that no current follows, a voltage limit for long.
         driven = match drive {
-            DriveKind::Hysteresis => gains || turned || interrupted(&parts.motor()),
-            DriveKind::Pwm => interrupted(&parts.motor()) || (sensing.resolver && sensing.commutated),
+            DriveKind::Hysteresis => six_step || gains || unseen || misled || interrupted(&parts.motor()),
+            DriveKind::Pwm => unseen || misled || interrupted(&parts.motor()),
             DriveKind::Off => false,
         };
+        /// Of these: the torque follows its reference but for the relays' band.
+        uneven = drive == DriveKind::Hysteresis && gains && !(six_step || unseen || misled || interrupted(&parts.motor()));
+        /// The references stand apart from the rotor by an angle that does not change.
+        turned = misled && parts.resolver().away(ResolverParameter::Offset);
         heat = Network::<f64>::needed(&parts.thermal());
         link = DcLink::<f64>::needed(&parts.link());
         extra_shaft = shaft.extra;

@@ -142,12 +142,19 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
         &m.healthy
     };
     let (mut derivative_inertia, mut per_inertia) = (m.control.derivative_inertia, p.per_effective_inertia);
+    let mut torque = p.efficacy * asked.torque;
+    let mut answer = p.efficacy;
+    if EXTRA && structure.driven && !structure.uneven {
+        // The windings make of a reference what they can: the torque there is, and what a step adds to it.
+        answer = answer.maximum(S::zero()) * m.drive.tracking;
+        torque = answer.fma(asked.torque - s.torque_ref, s.motor_torque);
+        per_inertia = S::one() / answer.fma(derivative_inertia, m.shaft.inertia);
+    }
     if FULL && structure.sensing.resolver {
         // The derivative sees what the resolver shows of the acceleration.
         derivative_inertia = derivative_inertia * m.sensing.follows();
-        per_inertia = S::one() / p.efficacy.fma(derivative_inertia, m.shaft.inertia);
+        per_inertia = S::one() / answer.fma(derivative_inertia, m.shaft.inertia);
     }
-    let torque = p.efficacy * asked.torque;
     let mut loads = m.shaft.loads::<FULL, EXTRA>(&structure.shaft, x, &s.shaft, torque);
     let acceleration = m.shaft.acceleration::<EXTRA>(&structure.shaft, &s.shaft, &loads, torque, per_inertia);
     let unlimited = asked.torque - derivative_inertia * acceleration;

@@ -1,0 +1,177 @@
+"""Where the two models part: the features that they share, in means over the low model's band.
+
+The low model carries means; the high one shows the ripple of relays and carrier beside them, and a
+sample of it now and then shows the carrier's phase: read once a millisecond in step with its
+20 kHz carrier, the landing gear's torque has a mean of 0.040 N m; it is 0.055 over all instants
+(and at low). So both are read often, out of step with any carrier, and averaged over `BAND`
+before their size is asked for.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+import elevon
+from elevon.errors import ElevonWarning
+from elevon.parameters import records
+from tests.contract import sets
+from tests.contract.cells import Cell, Choices, Variant, fault, severe
+
+#: Agreement in sign and within this factor ...
+FACTOR = 1.5
+#: ... where the high model's change is this many of its own floors (healthy against healthy) and
+#: this part of the healthy value.
+FLOORS, SEEN = 5.0, 0.05
+#: Healthy runs of the high model that differ in nothing that matters: half the step, and a winding
+#: a ten-thousandth warmer or colder, by which relays and stick fall into another phase.
+ALIKE = 1e-4
+
+#: Mechanical signals, torque, and the current that makes it (of a servo, of a landing gear).
+SIGNALS = ("user_position", "motor_speed", "motor_torque", "current_q", "current_mean")
+#: Window of the means, s, and the time between two readings, s: no carrier's period is a multiple.
+BAND, READ = 1e-3, 23e-6
+#: Runs in one batch: what they keep stays under a few hundred megabytes.
+BATCH = 16
+
+
+@dataclass(frozen=True)
+class Shown:
+    """How a run ended, and the mean size of each shared signal over it."""
+
+    status: str
+    message: str
+    sizes: Mapping[str, float]
+
+
+def shown(cell: Cell, variants: Sequence[Variant], duration: float | None = None) -> list[Shown]:
+    """What each variant shows, from batches of a few."""
+    return [
+        shows
+        for first in range(0, len(variants), BATCH)
+        for shows in _batch(cell, variants[first : first + BATCH], duration)
+    ]
+
+
+def _batch(cell: Cell, variants: Sequence[Variant], duration: float | None) -> list[Shown]:
+    signals = set(SIGNALS) & set(sets.signals(cell.name, cell.fidelity))
+    runs = [cell.of(variant, duration) for variant in variants]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ElevonWarning)
+        recordings = elevon.simulate_batch(
+            runs,
+            fidelity=cell.fidelity,
+            record=",".join(sorted(signals)) + f"@{_rate(cell)} Hz",
+            threads=1,
+        )
+    return [_shown(recording, signals) for recording in recordings]
+
+
+def _rate(cell: Cell) -> str:
+    """Readings a second: the multiple of the cell's step that is nearest to `READ`, or its step."""
+    path = "solver.step" if cell.fidelity == "high" else "low.step"
+    step = cell.actuator().parameters.value(path)
+    return repr(1.0 / (step * max(round(READ / step), 1)))
+
+
+def _shown(recording: elevon.Recording, signals: set[str]) -> Shown:
+    channels = {item.name: item for item in recording.channels if item.name in signals}
+    sizes = {name: _size(item.time, item.values) for name, item in channels.items()}
+    return Shown(recording.status, recording.meta["message"], sizes)
+
+
+def _size(time: np.ndarray, values: np.ndarray) -> float:
+    """Mean over the run of the size of the means over `BAND`."""
+    window = np.floor(time[1:] / BAND - 1e-6).astype(int)
+    means = np.bincount(window, values[1:]) / np.bincount(window)
+    return float(np.mean(np.abs(means)))
+
+
+def apart(
+    name: str,
+    choices: Choices,
+    push: float,
+    only: Collection[str] = (),
+    duration: float | None = None,
+) -> Iterator[str]:
+    """Faults that both models carry and in which they part: sign, or a factor of 1.5.
+
+    All of them, or only some, over the motion or another duration (s); where they are few, healthy
+    runs are not compared among themselves: what is asked for stands far above their differences.
+    """
+    choices = (*choices, *_shared(name))
+    high, low = (Cell(name, fidelity, choices, push) for fidelity in ("high", "low"))
+    asked = [variant for variant in _carried(high, low) if not only or variant.name in only]
+    healthy, *broken = shown(high, [Variant(), *asked], duration)
+    healthy_low, *broken_low = shown(low, [Variant(), *asked], duration)
+    floors = dict.fromkeys(healthy.sizes, 0.0) if only else _floors(high, healthy)
+    for variant, after, after_low in zip(asked, broken, broken_low, strict=True):
+        if after.status != after_low.status:
+            yield f"{variant.name}: high ends as {after.status}, low as {after_low.status}"
+        elif after.status == "ok":
+            yield from _parted(variant.name, floors, (healthy, after), (healthy_low, after_low))
+
+
+def _parted(
+    name: str,
+    floors: Mapping[str, float],
+    high: tuple[Shown, Shown],
+    low: tuple[Shown, Shown],
+) -> Iterator[str]:
+    """Features of one fault in which the low model is elsewhere: healthy and broken of each."""
+    for key in sorted(high[0].sizes.keys() & low[0].sizes.keys()):
+        before = high[0].sizes[key]
+        change, change_low = (after.sizes[key] - was.sizes[key] for was, after in (high, low))
+        if abs(change) <= max(FLOORS * floors[key], SEEN * before):
+            continue
+        ratio = change_low / change
+        if not 1.0 / FACTOR <= ratio <= FACTOR:
+            yield f"{name}: {key} {change:+.3g} high, {change_low:+.3g} low ({ratio:.2f})"
+
+
+def _carried(high: Cell, low: Cell) -> list[Variant]:
+    """Every fault that runs and acts at both fidelities, severe."""
+    lows = {(kind, place) for kind, place, _ in low.faults()}
+    asked = [
+        Variant(f"{kind}@{place}", faults=(fault(kind, place, record, severe(record)),))
+        for kind, place, record in high.faults()
+        if (kind, place) in lows
+    ]
+    return [
+        variant
+        for variant in asked
+        if not any(cell.refused(variant) or cell.resting(variant) for cell in (high, low))
+    ]
+
+
+def _floors(cell: Cell, healthy: Shown) -> dict[str, float]:
+    """Largest difference of each feature among healthy runs that differ in nothing of matter."""
+    value = cell.actuator().parameters.value
+    winding, step = "motor.winding_resistance", "solver.step"
+    alike = [
+        *shown(
+            cell, [Variant(values={winding: value(winding) * x}) for x in (1 + ALIKE, 1 - ALIKE)]
+        ),
+        *shown(cell, [Variant(values={step: 0.5 * value(step)})]),
+    ]
+    return {
+        key: max(abs(one.sizes[key] - size) for one in alike) for key, size in healthy.sizes.items()
+    }
+
+
+def _shared(name: str) -> Choices:
+    """Choices that the low model declines, at their defaults: both then have the same model."""
+    actuator = sets.actuator(name)
+    return tuple(
+        (path, record.choices[int(record.default)])
+        for path, record in records(actuator.wiring).items()
+        if record.choices and "low" not in record.fidelities and "high" in record.fidelities
+        and record.default is not None
+        and actuator.parameters[path].value != record.choices[int(record.default)]
+    )  # fmt: skip
+
+
+__all__ = ["apart", "shown"]
