@@ -13,6 +13,7 @@ from elevon.cli.reproduce.next_test import CASES as _NEXT_TEST
 from elevon.cli.reproduce.optimisers import CASES as _OPTIMISERS
 from elevon.cli.reproduce.pisa import CASES as _PISA
 from elevon.cli.reproduce.prognosis import CASES as _PROGNOSIS
+from elevon.cli.reproduce.signatures import CASES as _SIGNATURES
 from elevon.cli.reproduce.torino import CASES as _TORINO
 
 app = typer.Typer(
@@ -35,6 +36,7 @@ _CASES = (
     *_CRANFIELD,
     *_DIAGNOSIS,
     *_NEXT_TEST,
+    *_SIGNATURES,
     *_OPTIMISERS,
     *_PROGNOSIS,
 )

@@ -1,0 +1,293 @@
+"""What each fault looks like: healthy beside faulty, in time and in spectrum, for each actuator.
+
+No published figure: the gallery answers "what would I see?" for the whole catalogue.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.actuator import Actuator
+from elevon.errors import InputError
+from elevon.faults import FaultRecord, catalogue
+from elevon.progress import Progress
+from elevon.recording import Recording
+from elevon.report import Check, all_passed
+from elevon.scenario import Scenario
+from elevon.simulate import Run, simulate_batch
+
+__all__ = ["ACTUATORS", "Signature", "SignaturesResult", "reproduce_signatures"]
+
+Floats = npt.NDArray[np.float64]
+ACTUATORS = ("torino-rotary", "nasa-ballscrew", "pisa-landing-gear")
+RATE = 2000.0
+
+#: Severity shown, by kind, or kind and unit: plainly visible, and short of ruin (ASSUMED: a gallery
+#: shows what to look for, not where a fault begins to be seen). Every other kind, a switch or a
+#: share of time, at its most.
+_SHOWN: Mapping[str, float] = {
+    "adapter_gap": 0.5e-3,
+    "bearing m": 2e-5,
+    "bearing N m": 0.05,
+    "bearing_wear": 0.1,
+    "brake_dragging": 0.2,
+    "chipped_tooth m": 1e-4,
+    "chipped_tooth rad": 0.01,
+    "contamination": 0.01,
+    "dark_sectors": 0.2,
+    "demagnetisation": 0.2,
+    "dropout": 0.3,
+    "eccentricity_dynamic": 0.3,
+    "eccentricity_static": 0.3,
+    "efficiency_loss": 0.2,
+    "friction": 1.0,
+    "friction_growth": 500.0,
+    "gain": 0.2,
+    "gain_drift": 0.3,
+    "ground_short": 0.2,
+    "jam N": 2000.0,
+    "jam N m": 2.0,
+    "local_demagnetisation": 0.5,
+    "lock_spring_weak": 0.8,
+    "lubrication": 2.0,
+    "lubrication_loss": 0.5,
+    "mismatch": 0.1,
+    "missing_counts": 0.1,
+    "offset A": 0.5,
+    "offset m": 2e-3,
+    "offset rad": 0.3,
+    "phase_short": 0.2,
+    "play m": 0.5e-3,
+    "play rad": 0.015,
+    "resistor_short": 0.2,
+    "return_jam": 1.0,
+    "sag": 0.4,
+    "short": 0.3,
+    "spall": 2e-4,
+    "stator_rub": 0.97,
+    "tooth_wear m": 2e-4,
+    "tooth_wear rad": 0.01,
+    "unbalance": 2e-5,
+    "winding_short": 0.3,
+}
+#: What a fault needs of its actuator to show at all; the healthy unit beside it has the same.
+_GIVEN: Mapping[str, Mapping[str, str]] = {
+    "connector_open": {"inverter.link_capacitance": "470 uF"},
+}
+#: A failed release cable shows in no extension and no retraction: nobody pulls it.
+_SILENT = 1.0
+_SIGNALS = (
+    "user_position",
+    "encoder_position",
+    "motor_speed",
+    "current_q",
+    "current_q_meas",
+    "current_mean",
+    "motor_torque",
+)
+
+
+@dataclass(frozen=True)
+class Signature:
+    """One fault beside the healthy unit.
+
+    Attributes
+    ----------
+    actuator, kind, place : str
+        Which, where: the first place of the catalogue; `places` has all.
+    severity : float
+        In `unit`.
+    status : str
+        Of the faulty run.
+    changes : mapping of str to float
+        Signal to the rms difference from the healthy run, over the healthy one's rms about its
+        mean.
+    time : ndarray, shape (n,)
+        s.
+    shown : str
+        The signal whose change is the largest.
+    healthy, faulty : ndarray, shape (n,)
+        That signal, SI.
+    """
+
+    actuator: str
+    kind: str
+    place: str
+    places: tuple[str, ...]
+    severity: float
+    unit: str
+    effect: str
+    status: str
+    changes: Mapping[str, float]
+    time: Floats
+    shown: str
+    healthy: Floats
+    faulty: Floats
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the row."""
+        return {
+            "actuator": self.actuator,
+            "kind": self.kind,
+            "place": self.place,
+            "severity": self.severity,
+            "unit": self.unit,
+            "status": self.status,
+            "shown": self.shown,
+            **{f"change_{name}": self.changes.get(name) for name in _SIGNALS},
+        }
+
+
+@dataclass(frozen=True)
+class SignaturesResult:
+    """The gallery."""
+
+    signatures: tuple[Signature, ...]
+
+    def checks(self) -> list[Check]:
+        """Return what must hold: no run left the numbers; what leaves no trace is counted."""
+        diverged = sum(item.status == "diverged" for item in self.signatures)
+        silent = [i for i in self.signatures if max(i.changes.values(), default=0.0) < 1e-6]
+        return [
+            Check("faults whose run diverged", float(diverged), 0.0, "faults"),
+            Check("faults without any trace", float(len(silent)), _SILENT, "faults"),
+        ]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form."""
+        checks = self.checks()
+        return {
+            "status": "pass" if all_passed(checks) else "fail",
+            "checks": [check.to_dict() for check in checks],
+            "rows": [item.to_dict() for item in self.signatures],
+        }
+
+
+def reproduce_signatures(
+    actuators: tuple[str, ...] = ACTUATORS,
+    *,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> SignaturesResult:
+    """Run every kind of fault of some actuators at high fidelity, each beside the healthy unit.
+
+    Errors as `simulate_batch`.
+    """
+    signatures: list[Signature] = []
+    for number, name in enumerate(actuators):
+        start, share = number / len(actuators), 1.0 / len(actuators)
+
+        def part(fraction: float, start: float = start, share: float = share) -> bool:
+            return progress is None or progress(start + share * fraction) is not False
+
+        signatures += _gallery(_quiet(Actuator.load(name)), seed, part)
+    return SignaturesResult(tuple(signatures))
+
+
+def _gallery(actuator: Actuator, seed: int, progress: Progress) -> list[Signature]:
+    scenario = _motion(actuator)
+    records = [r for r in catalogue(actuator.wiring) if "high" in r.fidelities]
+    shown = {record.kind: record for record in reversed(records)}
+    faults = [(record, record.places[0], _severity(record)) for record in shown.values()][::-1]
+    runs = []
+    for record, place, severity in faults:
+        unit = actuator.with_values(_GIVEN.get(record.kind, {}))
+        runs.append(Run(unit, _with(scenario, record, place, severity), seed))
+    units = {run.actuator.hash: run.actuator for run in runs}
+    runs += [Run(unit, scenario, seed) for unit in units.values()]
+    signals = _recorded(actuator)
+    record_text = f"{','.join(signals)}@{RATE:g} Hz"
+    answers = simulate_batch(runs, record=record_text, progress=progress)
+    healthy = dict(zip(units, answers[len(faults) :], strict=True))
+    return [
+        _signature(actuator, fault, healthy[run.actuator.hash], answer)
+        for fault, run, answer in zip(faults, runs, answers, strict=False)
+    ]
+
+
+def _quiet(actuator: Actuator) -> Actuator:
+    """Return the actuator with a carrier-PWM drive where it has the choice.
+
+    The ripple of hysteresis relays is chaotic: it differs between any two runs and hides the rest.
+    """
+    return actuator.with_values(
+        {"drive.kind": "pwm"} if "drive.kind" in actuator.parameters else {}
+    )
+
+
+def _recorded(actuator: Actuator) -> list[str]:
+    from elevon.scenario.compile import signal_records
+
+    known = signal_records(actuator.wiring, "high")
+    return [name for name in _SIGNALS if name in known]
+
+
+def _motion(actuator: Actuator) -> Scenario:
+    """Return a motion that shows faults: a sine both ways against a load; a gear's own cycle."""
+    own = Scenario.from_dict(dict(actuator.default_scenario or {}), actuator.name)
+    if own.command.mode == "gear":
+        steps = [{"time": "0.1 s", "action": "extend"}, {"time": "9 s", "action": "retract"}]
+        return Scenario.from_dict({"duration": "18 s", "command": {"mode": "gear", "steps": steps}})
+    linear = "m" if "screw.lead" in actuator.parameters else "deg"
+    size, load = ("20 mm", "2000 N") if linear == "m" else ("7 deg", "20 N m")
+    sine = {"kind": "sine", "amplitude": size, "frequency": "1 Hz"}
+    return Scenario.from_dict(
+        {
+            "duration": "2 s",
+            "command": {"terms": [sine]},
+            "load": {"user": {"terms": [{"kind": "constant", "value": load}]}},
+        }
+    )
+
+
+def _severity(record: FaultRecord) -> float:
+    for key in (f"{record.kind} {record.unit}", record.kind):
+        if key in _SHOWN:
+            return min(_SHOWN[key], record.maximum)
+    if not np.isfinite(record.maximum):
+        raise InputError(f"{record.kind} [{record.unit}]: the gallery knows no severity to show")
+    return record.maximum
+
+
+def _with(scenario: Scenario, record: FaultRecord, place: str, severity: float) -> Scenario:
+    onset = {"kind": "step", "time": 0.25 * scenario.seconds}
+    fault = {"kind": record.kind, "place": place, "severity": severity, "profile": onset}
+    return scenario.with_faults([fault])
+
+
+def _signature(
+    actuator: Actuator,
+    fault: tuple[FaultRecord, str, float],
+    healthy: Recording,
+    faulty: Recording,
+) -> Signature:
+    record, place, severity = fault
+    changes = {name: _change(healthy[name].values, faulty[name].values) for name in healthy.names}
+    shown = max(changes, key=lambda name: changes[name])
+    count = len(faulty[shown])
+    return Signature(
+        actuator=actuator.name,
+        kind=record.kind,
+        place=place,
+        places=record.places,
+        severity=severity,
+        unit=record.unit,
+        effect=record.effect,
+        status=faulty.status,
+        changes=changes,
+        time=healthy[shown].time[:count],
+        shown=shown,
+        healthy=healthy[shown].values[:count],
+        faulty=faulty[shown].values,
+    )
+
+
+def _change(healthy: Floats, faulty: Floats) -> float:
+    count = min(healthy.size, faulty.size)
+    spread = float(np.std(healthy)) or 1.0
+    return float(np.sqrt(np.mean((faulty[:count] - healthy[:count]) ** 2)) / spread)
