@@ -11,7 +11,7 @@ import numpy as np
 
 from elevon.errors import InputError
 from elevon.prognose.answer import Known, Prognosis
-from elevon.prognose.future import look_ahead
+from elevon.prognose.future import MODEL_ERROR, look_ahead
 from elevon.prognose.observation import Inspection
 from elevon.prognose.particle import BIAS, COUNT, ParticleFilter, resampled
 from elevon.prognose.process import Process
@@ -102,7 +102,7 @@ def prognosis(
     """Look ahead from where a filter stands."""
     rng = np.random.default_rng([17, seed])
     units = flt.process.scaled(resampled(flt.units, _SAMPLES, rng), BIAS, rng)
-    future = look_ahead(flt.process, units, mission.usage, rng)
+    future = look_ahead(flt.process, units, mission.usage, rng, model_error=MODEL_ERROR)
     response = flt.process.response
     known = _known(flt.process, units, inspections, level)
     severity = np.array([item.severity for item in known])

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from elevon.actuator import Actuator
 from elevon.errors import InputError
 from elevon.prognose import Inspection, Mission, ParticleFilter, Process, Response, respond
-from elevon.prognose.future import look_ahead
+from elevon.prognose.future import MODEL_ERROR, look_ahead
 from elevon.prognose.metrics import (
     Track,
     convergence,
@@ -285,7 +285,8 @@ def tracked(
         flt.update(item)
         rng = np.random.default_rng([20, seed])
         units = flt.process.scaled(resampled(flt.units, _SAMPLES, rng), BIAS, rng)
-        rows.append(_quantiles(look_ahead(flt.process, units, mission.usage, rng).remaining))
+        future = look_ahead(flt.process, units, mission.usage, rng, model_error=MODEL_ERROR)
+        rows.append(_quantiles(future.remaining))
         longest = max(longest, clock.process_time() - begin)
     low, median, high = np.array(rows).T
     return Track(np.array([item.usage for item in seen]), median, low, high, end), longest
