@@ -20,6 +20,7 @@ LONG = (
     "reproduce nasa-",
     "reproduce pisa-",
     "reproduce diagnosis-limits",
+    "reproduce prognosis",
 )
 """These take ten seconds and more; the short ones run with every `make test`, once."""
 
