@@ -37,6 +37,8 @@ _MARGIN = 0.03  # s more at both ends, in which the bristles and the filters fin
 _LONGEST = 0.5  # s of a reversal; a longer standstill is no turn of the motion
 _CLEAR = 0.02  # of the highest speed: the shaft slides
 _SMALL = 0.05  # of the dry friction
+#: ASSUMED: rad/s of a Stribeck speed at least; a faster fall is over within a sample, unseen.
+_SLOWEST = 0.1
 _SCALE = 2.0  # residuals beyond so many of their deviations count less
 _EXPONENTS = (1.0, 2.0)
 
@@ -240,7 +242,7 @@ def _fit(windows: _Windows, dry: float, exponent: float, start: Floats | None = 
 
     if start is None:
         start = _coarse(windows, dry, exponent)
-    low = np.array([np.log(10.0 * dry), 0.0, np.log(1e-2), 0.0, 0.5 * dry, -0.2 * dry])
+    low = np.array([np.log(10.0 * dry), 0.0, np.log(_SLOWEST), 0.0, 0.5 * dry, -0.2 * dry])
     high = np.array([np.log(1e7 * dry), 2.0 * dry, np.log(1e1), 1e2 * dry, 1.5 * dry, 0.2 * dry])
 
     def residual(x: Floats) -> Floats:
