@@ -157,6 +157,8 @@ def calibrate(
         return _drops(logs[0], model, out, as_json=json, force=force)
     way = way_by_parts(logs, model, column_map)
     if way is not None:
+        if transient is not None or fidelity != "low":
+            say("--transient and --fidelity: not used, no model runs are fitted to these logs")
         return calibrate_by_parts(
             way, model, free=_paths(free), out=out, report=report, as_json=json, force=force,
             date=date,
