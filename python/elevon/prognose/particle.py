@@ -104,12 +104,12 @@ def _jittered(
     """
     damage, growth, form = out.damage.copy(), out.growth.copy(), out.form.copy()
     for k in range(damage.shape[1]):
-        told = before.active[:, k] & (before.damage[:, k] > 0.0) & (before.weight > 0.0)
+        updated = before.active[:, k] & (before.damage[:, k] > 0.0) & (before.weight > 0.0)
         moved = out.active[:, k] & (out.damage[:, k] > 0.0)
-        if told.sum() < 10 or not moved.any():
+        if updated.sum() < 10 or not moved.any():
             continue
-        weight = before.weight[told] / before.weight[told].sum()
-        new = _kernel(_rows(before, told, k), weight, _rows(out, moved, k), shrink, rng)
+        weight = before.weight[updated] / before.weight[updated].sum()
+        new = _kernel(_rows(before, updated, k), weight, _rows(out, moved, k), shrink, rng)
         damage[moved, k] = np.exp(new[:, 0])
         growth[moved, k], form[moved, k] = new[:, 1], new[:, 2]
     return replace(out, damage=damage, growth=growth, form=form)

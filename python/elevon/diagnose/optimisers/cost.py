@@ -130,10 +130,10 @@ class Monitor:
         return {**self._ready.core, "faults": faults}
 
     def _misfit(self, result: Mapping[str, Any]) -> float:
-        kept = result["clocks"][self._ready.plan[0].name]["values"][: len(self._keep)]
-        if result["status"] != "ok" or len(kept) < len(self._keep):
+        samples = result["clocks"][self._ready.plan[0].name]["values"][: len(self._keep)]
+        if result["status"] != "ok" or len(samples) < len(self._keep):
             return 1e6
-        current, user, motor = kept.T[:3]
+        current, user, motor = samples.T[:3]
         shown = np.column_stack((current, user, motor / self._ratio - user))[self._keep]
         rest = (shown - self._shown) / self._scale
         return float(np.mean(rest**2)) if np.isfinite(rest).all() else 1e6

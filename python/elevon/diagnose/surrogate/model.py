@@ -28,7 +28,7 @@ Floats = npt.NDArray[np.float64]
 _FORMAT, _VERSION = "elevon-surrogate", 1
 _MOST_BYTES = 50_000_000
 _TEST = 0.2  # relative difference of travel and speed up to which a log is of a test
-_KEPT = ("scaling", "conformal", "healthy", "known", "low", "high", "named")
+_STORED = ("scaling", "conformal", "healthy", "known", "low", "high", "named")
 
 
 @dataclass(frozen=True)
@@ -194,7 +194,7 @@ class Surrogate:
                 arrays |= {
                     f"{key}.{n}": a.astype(np.float32) for n, a in head.view.arrays().items()
                 }
-                arrays |= {f"{key}.{n}": getattr(head, n).astype(np.float32) for n in _KEPT}
+                arrays |= {f"{key}.{n}": getattr(head, n).astype(np.float32) for n in _STORED}
                 arrays[f"{key}.known"] = head.known.astype(np.float16)
                 arrays |= packed(head.ensemble, key)
         about = {
@@ -246,8 +246,8 @@ def _assembled(data: Mapping[str, Any]) -> Surrogate:
 def _head(data: Mapping[str, Any], key: str, reach: float) -> Head:
     own = {n.removeprefix(f"{key}."): a for n, a in data.items() if n.startswith(f"{key}.")}
     view = View.build(key.endswith("relative"), own)
-    kept = {n: np.asarray(own[n], dtype=np.float64) for n in _KEPT}
-    return Head(view=view, ensemble=unpacked(data, key), reach=reach, **kept)
+    arrays = {n: np.asarray(own[n], dtype=np.float64) for n in _STORED}
+    return Head(view=view, ensemble=unpacked(data, key), reach=reach, **arrays)
 
 
 @lru_cache(maxsize=1)
