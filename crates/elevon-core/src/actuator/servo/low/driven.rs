@@ -79,8 +79,8 @@ pub(super) fn driven_step<S: Scalar>(
     let per_volt = three!(|j| S::select(half.le(m.star.open[j]), zero, held[j]));
     let mut x = Driven { phases: i, torque: zero, copper: zero, drawn: zero, voltage: zero, quadrature: zero, seen: zero };
     let mut k = zero;
-    // The shaft's position takes the new speed: speed and currents stand half a step before it.
-    let middle = half * parts;
+    // Where the shaft's position takes the new speed, speed and currents stand half a step before it.
+    let middle = if structure.shaft.middle { zero } else { half * parts };
     // Lanes that have all their parts wait for the others.
     while S::any(k.lt(parts)) {
         let running = k.lt(parts);
@@ -112,7 +112,7 @@ pub(super) fn driven_step<S: Scalar>(
         x.seen = S::select(running, seen, x.seen);
         k = k + one;
     }
-    let (sin, cos) = m.star.electrical_angle((half * m.dt).fma(speed, s.shaft.motor_position)).sin_cos();
+    let (sin, cos) = m.star.electrical_angle(((parts - middle) * dt).fma(speed, s.shaft.motor_position)).sin_cos();
     x.quadrature = quadrature(x.phases, three_phase(sin, cos).0);
     x
 }
