@@ -87,10 +87,10 @@ def test_the_tab_key_completes(shell):
 def _wait_for(shell, wanted):
     """Read until the completed word stands there; zsh only loads the function at the first tab."""
     seen = ""
-    for _ in range(5):
+    for _ in range(6):
         with contextlib.suppress(pexpect.TIMEOUT):
             while wanted not in KEYS.sub("", seen):
-                seen += shell.read_nonblocking(4096, timeout=4)
+                seen += shell.read_nonblocking(4096, timeout=10)
         if wanted in KEYS.sub("", seen):
             return
         shell.send("\t")
