@@ -147,3 +147,13 @@ def test_figure_files_have_dark_ink(tmp_path, ending):
     assert html.count("<details>") == 1
     assert "Table of 21 rows: a, b" in html
     assert "beforeprint" in html
+
+
+def test_pages_of_one_folder_link_to_each_other(tmp_path):
+    (tmp_path / "other.html").write_text("<title>not ours</title>")
+    Report("First <page>").save(tmp_path / "a b.html")
+    Report("Second").save(tmp_path / "second.html")
+    html = (tmp_path / "second.html").read_text("utf-8")
+    assert '<a href="a%20b.html">First &lt;page&gt;</a>' in html
+    assert "other.html" not in html
+    assert "Beside this page" not in (tmp_path / "a b.html").read_text("utf-8")

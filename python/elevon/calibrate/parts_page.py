@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from elevon.calibrate.estimate import LEVEL
+from elevon.calibrate.forest import forest
 from elevon.report import Report, Table
 
 if TYPE_CHECKING:
@@ -40,6 +41,9 @@ def parts_report(
         for item in result.estimates
     ]
     columns = ["Parameter", "Before", "After", "Interval", "Unit", "Register", "Holds for"]
+    figure = forest(result.estimates)
+    if figure is not None:
+        section.figure(figure, "Estimates over the old values, with their intervals.")
     section.table(Table(columns, rows, digits=5))
     missing: list[list[object]] = [[path, why] for path, why in result.undetermined.items()]
     if missing:

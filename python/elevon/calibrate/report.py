@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elevon.calibrate.estimate import LEVEL
+from elevon.calibrate.forest import forest
 from elevon.calibrate.validation import SIGNALS
 from elevon.report import Check, Report, Table
 from elevon.report.figures import COLOURS, new_figure
@@ -137,29 +138,10 @@ def _parameters(report: Report, result: Calibration, truth: Mapping[str, float])
         if truth:
             row.insert(2, truth.get(item.path))
         rows.append(row)
+    figure = forest(result.estimates, truth)
+    if figure is not None:
+        section.figure(figure, "Estimates over the old values, with their intervals.")
     section.table(Table(columns, rows, "* not part of the set", digits=5))
-    with new_figure(width=8.0, height=0.28 * len(rows) + 1.2) as (figure, axes):
-        _draw_intervals(axes, result, truth)
-    section.figure(figure, "Estimates over the old values, with their intervals.")
-
-
-def _draw_intervals(axes: Any, result: Calibration, truth: Mapping[str, float]) -> None:
-    shown = [
-        i for i in result.estimates if i.in_set and i.old and i.value and i.old * i.value > 0.0
-    ]
-    for row, item in enumerate(reversed(shown)):
-        assert item.old is not None
-        low, high = (end / item.old for end in item.interval)
-        axes.plot([low, high], [row, row], color=COLOURS["blue"], lw=3, solid_capstyle="butt")
-        axes.plot(item.value / item.old, row, "o", color=COLOURS["blue"], ms=4)
-        if item.path in truth:
-            axes.plot(truth[item.path] / item.old, row, "x", color=COLOURS["red"], ms=7)
-    axes.axvline(1.0, color=COLOURS["grey"], lw=0.8)
-    axes.set(
-        yticks=range(len(shown)),
-        yticklabels=[i.path for i in reversed(shown)],
-        xlabel="New value over old (cross: truth)" if truth else "New value over old",
-    )
 
 
 def _ranking(report: Report, result: Calibration) -> None:

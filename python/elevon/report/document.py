@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
+from html import unescape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -188,6 +191,7 @@ class Report:
         self.sections: list[Section] = []
         self.facts: list[tuple[str, str, str]] = []
         self.opening: tuple[Markup, str] | None = None
+        self.beside: dict[str, str] = {}
         self._provenance: dict[str, str] = {}
 
     def section(self, title: str, *paragraphs: str) -> Section:
@@ -263,4 +267,23 @@ class Report:
         """
         from elevon.files import write_text
 
+        self.beside = _pages_beside(Path(path).expanduser())
         return write_text(path, self.html(), force=force)
+
+
+_MARK = '<meta name="generator" content="Elevon">'
+_HEAD = 4096  # bytes of a page in which its mark and its title stand
+
+
+def _pages_beside(path: Path) -> dict[str, str]:
+    """Return the other reports of a page's folder: file name to title, for the page to link to."""
+    pages = {}
+    for other in sorted(path.parent.glob("*.html")):
+        if other.name == path.name:
+            continue
+        with suppress(OSError), other.open(encoding="utf-8", errors="replace") as stream:
+            head = stream.read(_HEAD)
+            title = re.search(r"<title>(.*?)</title>", head, re.S)
+            if _MARK in head and title:
+                pages[other.name] = unescape(title[1])
+    return pages

@@ -44,7 +44,13 @@ def separation_page(result: SeparationResult, date: str | None) -> Report:
     report.fact("Best profile named", f"{named} of {len(winners)}", "pairs of fault and load")
     report.fact("Null rate", f"{100 * result.null_rate:.2g} %", "healthy against healthy")
     report.fact("Level", f"{100 * result.level:.3f} %", "of each interval; 95 % for the table")
-    report.section("Best profiles").table(_winners_table(result))
+    section = report.section("Best profiles")
+    section.figure(
+        _power_map(result),
+        "Largest distance from healthy, in healthy standard deviations, of each fault under each "
+        "load by profile; a frame: the best, named.",
+    )
+    section.table(_winners_table(result))
     section = report.section("Effect sizes")
     section.figure(
         _effects_figure(result),
@@ -88,6 +94,29 @@ def _winners_table(result: SeparationResult) -> Table:
         f"experiment, were they as estimated; named from {100 * POWER:.0f} % on. Draws: of each "
         "fault, with as many times more healthy units.",
     )  # fmt: skip
+
+
+def _power_map(result: SeparationResult) -> Figure:
+    groups = _groups(result)
+    shapes = list(dict.fromkeys(row.profile for row in result.rows))
+    sizes = np.zeros((len(groups), len(shapes)))
+    best: list[tuple[int, int]] = []
+    for line, group in enumerate(groups.values()):
+        for row in group:
+            column = shapes.index(row.profile)
+            sizes[line, column] = max(sizes[line, column], abs(row.effect.size))
+            if row.winner:
+                best.append((line, column))
+    with new_figure(width=8.0, height=0.24 * len(groups) + 1.6) as (figure, axes):
+        picture = axes.imshow(np.log10(np.maximum(sizes, 0.1)), aspect="auto", cmap="viridis")
+        axes.grid(visible=False)
+        axes.set_xticks(range(len(shapes)), shapes, rotation=20, ha="right", fontsize=8)
+        names = [f"{fault}, {load:.0f} N" for fault, load in groups]
+        axes.set_yticks(range(len(names)), names, fontsize=7)
+        for line, column in best:
+            axes.plot(column, line, "s", mfc="none", mec="white", ms=11, mew=1.5)
+        figure.colorbar(picture, label="log10 of the effect size")
+    return figure
 
 
 def _draws(row: SeparationRow, verdict: str) -> str:
