@@ -13,7 +13,17 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["OWN_ERROR", "SHARES", "SIZES", "UNITS", "Evidence", "Signals", "evidence", "regress"]
+__all__ = [
+    "OWN_ERROR",
+    "SHARES",
+    "SIZES",
+    "UNITS",
+    "Evidence",
+    "Signals",
+    "dragged",
+    "evidence",
+    "regress",
+]
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -195,7 +205,7 @@ def _size(beta: Floats, covariance: Floats, at: int, over: float = 1.0) -> tuple
 
 def _positions(signals: Signals, moving: Bools, ratio: float) -> dict[str, tuple[float, float]]:
     gap = signals.motor / ratio - signals.user
-    use = moving & _dragged(signals.motor / ratio, float(np.ptp(gap[moving])))
+    use = moving & dragged(signals.motor / ratio, float(np.ptp(gap[moving])))
     if use.sum() < _LEAST:
         use = moving
     centred = signals.user - float(np.mean(signals.user[use]))
@@ -203,8 +213,8 @@ def _positions(signals: Signals, moving: Bools, ratio: float) -> dict[str, tuple
     return {"lost_motion": _one(beta, cov, 0, 2.0), "position_scale": _one(beta, cov, 1)}
 
 
-def _dragged(driver: Floats, width: float) -> Bools:
-    """Samples after the driver has passed the whole gap since it turned."""
+def dragged(driver: Floats, width: float) -> Bools:
+    """Return the samples after the driver has passed the whole gap since it turned."""
     way = np.sign(np.gradient(driver))
     turns = np.flatnonzero(np.diff(way) != 0) + 1
     edges = np.concatenate(([0], turns, [len(driver)]))

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from elevon.calibrate.kinematics import command_fit
 from elevon.calibrate.log import BenchLog, bench_log
 from elevon.diagnose.bymodel.command import noted_command
-from elevon.diagnose.bymodel.evidence import regress
+from elevon.diagnose.bymodel.evidence import dragged, regress
 from elevon.errors import InputError
 from elevon.logs.command.reconstruct import reconstruct
 
@@ -151,11 +151,15 @@ def _check_motion(log: BenchLog, good: npt.NDArray[np.bool_], actuator: Actuator
     for way, text in ((1.0, "forwards"), (-1.0, "backwards")):
         if (good & (way * log.speed > _MOVING * top)).sum() < 100:
             raise InputError(f"{log.name}: hardly any motion {text}; friction and play need both")
+    ratio = actuator.parameters.value("gear.ratio")
     moving = good & (np.abs(log.speed) > _MOVING * top)
-    # The direction stands beside the position: play would tilt the line of a short motion.
+    # Past the play only, and with the direction beside the position: play would tilt the line of a
+    # short motion.
+    gap = log.motor / ratio - log.user
+    past = moving & dragged(log.motor / ratio, float(np.ptp(gap[moving])))
+    moving = past if past.sum() > 100 else moving
     columns = [log.user[moving], np.sign(log.speed[moving]), np.ones(int(moving.sum()))]
     slope = float(regress(columns, log.motor[moving])[0][0])
-    ratio = actuator.parameters.value("gear.ratio")
     if not abs(slope / ratio - 1.0) < _RATIO:
         raise InputError(
             f"{log.name}: the motor turns {slope:.4g} times as far as the user, {actuator.name} "
