@@ -60,14 +60,14 @@ _PHASES = tuple(f"motor.phase_{p}" for p in "abc")
 # elastic play and a PWM drive: positions and gains are geometry and arithmetic, ripples depend on
 # what the current loop makes of them, friction on its law.
 CANDIDATES: tuple[Candidate, ...] = (
-    Candidate("play", "transmission", "rad", 0.0, 0.03, _BEARING, 0.02),
+    Candidate("play", "transmission", "rad", 0.0, 0.03, _BEARING, 0.01),
     Candidate("friction", "transmission", "1", 0.0, 2.0, _BEARING / 2, 0.08),
     Candidate("lubrication", "transmission", "1", -0.7, 5.0, _BEARING / 2, 0.10),
-    Candidate("short", _PHASES[0], "1", 0.0, 0.6, _MOTOR / 3, 0.05, _PHASES[1:]),
+    Candidate("short", _PHASES[0], "1", 0.0, 0.6, _MOTOR / 3, 0.10, _PHASES[1:]),
     Candidate("eccentricity_static", "motor", "1", 0.0, 0.6, _MOTOR / 3, 0.05),
     Candidate("demagnetisation", "motor", "1", 0.0, 0.4, _MOTOR / 3, 0.05),
     Candidate("unbalance", "motor.rotor", "kg m2", 0.0, 4e-4, _BEARING / 10, 0.05),
-    Candidate("gain_drift", "control.position", "1", -0.4, 0.6, _SENSOR / 2, 0.005),
+    Candidate("gain_drift", "control.position", "1", -0.4, 0.6, _SENSOR / 2, 0.003),
     Candidate("gain_drift", "control.speed", "1", -0.5, 1.0, _SENSOR / 2, 0.05),
     Candidate("gain", "sensor.encoder", "1", -0.04, 0.04, _SENSOR, 0.01),
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +20,7 @@ from elevon.errors import InputError
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["diagnose"]
+__all__ = ["answer_of", "diagnose"]
 
 
 def diagnose(
@@ -67,23 +68,47 @@ def diagnose(
         case_of(prepared(item, actuator), actuator, candidates, healthy_logs, findings)
         for item in logs
     ]
-    return _answer(cases, candidates, false_alarm, findings, begin)
+    result = answer_of(cases, candidates, false_alarm, findings)
+    return replace(result, seconds=clock.perf_counter() - begin)
 
 
-def _answer(
+def answer_of(
     cases: Sequence[Case],
     candidates: Sequence[Candidate],
     rate: float,
-    findings: list[str],
-    begin: float,
+    findings: Sequence[str],
+    *,
+    pairs: bool = True,
 ) -> Diagnosis:
+    """Return the answer of logs that stand against their healthy unit.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+        One a log.
+    candidates : sequence of Candidate
+        Faults.
+    rate : float
+        Of false alarms.
+    findings : sequence of str
+        What was seen before.
+    pairs : bool
+        Whether two faults at once are weighed.
+    """
+    begin = clock.perf_counter()
     rest, root, detector = detector_of(cases, candidates)
     ratio = float(detector.ratio((root @ rest)[None, :])[0])
     _, covariance = joined(cases)
     degrees = min(case.unit.degrees for case in cases)
     errors = np.concatenate([case.errors for case in cases])
     result = posterior(
-        rest, covariance, degrees, candidates, lambda k, s: shift_of(cases, k, s), errors=errors
+        rest,
+        covariance,
+        degrees,
+        candidates,
+        lambda k, s: shift_of(cases, k, s),
+        errors=errors,
+        pairs=pairs,
     )
     faulty = ratio > detector.threshold(rate)
     best = next(h for h in result.hypotheses if bool(h.keys) or not faulty)

@@ -60,10 +60,10 @@ SHARES = frozenset(
 #: current loop, which the low model has not.
 OWN_ERROR: Mapping[str, float] = {
     "current_order_1": 0.10,
-    "current_order_2": 0.25,
+    "current_order_2": 0.35,
     "current_shaft": 0.20,
     "voltage_order_1": 0.30,
-    "voltage_order_2": 0.30,
+    "voltage_order_2": 0.40,
     "voltage_per_speed": 0.50,
     "voltage_per_current": 0.50,
 }

@@ -127,7 +127,7 @@ def moved(cases: Sequence[Case], keys: Sequence[str], values: Sequence[float]) -
                 Moved(
                     case.name,
                     name,
-                    UNITS[name][0],
+                    UNITS[name][0] if name in UNITS else "",
                     float(case.shown.values[k]),
                     float(case.unit.mean[k]),
                     float(std[k]),

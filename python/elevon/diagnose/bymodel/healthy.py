@@ -38,7 +38,7 @@ MISMATCH: Mapping[str, tuple[float, float]] = {
 #: Least deviation from run to run, beside what the draws of the model show: another start, counts,
 #: clocks, what the model has not. ASSUMED.
 FLOOR: Mapping[str, tuple[float, float]] = {
-    "lost_motion": (0.01, 2e-5),
+    "lost_motion": (0.005, 2e-5),
     "position_scale": (0.0, 2e-4),
     "dry_current": (0.01, 0.0),
     "viscous_current": (0.05, 0.0),
@@ -52,7 +52,7 @@ FLOOR: Mapping[str, tuple[float, float]] = {
     "voltage_order_1": (0.0, 0.002),
     "voltage_order_2": (0.0, 0.002),
     "speed_gain": (0.02, 0.0),
-    "following_gain": (0.001, 0.0),
+    "following_gain": (0.0005, 0.0),
 }
 
 

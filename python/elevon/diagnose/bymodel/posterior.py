@@ -59,6 +59,7 @@ def posterior(
     shift: Shift,
     *,
     errors: Floats | None = None,
+    pairs: bool = True,
 ) -> Posterior:
     """Weigh the hypotheses.
 
@@ -76,6 +77,8 @@ def posterior(
         Key and severities, shape (m,), to what they do to the evidence, shape (m, k).
     errors : ndarray, shape (k,), optional
         Deviation of each number's shift on its own, as a share of it; default: none.
+    pairs : bool
+        Whether two faults at once are weighed.
     """
     frame = Frame(
         rest, covariance, degrees, shift, np.zeros(len(rest)) if errors is None else errors
@@ -84,9 +87,9 @@ def posterior(
     out = [healthy_alone(frame, 1.0 - PRIOR_FAULTY)]
     for c in candidates:
         out.append(one_fault(frame, c, PRIOR_FAULTY * (1.0 - SECOND) * c.rate / total))
-    pairs = list(combinations(candidates, 2))
-    norm = sum(a.rate * b.rate for a, b in pairs) or 1.0
-    for a, b in pairs:
+    both = list(combinations(candidates, 2)) if pairs else []
+    norm = sum(a.rate * b.rate for a, b in both) or 1.0
+    for a, b in both:
         out.append(two_faults(frame, (a, b), PRIOR_FAULTY * SECOND * a.rate * b.rate / norm))
     scores = np.array([h.evidence + np.log(h.prior) for h in out])
     probability = np.exp(scores - scores.max())

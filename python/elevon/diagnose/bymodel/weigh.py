@@ -19,6 +19,7 @@ __all__ = ["Frame", "Hypothesis", "healthy_alone", "one_fault", "two_faults"]
 
 Floats = npt.NDArray[np.float64]
 Shift = Callable[[str, Floats], Floats]
+SMALL = 0.05  # of the range: ASSUMED; severities below it are as frequent as each other
 _COARSE = 401
 _FINE = 121
 _PAIR = 41
@@ -147,9 +148,9 @@ def one_fault(frame: Frame, c: Candidate, prior: float) -> Hypothesis:
     moved = own.shift(c.key, fine)
     log = own.log(own.y - moved, c.error * moved)
     top = float(log.max())
-    mass = np.exp(log - top) * np.gradient(fine)
+    mass = np.exp(log - top) * np.gradient(fine) * _before(c, fine)
     total = float(mass.sum())
-    evidence = top + float(np.log(total / (c.high - c.low)))
+    evidence = top + float(np.log(total))
     best = float(fine[int(np.argmax(log))])
     return Hypothesis((c.key,), evidence, prior, (fine,), (mass / total,), (best,))
 
@@ -165,18 +166,30 @@ def two_faults(frame: Frame, pair: tuple[Candidate, Candidate], prior: float) ->
     grids = [_around(b, 1.5 * w, c, _PAIR) for b, w, c in zip(at, widths, pair, strict=True)]
     log = _of_both(own, pair, own.shift(first.key, grids[0]), own.shift(second.key, grids[1]))
     top = float(log.max())
-    mass = np.exp(log - top) * np.outer(np.gradient(grids[0]), np.gradient(grids[1]))
+    sides = [np.gradient(g) * _before(c, g) for g, c in zip(grids, pair, strict=True)]
+    mass = np.exp(log - top) * np.outer(*sides)
     total = float(mass.sum())
-    area = (first.high - first.low) * (second.high - second.low)
     peak = np.unravel_index(int(np.argmax(log)), log.shape)
     return Hypothesis(
         (first.key, second.key),
-        top + float(np.log(total / area)),
+        top + float(np.log(total)),
         prior,
         tuple(grids),
         (mass.sum(axis=1) / total, mass.sum(axis=0) / total),
         (float(grids[0][peak[0]]), float(grids[1][peak[1]])),
     )
+
+
+def _before(c: Candidate, severity: Floats) -> Floats:
+    """Density of a severity before the log: it grows, so each passes the small ones first.
+
+    Proportional to 1/(|s| + s0) over the range, s0 a part of it: as often in each octave, but for
+    the smallest.
+    """
+    low, high = abs(c.low), c.high
+    least = SMALL * max(low, high)
+    norm = float(np.log1p(high / least) + (np.log1p(low / least) if low else 0.0))
+    return 1.0 / ((np.abs(severity) + least) * norm)
 
 
 def _around(best: float, scale: float, c: Candidate, count: int) -> Floats:

@@ -1,0 +1,85 @@
+"""Every fault of an actuator's catalogue that its low model has, as a candidate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from elevon.diagnose.bymodel.candidates import Candidate
+from elevon.errors import unknown
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.faults import FaultRecord
+
+__all__ = ["candidates_of", "declined_of"]
+
+#: Largest severity considered where the catalogue's own is larger or none, by unit. ASSUMED: what a
+#: unit of this size runs with at all; shares and counts are given by the catalogue.
+_MOST = {"m": 0.002, "rad": 0.3, "N": 5000.0, "kg m2": 4e-4, "A": 2.0, "N m": 1.0}
+_SHARE = 2.0  # of a share that the catalogue lets grow without bound
+_RATE = 1e-5  # per hour, ASSUMED alike for all
+_ERROR = 0.1  # of a shift, ASSUMED
+
+
+def candidates_of(actuator: Actuator, texts: Sequence[str] | None = None) -> tuple[Candidate, ...]:
+    """Return the candidates, one for places that differ by a phase only.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        Its wiring's catalogue counts.
+    texts : sequence of str, optional
+        ``KIND@PLACE`` of those wanted; default: all.
+
+    Raises
+    ------
+    UnknownNameError
+        None of that name can be told by the low model.
+    """
+    from elevon.faults import catalogue
+
+    out = []
+    for record in catalogue(actuator.wiring):
+        if "low" in record.fidelities:
+            out += [_candidate(record, group) for group in _groups(record.places)]
+    if not texts:
+        return tuple(out)
+    known = {f"{c.kind}@{place}": c for c in out for place in (c.place, *c.same)}
+    for text in texts:
+        if text.strip() not in known:
+            raise unknown("fault", text.strip(), known, "--fault")
+    wanted = {id(known[text.strip()]) for text in texts}
+    return tuple(c for c in out if id(c) in wanted)
+
+
+def declined_of(actuator: Actuator) -> list[dict[str, str]]:
+    """Return the faults that the low model has not, with its reason."""
+    from elevon.faults import catalogue
+
+    return [
+        {"kind": record.kind, "place": place, "reason": f"low model: {reason}"}
+        for record in catalogue(actuator.wiring)
+        if "low" not in record.fidelities
+        for place in record.places
+        for reason in [record.declined.get("low", "does not have it")]
+    ]
+
+
+def _groups(places: Sequence[str]) -> list[tuple[str, ...]]:
+    """Places that differ in the letter of a phase stand together."""
+    groups: dict[str, list[str]] = {}
+    for place in places:
+        stem = place[:-1] if place.endswith(("_a", "_b", "_c")) else place
+        groups.setdefault(stem, []).append(place)
+    return [tuple(group) for group in groups.values()]
+
+
+def _candidate(record: FaultRecord, places: tuple[str, ...]) -> Candidate:
+    unit = record.unit or "1"
+    most = _MOST.get(unit, _SHARE)
+    top = record.maximum if math.isfinite(record.maximum) else most
+    high = 0.95 * top if unit == "1" and top <= 1.0 else min(top, most)
+    low = max(record.minimum, -0.5 if unit == "1" else -most) if record.minimum < 0.0 else 0.0
+    return Candidate(record.kind, places[0], unit, low, high, _RATE, _ERROR, places[1:])
