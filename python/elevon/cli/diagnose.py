@@ -31,7 +31,9 @@ from elevon.errors import InputError, unknown
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from elevon.actuator import Actuator
     from elevon.diagnose.bymodel.answer import Diagnosis
+    from elevon.recording import Recording
 
 app = typer.Typer(rich_markup_mode=None)
 METHODS = ["model", "surrogate", "both"]
@@ -78,6 +80,13 @@ def diagnose(
         raise InputError(f"--false-alarm {false_alarm:g}: must be between 0 and 1")
     model = read_actuator(actuator, settings)
     logs = without_companions(logs)
+    if model.wiring != "rotary":
+        if method != "model":
+            raise InputError(f"--method {method}: serves rotary actuators; {model.name} is none")
+        result = _by_roles(
+            model, logs, baseline or [], column_map, faults=fault, false_alarm=false_alarm
+        )
+        return _shown(result, method, model.name, report, json=json, force=force)
     data = read_test_logs(
         logs,
         loadcells=one_each("--loadcell", loadcell, len(logs)),
@@ -86,10 +95,38 @@ def diagnose(
     )
     healthy = read_test_logs(without_companions(baseline or []), column_map=column_map)
     result = run(data, model, baselines=healthy, faults=fault, false_alarm=false_alarm)
+    return _shown(result, method, model.name, report, json=json, force=force)
+
+
+def _by_roles(
+    model: Actuator,
+    logs: list[Path],
+    baseline: list[Path],
+    column_map: Path | None,
+    *,
+    faults: list[str] | None,
+    false_alarm: float,
+) -> Diagnosis:
+    """Diagnose an actuator whose logs are read by roles."""
+    from elevon.cli.closed_loop import read_recording
+    from elevon.diagnose.byroles import diagnose_by_roles
+
+    def read(paths: list[Path]) -> list[tuple[str, Recording]]:
+        return [(path.name, read_recording(path, column_map)) for path in without_companions(paths)]
+
+    return diagnose_by_roles(
+        read(logs), model, baselines=read(baseline), faults=faults, false_alarm=false_alarm
+    )
+
+
+def _shown(
+    result: Diagnosis, method: str, name: str, report: Path | None, *, json: bool, force: bool
+) -> int:
+    """Write the report and print the answer."""
     if report is not None:
         from elevon.diagnose.bymodel.page import diagnosis_page
 
-        say(f"report: {diagnosis_page(result, model.name).save(report, force=force)}")
+        say(f"report: {diagnosis_page(result, name).save(report, force=force)}")
     if json:
         print_json({**result.to_dict(), "method": method})
         return 0

@@ -38,7 +38,7 @@ MISMATCH: Mapping[str, tuple[float, float]] = {
 #: Least deviation from run to run, beside what the draws of the model show: another start, counts,
 #: clocks, what the model has not. ASSUMED.
 FLOOR: Mapping[str, tuple[float, float]] = {
-    "lost_motion": (0.005, 2e-5),
+    "lost_motion": (0.01, 2e-5),
     "position_scale": (0.0, 2e-4),
     "dry_current": (0.01, 0.0),
     "viscous_current": (0.05, 0.0),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from elevon.diagnose.bymodel.candidates import Candidate
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.faults import FaultRecord
 
-__all__ = ["candidates_of", "declined_of"]
+__all__ = ["candidates_of", "counted_of", "declined_of"]
 
 #: Largest severity considered where the catalogue's own is larger or none, by unit. ASSUMED: what a
 #: unit of this size runs with at all; shares and counts are given by the catalogue.
@@ -41,9 +42,11 @@ def candidates_of(actuator: Actuator, texts: Sequence[str] | None = None) -> tup
     from elevon.faults import catalogue
 
     out = []
+    counted = counted_of(actuator)
     for record in catalogue(actuator.wiring):
         if "low" in record.fidelities:
-            out += [_candidate(record, group) for group in _groups(record.places)]
+            made = [_candidate(record, group) for group in _groups(record.places)]
+            out += [replace(c, high=1.0) if c.kind in counted else c for c in made]
     if not texts:
         return tuple(out)
     known = {f"{c.kind}@{place}": c for c in out for place in (c.place, *c.same)}
@@ -65,6 +68,13 @@ def declined_of(actuator: Actuator) -> list[dict[str, str]]:
         for place in record.places
         for reason in [record.declined.get("low", "does not have it")]
     ]
+
+
+def counted_of(actuator: Actuator) -> frozenset[str]:
+    """Return the kinds whose severity is a whole number; one is weighed against none."""
+    from elevon import _core
+
+    return frozenset(item["kind"] for item in _core.faults(actuator.wiring) if item["whole"])
 
 
 def _groups(places: Sequence[str]) -> list[tuple[str, ...]]:

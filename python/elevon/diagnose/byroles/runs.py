@@ -12,16 +12,17 @@ import numpy.typing as npt
 from elevon.diagnose.bymodel.candidates import Candidate
 from elevon.diagnose.bymodel.evidence import Evidence
 from elevon.diagnose.bymodel.replay import Replay
+from elevon.diagnose.byroles.candidates import counted_of
 from elevon.diagnose.byroles.log import RoleLog, evidence_of
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["DAILY", "drawn", "replay_by_roles", "shown_by"]
+__all__ = ["DAILY", "Unit", "drawn", "modelled", "replay_by_roles", "shown_by"]
 
 Floats = npt.NDArray[np.float64]
-_DRAWS = 30
-_POINTS = 4  # severities of each candidate, one way
+_DRAWS = 24
+_POINTS = 3  # severities of each candidate, one way
 _CHUNK = 32  # runs held at once
 
 #: Deviation of what changes from day to day, by the end of a parameter's path. ASSUMED, as for the
@@ -40,7 +41,9 @@ DAILY: Mapping[str, tuple[float, str]] = {
 
 
 @dataclass(frozen=True)
-class _Unit:
+class Unit:
+    """A unit of the replay: its values and its faults."""
+
     actuator: Actuator
     faults: tuple[str, ...] = ()
 
@@ -64,11 +67,14 @@ def drawn(actuator: Actuator, rng: np.random.Generator) -> Actuator:
 
 def replay_by_roles(item: RoleLog, actuator: Actuator, candidates: Sequence[Candidate]) -> Replay:
     """Run the test: healthy, each candidate at several severities, and the spread."""
-    severities = {c.key: _severities(c) for c in candidates}
-    units = [_Unit(actuator)]
+    counted = counted_of(actuator)
+    severities = {
+        c.key: np.array([0.0, 1.0]) if c.kind in counted else _severities(c) for c in candidates
+    }
+    units = [Unit(actuator)]
     for c in candidates:
-        units += [_Unit(actuator, (c.text(float(s)),)) for s in severities[c.key] if s != 0.0]
-    units += [_Unit(drawn(actuator, np.random.default_rng([15, k]))) for k in range(_DRAWS)]
+        units += [Unit(actuator, (c.text(float(s)),)) for s in severities[c.key] if s != 0.0]
+    units += [Unit(drawn(actuator, np.random.default_rng([15, k]))) for k in range(_DRAWS)]
     shown = list(shown_by(item, units))
     healthy = shown[0]
     rows = np.array([_on(healthy, e) for e in shown])
@@ -84,6 +90,11 @@ def replay_by_roles(item: RoleLog, actuator: Actuator, candidates: Sequence[Cand
     return Replay(healthy, severities, shifts, draws)
 
 
+def modelled(item: RoleLog, actuator: Actuator) -> Evidence:
+    """Return what the healthy model shows of a log's test."""
+    return next(shown_by(item, [Unit(actuator)]))
+
+
 def _on(healthy: Evidence, other: Evidence) -> Floats:
     """Values by the healthy run's names; NaN where the other run gives none."""
     there = dict(zip(other.names, other.values.tolist(), strict=True))
@@ -96,7 +107,7 @@ def _severities(c: Candidate) -> Floats:
     return np.concatenate((low, c.high * steps))
 
 
-def shown_by(item: RoleLog, units: Sequence[_Unit]) -> Iterator[Evidence]:
+def shown_by(item: RoleLog, units: Sequence[Unit]) -> Iterator[Evidence]:
     """Run units through a log's test; evidence of each by the log's roles."""
     from elevon.faults import Fault
     from elevon.simulate import Run
@@ -134,7 +145,7 @@ def _evidence(
         role: np.interp(at, rows["time"], np.nan_to_num(columns[name]))
         for role, name in signals.items()
     }
-    return evidence_of(channels, item.units, item.time, actuator)
+    return evidence_of(channels, item, actuator)
 
 
 def _signals(item: RoleLog, actuator: Actuator) -> dict[str, str]:
