@@ -262,7 +262,12 @@ def _drawn(actuator: Actuator, rng: np.random.Generator) -> _Unit:
             if path == "friction.dynamic":
                 still = actuator.parameters.value("friction.static")
                 values["friction.static"] = still * max(1.0 + step, 0.05)
-    turn = float(rng.uniform(0.0, 2.0 * math.pi / actuator.parameters.value("motor.pole_pairs")))
+    value = actuator.parameters.value
+    # Within the play: further off the user would not be where the motor holds it.
+    most = min(
+        0.45 * value("play.total") * value("gear.ratio"), math.pi / value("motor.pole_pairs")
+    )
+    turn = float(rng.uniform(-most, most))
     unit = actuator.with_values(values, source="run-to-run spread")
     return _Unit(unit, tuple(faults), brake, turn)
 

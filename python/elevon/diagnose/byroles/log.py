@@ -140,10 +140,10 @@ def _features(
     known = actuator.parameters
     pairs = known.value("motor.pole_pairs") if "motor.pole_pairs" in known else None
     try:
-        found = recording_features(recording, pole_pairs=pairs)
+        shown = recording_features(recording, pole_pairs=pairs)
     except InputError:
         return {}
-    return dict(found.values)
+    return dict(shown.values)
 
 
 def same_test(a: RoleLog, b: RoleLog, share: float = 0.05) -> bool:
