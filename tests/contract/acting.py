@@ -40,6 +40,10 @@ def others(record: Any, value: float | str) -> list[float | str]:
     assert isinstance(value, float)
     numbers = [value * factor for factor in FACTORS if value] + list(SIZES)
     numbers += [value + size for size in (1.0, -1.0) if value]
+    if (
+        record.unit == "K"
+    ):  # just above what the actuator starts at: limits that a short run reaches
+        numbers[:0] = [293.15 + 1e-7, 293.15 + 1e-4]
     return [
         number for number in dict.fromkeys(numbers) if number != value and inside(record, number)
     ]
@@ -192,6 +196,16 @@ def changed(cell: Cell, base: Variant, tried: Sequence[Variant]) -> dict[str, li
 def says(cell: Cell, path: str, variant: Variant) -> bool:
     """Does the program say of this variant that the parameter does not act?"""
     return any(text.startswith(f"{path} = ") for text in cell.resting(variant))
+
+
+def claims(cell: Cell, path: str) -> bool:
+    """Is there a company in which nothing says that the parameter rests?"""
+    for base in islice(companies(cell, path), MOST):
+        if not cell.refused(base):
+            tried = variants(cell, path, base)
+            if any(not says(cell, path, item) for item in tried):
+                return True
+    return False
 
 
 def shows(cell: Cell, path: str) -> bool:

@@ -11,7 +11,7 @@ import pytest
 from elevon import _core
 from elevon.parameters import records
 from tests.contract import sets
-from tests.contract.acting import changed, says, shows, variants
+from tests.contract.acting import claims, changed, says, shows, variants
 from tests.contract.cells import Cell, Variant, fault, load
 
 CASES = [(name, fidelity) for name in sets.names() for fidelity in sets.fidelities(name)]
@@ -39,7 +39,8 @@ def idle(name: str, fidelity: str, paths: list[str]) -> list[str]:
     """Parameters that change nothing in any company, though nothing says so."""
     cell = Cell(name, fidelity, load=load(name))
     known = records(cell.actuator().wiring)
-    return [path for path in paths if fidelity in known[path].fidelities and not shows(cell, path)]
+    carried = [path for path in paths if fidelity in known[path].fidelities]
+    return [path for path in carried if not shows(cell, path) and claims(cell, path)]
 
 
 def false(name: str, fidelity: str, count: int | None) -> list[str]:

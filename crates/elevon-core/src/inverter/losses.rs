@@ -6,6 +6,7 @@
 
 use crate::scalar::Scalar;
 use crate::three;
+use crate::variable::acts::When;
 use crate::variable::Own;
 use crate::variables;
 
@@ -21,11 +22,18 @@ variables! {
     /// The drive as a thermal node of its own: its losses heat it, not the winding.
     DriveHeatParameter, DRIVE_HEAT {
         DriveCapacity => "drive_capacity", "C_d", "J/K", Positive, Plant, Some(500.0), "heat capacity of the drive with its heat sink (ASSUMED: half a kilogram of aluminium)",
-            high_only("it has no inverter losses").when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);
+            high_only("it has no inverter losses").when(&[Chosen("thermal.model", &["quasi_static", "dynamic"]), LOSSES]);
         DriveToAir => "drive_to_air", "R_d", "K/W", Positive, Plant, Some(0.5), "thermal resistance from the drive to the air (ASSUMED: a heat sink of a hand's size, natural convection)",
-            high_only("it has no inverter losses").when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);
+            high_only("it has no inverter losses").when(&[Chosen("thermal.model", &["quasi_static", "dynamic"]), LOSSES]);
     }
 }
+
+/// What makes the inverter lose anything.
+const LOSSES: When = When::Either(&[
+    When::Away("inverter.switching_time", 0.0),
+    When::Away("inverter.on_resistance", 0.0),
+    When::Away("inverter.diode_drop", 0.0),
+]);
 
 /// Energy lost by legs that go from `old` to `new` commands; a leg that is or becomes off counts half.
 #[inline(always)]

@@ -23,6 +23,7 @@ use crate::transmission::gear::{Gear, GearParameter, LoadParameter};
 use crate::transmission::nut_heat::{NutHeat, NutState};
 use crate::transmission::play::{Play, PlayModel, PlayParameter};
 use crate::transmission::screw::Screw;
+use crate::transmission::tooth::Teeth;
 use crate::transmission::vibration::{Vibration, VibrationState};
 
 details! {
@@ -34,8 +35,8 @@ details! {
         /// Positions move with the new speed.
         semi_implicit: bool = x.semi_implicit;
         /// Positions move with the mean of both speeds: exact for a torque held over a long step. A spring asks for the new
-        /// speed, which neither feeds nor damps its swing.
-        middle: bool = x.low && !x.parts.load().away(LoadParameter::Stiffness);
+        /// speed, which neither feeds nor damps its swing; so do worn flanks under load.
+        middle: bool = x.low && !x.parts.load().away(LoadParameter::Stiffness) && !Teeth::<f64>::needed(&x.parts.tooth());
         train: TrainDetails = TrainDetails::read::<F>(x.parts);
     }
     full {
