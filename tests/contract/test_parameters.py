@@ -11,7 +11,7 @@ import pytest
 from elevon import _core
 from elevon.parameters import records
 from tests.contract import sets
-from tests.contract.acting import claims, changed, says, shows, variants
+from tests.contract.acting import changed, claims, says, shows, variants
 from tests.contract.cells import Cell, Variant, fault, load
 
 CASES = [(name, fidelity) for name in sets.names() for fidelity in sets.fidelities(name)]
