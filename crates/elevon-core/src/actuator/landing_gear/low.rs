@@ -37,6 +37,8 @@ const FUNDAMENTAL: f64 = 1.215_854_203_708_053_3;
 pub struct State<S> {
     body: Body<S>,
     current: S,
+    /// With the half of the third phase's current in it.
+    line: S,
     torque: S,
     /// 1 once the drive has tripped.
     tripped: S,
@@ -50,6 +52,10 @@ struct Pair<S> {
     resistance: S,
     inductance: S,
     closed: S,
+    /// Coefficient of the phase that is not used less the mean of those that are; none of an interrupted phase.
+    beside: S,
+    /// The same less that of the HIGH leg's.
+    apart: S,
 }
 
 #[inline(always)]
@@ -58,17 +64,25 @@ fn pair<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>) -> Pair<S>
     let resistance = m.c.resistance();
     let demand = six_step::demand(s.body.hall.code);
     let zero = S::zero();
-    let mut pair = Pair { constant: zero, winding: zero, resistance: zero, inductance: zero, closed: zero };
-    let mut open = zero;
+    let way = s.body.demand.signed(S::one());
+    let mut pair = Pair { constant: zero, winding: zero, resistance: zero, inductance: zero, closed: zero, beside: zero, apart: zero };
+    let (mut open, mut spare) = (zero, zero);
     for j in 0..3 {
         let used = demand[j].abs();
         pair.constant = pair.constant + demand[j] * k[j];
         pair.winding = pair.winding + used * resistance[j];
         pair.inductance = pair.inductance + used * m.inductance[j];
-        open = open + used * S::indicator(S::splat(0.5).le(m.c.star.open[j]));
+        let cut = S::indicator(S::splat(0.5).le(m.c.star.open[j]));
+        open = open + used * cut;
+        pair.beside = pair.beside + S::select(S::splat(0.5).lt(used), S::splat(-0.5) * k[j], k[j]);
+        let high = S::indicator(S::splat(0.5).lt(demand[j] * way));
+        pair.apart = pair.apart + (S::one() - used - high) * k[j];
+        spare = spare + (S::one() - used) * (S::one() - cut);
         pair.closed = pair.closed + used;
     }
     pair.resistance = pair.winding + m.on_resistance + m.on_resistance;
+    pair.beside = pair.beside * spare;
+    pair.apart = pair.apart * spare;
     pair.closed = S::indicator(S::splat(0.5).lt(pair.closed) & open.lt(S::splat(0.5)));
     pair
 }
@@ -83,10 +97,26 @@ fn against<S: Scalar>(m: &Model<S>, chopping: Chopping, link: S) -> S {
     }
 }
 
-/// Mean current over a carrier period (`docs/theory/landing-gear.md`).
+/// The pair's L di/dt = V - R i over a step, the commutations a part of R: share of the way to V/R.
+#[derive(Clone, Copy)]
+struct Lag<S> {
+    share: S,
+    from: S,
+}
+
+impl<S: Scalar> Lag<S> {
+    #[inline(always)]
+    fn to(&self, settled: S) -> S {
+        self.share.fma(settled - self.from, self.from)
+    }
+}
+
+/// Mean current over a carrier period after a step (`docs/theory/landing-gear.md`). The continuous current lags, and decays
+/// towards what its circuit drives back; the pulses, which start from none in each period, do not.
 #[inline(always)]
-fn mean_current<S: Scalar>(m: &Model<S>, chopping: Chopping, p: &Pair<S>, s: &Body<S>, duty: S) -> S {
+fn mean_current<S: Scalar>(m: &Model<S>, chopping: Chopping, p: &Pair<S>, body: &State<S>, duty: S) -> S {
     let (zero, one) = (S::zero(), S::one());
+    let s = &body.body;
     let speed = s.motion.motor_speed;
     let emf = p.constant * speed;
     let link = s.link;
@@ -97,6 +127,8 @@ fn mean_current<S: Scalar>(m: &Model<S>, chopping: Chopping, p: &Pair<S>, s: &Bo
     let passive = -(emf.signed(excess) / resistance);
     let sign = s.demand.signed(one);
     let along = sign * emf;
+    let share = (m.c.dt * resistance / inductance).minimum(one);
+    let lag = Lag { share, from: sign * body.current };
     let off = against(m, chopping, link);
     let (rise, fall) = (link - along, off + along);
     let usable = zero.lt(rise) & zero.lt(fall);
@@ -106,7 +138,6 @@ fn mean_current<S: Scalar>(m: &Model<S>, chopping: Chopping, p: &Pair<S>, s: &Bo
     let gap = duty.minimum(boundary);
     let pulsed = S::splat(0.5) * gap * gap * m.c.modulator.period / inductance * safe_rise * (one + safe_rise / safe_fall);
     let continuous = (duty * link - (one - duty) * off - along) / resistance;
-    let driven = S::select(boundary.lt(duty), pulsed.maximum(continuous), pulsed);
     let plugging = match chopping {
         // The EMF drives its current on through the HIGH leg.
         Chopping::LowSide => continuous,
@@ -114,10 +145,57 @@ fn mean_current<S: Scalar>(m: &Model<S>, chopping: Chopping, p: &Pair<S>, s: &Bo
     };
     // An EMF above the link drives a current back through the closed switches.
     let back = duty * rise / resistance;
-    let active = S::select(rise.le(zero), back, S::select(fall.le(zero), plugging, driven));
-    let cut = S::select(zero.lt(duty), active.clamp_abs(m.c.cutoff) * sign, zero);
+    let forced = S::select(zero.lt(duty), S::select(rise.le(zero), back, plugging), zero);
+    let settled = S::select(usable, pulsed.maximum(continuous), forced);
+    let reached = S::select(usable, pulsed.maximum(lag.to(continuous)), lag.to(forced));
+    let cut = settled.clamp_abs(m.c.cutoff) * sign;
     let braking = passive.signed(passive.abs().maximum((cut * passive.sign()).maximum(zero)));
-    S::select(passive.equals(zero), cut, S::select(zero.lt(cut * passive), braking, cut + passive)) * p.closed
+    let rectified = S::select(zero.lt(cut * passive), braking, cut + passive);
+    let rectified = share.fma(rectified - body.current, body.current);
+    S::select(passive.equals(zero), reached.clamp_abs(m.c.cutoff) * sign, rectified) * p.closed
+}
+
+/// Share of a carrier period in which the pair, switched off, still carries current (low-side chopping): its pulse falls to
+/// none before the next, or the EMF drives it on.
+#[inline(always)]
+fn freewheels<S: Scalar>(m: &Model<S>, p: &Pair<S>, s: &Body<S>, duty: S) -> S {
+    let (zero, one) = (S::zero(), S::one());
+    let along = s.demand.signed(one) * p.constant * s.motion.motor_speed;
+    let (rise, fall) = ((s.link - along).maximum(zero), m.diode_drop + along);
+    let off = one - duty;
+    let lasts = (duty * rise / S::select(zero.lt(fall), fall, one)).minimum(off);
+    S::select(zero.lt(fall), lasts, off)
+}
+
+/// Mean currents of the phase that is not used: beside the pair, and alone with the HIGH leg.
+struct Third<S> {
+    shared: S,
+    alone: S,
+}
+
+/// With low-side chopping the pair lies at the upper rail while it freewheels; an EMF above the pair's by half a diode then
+/// drives a current through the third phase's diode, x = e_3 - (e_1 + e_2)/2 - V_f/2 over 3/2 L. Once the pair's own has ended
+/// the HIGH leg is left, e_3 - e_1 - V_f over 2 L; while the pair is on it falls by (V + V_f)/2 - x over 3/2 L.
+#[inline(always)]
+fn third_current<S: Scalar>(m: &Model<S>, p: &Pair<S>, s: &Body<S>, duty: S) -> Third<S> {
+    let (zero, half, one) = (S::zero(), S::splat(0.5), S::one());
+    let inductance = S::select(zero.lt(p.inductance), p.inductance, one);
+    let per_volt = m.c.modulator.period / inductance;
+    let speed = s.motion.motor_speed;
+    let excess = (p.beside * speed - half * m.diode_drop).maximum(zero);
+    let against = (half * (s.link + m.diode_drop) - excess).maximum(S::splat(1e-3) * s.link.maximum(one));
+    let rise = S::splat(4.0 / 3.0) * per_volt * excess;
+    let fall = S::splat(4.0 / 3.0) * per_volt * against;
+    let drift = per_volt * (p.apart * speed - m.diode_drop);
+    let off = freewheels(m, p, s, duty);
+    let floats = (one - duty - off).maximum(zero);
+    let peak = rise * off;
+    let dies = drift.lt(zero);
+    let lasts = S::select(dies, (peak / S::select(dies, -drift, one)).minimum(floats), floats);
+    let last = (peak + drift * lasts).maximum(zero);
+    let falls = (last / fall).minimum(duty);
+    let conducts = p.closed * S::indicator(zero.lt(duty));
+    Third { shared: conducts * (half * peak * off + falls * (last - half * fall * falls)), alone: conducts * half * (peak + last) * lasts }
 }
 
 /// Line current that gives the mean torque of the windings shorted by the low switches: 3/2 k_1^2 w R/(R^2 + (p w L)^2)
@@ -147,33 +225,40 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
     let zero = S::zero();
     let half = S::splat(0.5);
     let duty = m.c.duty(&s.body) * s.body.driving * (one - s.body.short);
-    let mut target = mean_current(m, structure.chopping, &p, &s.body, duty * (one - s.tripped));
+    let mut current = mean_current(m, structure.chopping, &p, s, duty * (one - s.tripped));
     let shorted = m.terminals.maximum(s.body.short * (one - s.tripped));
     let short = half.lt(shorted) & half.lt(p.closed);
     if S::any(short) {
-        target = S::select(short, shorted_current(m, &p, &s.body), target);
+        let inductance = S::select(zero.lt(p.inductance), p.inductance, one);
+        let lag = Lag { share: (dt * p.resistance / inductance).minimum(one), from: s.current };
+        current = S::select(short, lag.to(shorted_current(m, &p, &s.body)), current);
     }
     if structure.shorted {
         // Driving into shorted terminals is a short of the link.
         s.tripped = S::select(half.lt(m.terminals) & zero.lt(duty), one, s.tripped);
     }
-    let inductance = S::select(zero.lt(p.inductance), p.inductance, one);
-    let follow = S::select(half.lt(p.closed), (dt * p.resistance / inductance).minimum(one), one);
-    let followed = follow.fma(target - s.current, s.current);
     // What decays to nothing is nothing: numbers without full precision are slow.
-    s.current = S::select(followed.abs().lt(S::splat(1e-30)), zero, followed);
+    s.current = S::select(current.abs().lt(S::splat(1e-30)), zero, current);
     let i = s.current;
-    Constants::meter(&mut s.body, i);
+    // Half of the third phase's current comes from each of the pair; it brakes.
+    let (mut line, mut dragged) = (i, zero);
+    if structure.chopping == Chopping::LowSide {
+        let third = third_current(m, &p, &s.body, duty * (one - s.tripped));
+        line = i + i.signed(S::select(short, zero, half * third.shared + third.alone));
+        dragged = S::select(short, zero, third.shared * p.beside + third.alone * p.apart);
+    }
+    s.line = line;
+    Constants::meter(&mut s.body, line);
     let square = i * i;
-    s.torque = m.c.star.saturate(p.constant * i);
+    s.torque = m.c.star.saturate(p.constant * i - dragged);
     let speed = s.body.motion.motor_speed;
     let drop = match structure.chopping {
         Chopping::LowSide => m.diode_drop,
         Chopping::Both => m.diode_drop + m.diode_drop,
     };
     let mut winding = p.winding * square;
-    let mut drops = i.abs() * (one - duty) * drop + (p.resistance - p.winding) * square;
-    let mut drawn = p.constant * speed * i + winding + drops;
+    let mut drops = i.abs() * (one - duty) * drop + (p.resistance - p.winding) * square + dragged * speed;
+    let mut drawn = (p.constant * i - dragged) * speed + winding + drops;
     if S::any(short) {
         // All that a shorted winding brakes becomes heat in its own circuit.
         let heat = -(p.constant * speed * i);
@@ -238,7 +323,7 @@ impl Wiring for Low {
     }
 
     fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
-        State { body: model.c.start(raw, initial), current: S::zero(), torque: S::zero(), tripped: S::zero() }
+        State { body: model.c.start(raw, initial), current: S::zero(), line: S::zero(), torque: S::zero(), tripped: S::zero() }
     }
 
     fn tick<S: Scalar>(
@@ -271,7 +356,7 @@ impl Wiring for Low {
 
     fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, _asked: Signals, out: &mut [S]) {
         m.c.observe(structure, inputs, &s.body, s.torque, t, out);
-        out[Q::CurrentLine as usize] = s.current;
+        out[Q::CurrentLine as usize] = s.line;
         out[Q::EnergyMagnetic as usize] = S::splat(0.5) * pair(m, structure, s).inductance * s.current * s.current;
     }
 
