@@ -14,6 +14,7 @@ from elevon.calibrate.closed_loop.fit import Searched, choose, final_fit
 from elevon.calibrate.closed_loop.free import free_list, inner
 from elevon.calibrate.closed_loop.held_out import held_out_errors
 from elevon.calibrate.closed_loop.intervals import known
+from elevon.calibrate.closed_loop.refine import load_share, steps
 from elevon.calibrate.closed_loop.result import agreement
 from elevon.cli.closed_loop import calibrate_closed_loop, check_loop_options
 from elevon.cli.runner import run as elevon
@@ -99,6 +100,25 @@ def test_from_a_good_start_a_short_log_is_followed():
     assert not reasons["control.pid_derivative_time"]
     held = held_out_errors(fitted)
     assert {error.signal for error in held.errors} == {"position", "speed", "current"}
+
+
+def test_friction_grows_with_the_torque_unless_the_set_says_how_it_does(known_drive):
+    base, data = known_drive
+    freed = {item.path for item in free_list(base, [data], "pid", {})}
+    assert "friction.load_motor" not in freed
+    grows = load_share(base, [data], "pid")
+    assert grows.parameters["friction.law"].value == "load_dependent"
+    assert "friction.load_motor" in {item.path for item in free_list(grows, [data], "pid", {})}
+    bristles = base.with_values({"friction.law": "lugre"})
+    assert load_share(bristles, [data], "pid") is bristles
+
+
+def test_a_step_that_stands_for_a_late_drive_is_short_against_the_log(known_drive):
+    base, data = known_drive
+    assert steps(base, [data]) == [5e-4, 1e-3, 2e-3]
+    slow = replace(data, time=2.0 * data.time)
+    assert steps(base, [slow]) == [5e-4, 1e-3, 2e-3, 3e-3]
+    assert steps(base.with_values({"low.step": 4e-3}), [slow]) == [4e-3]
 
 
 @pytest.fixture(scope="module")

@@ -16,13 +16,15 @@ from elevon.errors import unknown
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["STRUCTURES", "Free", "asked_for", "free_list", "in_set", "inner", "outer"]
+__all__ = ["LOAD_SHARE", "STRUCTURES", "Free", "asked_for", "free_list", "in_set", "inner", "outer"]
 
 Floats = npt.NDArray[np.float64]
 
 STRUCTURES = ("cascade", "pid")
 #: Static over dynamic friction: the fit's own variable, so that rest never holds less.
 STICK = "friction.stick"
+#: Friction per torque of the motor, where the law knows of it.
+LOAD_SHARE = "friction.load_motor"
 
 
 @dataclass(frozen=True)
@@ -127,6 +129,8 @@ def _plant(actuator: Actuator) -> list[Free]:
         _row("friction.reverse_scale", "1", "plant", 0.2, (0.1, 10.0)),
         _row("friction.viscous", "N m s/rad", "plant", 2.0, (1e-9, 1e3)),
     ]
+    if str(actuator.parameters["friction.law"].value) == "load_dependent":
+        rows.append(_row(LOAD_SHARE, "1", "plant", 1.0, (1e-3, 0.9)))
     weight = _torque_scale(actuator) * _per_output(actuator)
     rows.append(
         Free("load.constant", "N" if linear else "N m", "load", False, 0.0, weight,

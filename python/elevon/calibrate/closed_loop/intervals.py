@@ -13,6 +13,7 @@ from elevon.calibrate.closed_loop.fit import Fitted
 from elevon.calibrate.closed_loop.free import Free
 from elevon.calibrate.closed_loop.model import LoopModel
 from elevon.calibrate.closed_loop.objective import SOFT, Objective
+from elevon.calibrate.closed_loop.refine import FALL
 from elevon.calibrate.closed_loop.solve import Point, jacobian
 
 __all__ = ["SILENT", "Known", "known"]
@@ -22,7 +23,7 @@ _SHARE = 0.2  # of a logarithm: a deviation above which a number is not determin
 _TENTH = 0.5  # of its meaningful size, for an offset or a delay
 _SILENT = 1.0  # deviations of all residuals together that a whole spread moves
 _TOGETHER = 0.7  # correlation that is named
-_FALL = 0.02  # of the highest speed, over which friction may fall from rest to motion
+_LEAST_LATER = 5e-4  # s, by which the alternative's step is longer
 _LATE = 1.5e-3  # s between reading and acting of a drive with a tick of a millisecond
 _WEIGHTS = (0.25, 4.0)  # of a channel or log against the others: what a misfit would change
 #: Reasons of numbers that the logs do not feel: they stay as given.
@@ -145,18 +146,25 @@ def _misfit(objective: Objective, point: Point, jac: Floats, weight: Floats) -> 
 def _choices(objective: Objective, point: Point, gain: Floats) -> Floats:
     """What choices of the model that no slow log settles would change, by one step of Newton each.
 
-    The friction may fall with speed or grow with the torque, and a drive acts some time after it
-    has read. Each alternative is run once at the same values; the late drive as one that is late by
-    a step of the model more, its effect scaled to `_LATE`.
+    The friction may fall with speed or grow with the torque (where it does, fall over half or twice
+    the speed), and a drive acts some time after it has read. Each alternative is run once at the
+    same values; the late drive as a longer step of the model, its effect scaled to `_LATE`.
     """
     model = objective.model
     speed = max(float(np.nanmax(np.abs(log.motion(model.per_output)[0]))) for log in model.logs)
-    step = model.actuator.parameters.value("low.step")
-    alternatives: tuple[dict[str, str | float], ...] = (
-        {"friction.law": "stribeck", "friction.stribeck_speed": _FALL * speed},
-        {"friction.law": "load_dependent", "friction.stribeck_speed": _FALL * speed},
-        {"low.step": 2.0 * step},
-    )
+    parameters = model.actuator.parameters
+    later = max(0.5 * parameters.value("low.step"), _LEAST_LATER)
+    alternatives: list[dict[str, str | float]] = [
+        {"low.step": parameters.value("low.step") + later}
+    ]
+    if str(parameters["friction.law"].value) == "load_dependent":
+        fall = parameters.value("friction.stribeck_speed")
+        alternatives += [{"friction.stribeck_speed": factor * fall} for factor in (0.5, 2.0)]
+    else:
+        alternatives += [
+            {"friction.law": law, "friction.stribeck_speed": FALL * speed}
+            for law in ("stribeck", "load_dependent")
+        ]
     total = np.zeros((gain.shape[0], gain.shape[0]))
     for changes in alternatives:
         other = model.actuator.with_values(changes, source="calibration")
@@ -164,7 +172,7 @@ def _choices(objective: Objective, point: Point, gain: Floats) -> Floats:
         run = Objective(beside, objective.free)
         run.scales = objective.scales
         moved = gain @ (run.residual(point.x[None, :])[0] - point.residual)
-        moved = moved * (_LATE / step if "low.step" in changes else 1.0)
+        moved = moved * (_LATE / later if "low.step" in changes else 1.0)
         total += np.outer(moved, moved)
     return total
 

@@ -87,7 +87,7 @@ class LoopModel:
         self._names = list(prepared.plan[0].signals)
         step = solver_step(self.actuator, "low")
         period = min(log.period for log in self.logs)
-        every = max(1, round(period / _FINE / step))
+        every = max(1, int(period / _FINE / step + 1e-6))
         self._plan = [{**prepared.plan[0].to_core(), "period_steps": every}]
         self._clock = str(self._plan[0]["clock"])
         self._cores = [self._core(prepared.core, log) for log in self.logs]

@@ -22,6 +22,7 @@ from elevon.calibrate.closed_loop.held_out import held_out_errors
 from elevon.calibrate.closed_loop.intervals import SILENT, Known, known
 from elevon.calibrate.closed_loop.log import LoopLog
 from elevon.calibrate.closed_loop.predict import Agreement, errors_of
+from elevon.calibrate.closed_loop.refine import refined
 from elevon.calibrate.estimate import Estimate, quantile
 from elevon.errors import InputError, Interrupted
 from elevon.parameters.relations import static_following
@@ -164,7 +165,10 @@ def calibrate_loop(
     else:
         searched = _searched(actuator, logs, structure, seed, say)
     chosen, why = choose(searched)
-    fitted = final_fit(actuator, logs, chosen, check=say.go, advance=lambda f: say(0.6 + 0.35 * f))
+    servo = actuator
+    if free is None:
+        servo, chosen = refined(actuator, logs, chosen, check=say.go)
+    fitted = final_fit(servo, logs, chosen, check=say.go, advance=lambda f: say(0.6 + 0.35 * f))
     rows, degrees = known(fitted)
     held = held_out_errors(fitted)
     estimates, missing = _estimates(rows, degrees, actuator)
@@ -174,7 +178,7 @@ def calibrate_loop(
         raise InputError("the logs determine no parameter: nothing in them moves enough")
     say(1.0)
     return LoopCalibration(
-        actuator=_with(actuator, fitted, chosen.structure, missing),
+        actuator=_with(servo, fitted, chosen.structure, missing),
         before=actuator,
         logs=tuple(logs),
         estimates=tuple(estimates),

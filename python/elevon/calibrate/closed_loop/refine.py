@@ -1,0 +1,95 @@
+"""What a search leaves out: friction that grows with the torque, and how late the drive acts.
+
+Both bias gains, inertia and limits where they are missing: a screw's friction eats a share of the
+torque at the current's limit, so that a model without it lowers the limit; a drive that reads,
+waits and holds acts some milliseconds late, which the model's step stands for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elevon.calibrate.closed_loop.fit import Searched
+from elevon.calibrate.closed_loop.free import LOAD_SHARE, free_list, inner, outer
+from elevon.calibrate.closed_loop.log import LoopLog
+from elevon.calibrate.closed_loop.model import LoopModel
+from elevon.calibrate.closed_loop.objective import Objective
+from elevon.calibrate.closed_loop.solve import Point, solve
+from elevon.calibrate.closed_loop.start import windows
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["FALL", "load_share", "refined", "steps"]
+
+#: Share of the highest speed over which friction falls from rest to motion. ASSUMED: no log at
+#: 100 Hz settles it; half and twice as much are part of the intervals.
+FALL = 0.02
+_TICKS = (1e-3, 2e-3, 3e-3)  # s, tried beside the set's own step
+_PERIODS = 0.25  # of the log, a step at most
+_ROUNDS = 6
+
+
+def refined(
+    actuator: Actuator,
+    logs: Sequence[LoopLog],
+    chosen: Searched,
+    *,
+    check: Callable[[], bool] = lambda: True,
+) -> tuple[Actuator, Searched]:
+    """Return the servo and the point from which whole logs are fitted.
+
+    Friction is let grow with the motor's torque (laws that know of no such share), and the model's
+    step becomes the one of a few under which windows of the logs are followed best.
+    """
+    servo = load_share(actuator, logs, chosen.structure)
+    free = tuple(free_list(servo, logs, chosen.structure, outer(chosen.free, chosen.x)))
+    per_output = LoopModel(servo, logs, chosen.structure, check).per_output
+    parts = windows(logs, per_output)
+    tried = []
+    scales = None
+    for step in steps(servo, logs):
+        late = servo.with_values({"low.step": step}, source="calibration")
+        objective = Objective(LoopModel(late, parts, chosen.structure, check), free)
+        x = inner(free, outer(chosen.free, chosen.x))
+        if scales is None:
+            objective.refresh(x)
+            scales = objective.scales
+        objective.scales = dict(scales)
+        tried.append((late, solve(objective, x[None, :], rounds=_ROUNDS)[0]))
+    best, point = min(tried, key=_cost)
+    # The belief stays with the first values of the search.
+    first = {item.path: item.start for item in chosen.free}
+    free = tuple(replace(item, start=first.get(item.path, item.start)) for item in free)
+    return best, replace(chosen, free=free, x=point.x)
+
+
+def _cost(tried: tuple[Actuator, Point]) -> float:
+    return tried[1].cost
+
+
+def steps(actuator: Actuator, logs: Sequence[LoopLog]) -> list[float]:
+    """Return the steps of the model that are tried, the set's own first, s."""
+    own = actuator.parameters.value("low.step")
+    longest = _PERIODS * min(log.period for log in logs)
+    return [own, *(tick for tick in _TICKS if own < tick <= longest)]
+
+
+def load_share(actuator: Actuator, logs: Sequence[LoopLog], structure: str) -> Actuator:
+    """Return the servo with friction that grows with the torque; a law of bristles stays."""
+    if str(actuator.parameters["friction.law"].value) not in {"borello", "stribeck"}:
+        return actuator
+    model = LoopModel(actuator, logs, structure)
+    top = max(float(np.nanmax(np.abs(log.motion(model.per_output)[0]))) for log in logs)
+    if not top > 0.0:
+        return actuator
+    values: dict[str, str | float] = {
+        "friction.law": "load_dependent", "friction.stribeck_speed": FALL * top,
+        LOAD_SHARE: 0.05, "friction.load_external": 0.0, "friction.load_motor_stribeck": 0.0,
+        "friction.load_external_stribeck": 0.0,
+    }  # fmt: skip
+    return actuator.with_values(values, source="calibration")
