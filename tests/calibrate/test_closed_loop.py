@@ -243,23 +243,22 @@ def test_logs_of_fewer_channels():
 
 @pytest.mark.long
 def test_twelve_benches_and_their_intervals():
-    """Medians within 5 %, and 90 % intervals that hold 70 to 99 % of the truths: the plant has a
-    friction and a sampled drive that the model has not."""
+    """Medians within 5 %, current within 18 % of its RMS, and 90 % intervals that hold 80 to 97 %
+    of the truths: the plant has a friction and a sampled drive that the model has not."""
     off, hits = {}, []
     for seed in range(12):
         bench = draw(seed)
         result = calibrate_loop(both(bench, seed), datasheet(bench), structure="pid")
+        assert above(result.agreement, BAR) == {}
         known = {item.path: item for item in result.estimates}
         for path, value in truth(bench).items():
             if path in known:
                 low, high = known[path].interval
                 off.setdefault(path, []).append(abs(known[path].value / value - 1.0))
                 hits.append(low <= value <= high)
-    # A sample every 10 ms misses the current's peaks.
     far = {path: float(np.median(e)) for path, e in off.items()}
-    assert far.pop("control.current_limit") < 0.10
     assert max(far.values()) < 0.05, far
-    assert 0.7 <= np.mean(hits) <= 0.99
+    assert 0.8 <= np.mean(hits) <= 0.97
 
 
 def write_csv(path, columns):
