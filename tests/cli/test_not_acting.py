@@ -6,7 +6,7 @@ import pytest
 
 SIMULATE = ("simulate", "torino-rotary", "--duration", "0.01")
 IDLE = {
-    "the fidelity": (("--fidelity", "low", "--set", "solver.step=2e-6"), "solver.step = 2 us"),
+    "the fidelity": (("--fidelity", "low", "--set", "solver.step=2 us"), "solver.step = 2 us"),
     "the drive": (("--set", "pwm.frequency=5 kHz"), "pwm.frequency = 5 kHz"),
     "an attribute": (
         ("--fault", "short@motor.phase_a=0.1,contact_resistance=1"),
@@ -109,7 +109,7 @@ def test_a_comparison_names_what_neither_model_carries(elevon_cli, tmp_path):
         'frequency = "2 Hz"\n'
     )
     asked = ("compare", "torino-rotary", "--scenario", scenario, "--after", "0.5", "--strict")
-    assert elevon_cli(*asked, "--set", "solver.step=2e-6").code == 0
+    assert elevon_cli(*asked, "--set", "solver.step=2 us").code == 0
     refused = elevon_cli(*asked, "--set", "pwm.frequency=5 kHz")
     assert refused.code == 2
     assert "pwm.frequency = 5 kHz does not act" in refused.err

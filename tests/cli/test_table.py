@@ -8,8 +8,8 @@ import sys
 
 import pytest
 
-from elevon.cli.numbers import estimate_texts, interval_texts, severity_texts
 from elevon.cli.table import table_lines
+from elevon.number_text import estimate_texts, interval_texts, severity_texts
 
 HEADS = ["parameter", "before", "after", "low", "high", "unit", "register", "holds for"]
 ROWS = [

@@ -12,7 +12,7 @@ PACKAGE = Path(__file__).resolve().parents[2] / "python" / "elevon"
 ROWS = [
     ["errors", "extras", "_core"],
     ["units", "files", "progress", "memory", "data"],
-    ["documents", "series", "report", "worklog", "containers"],
+    ["documents", "series", "number_text", "report", "worklog", "containers"],
     ["recording"],
     ["parameters", "loads"],
     ["actuator", "faults", "waveforms"],

@@ -82,3 +82,18 @@ def test_a_sparkline_keeps_its_extremes_and_its_gaps():
     assert sparkline(line).count("<polyline") == 2
     assert sparkline([1.0]) == sparkline(np.full(9, np.nan)) == ""
     assert sparkline(np.ones(9)).count("<polyline") == 1
+
+
+def test_a_calibration_shows_its_intervals_and_what_it_cannot_tell():
+    from elevon.calibrate.estimate import Estimate
+    from elevon.calibrate.shown import calibration_card
+
+    actuator = elevon.Actuator.load("torino-rotary")
+    value, interval = 7.913e-4, (7.85e-4, 7.98e-4)
+    item = Estimate("motor.inertia", value, 4e-6, interval, "kg m2", "plant", old=7.7e-4)
+    html = calibration_card(actuator, ["a.csv"], [item], {"play.total": "no reversal"})
+    text = _text(html)
+    for word in ("torino-rotary", "a.csv", "motor.inertia", "kg cm2", "7.7", "play.total"):
+        assert word in text
+    assert "7.91 7.85 7.98" in text
+    assert "no reversal" in text

@@ -57,6 +57,12 @@ class PartsCalibration:
 
         raise unknown("estimate", path, [item.path for item in self.estimates])
 
+    def _repr_html_(self) -> str:
+        from elevon.calibrate.shown import calibration_card
+
+        names = [log.name for log in self.logs]
+        return calibration_card(self.before, names, self.estimates, self.undetermined)
+
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
         return {

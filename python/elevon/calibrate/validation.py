@@ -259,7 +259,7 @@ def _trace(
             "initial": {
                 "motor_position": shift,
                 "motor_speed": float(log.speed[0]),
-                "user_position": _start(log, offset, middle),
+                "user_position": _start(log, offset, middle, actuator),
             },
         }
     )
@@ -291,9 +291,16 @@ def _record(actuator: Actuator, fidelity: str, rate: str) -> str:
     return f"{','.join(SIGNALS)}@{f'{1.0 / (round(steps) * step):.12g} Hz' if whole else 'every'}"
 
 
-def _start(log: BenchLog, offset: float, middle: float) -> float:
+def _start(log: BenchLog, offset: float, middle: float, actuator: Actuator) -> float:
+    """Return where the user begins: as the encoder shows it, at an end of the play at most.
+
+    What noise and errors of the sensors add beyond the play is nowhere an actuator can stand.
+    """
     assert log.user is not None
-    return float(log.user[0]) - offset if np.isfinite(log.user[0]) else middle
+    shown = float(log.user[0]) - offset if np.isfinite(log.user[0]) else middle
+    value = actuator.parameters.value
+    half = 0.5 * (value("play.total") + value("play.extra"))
+    return float(np.clip(shown, middle - half, middle + half))
 
 
 def _command(log: BenchLog, actuator: Actuator) -> tuple[Floats, str]:

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from elevon.cli.closed_loop import read_recording
-from elevon.cli.numbers import estimate_row
 from elevon.cli.output import print_json, print_table, progress_bar, say
 from elevon.errors import ElevonError, InputError
+from elevon.number_text import estimate_row
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator

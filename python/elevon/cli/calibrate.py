@@ -21,9 +21,9 @@ from elevon.cli.common import (
     read_actuator,
     without_companions,
 )
-from elevon.cli.numbers import estimate_row, estimate_texts, written_unit
 from elevon.cli.output import print_json, print_table, progress_bar, say
 from elevon.errors import InputError
+from elevon.number_text import estimate_row, estimate_texts, written_unit
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from elevon.cli.numbers import estimate_row
 from elevon.cli.output import print_json, print_table, progress_bar, say
 from elevon.errors import FormatError, InputError
+from elevon.number_text import estimate_row
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator

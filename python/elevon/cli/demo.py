@@ -101,7 +101,7 @@ def _story(out: Path) -> str:
 
 def _row(row: dict[str, Any], result: Demo) -> tuple[str, ...]:
     """Return a row of the table, in the unit of the set and with the digits of the interval."""
-    from elevon.cli.numbers import estimate_texts, written_unit
+    from elevon.number_text import estimate_texts, written_unit
     from elevon.units import to_display
 
     unit = written_unit(result.base, row["path"])

@@ -24,9 +24,9 @@ from elevon.cli.common import (
     read_actuator,
     without_companions,
 )
-from elevon.cli.numbers import severity_texts
 from elevon.cli.output import print_json, print_table, say
 from elevon.errors import InputError, unknown
+from elevon.number_text import severity_texts
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from elevon.cli.common import JsonOption
-from elevon.cli.numbers import quantity_text
 from elevon.cli.output import print_json, print_table, say
+from elevon.number_text import quantity_text
 
 app = typer.Typer(rich_markup_mode=None)
 

@@ -167,17 +167,18 @@ def _csv(table: LoadTable, linear: bool) -> str:
 
 
 def _scenario(table: LoadTable) -> str:
-    def term(place: str, values: Any) -> str:
+    def term(place: str, values: Any, unit: str) -> str:
         times = ", ".join(f"{t:.9g}" for t in table.time)
         numbers = ", ".join(f"{v:.9g}" for v in values)
-        return f'[[{place}]]\nkind = "table"\ntimes = [{times}]\nvalues = [{numbers}]\n'
+        head = f'[[{place}]]\nkind = "table"\nunit = "{unit}"\n'
+        return f"{head}times = [{times}]\nvalues = [{numbers}]\n"
 
     return (
         f"# A flight: load scale {table.load_scale:.6g}, "
         f"position scale {table.position_scale:.6g}\n"
         f'duration = {table.time[-1]:.9g}\n[command]\nmode = "position"\n'
-        + term("command.terms", table.position)
-        + term("load.user.terms", table.load)
+        + term("command.terms", table.position, "m" if table.linear else "rad")
+        + term("load.user.terms", table.load, "N" if table.linear else "N m")
     )
 
 

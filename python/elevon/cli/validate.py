@@ -26,8 +26,8 @@ from elevon.cli.common import (
     check_outputs,
     read_actuator,
 )
-from elevon.cli.numbers import quantity_text
 from elevon.cli.output import print_json, print_table, progress_bar, say
+from elevon.number_text import quantity_text
 
 app = typer.Typer(rich_markup_mode=None)
 

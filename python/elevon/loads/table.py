@@ -33,6 +33,8 @@ class LoadTable:
         What the aircraft's values were multiplied by.
     dynamic_pressure, mach : ndarray, shape (n,)
         Pa, and 1; for plots and checks, never scaled.
+    linear : bool
+        A ram, in m and N; else a shaft, in rad and N m.
     """
 
     time: Array
@@ -42,14 +44,15 @@ class LoadTable:
     position_scale: float
     dynamic_pressure: Array
     mach: Array
+    linear: bool = False
 
     def load_term(self, *, repeat: bool = False) -> dict[str, Any]:
         """Return the table as one entry of ``load.user.terms``."""
-        return _term(self.time, self.load, repeat)
+        return _term(self.time, self.load, "N" if self.linear else "N m", repeat)
 
     def command_term(self, *, repeat: bool = False) -> dict[str, Any]:
         """Return the position as one entry of ``command.terms``."""
-        return _term(self.time, self.position, repeat)
+        return _term(self.time, self.position, "m" if self.linear else "rad", repeat)
 
     def scenario(self) -> dict[str, Any]:
         """Return a scenario that flies the flight: command, load and duration, in SI units."""
@@ -126,7 +129,14 @@ def flight_load(
     load, load_scale = _scaled("limit", -moment / lever, limit)
     position, position_scale = _scaled("travel", lever * flight.deflection, travel)
     return LoadTable(
-        flight.time - flight.time[0], load, position, load_scale, position_scale, pressure, mach
+        flight.time - flight.time[0],
+        load,
+        position,
+        load_scale,
+        position_scale,
+        pressure,
+        mach,
+        linear=arm is not None,
     )
 
 
@@ -148,10 +158,11 @@ def _finite(name: str, value: float) -> float:
     return float(value)
 
 
-def _term(time: Array, values: Array, repeat: bool) -> dict[str, Any]:
+def _term(time: Array, values: Array, unit: str, repeat: bool) -> dict[str, Any]:
     return {
         "kind": "table",
         "times": time.tolist(),
         "values": values.tolist(),
+        "unit": unit,
         "repeat": repeat,
     }

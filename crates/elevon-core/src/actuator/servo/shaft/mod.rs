@@ -14,6 +14,7 @@ use super::form::Form;
 use super::high::model::network_period;
 use super::layout::*;
 use crate::details;
+use crate::motor::cogging::Cogging;
 use crate::motor::star::MotorParameter;
 use crate::motor::thermal::Network;
 use crate::motor::unbalance::Unbalance;
@@ -35,8 +36,11 @@ details! {
         /// Positions move with the new speed.
         semi_implicit: bool = x.semi_implicit;
         /// Positions move with the mean of both speeds: exact for a torque held over a long step. A spring asks for the new
-        /// speed, which neither feeds nor damps its swing; so do worn flanks under load.
-        middle: bool = x.low && !x.parts.load().away(LoadParameter::Stiffness) && !Teeth::<f64>::needed(&x.parts.tooth());
+        /// speed, which neither feeds nor damps its swing; so do worn flanks under load and cogging.
+        middle: bool = x.low
+            && !x.parts.load().away(LoadParameter::Stiffness)
+            && !Teeth::<f64>::needed(&x.parts.tooth())
+            && !Cogging::<f64>::needed(&x.parts.cogging());
         train: TrainDetails = TrainDetails::read::<F>(x.parts);
     }
     full {
