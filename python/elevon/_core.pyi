@@ -1,7 +1,7 @@
 """The Rust core: all physics. Every number crossing this seam is an SI float."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,7 @@ __all__ = [
     "wirings",
 ]
 
+@final
 class Session:
     def __new__(
         cls,
