@@ -138,17 +138,21 @@ class LifeDemo:
         return cumulative_relative_accuracy(self.track, (0.5, 0.6, 0.7, 0.8, 0.9))
 
     @property
-    def checks(self) -> list[Check]:
-        """What must hold."""
+    def inside(self) -> float:
+        """Share of the predictions whose 90 % interval holds the true end of life."""
         track = self.track
-        inside = np.mean((track.low <= track.true) & (track.true <= track.high))
+        return float(np.mean((track.low <= track.true) & (track.true <= track.high)))
+
+    @property
+    def checks(self) -> list[Check]:
+        """What must hold of any one life; how well it was predicted is shown, and judged by many.
+
+        `elevon reproduce prognosis` asks for accuracy and coverage, of sixty lives.
+        """
+        track = self.track
         named = np.mean([v.diagnosis.status == "faulty" for v in self.visits[1:]])
         width = (track.high - track.low)[[len(track.usage) // 3, -1]]
         return [
-            Check("predictions whose 90 % interval holds the true end", float(inside), 0.6,
-                  at_least=True),
-            Check("mean relative accuracy, 50 to 90 % of life", self.accuracy, 0.6,
-                  at_least=True),
             Check("last interval's width over that at a third of the inspections",
                   float(width[1] / width[0]), 1.0),
             Check("inspections after the first that name a fault", float(named), 0.8,
@@ -163,6 +167,7 @@ class LifeDemo:
             "seed": self.seed,
             "end": self.life.end,
             "cumulative_relative_accuracy": self.accuracy,
+            "inside": self.inside,
             "rows": [
                 {
                     "usage": v.usage,
