@@ -107,8 +107,13 @@ def test_a_state_is_saved_and_restored():
     for signal in SIGNALS:
         assert np.array_equal(first[signal], again[signal])
     assert np.array_equal(_stepped(other, SIGNALS, 10)["motor_speed"], first["motor_speed"])
-    with pytest.raises(InputError, match="another wiring"):
-        elevon.Session("torino-rotary").restore(state)
+    for other in (
+        elevon.Session("torino-rotary", mode="torque"),
+        elevon.Session("nasa-ballscrew", mode="torque", fidelity="low"),
+        elevon.Session("nasa-ballscrew", mode="speed"),
+    ):
+        with pytest.raises(InputError, match="another kind"):
+            other.restore(state)
     with pytest.raises(ArgumentTypeError):
         session.restore("yesterday")
 
@@ -254,3 +259,33 @@ def test_each_lane_has_a_status_of_its_own():
     assert "trip" in session.messages[1]
     torque = session["motor_torque"]
     assert torque[0] > 0.5 > torque[1]
+
+
+def test_a_change_that_one_lane_refuses_changes_none():
+    actuator = elevon.Actuator.load("torino-rotary")
+    still = actuator.with_values({"motor.cogging_torque": "0.01 N m"})
+    runs = [elevon.Run(still), elevon.Run(actuator)]
+    session = elevon.Session(runs, fidelity="low")
+    session.advance("1 ms")
+    before = session.read(*SIGNALS), session.actuators
+
+    def unchanged():
+        read = session.read(*SIGNALS)
+        assert all(np.array_equal(read[name], before[0][name]) for name in SIGNALS)
+        assert session.actuators == before[1]
+        assert session.save().faults == ({}, {})
+
+    with pytest.raises(InputError, match="announce"):  # the second lane has no cogging
+        session.set_parameter("motor.cogging_torque", np.array([0.02, 0.03]))
+    unchanged()
+    with pytest.raises(RangeError):
+        session.set_parameter("motor.inertia", np.array([1e-3, -1.0]))
+    unchanged()
+    with pytest.raises(RangeError):
+        session.set_fault("short@motor.phase_a", np.array([0.1, 2.0]))
+    unchanged()
+    command = session["command"]
+    with pytest.raises(UnknownNameError):
+        session.set(command=0.5, comand=0.5)
+    assert np.array_equal(session["command"], command)
+    unchanged()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from elevon.errors import InputError, unknown
+from elevon.errors import InputError, UnknownNameError, unknown
 
 __all__ = ["VARIABLE", "find_set", "is_shipped", "set_names", "set_paths"]
 
@@ -45,7 +45,7 @@ def find_set(reference: str | os.PathLike[str], folder: Path | None = None) -> P
     Raises
     ------
     UnknownNameError
-        No set of that name; the message holds the nearest.
+        No set of that name; the message holds the nearest, and the file to write.
     InputError
         The file does not exist.
     """
@@ -58,7 +58,9 @@ def find_set(reference: str | os.PathLike[str], folder: Path | None = None) -> P
     near = [place / f"{text}.toml" for place in (folder or Path(), Path())]
     beside = next((path for path in near if path.is_file()), None)
     if beside is None:
-        raise unknown("actuator", text, known)
+        error = unknown("actuator", text, known)
+        where = near[0]
+        raise UnknownNameError(f"{error}; or write {where}", error.name, error.nearest)
     return beside
 
 

@@ -1,6 +1,7 @@
 """Live sessions: actuators that are stepped, read and changed while they run."""
 
 from elevon.session.loop import Controller, run_loop
-from elevon.session.session import Session, SessionState
+from elevon.session.session import Session
+from elevon.session.start import SessionState
 
 __all__ = ["Controller", "Session", "SessionState", "run_loop"]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from typing import Any
 
 import numpy as np
@@ -17,30 +17,19 @@ from elevon.faults import Fault, find_record
 from elevon.parameters.records import record_of
 from elevon.progress import Progress
 from elevon.recording import Recording
-from elevon.scenario import Scenario, Term
+from elevon.scenario import Term
 from elevon.scenario.compile import compile_term, port_units, signal_records
+from elevon.session.start import SessionState, fault_places, runs_of
 from elevon.simulate.acting import report
-from elevon.simulate.arguments import ActuatorLike, ScenarioLike, as_actuator
+from elevon.simulate.arguments import ActuatorLike, ScenarioLike
 from elevon.simulate.prepare import Run, prepare, solver_step
 from elevon.units import parse_quantity, shown_unit
 
-__all__ = ["Session", "SessionState", "Value"]
+__all__ = ["Session", "Value"]
 
 Floats = npt.NDArray[np.float64]
 Value = float | str | Sequence[float] | Floats
 _FOREVER = 4.0e15  # solver steps: a session has no end of its own
-
-
-@dataclass(frozen=True)
-class SessionState:
-    """All that a session holds, as `Session.save` found it; `Session.restore` goes back to it.
-
-    It lives in this process only: the core's state has no form on a disk.
-    """
-
-    core: Any
-    actuators: tuple[Actuator, ...]
-    faults: tuple[Mapping[str, int], ...]
 
 
 class Session:
@@ -109,9 +98,9 @@ class Session:
         signals: Iterable[str] = (),
         lanes: str = "auto",
     ) -> None:
-        runs = _runs(actuator, scenario, mode, seed)
+        runs = runs_of(actuator, scenario, mode, seed)
         self.many = not isinstance(actuator, (Actuator, str, os.PathLike))
-        prepared = [prepare(run, fidelity, f"{_POSITION}@every") for run in runs]
+        prepared = [prepare(run, fidelity, "user_position@every") for run in runs]
         report([item.doubts for item in prepared], strict=False)
         wirings = {item.actuator.wiring for item in prepared}
         if len(wirings) > 1:
@@ -120,7 +109,7 @@ class Session:
         self.actuators = tuple(item.actuator for item in prepared)
         self._modes = [item.core["command_mode"] for item in prepared]
         self._units = [port_units(mode, self.wiring) for mode in self._modes]
-        self._faults: tuple[dict[str, int], ...] = tuple(_placed(run.scenario) for run in runs)
+        self._faults: tuple[dict[str, int], ...] = tuple(fault_places(run.scenario) for run in runs)
         self.step = solver_step(self.actuators[0], fidelity)
         self._index = {name: i for i, name in enumerate(signal_records(self.wiring, fidelity))}
         from elevon import _core
@@ -137,6 +126,11 @@ class Session:
         except ValueError as error:
             raise InputError(str(error)) from error
         self._readable: dict[str, bool] = {}
+        self._driven: set[str] = set()
+
+    @property
+    def _kind(self) -> tuple[Any, ...]:
+        return (self.wiring, self.fidelity, self.step, *self._modes)
 
     def __repr__(self) -> str:
         names = dict.fromkeys(actuator.name for actuator in self.actuators)
@@ -237,27 +231,25 @@ class Session:
         InputError
             No such input, a unit of another kind, a value that is not a number.
         """
-        for port, value in inputs.items():
-            self.unit(port)
-            if isinstance(value, Mapping):
-                done = self._set_waveform(port, value)
-            else:
-                given = zip(self._each(value), self._units, strict=True)
-                read = [_quantity(each, units[port] or "1", port) for each, units in given]
-                done = self._core.set_values(port, read)
-            if not done:
-                raise InputError(
-                    f"{port}: the equations in use leave this input out; announce it with a "
-                    "scenario that drives it from the start"
-                )
+        changes = {port: self._change(port, value) for port, value in inputs.items()}
+        with nullcontext() if self._driven.issuperset(changes) else self._whole():
+            for port, change in changes.items():
+                if not change():
+                    how = "announce it with a scenario that drives it from the start"
+                    raise InputError(f"{port}: the equations in use leave this input out; {how}")
+        self._driven.update(changes)
 
-    def _set_waveform(self, port: str, waveform: Mapping[str, Any]) -> bool:
-        term = validated(Term, waveform, Document(port, "", {}))
-        done = [
-            self._core.set_input(run, port, [compile_term(term, units[port], port)])
-            for run, units in enumerate(self._units)
-        ]
-        return all(done)
+    def _change(self, port: str, value: Value | Mapping[str, Any]) -> Callable[[], bool]:
+        """Return the change of an input, checked: several change together or not at all."""
+        self.unit(port)
+        if isinstance(value, Mapping):
+            term = validated(Term, value, Document(port, "", {}))
+            terms = [compile_term(term, units[port], port) for units in self._units]
+            runs = range(len(terms))
+            return lambda: all(self._core.set_input(run, port, [terms[run]]) for run in runs)
+        given = zip(self._each(value), self._units, strict=True)
+        read = [_quantity(each, units[port] or "1", port) for each, units in given]
+        return lambda: bool(self._core.set_values(port, read))
 
     def set_parameter(self, path: str, value: Value) -> None:
         """Give a parameter another value, from now on, beneath the faults that act on it.
@@ -271,16 +263,15 @@ class Session:
             left out (see `tunable`).
         """
         record = record_of(self.wiring, path)
-        changed = list(self.actuators)
-        for run, given in enumerate(self._each(value)):
-            changed[run] = self.actuators[run].with_values({path: given}, source="set in a session")
-            number = record.number(changed[run].parameters[path].value)
-            done = self._checked(self._core.set_parameter, run, path, number)
-            if not done:
-                raise InputError(
-                    f"{path}: the equations in use leave it out; announce it: Session(..., "
-                    f"tunable=[{path!r}])"
-                )
+        changed = [
+            actuator.with_values({path: given}, source="set in a session")
+            for actuator, given in zip(self.actuators, self._each(value), strict=True)
+        ]
+        with self._whole():
+            for run, actuator in enumerate(changed):
+                number = record.number(actuator.parameters[path].value)
+                if not self._checked(self._core.set_parameter, run, path, number):
+                    raise self._left_out(path, "tunable")
             self.actuators = tuple(changed)
 
     def set_fault(self, name: str, severity: Value, **attributes: float | str) -> None:
@@ -301,16 +292,18 @@ class Session:
             No such fault, out of range, or one that needs equations the session left out.
         """
         kind, _, place = name.partition("@")
-        for run, given in enumerate(self._each(severity)):
-            table = {"kind": kind, "place": place, "severity": given, **attributes}
-            fault = Fault.from_dict(table, name).resolved(self.wiring, self.fidelity, name)
-            places = self._faults[run]
-            if not self._checked(self._core.set_fault, run, places.get(name, len(places)), fault):
-                raise InputError(
-                    f"{name}: the equations in use leave it out; announce it: Session(..., "
-                    f"faults=[{name!r}])"
-                )
-            places.setdefault(name, len(places))
+        faults = [
+            Fault.from_dict({"kind": kind, "place": place, "severity": given, **attributes}, name)
+            for given in self._each(severity)
+        ]
+        resolved = [fault.resolved(self.wiring, self.fidelity, name) for fault in faults]
+        with self._whole():
+            for run, fault in enumerate(resolved):
+                places = self._faults[run]
+                at = places.get(name, len(places))
+                if not self._checked(self._core.set_fault, run, at, fault):
+                    raise self._left_out(name, "faults")
+                places.setdefault(name, len(places))
 
     def run(
         self,
@@ -328,20 +321,33 @@ class Session:
 
     def save(self) -> SessionState:
         """Return the state as it is now; the session goes on without touching it."""
-        return SessionState(
-            self._core.copy(), self.actuators, tuple(dict(item) for item in self._faults)
-        )
+        faults = tuple(dict(item) for item in self._faults)
+        return SessionState(self._core.copy(), self.actuators, faults, self._kind)
 
     def restore(self, state: SessionState) -> None:
         """Go back (or forth) to a state that this session, or one made alike, saved."""
         if not isinstance(state, SessionState):
             raise ArgumentTypeError(f"state: a {type(state).__name__} is no SessionState")
-        wirings = {actuator.wiring for actuator in state.actuators}
-        if wirings != {self.wiring} or len(state.actuators) != len(self):
-            raise InputError("state: it was saved by a session of another wiring or number of runs")
+        if state.kind != self._kind:
+            raise InputError(
+                "state: it was saved by a session of another kind (wiring, fidelity, solver step, "
+                f"modes of its runs): {state.kind}, this one has {self._kind}"
+            )
         self._core = state.core.copy()
         self.actuators = state.actuators
         self._faults = tuple(dict(item) for item in state.faults)
+        self._readable.clear()
+        self._driven.clear()
+
+    @contextmanager
+    def _whole(self) -> Iterator[None]:
+        """Undo what a change has done to some inputs or lanes when another one refuses it."""
+        state = self.save()
+        try:
+            yield
+        except BaseException:
+            self.restore(state)
+            raise
 
     def _each(self, value: Value) -> list[float | str]:
         """Return one value a run."""
@@ -368,11 +374,15 @@ class Session:
         if name not in self._readable:
             self._readable[name] = self._core.carries([name])
         if not self._readable[name]:
-            raise InputError(
-                f"{name}: the equations in use leave it out; announce it: Session(..., "
-                f"signals=[{name!r}])"
-            )
+            raise self._left_out(name, "signals")
         return index
+
+    @staticmethod
+    def _left_out(name: str, option: str) -> InputError:
+        return InputError(
+            f"{name}: the equations in use leave it out; announce it: Session(..., "
+            f"{option}=[{name!r}])"
+        )
 
     def _tunable(self, paths: Iterable[str]) -> list[str]:
         return [record_of(self.wiring, path).path for path in paths]
@@ -385,36 +395,6 @@ class Session:
         return moved
 
 
-_POSITION = "user_position"
-
-
-def _runs(
-    given: ActuatorLike | Sequence[Run], scenario: ScenarioLike, mode: str | None, seed: int
-) -> list[Run]:
-    if isinstance(given, (Actuator, str, os.PathLike)):
-        actuator = as_actuator(given)
-        if scenario is None:
-            command = {} if mode is None else {"mode": mode}
-            scenario = {"duration": 1, "command": command}
-        elif mode is not None:
-            raise InputError(f"mode = {mode!r}: a scenario has its own (command.mode)")
-        return [Run(actuator, scenario, seed)]
-    if scenario is not None or mode is not None:
-        raise InputError("runs have scenarios and modes of their own")
-    runs: list[Any] = list(given)
-    kinds = [type(run).__name__ for run in runs if not isinstance(run, Run)]
-    if kinds or not runs:
-        raise ArgumentTypeError(
-            f"{f'a {kinds[0]}' if kinds else 'an empty list'} is no run; expected an actuator, or "
-            "a sequence of elevon.Run"
-        )
-    return runs
-
-
 def _quantity(given: float | str, unit: str, place: str) -> float:
     """Return SI; a text without a unit is refused where a person reads another one."""
     return parse_quantity(given, unit, place, shown_unit(unit))
-
-
-def _placed(scenario: Scenario) -> dict[str, int]:
-    return {f"{fault.kind}@{fault.place}": i for i, fault in enumerate(scenario.fault)}

@@ -1,0 +1,59 @@
+"""What a session starts from, in every form a caller has it, and the state it may go back to."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from elevon.actuator import Actuator
+from elevon.errors import ArgumentTypeError, InputError
+from elevon.scenario import Scenario
+from elevon.simulate.arguments import ActuatorLike, ScenarioLike, as_actuator
+from elevon.simulate.prepare import Run
+
+__all__ = ["SessionState", "fault_places", "runs_of"]
+
+
+@dataclass(frozen=True)
+class SessionState:
+    """All that a session holds, as `Session.save` left it; `Session.restore` goes back to it.
+
+    It lives in this process only: the core's state has no form on a disk.
+    """
+
+    core: Any
+    actuators: tuple[Actuator, ...]
+    faults: tuple[Mapping[str, int], ...]
+    kind: tuple[Any, ...]
+    """What two sessions have alike that may exchange states: wiring, fidelity, step, modes."""
+
+
+def runs_of(
+    given: ActuatorLike | Sequence[Run], scenario: ScenarioLike, mode: str | None, seed: int
+) -> list[Run]:
+    """Return the runs of a session: those given, or the one of an actuator."""
+    if isinstance(given, (Actuator, str, os.PathLike)):
+        actuator = as_actuator(given)
+        if scenario is None:
+            command = {} if mode is None else {"mode": mode}
+            scenario = {"duration": 1, "command": command}
+        elif mode is not None:
+            raise InputError(f"mode = {mode!r}: a scenario has its own (command.mode)")
+        return [Run(actuator, scenario, seed)]
+    if scenario is not None or mode is not None:
+        raise InputError("runs have scenarios and modes of their own")
+    runs: list[Any] = list(given)
+    kinds = [type(run).__name__ for run in runs if not isinstance(run, Run)]
+    if kinds or not runs:
+        raise ArgumentTypeError(
+            f"{f'a {kinds[0]}' if kinds else 'an empty list'} is no run; expected an actuator, or "
+            "a sequence of elevon.Run"
+        )
+    return runs
+
+
+def fault_places(scenario: Scenario) -> dict[str, int]:
+    """Return ``KIND@PLACE`` of a scenario's faults to their places in its list."""
+    return {f"{fault.kind}@{fault.place}": i for i, fault in enumerate(scenario.fault)}
