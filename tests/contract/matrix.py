@@ -181,7 +181,7 @@ def lasting(cell: Cell) -> Iterator[str]:
 
 
 def _later(variant: Variant, time: float) -> Variant:
-    """The same fault coming only at a time (s): before that, the choice of equations is all of it."""
+    """The same fault coming only at a time (s): until then it only chooses the equations."""
     (whole,) = variant.faults
     coming = {**whole, "profile": {"kind": "step", "time": time}}
     return Variant(f"later {variant.name}", variant.values, (coming,))
