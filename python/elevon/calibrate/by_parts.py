@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from elevon.calibrate.estimate import Estimate
 from elevon.calibrate.level import Level
+from elevon.calibrate.outcome import Outcome, log_facts
 from elevon.calibrate.role_log import RoleLog
 from elevon.errors import InputError, Interrupted
 from elevon.parameters.records import record_of
@@ -21,58 +22,25 @@ __all__ = ["Parts", "PartsCalibration", "go"]
 _WIDE = 0.2  # of a value: a deviation above which it is not determined
 
 
-@dataclass(frozen=True)
-class PartsCalibration:
-    """The answer.
+@dataclass(frozen=True, kw_only=True)
+class PartsCalibration(Outcome):
+    """The answer; see `elevon.calibrate.outcome.Outcome` for what every answer has.
 
     Attributes
     ----------
-    actuator, before : Actuator
-        With the calibrated values, and as given.
     logs : tuple of RoleLog
         The data.
-    estimates : tuple of Estimate
-        What the logs determine.
-    undetermined : mapping of str to str
-        What they do not, and why.
     facts : mapping of str to object
         What else is known of the fit, plain types.
-    wall_s : float
-        Time it took.
     """
 
-    actuator: Actuator
-    before: Actuator
     logs: tuple[RoleLog, ...]
-    estimates: tuple[Estimate, ...]
-    undetermined: Mapping[str, str]
     facts: Mapping[str, Any]
-    wall_s: float = field(compare=False)
-
-    def __getitem__(self, path: str) -> Estimate:
-        for item in self.estimates:
-            if item.path == path:
-                return item
-        from elevon.errors import unknown
-
-        raise unknown("estimate", path, [item.path for item in self.estimates])
-
-    def _repr_html_(self) -> str:
-        from elevon.calibrate.shown import calibration_card
-
-        names = [log.name for log in self.logs]
-        return calibration_card(self.before, names, self.estimates, self.undetermined)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
         return {
-            "status": "ok",
-            "actuator": self.before.name,
-            "logs": [
-                {"name": log.name, "samples": len(log.time), "rate_hz": 1.0 / log.period}
-                for log in self.logs
-            ],
-            "parameters": {item.path: item.to_dict() for item in self.estimates},
+            **self.head([log_facts(log) for log in self.logs]),
             "undetermined": dict(self.undetermined),
             **self.facts,
             "wall_s": self.wall_s,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from elevon.calibrate.findings import amplitude_findings, plant_findings
 from elevon.calibrate.heldout import HeldOut, held_out
 from elevon.calibrate.kinematics import KINEMATIC, CommandFit
 from elevon.calibrate.log import BenchLog
+from elevon.calibrate.outcome import Outcome, log_facts
 from elevon.calibrate.plant import Torque
 from elevon.calibrate.plays import PER_LOG
 from elevon.calibrate.regression import Regression
@@ -36,16 +37,14 @@ _RUN_IN = 1.0  # s at least before a log counts
 _SETTLED = 0.5  # s after the set point has left its limit for the first time
 
 
-@dataclass(frozen=True)
-class Calibration:
-    """The answer.
+@dataclass(frozen=True, kw_only=True)
+class Calibration(Outcome):
+    """The answer; see `elevon.calibrate.outcome.Outcome` for what every answer has.
+
+    What the logs do not determine stands among the findings.
 
     Attributes
     ----------
-    actuator : Actuator
-        With the calibrated values.
-    before : Actuator
-        As given.
     logs : tuple of BenchLog
         The data.
     skipped : dict of str to float
@@ -66,15 +65,10 @@ class Calibration:
         Errors on data that were kept from the fit.
     findings : tuple of str
         What the user should know, in words.
-    wall_s : float
-        Time it took.
     """
 
-    actuator: Actuator
-    before: Actuator
     logs: tuple[BenchLog, ...]
     skipped: Mapping[str, float]
-    estimates: tuple[Estimate, ...]
     followed: Mapping[str, float]
     torque: Torque
     plant: Regression | None
@@ -83,19 +77,6 @@ class Calibration:
     dynamic: Dynamic | None
     held_out: tuple[HeldOut, ...]
     findings: tuple[str, ...]
-    wall_s: float = field(compare=False)
-
-    def __getitem__(self, path: str) -> Estimate:
-        for item in self.estimates:
-            if item.path == path:
-                return item
-        raise unknown("estimate", path, [item.path for item in self.estimates])
-
-    def _repr_html_(self) -> str:
-        from elevon.calibrate.shown import calibration_card
-
-        names = [log.name for log in self.logs]
-        return calibration_card(self.before, names, self.estimates, {})
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
@@ -103,21 +84,17 @@ class Calibration:
         for item in self.estimates:
             name = "derived" if item.path.startswith("derived.") else item.register
             groups.setdefault(name, []).append(item.to_dict())
+        logs = [
+            {
+                **log_facts(log),
+                "brake": log.brake.known,
+                "skipped_s": self.skipped[log.name],
+                "warnings": list(log.warnings),
+            }
+            for log in self.logs
+        ]
         return {
-            "status": "ok",
-            "actuator": self.before.name,
-            "logs": [
-                {
-                    "name": log.name,
-                    "samples": len(log.time),
-                    "rate_hz": 1.0 / log.period,
-                    "brake": log.brake.known,
-                    "skipped_s": self.skipped[log.name],
-                    "warnings": list(log.warnings),
-                }
-                for log in self.logs
-            ],
-            "parameters": {i.path: i.to_dict() for i in self.estimates},
+            **self.head(logs),
             "registers": {name: [i["path"] for i in items] for name, items in groups.items()},
             "torque_constant": {
                 "value": self.torque.constant,

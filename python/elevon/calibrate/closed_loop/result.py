@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from elevon.calibrate.closed_loop.log import LoopLog
 from elevon.calibrate.closed_loop.predict import Agreement, errors_of
 from elevon.calibrate.closed_loop.refine import refined
 from elevon.calibrate.estimate import Estimate, quantile
+from elevon.calibrate.outcome import Outcome, log_facts
 from elevon.errors import InputError, Interrupted
 from elevon.parameters.relations import static_following
 from elevon.progress import Progress
@@ -41,20 +42,14 @@ _SCALED = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class LoopCalibration:
-    """The answer.
+@dataclass(frozen=True, kw_only=True)
+class LoopCalibration(Outcome):
+    """The answer; see `elevon.calibrate.outcome.Outcome` for what every answer has.
 
     Attributes
     ----------
-    actuator, before : Actuator
-        With the fitted values, and as given.
     logs : tuple of LoopLog
         The data.
-    estimates : tuple of Estimate
-        What the logs determine.
-    undetermined : mapping of str to str
-        What they do not, and why.
     structure : str
         Of the controller that explains the logs.
     why : str
@@ -67,47 +62,20 @@ class LoopCalibration:
         Delays and offsets of the log, and `friction.stick`: what is no parameter of a set.
     held_out : Validation
         Errors of each log under values fitted to the others.
-    wall_s : float
-        Time it took.
     """
 
-    actuator: Actuator
-    before: Actuator
     logs: tuple[LoopLog, ...]
-    estimates: tuple[Estimate, ...]
-    undetermined: Mapping[str, str]
     structure: str
     why: str
     searched: tuple[Searched, ...]
     agreement: tuple[Agreement, ...]
     shown: Mapping[str, float]
     held_out: Validation
-    wall_s: float = field(compare=False)
-
-    def __getitem__(self, path: str) -> Estimate:
-        for item in self.estimates:
-            if item.path == path:
-                return item
-        from elevon.errors import unknown
-
-        raise unknown("estimate", path, [item.path for item in self.estimates])
-
-    def _repr_html_(self) -> str:
-        from elevon.calibrate.shown import calibration_card
-
-        names = [log.name for log in self.logs]
-        return calibration_card(self.before, names, self.estimates, self.undetermined)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
         return {
-            "status": "ok",
-            "actuator": self.before.name,
-            "logs": [
-                {"name": log.name, "samples": len(log.time), "rate_hz": 1.0 / log.period}
-                for log in self.logs
-            ],
-            "parameters": {item.path: item.to_dict() for item in self.estimates},
+            **self.head([log_facts(log) for log in self.logs]),
             "undetermined": dict(self.undetermined),
             "structure": {
                 "chosen": self.structure,
