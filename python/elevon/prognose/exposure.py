@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from elevon.prognose.laws import LAWS
 from elevon.prognose.requirement import Shown
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ _ROLES = (
     "locked",
 )
 _NAMES = ("motor_torque", "friction_torque", "energy_friction", "energy_efficiency")
-_AGEING = 12700.0  # K, activation of the temperature mean: as in the law of insulation
+_AGEING = LAWS["insulation"].coefficients["activation"].value  # K
 
 
 @lru_cache(maxsize=16)
@@ -65,10 +66,10 @@ def exposure(run: Shown, mission: Mission) -> dict[str, float]:
     """Return the drivers of a mission, keys of `DRIVERS`, for one of its units of use."""
     step = np.diff(run.time, append=run.time[-1])
     speed = run["motor_speed"]
-    way = np.abs(speed) * step
+    travel = np.abs(speed) * step
     torque = np.abs(run["motor_torque"])
-    travelled = float(way.sum())
-    cubic = float((torque**3 @ way) / travelled) if travelled > 0.0 else 0.0
+    travelled = float(travel.sum())
+    cubic = float((torque**3 @ travel) / travelled) if travelled > 0.0 else 0.0
     winding = run["temperature"]
     out = {
         "hours": float(mission.hours),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +11,7 @@ from elevon.prognose.mission import Usage
 from elevon.prognose.process import Population, Process
 from elevon.prognose.requirement import SEVERITY
 
-__all__ = ["MODEL_ERROR", "Future", "look_ahead"]
+__all__ = ["MODEL_ERROR", "Future", "crossing", "look_ahead"]
 
 Floats = npt.NDArray[np.float64]
 MODEL_ERROR = 0.008
@@ -88,7 +88,7 @@ def look_ahead(
     dead = reserve.min(axis=0) < 0.0
     end[dead], first[dead] = units.usage, reserve[:, dead].argmin(axis=0)
     alive, reserve = alive[~dead], reserve[:, ~dead]
-    now = _part(units, ~dead)
+    now = units.picked(np.flatnonzero(~dead))
     at, course = [units.usage], [_quantiles(process, damage)]
     for _ in range(_MOST_STEPS):
         if not len(alive) or _out_of_sight(now.usage - units.usage, end - units.usage):
@@ -98,12 +98,13 @@ def look_ahead(
         after = process.response.reserve(process.severity(later.damage)) + off[:, alive]
         failed = after.min(axis=0) < 0.0
         if failed.any():
-            share, which = _crossing(reserve[:, failed], after[:, failed])
+            share, which = crossing(reserve[:, failed], after[:, failed])
             end[alive[failed]], first[alive[failed]] = now.usage + share * step, which
         damage[alive] = later.damage
         at.append(later.usage)
         course.append(_quantiles(process, damage))
-        alive, reserve, now = alive[~failed], after[:, ~failed], _part(later, ~failed)
+        alive, reserve = alive[~failed], after[:, ~failed]
+        now = later.picked(np.flatnonzero(~failed))
     return Future(units.usage, end, first, np.array(at), np.array(course))
 
 
@@ -125,27 +126,21 @@ def _out_of_sight(more: float, ends: Floats) -> bool:
     return bool(long_ago) or more > _FARTHEST
 
 
-def _part(units: Population, keep: npt.NDArray[np.bool_]) -> Population:
-    return replace(
-        units,
-        damage=units.damage[keep],
-        growth=units.growth[keep],
-        form=units.form[keep],
-        weight=units.weight[keep],
-        active=units.active[keep],
-    )
-
-
 def _step(process: Process, units: Population, load: Floats) -> float:
     """Repetitions in which the fastest units go a hundredth of the way to the greatest severity."""
     rate = np.quantile(process.rate(units, units.damage, load), 0.9, axis=0)
-    way = np.array([law.damage(np.array([law.highest]))[0] - law.start for law in process.laws])
     with np.errstate(divide="ignore"):
-        return float(min(np.min(_STEP * way / rate), 0.1 * _FARTHEST))
+        return float(min(np.min(_STEP * process.range / rate), 0.1 * _FARTHEST))
 
 
-def _crossing(before: Floats, after: Floats) -> tuple[Floats, npt.NDArray[np.intp]]:
-    """Return the share of the step at which the first reserve is gone, and which it is."""
+def crossing(before: Floats, after: Floats) -> tuple[Floats, npt.NDArray[np.intp]]:
+    """Return the share of a step at which the first reserve is gone, and which it is.
+
+    Parameters
+    ----------
+    before, after : ndarray, shape (m, n)
+        Reserves of m requirements before and after the step, of units that failed in it.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(after < 0.0, before / (before - after), np.inf)
     which = share.argmin(axis=0)

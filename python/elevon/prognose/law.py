@@ -20,8 +20,8 @@ Rate = Callable[[Floats, Mapping[str, Floats], Mapping[str, float]], Floats]
 DRIVERS: dict[str, tuple[str, str]] = {
     "hours": ("h", "time in use"),
     "friction_work": ("J", "work that friction turned into heat"),
-    "shaft_travel": ("rad", "way of the motor's shaft"),
-    "torque_cubic_mean": ("N m", "cubic mean of the motor torque over the shaft's way"),
+    "shaft_travel": ("rad", "travel of the motor's shaft"),
+    "torque_cubic_mean": ("N m", "cubic mean of the motor torque over the shaft's travel"),
     "winding_temperature": ("K", "winding temperature that ages as the whole mission does"),
     "surface_temperature": ("K", "mean temperature of the motor's surface"),
 }
@@ -55,7 +55,7 @@ class Law:
     """Growth of one fault.
 
     A law has one state, the *damage*. Its mean growth in one repetition of the mission is ``rate``
-    times a factor that belongs to the unit and that histories tell; about the mean it grows as a
+    times a factor that belongs to the unit and that histories show; about the mean it grows as a
     gamma process, which never heals. `severity` turns damage into the fault's severity.
 
     Attributes
@@ -125,6 +125,11 @@ class Law:
     def key(self) -> str:
         """``KIND@PLACE`` of its fault."""
         return f"{self.kind}@{self.place}"
+
+    @property
+    def highest_damage(self) -> float:
+        """Damage at the greatest severity that predictions look at."""
+        return float(self.damage(np.array([self.highest]))[0])
 
     def growth(self, damage: Floats, drivers: Mapping[str, Floats]) -> Floats:
         """Return the mean growth of the damage in one repetition, shape (n,)."""

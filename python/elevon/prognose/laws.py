@@ -20,9 +20,12 @@ __all__ = ["LAWS", "find_law"]
 Floats = npt.NDArray[np.float64]
 Drivers = Mapping[str, Floats]
 Values = Mapping[str, float]
-
-
 _DORMANT = 0.3  # ASSUMED: in as many units a fault does not grow to be seen
+
+
+def _arrhenius(activation: float, reference: float, temperature: Floats) -> Floats:
+    """Pace of a thermally activated process over that at a reference [K]."""
+    return np.exp(activation * (1.0 / reference - 1.0 / np.maximum(temperature, 1.0)))
 
 
 def _archard(_damage: Floats, drivers: Drivers, c: Values) -> Floats:
@@ -35,9 +38,8 @@ def _lubricant(_damage: Floats, drivers: Drivers, c: Values) -> Floats:
 
 
 def _insulation(damage: Floats, drivers: Drivers, c: Values) -> Floats:
-    own = c["own_heat"] * _shorted(damage)
-    hot = np.maximum(drivers["winding_temperature"] + own, 1.0)
-    ageing = np.exp(c["activation"] * (1.0 / c["index_temperature"] - 1.0 / hot))
+    hot = drivers["winding_temperature"] + c["own_heat"] * _shorted(damage)
+    ageing = _arrhenius(c["activation"], c["index_temperature"], hot)
     pace = np.where(damage < 1.0, 1.0, c["after_contact"])
     return pace * ageing * drivers["hours"] / c["index_life"]
 
@@ -58,8 +60,7 @@ def _short_damage(severity: Floats) -> Floats:
 
 
 def _magnets(damage: Floats, drivers: Drivers, c: Values) -> Floats:
-    temperature = np.maximum(drivers["winding_temperature"], 1.0)
-    pace = np.exp(c["activation"] * (1.0 / c["reference_temperature"] - 1.0 / temperature))
+    pace = _arrhenius(c["activation"], c["reference_temperature"], drivers["winding_temperature"])
     return c["loss"] * drivers["hours"] * pace * np.maximum(1.0 - damage, 0.0)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import InputError
+from elevon.prognose.future import crossing
 from elevon.prognose.process import Population, Process
 
 __all__ = ["Life", "run_to_failure"]
@@ -63,18 +64,17 @@ def run_to_failure(process: Process, unit: Population, rng: np.random.Generator)
     if len(unit.weight) != 1:
         raise InputError("a life is that of one unit")
     usage, severity = [unit.usage], [process.severity(unit.damage)[0]]
-    before = process.response.reserve(process.severity(unit.damage))[:, 0]
+    before = process.response.reserve(process.severity(unit.damage))
     one = np.ones(1)
     for _ in range(_MOST):
         rate = process.rate(unit, unit.damage, one)[0]
-        way = [law.damage(np.array([law.highest]))[0] - law.start for law in process.laws]
         with np.errstate(divide="ignore"):
-            step = float(np.min(np.array(way) / (_STEPS * rate)))
+            step = float(np.min(process.range / (_STEPS * rate)))
         if not np.isfinite(step):
             break
         unit = process.advance(unit, step, rng)
         shown = process.severity(unit.damage)
-        after = process.response.reserve(shown)[:, 0]
+        after = process.response.reserve(shown)
         usage.append(unit.usage)
         severity.append(shown[0])
         if after.min() < 0.0:
@@ -85,9 +85,7 @@ def run_to_failure(process: Process, unit: Population, rng: np.random.Generator)
 
 def _ended(usage: list[float], severity: list[Floats], before: Floats, after: Floats) -> Life:
     """Cut the last step where the first requirement fails."""
-    share = np.where(after < 0.0, before / np.maximum(before - after, 1e-300), np.inf)
-    first = int(share.argmin())
-    part = float(np.clip(share[first], 0.0, 1.0))
-    end = usage[-2] + part * (usage[-1] - usage[-2])
-    last = severity[-2] + part * (severity[-1] - severity[-2])
-    return Life(np.array([*usage[:-1], end]), np.array([*severity[:-1], last]), end, first)
+    share, first = crossing(before, after)
+    end = usage[-2] + float(share[0]) * (usage[-1] - usage[-2])
+    last = severity[-2] + share[0] * (severity[-1] - severity[-2])
+    return Life(np.array([*usage[:-1], end]), np.array([*severity[:-1], last]), end, int(first[0]))

@@ -55,7 +55,7 @@ class Population:
 
     def picked(self, index: npt.NDArray[np.intp]) -> Population:
         """Return those of an index, all with the same weight."""
-        even = np.full(len(index), 1.0 / len(index))
+        even = np.full(len(index), 1.0 / max(len(index), 1))
         return replace(
             self,
             damage=self.damage[index],
@@ -83,7 +83,9 @@ class Process:
         self.drift = drift
         self._quarter = np.array([0.25 * law.highest for law in self.laws])
         # Beyond the greatest severity of the tables nothing is known; no state runs away there.
-        self._most = np.array([2.0 * law.damage(np.array([law.highest]))[0] for law in self.laws])
+        self.range = np.array([law.highest_damage - law.start for law in self.laws])
+        """Damage from new to the greatest severity of the tables, shape (k,)."""
+        self._most = np.array([2.0 * law.highest_damage for law in self.laws])
 
     def start(self, count: int, rng: np.random.Generator) -> Population:
         """Draw new units."""
@@ -160,7 +162,7 @@ class Process:
     def scaled(self, units: Population, deviation: float, rng: np.random.Generator) -> Population:
         """Return the units with severities that differ by a factor common to all diagnoses.
 
-        What all diagnoses of a unit err by alike is not told by them: the filters follow the
+        What all diagnoses of a unit err by alike is not shown by them: the filters follow the
         severities as they are shown, and what they truly are is drawn before looking ahead.
 
         Parameters
@@ -199,12 +201,14 @@ class Process:
     def reset(self, units: Population, keys: Sequence[str], rng: np.random.Generator) -> Population:
         """Return the units with parts made new; what replaces them has a growth of its own."""
         new = self.start(len(units.weight), rng)
-        at = [k for k, law in enumerate(self.laws) if law.key in keys]
-        damage, growth, active = units.damage.copy(), units.growth.copy(), units.active.copy()
-        damage[:, at], growth[:, at] = new.damage[:, at], new.growth[:, at]
-        form = units.form.copy()
-        form[:, at], active[:, at] = new.form[:, at], new.active[:, at]
-        return replace(units, damage=damage, growth=growth, form=form, active=active)
+        made = np.array([law.key in keys for law in self.laws])
+        return replace(
+            units,
+            damage=np.where(made, new.damage, units.damage),
+            growth=np.where(made, new.growth, units.growth),
+            form=np.where(made, new.form, units.form),
+            active=np.where(made, new.active, units.active),
+        )
 
 
 def _gamma(mean: Floats, laws: Sequence[Law], rng: np.random.Generator) -> Floats:
