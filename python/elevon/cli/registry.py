@@ -50,6 +50,8 @@ COMMANDS: dict[str, Command] = {
     "next-test": Command(
         "elevon.cli.next_test", "Propose the test that tells most about what is ambiguous."
     ),
-    "demo": Command("elevon.cli.demo", "Find a bench's hidden values from its logs; one report."),
+    "demo": Command(
+        "elevon.cli.demo", "Let a unit wear, diagnose it, predict its end; one report."
+    ),
     "reproduce": Command("elevon.cli.reproduce", "Recompute a published table or figure."),
 }
