@@ -8,7 +8,7 @@ import pytest
 
 from elevon import Actuator
 from elevon.diagnose.bymodel.candidates import CANDIDATES
-from elevon.diagnose.bymodel.evidence import UNITS
+from elevon.diagnose.bymodel.evidence import UNITS, Signals, dragged, evidence
 from elevon.diagnose.surrogate import (
     Surrogate,
     diagnose_by_both,
@@ -99,6 +99,32 @@ def test_features_are_the_evidence_and_the_position_gain(unit, logs):
     gain = unit.parameters.value("control.position_gain")
     assert values["following_gain"] == pytest.approx(1.0 / gain, rel=0.005)
     assert np.isnan(values["brake_current"])
+
+
+def test_evidence_without_deviations_is_the_same(unit, logs):
+    """The surrogate and the model's runs need the numbers alone; they must be the same ones."""
+    log = logs["short"].log
+    signals = Signals(
+        log.time, log.user, log.motor, log.speed_ref, log.speed, log.current_target, log.current,
+        logs["short"].voltage, None, None, (150.0, 1.0), log.good,
+    )  # fmt: skip
+    value = unit.parameters.value
+    about = {"ratio": value("gear.ratio"), "pole_pairs": value("motor.pole_pairs"), "emf": 1.0}
+    whole = evidence(signals, **about)
+    quick = evidence(signals, **about, deviations=False, shaft=False)
+    assert set(whole.names) - set(quick.names) == {"current_shaft"}
+    np.testing.assert_allclose(quick.values, whole.only(quick.names).values, rtol=1e-9)
+    assert (whole.std > 0.0).all()
+    assert np.isnan(quick.std[:-1]).all()  # the position gain's is given
+
+
+def test_a_gap_is_passed_once_the_driver_has_gone_its_width():
+    driver = np.concatenate((np.arange(0.0, 10.0), np.arange(10.0, -5.0, -1.0)))
+    expected = np.concatenate((np.arange(0.0, 10.0), [10.0], np.arange(1.0, 15.0))) > 4.5
+    out = dragged(driver, 3.0)
+    np.testing.assert_array_equal(out[:10], expected[:10])
+    assert not out[11:15].any()
+    assert out[16:].all()
 
 
 def test_a_change_is_a_share_where_it_scales():

@@ -6,9 +6,9 @@ What a fault does to them comes from model runs that pass through the same regre
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +27,7 @@ __all__ = [
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
+Fit = tuple[Floats, Floats]  # weights, shape (k,), and their covariance, shape (k, k)
 
 #: Name to unit and text.
 UNITS: dict[str, tuple[str, str]] = {
@@ -71,6 +72,7 @@ _BLOCKS = 16  # stretches of a log whose scores give the deviations
 _LEAST = 100  # samples of a regression
 _SLOW = 0.1  # of the highest speed
 _SMOOTH = 0.02  # s of the difference that gives the acceleration
+_BRAKE = 8  # place of the brake torque among the columns that explain the current
 
 
 @dataclass(frozen=True)
@@ -125,7 +127,15 @@ class Evidence:
         return Evidence(tuple(names), self.values[at], self.std[at])
 
 
-def evidence(signals: Signals, *, ratio: float, pole_pairs: float, emf: float) -> Evidence:
+def evidence(
+    signals: Signals,
+    *,
+    ratio: float,
+    pole_pairs: float,
+    emf: float,
+    deviations: bool = True,
+    shaft: bool = True,
+) -> Evidence:
     """Regress.
 
     Parameters
@@ -138,17 +148,25 @@ def evidence(signals: Signals, *, ratio: float, pole_pairs: float, emf: float) -
         Electrical angle over shaft angle.
     emf : float
         Of the set [V s/rad]: what the voltage's ripple is a share of.
+    deviations : bool
+        Whether deviations are asked for; without them `Evidence.std` is NaN, in a third of the
+        time.
+    shaft : bool
+        Whether what turns with the shaft is sought.
     """
     rows: dict[str, tuple[float, float]] = {}
     width = float(np.median(np.diff(signals.time)))
     moving = signals.good & (np.abs(signals.speed) > _SLOW * np.abs(signals.speed).max())
-    rows |= _positions(signals, moving, ratio)
+    rows |= _positions(signals, moving, ratio, deviations)
     cosine, sine = np.cos(pole_pairs * signals.motor), np.sin(pole_pairs * signals.motor)
     waves = (cosine, sine, cosine**2 - sine**2, 2.0 * cosine * sine)
-    rows |= _currents(signals, moving, waves, width)
+    fit, columns = _current_fit(signals, moving, waves, width, deviations)
+    rows |= _currents(fit)
+    if shaft:
+        rows |= _shaft(signals, moving, fit, columns, deviations)
     if signals.voltage is not None:
-        rows |= _voltages(signals, moving, waves, emf)
-    rows |= _control(signals, width)
+        rows |= _voltages(signals, moving, waves, emf, deviations)
+    rows |= _control(signals, width, deviations)
     names = tuple(name for name in UNITS if name in rows)
     return Evidence(
         names,
@@ -172,83 +190,110 @@ def regress(columns: Sequence[Floats], data: Floats) -> tuple[Floats, Floats]:
     ndarray, shape (k,), ndarray, shape (k, k)
         Weights and their covariance.
     """
-    rows = np.stack(columns)
-    scale = np.sqrt(np.mean(rows**2, axis=1))
+    return _regress(np.stack([*columns, data]), True)
+
+
+def _regress(rows: Floats, deviations: bool) -> tuple[Floats, Floats]:
+    """Regress the last of the rows, shape (k + 1, n), on the others; they are scaled in place."""
+    count = len(rows) - 1
+    gram = rows @ rows.T
+    scale = np.sqrt(np.diag(gram)[:count] / rows.shape[1])
     scale[scale == 0.0] = 1.0
-    rows /= scale[:, None]
-    inverse = np.linalg.pinv(rows @ rows.T, rcond=1e-10, hermitian=True)
-    beta = inverse @ (rows @ data)
-    score = rows * (data - beta @ rows)
+    inverse = np.linalg.pinv(gram[:count, :count] / np.outer(scale, scale), 1e-10, hermitian=True)
+    beta = inverse @ (gram[:count, count] / scale)
+    if not deviations:
+        return beta / scale, np.full((count, count), np.nan)
+    columns = rows[:count]
+    columns /= scale[:, None]
+    score = columns * (rows[count] - beta @ columns)
     parts = np.add.reduceat(score, _edges(score.shape[1]), axis=1)
     covariance = inverse @ (parts @ parts.T) @ inverse * _BLOCKS / (_BLOCKS - 1)
     return beta / scale, covariance / np.outer(scale, scale)
 
 
-def _fit(columns: Sequence[Floats], target: Floats, use: Bools) -> tuple[Floats, Floats]:
-    return regress([column[use] for column in columns], target[use])
+def _fit(columns: Sequence[Floats], target: Floats, use: Bools, deviations: bool) -> Fit:
+    at = np.flatnonzero(use)
+    rows = np.empty((len(columns) + 1, len(at)))
+    for row, column in zip(rows, (*columns, target), strict=True):
+        np.take(column, at, out=row, mode="clip")
+    return _regress(rows, deviations)
 
 
 def _edges(count: int) -> npt.NDArray[np.intp]:
     return np.linspace(0, count, _BLOCKS, endpoint=False).astype(np.intp)
 
 
-def _one(beta: Floats, covariance: Floats, at: int, factor: float = 1.0) -> tuple[float, float]:
-    return factor * float(beta[at]), abs(factor) * float(np.sqrt(max(covariance[at, at], 0.0)))
+def _one(fit: Fit, at: int, factor: float = 1.0) -> tuple[float, float]:
+    beta, covariance = fit
+    return factor * float(beta[at]), abs(factor) * _root(float(covariance[at, at]))
 
 
-def _size(beta: Floats, covariance: Floats, at: int, over: float = 1.0) -> tuple[float, float]:
+def _size(fit: Fit, at: int, over: float = 1.0) -> tuple[float, float]:
     """Amplitude of a cosine and a sine; its phase depends on where the angle has its zero."""
+    beta, covariance = fit
     variance = 0.5 * float(covariance[at, at] + covariance[at + 1, at + 1])
-    size = float(np.hypot(beta[at], beta[at + 1]))
-    return size / abs(over), float(np.sqrt(max(variance, 0.0))) / abs(over)
+    return float(np.hypot(beta[at], beta[at + 1])) / abs(over), _root(variance) / abs(over)
 
 
-def _positions(signals: Signals, moving: Bools, ratio: float) -> dict[str, tuple[float, float]]:
+def _root(variance: float) -> float:
+    """Deviation; rounding may leave a variance below zero, and NaN is kept."""
+    return math.nan if math.isnan(variance) else math.sqrt(max(variance, 0.0))
+
+
+def _positions(
+    signals: Signals, moving: Bools, ratio: float, deviations: bool
+) -> dict[str, tuple[float, float]]:
     gap = signals.motor / ratio - signals.user
     use = moving & dragged(signals.motor / ratio, float(np.ptp(gap[moving])))
     if use.sum() < _LEAST:
         use = moving
     centred = signals.user - float(np.mean(signals.user[use]))
-    beta, cov = _fit([np.sign(signals.speed), centred, np.ones_like(gap)], gap, use)
-    return {"lost_motion": _one(beta, cov, 0, 2.0), "position_scale": _one(beta, cov, 1)}
+    columns = [np.sign(signals.speed), centred, np.ones_like(gap)]
+    fit = _fit(columns, gap, use, deviations)
+    return {"lost_motion": _one(fit, 0, 2.0), "position_scale": _one(fit, 1)}
 
 
 def dragged(driver: Floats, width: float) -> Bools:
     """Return the samples after the driver has passed the whole gap since it turned."""
     way = np.sign(np.gradient(driver))
+    last = np.zeros(len(driver), dtype=np.intp)
     turns = np.flatnonzero(np.diff(way) != 0) + 1
-    edges = np.concatenate(([0], turns, [len(driver)]))
-    out = np.zeros(len(driver), dtype=np.bool_)
-    for first, last in pairwise(edges.tolist()):
-        out[first:last] = np.abs(driver[first:last] - driver[first]) > 1.5 * width
-    return out
+    last[turns] = turns
+    start = driver[np.maximum.accumulate(last)]
+    return np.asarray(np.abs(driver - start) > 1.5 * width)
 
 
-def _currents(
-    signals: Signals, moving: Bools, waves: Sequence[Floats], width: float
-) -> dict[str, tuple[float, float]]:
+def _current_fit(
+    signals: Signals, moving: Bools, waves: Sequence[Floats], width: float, deviations: bool
+) -> tuple[Fit, list[Floats]]:
     half = max(1, round(0.5 * _SMOOTH / width))
     rate = _slope(signals.speed, half) / width
     way = np.sign(signals.speed)
     level = _mean(signals.current, 8 * half)
     columns = [way, signals.speed, rate, np.ones_like(way)]
     columns += [level * wave for wave in waves]
-    braked = signals.brake is not None and float(np.ptp(signals.brake[moving])) > 0.0
-    if braked:
-        assert signals.brake is not None
+    if signals.brake is not None and float(np.ptp(signals.brake[moving])) > 0.0:
         columns.append(way * signals.brake)
-    beta, cov = _fit(columns, signals.current, moving)
+    return _fit(columns, signals.current, moving, deviations), columns
+
+
+def _currents(fit: Fit) -> dict[str, tuple[float, float]]:
     names = ("dry_current", "viscous_current", "inertia_current")
-    rows = {name: _one(beta, cov, k) for k, name in enumerate(names)}
-    if braked:
-        rows["brake_current"] = _one(beta, cov, 8)
-    rows["current_order_1"] = _size(beta, cov, 4)
-    rows["current_order_2"] = _size(beta, cov, 6)
-    rest = signals.current - sum(b * column for b, column in zip(beta, columns, strict=True))
-    # The shaft's turn is sought in what is left: in a short motion it looks like the acceleration.
-    beta, cov = _fit([np.cos(signals.motor), np.sin(signals.motor)], rest, moving)
-    rows["current_shaft"] = _size(beta, cov, 0)
+    rows = {name: _one(fit, k) for k, name in enumerate(names)}
+    if len(fit[0]) > _BRAKE:
+        rows["brake_current"] = _one(fit, _BRAKE)
+    rows["current_order_1"] = _size(fit, 4)
+    rows["current_order_2"] = _size(fit, 6)
     return rows
+
+
+def _shaft(
+    signals: Signals, moving: Bools, fit: Fit, columns: Sequence[Floats], deviations: bool
+) -> dict[str, tuple[float, float]]:
+    """The shaft's turn, in what is left: in a short motion it looks like the acceleration."""
+    rest = signals.current - sum(b * column for b, column in zip(fit[0], columns, strict=True))
+    turn = [np.cos(signals.motor), np.sin(signals.motor)]
+    return {"current_shaft": _size(_fit(turn, rest, moving, deviations), 0)}
 
 
 def _slope(values: Floats, half: int) -> Floats:
@@ -265,37 +310,34 @@ def _mean(values: Floats, half: int) -> Floats:
 
 
 def _voltages(
-    signals: Signals, moving: Bools, waves: Sequence[Floats], emf: float
+    signals: Signals, moving: Bools, waves: Sequence[Floats], emf: float, deviations: bool
 ) -> dict[str, tuple[float, float]]:
     assert signals.voltage is not None
     use = moving & np.isfinite(signals.voltage)
+    if use.sum() < 2 * _LEAST:
+        return {}
     columns = [signals.speed, signals.current, np.ones_like(signals.speed)]
     columns += [signals.speed * wave for wave in waves]
-    if use.sum() < 200:
-        return {}
-    beta, cov = _fit(columns, signals.voltage, use)
-    rows = {
-        "voltage_per_speed": _one(beta, cov, 0),
-        "voltage_per_current": _one(beta, cov, 1),
+    fit = _fit(columns, signals.voltage, use, deviations)
+    return {
+        "voltage_per_speed": _one(fit, 0),
+        "voltage_per_current": _one(fit, 1),
+        "voltage_order_1": _size(fit, 3, emf),
+        "voltage_order_2": _size(fit, 5, emf),
     }
-    rows["voltage_order_1"] = _size(beta, cov, 3, emf)
-    rows["voltage_order_2"] = _size(beta, cov, 5, emf)
-    return rows
 
 
-def _control(signals: Signals, width: float) -> dict[str, tuple[float, float]]:
+def _control(signals: Signals, width: float, deviations: bool) -> dict[str, tuple[float, float]]:
     error = signals.speed_ref - signals.speed
-    top = float(np.abs(signals.speed_ref).max())
-    inside = signals.good & (np.abs(signals.speed_ref) < 0.999 * top)
+    size = np.abs(signals.speed_ref)
+    inside = signals.good & (size < 0.999 * float(size.max()))
     integral = np.cumsum(error) * width
     columns = [error, integral, np.gradient(error, width), np.ones_like(error)]
-    beta, cov = _fit(columns, signals.current_ref, inside)
-    rows = {"speed_gain": _one(beta, cov, 0)}
+    rows = {"speed_gain": _one(_fit(columns, signals.current_ref, inside, deviations), 0)}
     if signals.gain is not None:
         gain, std = signals.gain
         rows["following_gain"] = (1.0 / gain, std / gain**2)
     elif signals.command is not None:
         columns = [signals.speed_ref, signals.command, np.ones_like(error)]
-        beta, cov = _fit(columns, signals.user, inside)
-        rows["following_gain"] = _one(beta, cov, 0, -1.0)
+        rows["following_gain"] = _one(_fit(columns, signals.user, inside, deviations), 0, -1.0)
     return rows

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
 import numpy.typing as npt
@@ -139,7 +139,7 @@ def _replayed(item: TestLog, actuator: Actuator, candidates: Sequence[Candidate]
     if candidates:
         units += [_drawn(actuator, np.random.default_rng([15, k])) for k in range(_DRAWS)]
     constants = _constants(actuator)
-    shown = [evidence(run, **constants) for run in _runs(item, units)]
+    shown = [evidence(run, **constants, deviations=False) for run in _runs(item, units)]
     names = tuple(n for n in shown[0].names if all(n in s.names for s in shown))
     rows = np.array([s.only(names).values for s in shown])
     shifts, at = {}, 1
@@ -163,7 +163,15 @@ def _moved_by(rows: Floats, healthy: Floats, names: Sequence[str]) -> Floats:
     return out
 
 
-def _constants(actuator: Actuator) -> dict[str, float]:
+class _Constants(TypedDict):
+    """Of the set, for the regressions."""
+
+    ratio: float
+    pole_pairs: float
+    emf: float
+
+
+def _constants(actuator: Actuator) -> _Constants:
     value = actuator.parameters.value
     return {
         "ratio": value("gear.ratio"),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -49,7 +48,7 @@ SCALES = frozenset(
 #: Those that need the voltage.
 VOLTAGE = frozenset(name for name in NAMES if name.startswith("voltage"))
 _SETTLED = 3.0  # s of the log until the command has begun and is followed
-_STEPS = 2  # linear fits: at the noted frequency, then with its correction
+_LEAST = 100  # samples of a fit
 _FAR = 8.0  # median deviations
 
 
@@ -107,7 +106,9 @@ def log_features(item: TestLog, actuator: Actuator) -> LogFeatures:
     )  # fmt: skip
     value = actuator.parameters.value
     ratio, pole_pairs = value("gear.ratio"), value("motor.pole_pairs")
-    shown = evidence(signals, ratio=ratio, pole_pairs=pole_pairs, emf=1.0)
+    shown = evidence(
+        signals, ratio=ratio, pole_pairs=pole_pairs, emf=1.0, deviations=False, shaft=False
+    )
     rows = dict(zip(shown.names, shown.values.tolist(), strict=True))
     for name in ("voltage_order_1", "voltage_order_2"):  # of the log's own EMF, not the set's
         if name in rows:
@@ -141,7 +142,8 @@ def _following(log: BenchLog, good: npt.NDArray[np.bool_]) -> float:
     """Following error over speed set point [s], of a noted sine; NaN without one.
 
     The command is a sine of nearly the noted frequency: user + following x set point = a sin + b
-    cos + c, the frequency by Gauss-Newton. What lies far off (the command's start) is left out.
+    cos + c, the frequency by one step of Gauss-Newton. What lies far off (the command's start) is
+    left out.
     """
     note = log.note
     frequency = note.parameters.get("frequency") if note and note.waveform == "sine" else None
@@ -149,27 +151,28 @@ def _following(log: BenchLog, good: npt.NDArray[np.bool_]) -> float:
         return math.nan
     reference = np.abs(log.speed_ref)
     keep = good & (reference < 0.999 * reference.max()) & (log.time > _SETTLED)
-    if keep.sum() < 100:
+    if keep.sum() < _LEAST:
         return math.nan
     centre = log.time[keep] - 0.5 * log.duration
-    return _sine(centre, log.user[keep], log.speed_ref[keep], 2.0 * math.pi * frequency)
+    return _gain(centre, log.user[keep], log.speed_ref[keep], 2.0 * math.pi * frequency)
 
 
-def _sine(centre: Floats, user: Floats, set_point: Floats, rate: float) -> float:
+def _gain(centre: Floats, user: Floats, set_point: Floats, rate: float) -> float:
     scale = float(np.std(set_point)) or 1.0
-    beta: Floats = np.zeros(4)
-    rows: Floats = np.zeros((4, 0))
-    for step in range(_STEPS):
-        sine, cosine = np.sin(rate * centre), np.cos(rate * centre)
-        columns: Sequence[Floats] = [-set_point / scale, sine, cosine, np.ones_like(centre)]
-        if step:
-            columns = [*columns, centre * (beta[1] * cosine - beta[2] * sine)]
-        rows = np.stack(columns)
-        beta = np.asarray(np.linalg.lstsq(rows @ rows.T, rows @ user, rcond=None)[0])
-        if step:
-            rate += float(np.clip(beta[4], -0.05 * rate, 0.05 * rate))
-    rest = np.abs(user - beta @ rows)
-    near = rest < _FAR * float(np.median(rest)) + 1e-12
-    rows = rows[:, near]
-    last = np.linalg.lstsq(rows @ rows.T, rows @ user[near], rcond=None)[0]
-    return float(last[0]) / scale
+    rows = np.empty((6, len(centre)))
+    rows[0] = set_point / -scale
+    np.sin(rate * centre, out=rows[1])
+    np.cos(rate * centre, out=rows[2])
+    rows[3], rows[4], rows[5] = 1.0, 0.0, user
+    gram = rows @ rows.T
+    first = _solved(gram, 4)
+    rows[4] = centre * (first[1] * rows[2] - first[2] * rows[1])  # by the rate
+    gram[4] = gram[:, 4] = rows @ rows[4]
+    rest = np.abs(user - _solved(gram, 5) @ rows[:5])
+    far = rows[:, rest >= _FAR * float(np.median(rest)) + 1e-12]
+    return float(_solved(gram - far @ far.T, 5)[0]) / scale
+
+
+def _solved(gram: Floats, count: int) -> Floats:
+    """Weights of the first rows that explain the last one, of the products of all."""
+    return np.asarray(np.linalg.lstsq(gram[:count, :count], gram[:count, -1], rcond=None)[0])

@@ -1,0 +1,90 @@
+"""Time of a diagnosis by the surrogate, logs in memory to answer, with no baseline and with some.
+
+    python benchmarks/surrogate.py [--rounds N] [--json]
+
+Processor time and wall time of one thread (the linear algebra is held to one), least and median of
+the rounds. Reading logs from files is not part of it, nor of `seconds` in the JSON of `elevon
+diagnose`.
+"""
+
+import argparse
+import json
+import os
+import statistics
+import time
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from elevon import Actuator  # after the number of threads is set: NumPy reads it when loaded
+from elevon.bench.procedure import load_procedure
+from elevon.bench.rig import setups
+from elevon.bench.traces import recorded
+from elevon.diagnose.surrogate import diagnose_by_surrogate
+from elevon.diagnose.surrogate.features import log_features
+from elevon.diagnose.virtual import first_trace, traced
+from elevon.scenario.compile import signal_records
+from elevon.simulate import Run, simulate_batch
+
+FAULT = "short@motor.phase_b=0.2"
+BASELINES = 3
+TESTS = ("backlash", "loaded")
+
+
+def logs(unit, test):
+    """Return a faulty log and healthy ones of other days, of the low model."""
+    procedure = first_trace(load_procedure(test))
+    asked = [[FAULT]] + [[]] * BASELINES
+    made = [setups(procedure, unit, faults=f, seed=k)[0] for k, f in enumerate(asked)]
+    record = recorded(list(signal_records(unit.wiring, "low")))
+    runs = [Run(s.actuator, s.scenario, s.conditions.seed) for s in made]
+    shown = simulate_batch(runs, fidelity="low", record=record)
+    return [traced(s, r) for s, r in zip(made, shown, strict=True)]
+
+
+def timed(run, rounds):
+    """Return milliseconds of processor and wall time, least and median."""
+    run()
+    spent = []
+    for _ in range(rounds):
+        begin, wall = time.process_time(), time.perf_counter()
+        run()
+        spent.append((time.process_time() - begin, time.perf_counter() - wall))
+    cpu, wall = zip(*spent, strict=True)
+    return {
+        "cpu_least_ms": 1e3 * min(cpu),
+        "cpu_median_ms": 1e3 * statistics.median(cpu),
+        "wall_median_ms": 1e3 * statistics.median(wall),
+    }
+
+
+def main():
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rounds", type=int, default=100)
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    unit = Actuator.load("torino-rotary")
+    rows = []
+    for test in TESTS:
+        first, *healthy = logs(unit, test)
+        row = timed(lambda log=first: log_features(log, unit), options.rounds)
+        rows.append({"test": test, "what": "features of one log", **row})
+        for count in range(BASELINES + 1):
+            ask = {"baselines": healthy[:count]}
+            row = timed(
+                lambda log=first, ask=ask: diagnose_by_surrogate([log], unit, **ask),
+                options.rounds,
+            )
+            rows.append({"test": test, "what": f"answer, {count} baselines", **row})
+    if options.json:
+        print(json.dumps({"samples": len(first.log.time), "rows": rows}))
+        return
+    print(f"{'test':10s} {'what':22s} {'cpu least':>10s} {'median':>8s} {'wall':>8s}  [ms]")
+    for row in rows:
+        times = [row[name] for name in ("cpu_least_ms", "cpu_median_ms", "wall_median_ms")]
+        values = " ".join(f"{value:8.2f}" for value in times)
+        print(f"{row['test']:10s} {row['what']:22s}   {values}")
+
+
+if __name__ == "__main__":
+    main()
