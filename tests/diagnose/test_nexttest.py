@@ -10,24 +10,35 @@ from elevon.diagnose.bymodel.candidates import CANDIDATES
 from elevon.diagnose.nexttest import Belief, Possible, next_test, profiles
 from elevon.diagnose.nexttest.belief import read_result
 from elevon.diagnose.nexttest.information import expected_information, planned, updated
+from elevon.diagnose.surrogate.population import FAULTS
 from elevon.errors import FormatError, InputError
 from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
 
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
 SHORT, FRICTION = "short@motor.phase_a", "friction@transmission"
+PLAY = "play@transmission"
 
 
-def _fault(key, probability, severity, interval, equivalents=()):
-    kind, _, place = key.partition("@")
-    return {"kind": kind, "place": place, "probability": probability, "severity": severity,
-            "unit": "1", "interval": interval, "equivalents": list(equivalents)}  # fmt: skip
+def _set(probability, *faults):
+    rows = []
+    for key, severity, interval in faults:
+        kind, _, place = key.partition("@")
+        row = {"kind": kind, "place": place, "severity": severity, "unit": "1"}
+        rows.append({**row, "interval": interval})
+    return {"faults": rows, "probability": probability}
 
 
+SMALL_SHORT = (SHORT, 0.05, [0.02, 0.08])
+SMALL_FRICTION = (FRICTION, 0.1, [0.0, 0.2])
 RESULT = {
     "status": "faulty",
-    "p_fault": 0.9,
-    "faults": [_fault(SHORT, 0.6, 0.05, [0.02, 0.08]), _fault(FRICTION, 0.4, 0.1, [0.0, 0.2])],
-    "best": {"faults": [SHORT, FRICTION], "probability": 0.1},
+    "detectable": {c.key: 0.1 for c in CANDIDATES},
+    "hypotheses": [
+        _set(0.5, SMALL_SHORT),
+        _set(0.3, SMALL_FRICTION),
+        _set(0.1, SMALL_SHORT, SMALL_FRICTION),
+        _set(0.0998),
+    ],
 }
 
 
@@ -57,11 +68,11 @@ def test_before_any_test_the_prior_holds():
 
 
 def test_a_result_is_believed_as_it_stands():
-    belief = _weights(Belief.after([RESULT]).leading())
-    assert belief[SHORT,] == pytest.approx(0.5, abs=0.03)
-    assert belief[FRICTION,] == pytest.approx(0.3, abs=0.03)
-    assert belief[FRICTION, SHORT] == pytest.approx(0.1, abs=0.02)
-    assert belief[()] == pytest.approx(0.1, abs=0.02)
+    belief = _weights(Belief.after([RESULT]))
+    assert belief[SHORT,] == pytest.approx(0.5, rel=1e-9)
+    assert belief[FRICTION,] == pytest.approx(0.3, rel=1e-9)
+    assert belief[FRICTION, SHORT] == pytest.approx(0.1, rel=1e-9)
+    assert belief[()] == pytest.approx(0.0998, rel=1e-9)
 
 
 def test_two_results_agree_more_than_one():
@@ -71,15 +82,27 @@ def test_two_results_agree_more_than_one():
     assert width[1] == pytest.approx(width[0] / np.sqrt(2.0))
 
 
-def test_what_a_log_does_not_separate_shares_the_probability():
-    alike = {"kind": "friction", "place": "transmission"}
-    result = {**RESULT, "best": {"faults": [SHORT], "probability": 0.8},
-              "faults": [_fault(SHORT, 0.9, 0.05, [0.02, 0.08], [alike])]}  # fmt: skip
-    belief = {p.keys: p for p in Belief.after([result]).possible}
-    rate = {c.key: c.rate for c in CANDIDATES}
-    ratio = belief[FRICTION,].weight / belief[SHORT,].weight
-    assert ratio == pytest.approx(rate[FRICTION] / rate[SHORT], rel=1e-6)
-    assert belief[FRICTION,].deviation == (np.inf,)
+def test_a_log_says_of_what_it_cannot_show_that_nothing_is_there():
+    """A fault that was not weighed looks like none; beside another one, like that one alone."""
+    detectable = {key: 0.1 for key in RESULT["detectable"] if key != PLAY}
+    belief, prior = (
+        _weights(Belief.after([{**RESULT, "detectable": detectable}])),
+        _weights(Belief.prior()),
+    )
+    moved = {keys: weight / prior[keys] for keys, weight in belief.items()}
+    assert moved[PLAY,] == pytest.approx(moved[()], rel=1e-9)
+    assert moved[PLAY, SHORT] == pytest.approx(moved[SHORT,], rel=1e-9)
+    assert moved[SHORT,] > 2.0 * moved[()]
+
+
+def test_a_surrogates_result_stands_against_what_it_was_trained_on():
+    """It says one half of a fault that half of the runs do not have: twenty times as likely."""
+    detectable = dict.fromkeys(FAULTS, 0.1)
+    shares = {0: 0.37, 1: 0.7 * 0.65 / 9, 2: 0.7 * 0.25 / 36}
+    said = {**RESULT, "detectable": detectable, "method": "surrogate"}
+    belief, prior = _weights(Belief.after([said])), _weights(Belief.prior())
+    moved = [belief[keys] / prior[keys] for keys in ((SHORT,), ())]
+    assert moved[0] / moved[1] == pytest.approx((0.5 / shares[1]) / (0.0998 / shares[0]), rel=1e-9)
 
 
 def test_information_lies_between_nothing_and_all(cases):
@@ -108,9 +131,16 @@ def test_profiles_are_the_benchs_and_variants():
 
 
 def test_a_file_that_is_no_result(tmp_path):
-    for text in ("", "{}", '{"p_fault": 0.5, "faults": [{"kind": "play"}]}', "[1]"):
+    unknown = {**RESULT, "hypotheses": [_set(1.0, ("rust@gear", 0.1, [0.0, 0.2]))]}
+    texts = {
+        "": "Expecting",
+        "{}": "no 'hypotheses'",
+        "[1]": "indices",
+        json.dumps(unknown): "rust",
+    }
+    for text, why in texts.items():
         (tmp_path / "r.json").write_text(text)
-        with pytest.raises(FormatError):
+        with pytest.raises(FormatError, match=why):
             read_result(tmp_path / "r.json")
     with pytest.raises(InputError, match="rotary"):
         next_test(Actuator.load("nasa-ballscrew"))

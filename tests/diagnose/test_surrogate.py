@@ -9,6 +9,7 @@ import pytest
 from elevon import Actuator
 from elevon.diagnose.bymodel.candidates import CANDIDATES
 from elevon.diagnose.bymodel.evidence import UNITS, Signals, dragged, evidence
+from elevon.diagnose.nexttest.belief import Told
 from elevon.diagnose.surrogate import (
     Surrogate,
     diagnose_by_both,
@@ -157,6 +158,21 @@ def test_both_is_the_model_on_what_was_proposed(unit, logs):
     weighed = {f"{i['kind']}@{i['place']}" for i in result.unobservable} | set(result.detectable)
     # What it was not trained on it cannot rule out.
     assert {c.key for c in CANDIDATES} - set(FAULTS) <= weighed < {c.key for c in CANDIDATES}
+
+
+def test_sets_of_faults_share_the_probability(unit, logs):
+    """What next-test reads: each set with its own probability, the likeliest first."""
+    asked = ([logs["short"]], unit)
+    for way in (diagnose_by_surrogate, diagnose_by_both):
+        result = way(*asked, baselines=[logs["base"]])
+        shares = [item.probability for item in result.hypotheses]
+        assert shares == sorted(shares, reverse=True)
+        assert sum(shares) == pytest.approx(1.0, abs=0.05)
+        first = result.hypotheses[0]
+        assert [f"{kind}@{place}" for kind, place, _ in first.faults] == list(result.best)
+        assert first.interval[0][0] < first.severity[0] < first.interval[0][1]
+        told = Told.of(json.loads(json.dumps(result.to_dict())))
+        assert told.possible[result.best].weight == shares[0]
 
 
 def test_two_logs_of_a_unit_are_surer_than_one(unit, logs):

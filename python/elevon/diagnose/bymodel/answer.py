@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-__all__ = ["SEEN", "Cause", "Diagnosis", "Moved"]
+__all__ = ["SEEN", "Cause", "Diagnosis", "Explanation", "Moved"]
 
 SEEN = 3.0  # deviations that a fault's shift must reach to be observable
 
@@ -46,6 +46,39 @@ class Cause:
             "unit": self.unit,
             "interval": list(self.interval),
             "equivalents": [{"kind": k, "place": p} for k, p in self.equivalents],
+        }
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """One set of faults that may be there.
+
+    Attributes
+    ----------
+    faults : tuple of (str, str, str)
+        Kind, place and unit of each; none for healthy.
+    probability : float
+        Of this set and no other.
+    severity : tuple of float
+        Median of each.
+    interval : tuple of (float, float)
+        Of 90 %, of each.
+    """
+
+    faults: tuple[tuple[str, str, str], ...]
+    probability: float
+    severity: tuple[float, ...]
+    interval: tuple[tuple[float, float], ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form."""
+        rows = zip(self.faults, self.severity, self.interval, strict=True)
+        return {
+            "faults": [
+                {"kind": k, "place": p, "severity": s, "unit": u, "interval": list(ends)}
+                for (k, p, u), s, ends in rows
+            ],
+            "probability": self.probability,
         }
 
 
@@ -111,7 +144,9 @@ class Diagnosis:
     findings : tuple of str
         What the user should know.
     seconds : float
-        Time it took.
+        Wall time from the logs in memory to the answer.
+    hypotheses : tuple of Explanation
+        Sets of faults that are still possible, most probable first.
     """
 
     logs: tuple[str, ...]
@@ -127,6 +162,7 @@ class Diagnosis:
     moved: tuple[Moved, ...]
     findings: tuple[str, ...]
     seconds: float = field(compare=False)
+    hypotheses: tuple[Explanation, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
@@ -137,6 +173,7 @@ class Diagnosis:
             "chance": self.chance,
             "faults": [cause.to_dict() for cause in self.faults],
             "best": {"faults": list(self.best), "probability": self.p_best},
+            "hypotheses": [item.to_dict() for item in self.hypotheses],
             "unobservable": [dict(item) for item in self.unobservable],
             "detectable": dict(self.detectable),
             "evidence": [item.to_dict() for item in self.moved],

@@ -12,7 +12,7 @@ import numpy as np
 from elevon.diagnose.bymodel.answer import Diagnosis
 from elevon.diagnose.bymodel.candidates import Candidate, chosen
 from elevon.diagnose.bymodel.case import Case, case_of, detector_of, joined, shift_of
-from elevon.diagnose.bymodel.explain import causes, limits, moved, unexplained
+from elevon.diagnose.bymodel.explain import causes, explanations, limits, moved, unexplained
 from elevon.diagnose.bymodel.log import TestLog, prepared
 from elevon.diagnose.bymodel.posterior import posterior
 from elevon.errors import InputError
@@ -128,4 +128,5 @@ def answer_of(
         moved=changed,
         findings=(*findings, *unexplained(root, rest, cases, best.keys, best.best)),
         seconds=clock.perf_counter() - begin,
+        hypotheses=explanations(result, candidates),
     )

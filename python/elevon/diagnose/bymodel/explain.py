@@ -7,16 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from elevon.diagnose.bymodel.answer import SEEN, Cause, Moved
+from elevon.diagnose.bymodel.answer import SEEN, Cause, Explanation, Moved
 from elevon.diagnose.bymodel.candidates import Candidate
 from elevon.diagnose.bymodel.case import Case, shift_of
 from elevon.diagnose.bymodel.evidence import UNITS
 from elevon.diagnose.bymodel.posterior import Posterior, marginals, quantiles
 
-__all__ = ["causes", "limits", "moved", "unexplained"]
+__all__ = ["causes", "explanations", "limits", "moved", "unexplained"]
 
 Floats = npt.NDArray[np.float64]
 LISTED = 0.02  # probability below which a cause is not listed
+POSSIBLE = 1e-3  # probability below which a set of faults is not listed
 ALIKE = 1.0  # deviations between two faults' shifts below which no log separates them
 
 
@@ -72,6 +73,20 @@ def causes(
         names += [(o.kind, p) for o in alike for p in (o.place, *o.same)]
         out.append(Cause(c.kind, c.place, c.unit, probability, middle, (low, high), tuple(names)))
     return tuple(sorted(out, key=lambda cause: -cause.probability))
+
+
+def explanations(result: Posterior, candidates: Sequence[Candidate]) -> tuple[Explanation, ...]:
+    """Return the sets of faults that are still possible."""
+    known = {c.key: c for c in candidates}
+    out = []
+    for h, p in zip(result.hypotheses, result.probabilities, strict=True):
+        if p < POSSIBLE:
+            continue
+        ends = [quantiles(g, w, (0.05, 0.5, 0.95)) for g, w in zip(h.grids, h.weights, strict=True)]
+        faults = tuple((known[k].kind, known[k].place, known[k].unit) for k in h.keys)
+        middle, interval = tuple(e[1] for e in ends), tuple((e[0], e[2]) for e in ends)
+        out.append(Explanation(faults, p, middle, interval))
+    return tuple(out)
 
 
 def _alike(

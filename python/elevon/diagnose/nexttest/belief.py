@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import chain, combinations
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from elevon.errors import FormatError, InputError
 __all__ = ["Belief", "Possible", "read_result"]
 
 Floats = npt.NDArray[np.float64]
-_UNLISTED = 0.002  # weight of a single fault that a result does not list
+_LEAST = 1e-4  # weight that all sets have together that a result does not list
 _SMALL = 0.1  # root of the least severity over the greatest, where nothing is known of it
 _NINETY = 3.29  # deviations in a Gaussian's interval of 90 %
 _KNOWN = {c.key: c for c in CANDIDATES}
@@ -93,20 +93,15 @@ class Belief:
     def after(cls, results: Sequence[Mapping[str, Any]]) -> Belief:
         """Return what is believed after diagnoses (`elevon diagnose --json`) of different logs.
 
-        Each result counts by how far it moved the weights from the prior.
+        Each result counts by how far it moved the weights from its own prior; a fault that it did
+        not weigh counts as absent, as it would on a log that cannot show it.
         """
-        prior = {p.keys: p for p in cls.prior().possible}
-        if not results:
-            return cls.of(list(prior.values()))
-        single = [_one(result) for result in results]
+        prior = cls.prior().possible
+        told = [Told.of(result) for result in results]
         out = []
-        for keys, before in prior.items():
-            said = [s.get(keys) for s in single]
-            weight = before.weight
-            for other in said:
-                ratio = (other.weight if other else _unlisted(keys)) / before.weight
-                weight *= ratio
-            known = [other for other in said if other is not None]
+        for before in prior:
+            weight = before.weight * math.prod(t.ratio(before) for t in told)
+            known = [t.possible[before.keys] for t in told if before.keys in t.possible]
             out.append(_merged(replace(before, weight=weight), known))
         return cls.of([p for p in out if p.weight > 0.0])
 
@@ -120,10 +115,6 @@ class Belief:
     def leading(self, least: float = 0.003) -> Belief:
         """Return the sets that are worth telling apart."""
         return Belief.of([p for p in self.possible if p.weight >= least])
-
-
-def _unlisted(keys: tuple[str, ...]) -> float:
-    return _UNLISTED if len(keys) == 1 else 0.1 * _UNLISTED
 
 
 def _merged(possible: Possible, said: Sequence[Possible]) -> Possible:
@@ -144,47 +135,81 @@ def read_result(path: str | Path) -> dict[str, Any]:
     Raises
     ------
     FormatError
-        No such file, no JSON, or no diagnosis.
+        No such file, no JSON, or no diagnosis of a rotary actuator.
     """
     try:
         data = json.loads(Path(path).read_text("utf-8"))
-        _one(data)
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        Told.of(data)
+    except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
+        why = f"no {error}" if isinstance(error, KeyError) else str(error)
         raise FormatError(
-            f"{path}: not a result of elevon diagnose --json: {type(error).__name__} {error}"
+            f"{path}: not a result of elevon diagnose --json of a rotary actuator: {why}"
         ) from error
     return dict(data)
 
 
-def _one(result: Mapping[str, Any]) -> dict[tuple[str, ...], Possible]:
-    """Return the sets that one result lists."""
-    p_fault = min(max(float(result["p_fault"]), 1e-6), 1.0 - 1e-6)
-    faults = {f"{f['kind']}@{f['place']}": f for f in result["faults"]}
-    best = tuple(sorted(result.get("best", {}).get("faults", ()), key=_order))
-    share = float(result.get("best", {}).get("probability", 0.0)) if len(best) == 2 else 0.0
-    out: dict[tuple[str, ...], Possible] = {(): Possible((), 1.0 - p_fault)}
-    for key, fault in faults.items():
-        weight = max(float(fault["probability"]) - (share if key in best else 0.0), 1e-4)
-        alike = [f"{e['kind']}@{e['place']}" for e in fault["equivalents"]]
-        alike = [k for k in alike if k in _KNOWN and k.partition("@")[0] != fault["kind"]]
-        rates = [_KNOWN[k].rate for k in (key, *alike) if k in _KNOWN]
-        for k, rate in zip((key, *alike), rates, strict=False):
-            known = k == key
-            centre = float(fault["severity"]) if known else 0.0
-            deviation = _deviation(fault) if known else math.inf
-            out[k,] = Possible((k,), weight * rate / sum(rates), (centre,), (deviation,))
-    if len(best) == 2 and all(k in faults for k in best):
-        out[best] = Possible(
-            best, share, tuple(float(faults[k]["severity"]) for k in best),
-            tuple(_deviation(faults[k]) for k in best),
-        )  # fmt: skip
-    return out
+@dataclass(frozen=True)
+class Told:
+    """What one result says.
+
+    Attributes
+    ----------
+    possible : dict
+        The sets it lists, by their keys.
+    rest : float
+        Weight of all other sets together.
+    weighed : frozenset of str
+        Faults that it weighed; what its log cannot show is not among them.
+    prior : dict
+        Weight of every set before its log.
+    """
+
+    possible: dict[tuple[str, ...], Possible]
+    rest: float
+    weighed: frozenset[str]
+    prior: dict[tuple[str, ...], float]
+
+    @classmethod
+    def of(cls, result: Mapping[str, Any]) -> Told:
+        """Read a result."""
+        possible = {one.keys: one for one in map(_possible, result["hypotheses"])}
+        seen = {*result["detectable"], *chain.from_iterable(possible)}
+        weighed = [c for c in CANDIDATES if c.key in seen]
+        prior = {p.keys: p.weight for p in Belief.prior(weighed).possible}
+        if result.get("method") == "surrogate":
+            prior = {keys: _trained(len(keys)) for keys in prior}
+        rest = max(1.0 - sum(p.weight for p in possible.values()), _LEAST)
+        return cls(possible, rest, frozenset(c.key for c in weighed), prior)
+
+    def ratio(self, before: Possible) -> float:
+        """How far it moved the weight of a set."""
+        keys = tuple(key for key in before.keys if key in self.weighed)
+        if keys in self.possible:
+            return self.possible[keys].weight / self.prior[keys]
+        return self.rest / sum(w for k, w in self.prior.items() if k not in self.possible)
+
+
+def _trained(count: int) -> float:
+    """Share of one set of so many faults among the runs that a surrogate is trained on."""
+    from elevon.diagnose.surrogate.campaign import FAULTY_DAYS, HEALTHY_DAYS
+    from elevon.diagnose.surrogate.population import FAULTS, HEALTHY, SINGLE
+
+    share = (HEALTHY, SINGLE, 1.0 - HEALTHY - SINGLE)[count] / math.comb(len(FAULTS), count)
+    faulty = FAULTY_DAYS / (FAULTY_DAYS + HEALTHY_DAYS)
+    return faulty * share + (0.0 if count else 1.0 - faulty)
+
+
+def _possible(item: Mapping[str, Any]) -> Possible:
+    """Return one listed set; its keys in the order of the candidates."""
+    rows = {f"{f['kind']}@{f['place']}": f for f in item["faults"]}
+    if not rows.keys() <= _KNOWN.keys():
+        raise ValueError(f"{', '.join(sorted(rows.keys() - _KNOWN.keys()))} is no candidate")
+    keys = tuple(sorted(rows, key=list(_KNOWN).index))
+    centre = tuple(float(rows[k]["severity"]) for k in keys)
+    deviation = tuple(_deviation(rows[k]) for k in keys)
+    return Possible(keys, float(item["probability"]), centre, deviation)
 
 
 def _deviation(fault: Mapping[str, Any]) -> float:
     low, high = fault["interval"]
     return max(float(high) - float(low), 1e-9) / _NINETY
-
-
-def _order(key: str) -> int:
-    return list(_KNOWN).index(key)
