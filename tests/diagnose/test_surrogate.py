@@ -23,6 +23,7 @@ from elevon.diagnose.surrogate.network import Batch, either, honest, loss_and_gr
 from elevon.diagnose.surrogate.population import FAULTS, day_of, drawn_faults, learned, unit_of
 from elevon.diagnose.surrogate.sampling import Rows, severities, sizes
 from elevon.errors import FormatError, InputError
+from elevon.prognose.history import _KEYS, _OF_DIAGNOSIS
 from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
 from tests.diagnose.virtual import bench_logs
 
@@ -173,6 +174,12 @@ def test_sets_of_faults_share_the_probability(unit, logs):
         assert first.interval[0][0] < first.severity[0] < first.interval[0][1]
         told = Told.of(json.loads(json.dumps(result.to_dict())))
         assert told.possible[result.best].weight == shares[0]
+
+
+def test_a_history_takes_what_a_diagnosis_says(unit, logs):
+    """`elevon predict` refuses keys that it does not know; none of a diagnosis may be among them."""
+    said = diagnose_by_surrogate([logs["short"]], unit, baselines=[logs["base"]]).to_dict()
+    assert set(said) <= _KEYS | _OF_DIAGNOSIS
 
 
 def test_two_logs_of_a_unit_are_surer_than_one(unit, logs):
