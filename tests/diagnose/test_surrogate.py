@@ -177,7 +177,7 @@ def test_sets_of_faults_share_the_probability(unit, logs):
 
 
 def test_a_history_takes_what_a_diagnosis_says(unit, logs):
-    """`elevon predict` refuses keys that it does not know; none of a diagnosis may be among them."""
+    """`elevon predict` refuses keys that it does not know; a diagnosis must have none."""
     said = diagnose_by_surrogate([logs["short"]], unit, baselines=[logs["base"]]).to_dict()
     assert set(said) <= _KEYS | _OF_DIAGNOSIS
 
