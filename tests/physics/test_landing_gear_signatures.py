@@ -16,6 +16,7 @@ from tests.physics.gear import gear, value
 
 BOTH = pytest.mark.parametrize("fidelity", ["high", "low"])
 STEADY = 1.2  # s: the speed is reached
+RATE = 12_500.0  # samples a second
 LEGS = {(1, 0, 1): "ab", (1, 0, 0): "ac", (1, 1, 0): "bc", (0, 1, 0): "ba", (0, 1, 1): "ca",
         (0, 0, 1): "cb"}  # fmt: skip  # High and low leg of a positive demand by Hall code.
 SHOWN = ("motor_torque", "current_line", "motor_position", "motor_speed", "hall_a", "hall_b",
@@ -30,7 +31,7 @@ def retraction(
     """Signals of the steady part of a retraction."""
     names = SHOWN + (PHASES if fidelity == "high" else ())
     rec = gear((0.0, "retract"), duration=1.4, start="200 mm", fidelity=fidelity,
-               faults=list(faults), record=f"{','.join(names)}@12.5 kHz",
+               faults=list(faults), record=f"{','.join(names)}@{RATE} Hz",
                values={"load.factor": factor, "inverter.chopping": chopping})  # fmt: skip
     late = rec["motor_torque"].time > STEADY
     return {name: rec[name].values[late] for name in names}
@@ -59,8 +60,21 @@ def per_ampere(run: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         sizes = np.sort(np.abs([run[name] for name in PHASES]), axis=0)
         conducting = (sizes[0] < 1e-9) & (sizes[2] > 1.0)
         current = 0.5 * sizes.sum(axis=0)
+    else:
+        conducting &= settled(run, float(np.max(current)))
     size = np.abs(run["motor_torque"][conducting]) / current[conducting]
     return size / (2.0 * value("motor.emf_constant")), conducting
+
+
+def settled(run: dict[str, np.ndarray], largest: float) -> np.ndarray:
+    """Samples of the low model in which the phase that left the pair has no current any more.
+
+    With both legs chopped it dies within 3 L I/(V + e), the pair's EMF e with the current or none.
+    """
+    overlap = 3.0 * value("motor.winding_inductance") * largest / value("inverter.supply_voltage")
+    since = int(np.ceil(overlap * RATE))
+    changed = np.r_[False, np.diff(run["hall_a"] + 2 * run["hall_b"] + 4 * run["hall_c"]) != 0.0]
+    return np.convolve(changed, np.ones(since + 1))[: changed.size] == 0.0
 
 
 def gaps(angle: np.ndarray, sign: float, zeta: float, phase: float) -> dict[str, np.ndarray]:

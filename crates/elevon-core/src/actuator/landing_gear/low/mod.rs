@@ -1,0 +1,211 @@
+//! Low fidelity: the conducting pair as one circuit, its current averaged over a carrier period, continuous or not;
+//! the commutations as a resistance that grows with speed.
+
+mod current;
+mod handover;
+mod pair;
+
+use self::current::{mean_current, shorted_current, third_current, Lag};
+use self::handover::{hand_over, handed_over, Handover};
+use self::pair::pair;
+use super::body::{Body, Constants, Structure, E_COPPER, E_INVERTER};
+use super::layout::*;
+use super::signals::{Quantity as Q, ALL, PHASES};
+use super::LandingGear;
+use crate::actuator::{Finding, Inputs, Setup, Signals, Tick, Watch, Wiring, WATCHED};
+use crate::control::pi_rate::PiRateParameter;
+use crate::inverter::bridge::InverterParameter;
+use crate::inverter::six_step::{self, Chopping, SixStepParameter};
+use crate::scalar::Scalar;
+use crate::three;
+use crate::time::Steps;
+use crate::variable::Signal;
+
+/// The landing-gear actuator at low fidelity.
+#[derive(Clone)]
+pub struct Low;
+
+#[derive(Clone, Debug)]
+pub struct Model<S> {
+    c: Constants<S>,
+    on_resistance: S,
+    diode_drop: S,
+    inductance: [S; 3],
+    /// Commutation resistance per motor speed and inductance: c p.
+    commutation: S,
+    /// 1 while the motor's terminals are shorted.
+    terminals: S,
+}
+
+#[derive(Clone, Debug)]
+pub struct State<S> {
+    body: Body<S>,
+    current: S,
+    /// With the half of the third phase's current in it.
+    line: S,
+    torque: S,
+    /// 1 once the drive has tripped.
+    tripped: S,
+    handover: Handover<S>,
+}
+
+#[inline(always)]
+fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &mut State<S>, k: Steps) {
+    let dt = m.c.dt;
+    let t = S::splat(k as f64) * dt;
+    let one = S::one();
+    let source = m.c.source(inputs, t);
+    let p = pair(m, structure, s);
+    let zero = S::zero();
+    let half = S::splat(0.5);
+    let duty = m.c.duty(&s.body) * s.body.driving * (one - s.body.short);
+    let mut current = mean_current(m, structure.chopping, &p, s, duty * (one - s.tripped));
+    let shorted = m.terminals.maximum(s.body.short * (one - s.tripped));
+    let short = half.lt(shorted) & half.lt(p.closed);
+    if S::any(short) {
+        let inductance = S::select(zero.lt(p.inductance), p.inductance, one);
+        let lag = Lag { share: (dt * p.resistance / inductance).minimum(one), from: s.current };
+        current = S::select(short, lag.to(shorted_current(m, &p, &s.body)), current);
+    }
+    if structure.shorted {
+        // Driving into shorted terminals is a short of the link.
+        s.tripped = S::select(half.lt(m.terminals) & zero.lt(duty), one, s.tripped);
+    }
+    // What decays to nothing is nothing: numbers without full precision are slow.
+    s.current = S::select(current.abs().lt(S::splat(1e-30)), zero, current);
+    let i = s.current;
+    // Half of the third phase's current comes from each of the pair; it brakes.
+    let (mut line, mut dragged) = (i, zero);
+    if structure.chopping == Chopping::LowSide {
+        let third = third_current(m, &p, &s.body, duty * (one - s.tripped));
+        line = i + i.signed(S::select(short, zero, half * third.shared + third.alone));
+        dragged = S::select(short, zero, third.shared * p.beside + third.alone * p.apart);
+    }
+    s.line = line;
+    Constants::meter(&mut s.body, line);
+    let square = i * i;
+    let outgoing = handed_over(m, structure.chopping, &p, s, duty, i);
+    let driving = p.constant * i - S::select(short, zero, p.handed * outgoing);
+    s.torque = m.c.star.saturate(driving - dragged);
+    let speed = s.body.motion.motor_speed;
+    let drop = match structure.chopping {
+        Chopping::LowSide => m.diode_drop,
+        Chopping::Both => m.diode_drop + m.diode_drop,
+    };
+    let mut winding = p.winding * square;
+    let mut drops = i.abs() * (one - duty) * drop + (p.resistance - p.winding) * square + dragged * speed;
+    let mut drawn = (driving - dragged) * speed + winding + drops;
+    if S::any(short) {
+        // All that a shorted winding brakes becomes heat in its own circuit.
+        let heat = -(p.constant * speed * i);
+        let share = p.winding / S::select(zero.lt(p.resistance), p.resistance, one);
+        winding = S::select(short, heat * share, winding);
+        drops = S::select(short, heat * (one - share), drops);
+        drawn = S::select(short, zero, drawn);
+    }
+    let bus = drawn / s.body.link.maximum(one);
+    if structure.accounts {
+        s.body.energy[E_COPPER] = s.body.energy[E_COPPER] + dt * winding;
+        s.body.energy[E_INVERTER] = s.body.energy[E_INVERTER] + dt * drops;
+    }
+    m.c.feed(&mut s.body, source, bus, structure.accounts);
+    let acting = m.c.acting(&s.body, inputs, s.torque, t);
+    m.c.mechanics.kick(&mut s.body.motion, &acting, structure.rig);
+    let before = s.body.motion.motor_position;
+    m.c.mechanics.drift(&mut s.body.motion, dt);
+    let angle = m.c.star.electrical_angle(s.body.motion.motor_position);
+    let advance = (s.body.motion.motor_position - before) * m.c.star.pole_pairs;
+    m.c.hall.observe(&mut s.body.hall, angle, advance, t + dt, dt);
+    hand_over(s);
+}
+
+impl Wiring for Low {
+    type Structure = Structure;
+    type Model<S: Scalar> = Model<S>;
+    type State<S: Scalar> = State<S>;
+
+    type Machine = LandingGear;
+    const INITIAL: &'static [&'static str] = super::INITIAL;
+
+    fn signals() -> &'static [Signal] {
+        &ALL[..PHASES]
+    }
+    fn step(raw: &[f64]) -> f64 {
+        raw[LowParameter::Step.at()]
+    }
+    fn fault_grid(raw: &[f64]) -> f64 {
+        raw[SolverParameter::FaultGrid.at()].max(raw[LowParameter::Step.at()])
+    }
+    fn structure(setup: &Setup) -> Structure {
+        Structure::read(setup)
+    }
+    fn ticks(raw: &[f64], _structure: &Structure) -> Vec<Tick> {
+        super::control_tick(raw[PiRateParameter::Period.at()], raw[LowParameter::Step.at()])
+    }
+    fn check(raw: &[f64]) -> Vec<Finding> {
+        super::checks::low(raw)
+    }
+
+    fn derive<S: Scalar>(raw: &[S], structure: &Structure) -> Model<S> {
+        let dt = raw[LowParameter::Step.at()];
+        let c = Constants::derive(raw, structure, dt, dt);
+        Model {
+            on_resistance: raw[InverterParameter::OnResistance.at()],
+            diode_drop: raw[InverterParameter::DiodeDrop.at()],
+            inductance: three!(|j| S::one() / c.star.per_inductance[j]),
+            commutation: raw[LowParameter::CommutationFactor.at()] * c.star.pole_pairs,
+            terminals: S::indicator(S::splat(0.5).le(raw[SixStepParameter::TerminalsShorted.at()])),
+            c,
+        }
+    }
+
+    fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
+        let (zero, body) = (S::zero(), model.c.start(raw, initial));
+        let handover = Handover { outgoing: zero, demand: six_step::demand(body.hall.code), change: [zero; 3] };
+        State { body, current: zero, line: zero, torque: zero, tripped: zero, handover }
+    }
+
+    fn tick<S: Scalar>(
+        _kind: u8,
+        structure: &Structure,
+        m: &Model<S>,
+        inputs: &Inputs<S>,
+        s: &mut State<S>,
+        t: S,
+        noise: &mut dyn FnMut(u64) -> S,
+    ) {
+        m.c.tick(structure, &mut s.body, inputs, t, s.tripped, noise);
+    }
+
+    #[inline(always)]
+    fn advance<S: Scalar>(
+        structure: &Structure,
+        models: &[Model<S>],
+        inputs: &[Inputs<S>],
+        states: &mut [State<S>],
+        from: Steps,
+        count: Steps,
+    ) {
+        for k in from..from + count {
+            for ((model, inputs), state) in models.iter().zip(inputs).zip(states.iter_mut()) {
+                step(model, structure, inputs, state, k);
+            }
+        }
+    }
+
+    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, _asked: Signals, out: &mut [S]) {
+        m.c.observe(structure, inputs, &s.body, s.torque, t, out);
+        out[Q::CurrentLine as usize] = s.line;
+        out[Q::EnergyMagnetic as usize] = S::splat(0.5) * pair(m, structure, s).inductance * s.current * s.current;
+    }
+
+    fn watch<S: Scalar>(s: &State<S>) -> [Watch<S>; WATCHED] {
+        super::watch(&s.body, s.current)
+    }
+    fn tripped<S: Scalar>(s: &State<S>) -> S {
+        s.body.tripped()
+    }
+    fn trip_reason<S: Scalar>(m: &Model<S>, s: &State<S>, lane: usize) -> Option<String> {
+        m.c.trip_reason(&s.body, lane)
+    }
+}
