@@ -3,21 +3,14 @@
 use super::block::{structure, Block};
 use super::kernels::Plain;
 use super::spec::{Clock, RunOutput, RunSpec, Status};
-use super::width::Width;
+use super::width::{with_lanes, Width};
 use crate::actuator::{Tick, Wiring, MAX_CHUNKS};
-#[cfg(not(any(feature = "physics", feature = "widest")))]
-use crate::scalar::Portable;
 use crate::scalar::Scalar;
 use crate::time::Steps;
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::panic::{catch_unwind, AssertUnwindSafe};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
-
-#[cfg(all(target_arch = "x86_64", not(any(feature = "physics", feature = "widest"))))]
-use crate::scalar::Avx2x4;
-#[cfg(all(target_arch = "x86_64", not(feature = "physics")))]
-use crate::scalar::Avx512x8;
 
 /// Progress out, interruption in; shared between threads.
 #[derive(Debug, Default)]
@@ -85,24 +78,7 @@ fn run_block<W: Wiring, S: Scalar>(runs: &[&RunSpec], clocks: &[Clock], recorded
 }
 
 fn run_width<W: Wiring>(width: Width, runs: &[&RunSpec], clocks: &[Clock], recorded: &[usize], monitor: &Monitor) -> Vec<RunOutput> {
-    // A run by name of its width, too.
-    let width = if width == Width::Single { Width::alone() } else { width };
-    match width {
-        // A build for work on physics knows single runs only (`Width::detect`).
-        #[cfg(feature = "physics")]
-        _ => run_block::<W, f64>(runs, clocks, recorded, monitor),
-        #[cfg(not(feature = "physics"))]
-        Width::Single => run_block::<W, f64>(runs, clocks, recorded, monitor),
-        #[cfg(all(target_arch = "x86_64", not(any(feature = "physics", feature = "widest"))))]
-        Width::Avx2 => run_block::<W, Avx2x4>(runs, clocks, recorded, monitor),
-        #[cfg(all(target_arch = "x86_64", not(feature = "physics")))]
-        Width::Avx512 => run_block::<W, Avx512x8>(runs, clocks, recorded, monitor),
-        #[cfg(not(any(feature = "physics", feature = "widest")))]
-        _ => run_block::<W, Portable<2>>(runs, clocks, recorded, monitor),
-        // A build for work on speed knows single runs and the widest lanes.
-        #[cfg(all(feature = "widest", not(feature = "physics")))]
-        _ => run_block::<W, f64>(runs, clocks, recorded, monitor),
-    }
+    with_lanes!(width.of(runs.len()), Lanes => run_block::<W, Lanes>(runs, clocks, recorded, monitor))
 }
 
 /// The runs of one block. What panics in company is run alone: a defect may cost the runs that show it, no others.
@@ -111,7 +87,7 @@ fn run_caught<W: Wiring>(width: Width, runs: &[&RunSpec], clocks: &[Clock], reco
     match (catch_unwind(AssertUnwindSafe(work)), runs) {
         (Ok(outputs), _) => outputs,
         (Err(_), [run]) => vec![broken::<W>(run, clocks)],
-        (Err(_), _) => runs.iter().flat_map(|run| run_caught::<W>(Width::alone(), &[run], clocks, recorded, monitor)).collect(),
+        (Err(_), _) => runs.iter().flat_map(|run| run_caught::<W>(width, &[run], clocks, recorded, monitor)).collect(),
     }
 }
 
@@ -141,7 +117,7 @@ pub(super) fn recorded(clocks: &[Clock]) -> Vec<usize> {
 pub fn run_all<W: Wiring>(runs: &[RunSpec], clocks: &[Clock], threads: usize, width: Width, monitor: &Monitor) -> Vec<RunOutput> {
     let recorded = recorded(clocks);
     if let [run] = runs {
-        return run_caught::<W>(Width::alone(), &[run], clocks, &recorded, monitor);
+        return run_caught::<W>(width, &[run], clocks, &recorded, monitor);
     }
     let blocks = blocks::<W>(runs, &recorded, width, threads);
     let work = || -> Vec<(Vec<usize>, Vec<RunOutput>)> {
@@ -149,8 +125,6 @@ pub fn run_all<W: Wiring>(runs: &[RunSpec], clocks: &[Clock], threads: usize, wi
             .into_par_iter()
             .map(|indices| {
                 let members: Vec<&RunSpec> = indices.iter().map(|&i| &runs[i]).collect();
-                // A lone run gains nothing from lanes.
-                let width = if members.len() == 1 { Width::alone() } else { width };
                 let outputs = run_caught::<W>(width, &members, clocks, &recorded, monitor);
                 (indices, outputs)
             })

@@ -71,11 +71,8 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         let steps = (first.duration / dt).round() as Steps;
         let structure = structure::<W>(first, recorded);
         let chunks = runs.len() / S::LANES;
-        let count = first.parameters.len();
-        let healthy: Vec<Vec<S>> = (0..chunks).map(|c| (0..count).map(|i| lift.parameter(runs, c * S::LANES, i)).collect()).collect();
         let grid = (W::fault_grid(&first.parameters) / dt).round() as Steps;
         let faults = FaultLanes::new(runs.iter().map(|r| r.faults.clone()).collect(), grid);
-        let sources = (0..W::PORTS.len()).map(|p| SourceLanes::new(runs.iter().map(|r| r.ports[p].clone()).collect())).collect();
         let ticks = W::ticks(&first.parameters, &structure);
         let rows = (0..chunks).map(|c| Rows::new(c * S::LANES, real, clocks, &faults, steps, &lift)).collect();
         let mut block = Self {
@@ -83,6 +80,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             clock_due: vec![0; clocks.len()],
             keys: runs.iter().map(|r| (r.seed, r.run)).collect(),
             real,
+            healthy: (0..chunks).map(|c| (0..first.parameters.len()).map(|i| lift.parameter(runs, c * S::LANES, i)).collect()).collect(),
             lift,
             clocks,
             dt,
@@ -90,9 +88,8 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             k: 0,
             trouble: true,
             stale: false,
-            healthy,
             faults,
-            sources,
+            sources: (0..W::PORTS.len()).map(|p| SourceLanes::new(runs.iter().map(|r| r.ports[p].clone()).collect())).collect(),
             ticks,
             rows,
             models: Vec::new(),

@@ -5,19 +5,12 @@ use super::batch::{blocks, padded, shape, Monitor, Shape};
 use super::block::Block;
 use super::kernels::Plain;
 use super::spec::{RunSpec, Status};
-use super::width::Width;
+use super::width::{with_lanes, Width};
 use crate::actuator::{Signals, Wiring};
 use crate::command::SourcePlan;
 use crate::fault::FaultSpec;
 use crate::scalar::Scalar;
 use crate::time::Steps;
-
-#[cfg(all(target_arch = "x86_64", not(any(feature = "physics", feature = "widest"))))]
-use crate::scalar::Avx2x4;
-#[cfg(all(target_arch = "x86_64", not(feature = "physics")))]
-use crate::scalar::Avx512x8;
-#[cfg(not(any(feature = "physics", feature = "widest")))]
-use crate::scalar::Portable;
 
 /// What a caller may change between two steps.
 #[derive(Clone, Debug)]
@@ -162,21 +155,11 @@ impl<W: Wiring, S: Scalar> Live for Session<W, S> {
 pub fn live<W: Wiring>(runs: &[RunSpec], recorded: &[usize], width: Width) -> Vec<(Vec<usize>, Box<dyn Live>)> {
     let one = |indices: Vec<usize>| {
         let members: Vec<RunSpec> = indices.iter().map(|&i| runs[i].clone()).collect();
-        let width = if members.len() == 1 || width == Width::Single { Width::alone() } else { width };
         (indices, block::<W>(width, members, recorded))
     };
     blocks::<W>(runs, recorded, width, 1).into_iter().map(one).collect()
 }
 
 fn block<W: Wiring>(width: Width, runs: Vec<RunSpec>, recorded: &[usize]) -> Box<dyn Live> {
-    match width {
-        // A build for work on physics knows single runs only (`Width::detect`).
-        #[cfg(not(any(feature = "physics", feature = "widest")))]
-        Width::Portable => Box::new(Session::<W, Portable<2>>::new(runs, recorded)),
-        #[cfg(all(target_arch = "x86_64", not(any(feature = "physics", feature = "widest"))))]
-        Width::Avx2 => Box::new(Session::<W, Avx2x4>::new(runs, recorded)),
-        #[cfg(all(target_arch = "x86_64", not(feature = "physics")))]
-        Width::Avx512 => Box::new(Session::<W, Avx512x8>::new(runs, recorded)),
-        _ => Box::new(Session::<W, f64>::new(runs, recorded)),
-    }
+    with_lanes!(width.of(runs.len()), Lanes => Box::new(Session::<W, Lanes>::new(runs, recorded)))
 }

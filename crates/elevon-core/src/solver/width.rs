@@ -43,6 +43,15 @@ impl Width {
         }
     }
 
+    /// For so many runs: lanes gain a lone one nothing.
+    pub(super) fn of(self, runs: usize) -> Self {
+        if runs == 1 || self == Self::Single {
+            Self::alone()
+        } else {
+            self
+        }
+    }
+
     pub const NAMES: [&'static str; 4] = ["single", "portable", "avx2", "avx512"];
 
     pub fn name(self) -> &'static str {
@@ -73,3 +82,33 @@ impl Width {
         }
     }
 }
+
+/// `$body` with `$lanes` as the scalar of a width. A build for work on physics knows single runs only, one for work on speed
+/// those and the widest lanes (`Width::detect`).
+macro_rules! with_lanes {
+    ($width:expr, $lanes:ident => $body:expr) => {
+        match $width {
+            #[cfg(not(any(feature = "physics", feature = "widest")))]
+            $crate::solver::Width::Portable => {
+                type $lanes = $crate::scalar::Portable<2>;
+                $body
+            }
+            #[cfg(all(target_arch = "x86_64", not(any(feature = "physics", feature = "widest"))))]
+            $crate::solver::Width::Avx2 => {
+                type $lanes = $crate::scalar::Avx2x4;
+                $body
+            }
+            #[cfg(all(target_arch = "x86_64", not(feature = "physics")))]
+            $crate::solver::Width::Avx512 => {
+                type $lanes = $crate::scalar::Avx512x8;
+                $body
+            }
+            _ => {
+                type $lanes = f64;
+                $body
+            }
+        }
+    };
+}
+
+pub(super) use with_lanes;

@@ -200,8 +200,13 @@ impl<S: Scalar> Constants<S> {
             };
             s.units[lane].tick(&self.raw[lane], &shown);
         }
+        self.obey(s, inputs[USER].at(t), noise);
+    }
+
+    /// What the unit's answer sets, and what is read anew once a tick.
+    fn obey(&self, s: &mut Body<S>, user: S, noise: &mut dyn FnMut(u64) -> S) {
         s.charge = S::zero();
-        s.lock_use = s.motion.locked * self.mechanics.end_load(inputs[USER].at(t)).abs() * self.mechanics.lock.per_strength;
+        s.lock_use = s.motion.locked * self.mechanics.end_load(user).abs() * self.mechanics.lock.per_strength;
         s.obey(self.cable);
         if S::any(S::zero().lt(self.cell_noise)) {
             s.cell_noise = self.cell_noise * noise(0);

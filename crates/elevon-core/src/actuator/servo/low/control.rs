@@ -80,6 +80,34 @@ fn slew<S: Scalar>(m: &Model<S>, supply: S) -> S {
     m.drive.voltage_ratio * supply * m.drive.supply_scale / (m.cold[2] * m.control.per_torque_constant)
 }
 
+/// Speed that is asked for, within its limit.
+#[inline(always)]
+fn speed_reference<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, command: S, position_error: S) -> S {
+    let c = &m.control;
+    let demanded = match structure.control.mode {
+        Mode::Position if structure.control.feedforward => {
+            let moved = command - s.command;
+            s.command = command;
+            let ahead = S::select(moved.equals(moved), c.feedforward * moved, S::zero());
+            c.position_gain * position_error + ahead
+        }
+        Mode::Position => c.position_gain * position_error,
+        Mode::Speed | Mode::Torque => command,
+    };
+    demanded.clamp_abs(c.speed_limit)
+}
+
+/// Change of the speed that the resolver shows beside the shaft's own acceleration, which is solved for.
+#[inline(always)]
+fn shown_beside<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &mut State<S>, speed: S) -> S {
+    if !(FULL && structure.sensing.resolver) {
+        return S::zero();
+    }
+    let beside = speed - s.jumps.shown - m.sensing.follows() * (s.shaft.motor_speed - s.jumps.moved);
+    (s.jumps.shown, s.jumps.moved) = (speed, s.shaft.motor_speed);
+    beside
+}
+
 /// The controller's answer to a command and what the sensors show.
 #[inline(always)]
 pub(super) fn demand<S: Scalar, const FULL: bool>(
@@ -96,29 +124,13 @@ pub(super) fn demand<S: Scalar, const FULL: bool>(
     if structure.control.pid {
         return position_pid(m, structure, s, position_error, speed);
     }
-    let demanded = match structure.control.mode {
-        Mode::Position if structure.control.feedforward => {
-            let moved = command - s.command;
-            s.command = command;
-            let ahead = S::select(moved.equals(moved), c.feedforward * moved, zero);
-            c.position_gain * position_error + ahead
-        }
-        Mode::Position => c.position_gain * position_error,
-        Mode::Speed | Mode::Torque => command,
-    };
-    let speed_ref = demanded.clamp_abs(c.speed_limit);
+    let speed_ref = speed_reference(m, structure, s, command, position_error);
     let error = speed_ref - speed;
     let none = Demand { speed_ref, error, position_error, speed, torque: command, cut: zero };
     if structure.control.mode == Mode::Torque {
         return none;
     }
-    let mut change = speed_ref - s.speed_ref;
-    if FULL && structure.sensing.resolver {
-        // What the resolver shows beside the shaft's own acceleration, which is solved for.
-        let shown = speed - s.jumps.shown;
-        change = change - (shown - m.sensing.follows() * (s.shaft.motor_speed - s.jumps.moved));
-        (s.jumps.shown, s.jumps.moved) = (speed, s.shaft.motor_speed);
-    }
+    let change = speed_ref - s.speed_ref - shown_beside::<S, FULL>(m, structure, s, speed);
     let mut torque = c.speed_gain * error + s.integral;
     let mut cut = zero;
     if structure.control.derivative {
