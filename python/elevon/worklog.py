@@ -24,10 +24,12 @@ from typing import Any
 from elevon.errors import BusyError, FormatError, OutputError
 from elevon.files import write_text
 
-__all__ = ["LOCK", "Item", "WorkLog", "digest", "is_locked", "locked", "sweep"]
+__all__ = ["LOCK", "Item", "WorkLog", "digest", "finished", "is_locked", "locked", "sweep"]
 
 LOCK = ".elevon.lock"
 """Name of the lock in a folder. A killed process leaves the file, but holds it no more."""
+
+_LOG = "finished.log"
 
 _FAR = 2**30
 """Where the byte stands that is locked on Windows."""
@@ -174,6 +176,28 @@ def digest(path: Path) -> dict[str, Any]:
         return {"bytes": path.stat().st_size, "sha256": _sha(path)}
     except OSError as error:
         raise OutputError(f"{path}: has gone since it was written: {error.strerror}") from error
+
+
+@contextmanager
+def finished(folder: Path | None, work: str) -> Iterator[WorkLog | None]:
+    """Hold a folder and give the log of what is finished there; None where there is no folder.
+
+    Parameters
+    ----------
+    folder : path or None
+        Made where it is missing.
+    work : str
+        Tells this work from any other; the log of other work, or of another version, is replaced.
+    """
+    from elevon import __version__
+
+    if folder is None:
+        yield None
+        return
+    key = f"{work} {__version__}"
+    with locked(folder):
+        log = WorkLog.read(folder / _LOG)
+        yield log if log is not None and log.key == key else WorkLog.begin(folder / _LOG, key)
 
 
 @contextmanager

@@ -13,8 +13,10 @@ from elevon.diagnose.optimisers import CAUSES, METHODS, Monitor, search
 from elevon.diagnose.optimisers.cost import limits
 from elevon.diagnose.virtual import first_trace, traced
 from elevon.errors import UnknownNameError
+from elevon.reproduce.diagnosis_optimisers import Outcome
 from elevon.scenario.compile import signal_records
 from elevon.simulate import Run, simulate_batch
+from elevon.worklog import finished
 from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
 
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
@@ -74,11 +76,28 @@ def test_the_misfit_is_least_at_the_truth(monitor):
     )
 
 
+def test_an_outcome_survives_its_file():
+    for reached in (1.5, float("nan")):
+        one = Outcome("play", "genetic", 0.1, 2000, 1.4, reached)
+        again = Outcome.of(json.loads(json.dumps(one.to_dict(), allow_nan=False)))
+        assert again.to_dict() == one.to_dict()
+
+
+def test_finished_work_is_known_again_by_its_name(tmp_path):
+    with finished(None, "work") as log:
+        assert log is None
+    for name, known in (("work 1", []), ("work 1", ["a"]), ("work 2", [])):
+        with finished(tmp_path, name) as log:
+            assert list(log.items) == known
+            log.note("a", [], rows=[1.0])
+
+
 @pytest.mark.long
-def test_the_table(elevon_cli):  # noqa: F811
-    result = elevon_cli(
-        "reproduce", "diagnosis-optimisers", "--seeds", "2", "--budget", "400", "--json"
-    )
+def test_the_table(elevon_cli, tmp_path):  # noqa: F811
+    asked = ("reproduce", "diagnosis-optimisers", "--seeds", "2", "--budget", "400",
+             "--runs", tmp_path, "--json")  # fmt: skip
+    result = elevon_cli(*asked)
     document = json.loads(result.out)
     assert {row["method"] for row in document["rows"]} >= set(METHODS)
     assert all({"name", "value", "limit", "unit", "passed"} <= set(c) for c in document["checks"])
+    assert elevon_cli(*asked).out == result.out  # seconds and all: from the finished logs

@@ -9,10 +9,12 @@ as the bench writes it and one healthy log of the same test.
 from __future__ import annotations
 
 import math
+import os
 import time as clock
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +25,7 @@ from elevon.diagnose.optimisers import CAUSES, METHODS, Monitor, search
 from elevon.diagnose.optimisers.cost import limits
 from elevon.errors import Interrupted
 from elevon.report import Check, all_passed
+from elevon.worklog import finished
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -73,6 +76,15 @@ class Outcome:
     evaluations: int
     seconds: float
     reached: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form."""
+        return {**vars(self), "reached": self.reached if math.isfinite(self.reached) else None}
+
+    @classmethod
+    def of(cls, data: Mapping[str, Any]) -> Outcome:
+        """Return what `to_dict` wrote."""
+        return cls(**{**data, "reached": math.nan if data["reached"] is None else data["reached"]})
 
 
 @dataclass(frozen=True)
@@ -160,6 +172,8 @@ def reproduce_optimisers(
     seeds: int = 4,
     budget: int = BUDGET,
     cases: Sequence[str] = tuple(CASES),
+    processes: int | None = None,
+    folder: Path | None = None,
     progress: Progress | None = None,
 ) -> OptimisersResult:
     """Diagnose logs of the high model by every method.
@@ -174,26 +188,76 @@ def reproduce_optimisers(
         Evaluations of a search.
     cases : sequence of str
         Of `CASES`.
+    processes : int, optional
+        That work side by side, a log each; default: one for each processor.
+    folder : path, optional
+        Where finished logs are noted; the same work goes on from there. Default: nowhere.
     progress : callable, optional
         Told the done fraction; returns False to stop.
+
+    Raises
+    ------
+    Interrupted
+        `progress` returned False; finished logs stay noted.
     """
     from elevon.actuator import Actuator
 
     unit = Actuator.load("torino-rotary").with_values({"drive.kind": "pwm"})
-    logs = _logs(unit, cases, seed, seeds)
-    outcomes: list[Outcome] = []
-    for number, (case, setup, log, base) in enumerate(logs):
-        if number == 0:
-            _ours(unit, log, base)  # what is loaded once is not timed
-        if progress is not None and progress(number / len(logs)) is False:
-            raise Interrupted("interrupted between two logs")
-        outcomes += _one(unit, case, setup, log, base, budget=budget, seed=seed + number)
-    return OptimisersResult(tuple(outcomes))
+    names = [f"{case} {k}" for k in range(seeds) for case in cases]
+    with finished(folder, f"diagnosis-optimisers seed {seed} budget {budget}") as done:
+        known = {n: done.items[n].data["rows"] for n in names if done and n in done.items}
+        missing = [n for n in names if n not in known]
+        jobs = dict(zip(names, _logs(unit, cases, seed, seeds) if missing else (), strict=False))
+        work = partial(_one, unit, budget=budget)
+        for name, rows in _worked(
+            work, jobs, missing, seed=seed, processes=processes, progress=progress
+        ):
+            known[name] = [row.to_dict() for row in rows]
+            if done is not None:
+                done.note(name, [], rows=known[name])
+    return OptimisersResult(tuple(Outcome.of(row) for n in names for row in known[n]))
 
 
-def _logs(
-    unit: Actuator, cases: Sequence[str], seed: int, seeds: int
-) -> list[tuple[str, Setup, TestLog, TestLog]]:
+Job = tuple[str, "Setup", "TestLog", "TestLog"]
+
+
+def _worked(
+    work: Callable[..., list[Outcome]],
+    jobs: Mapping[str, Job],
+    missing: Sequence[str],
+    *,
+    seed: int,
+    processes: int | None,
+    progress: Progress | None,
+) -> Iterator[tuple[str, list[Outcome]]]:
+    """Give each log that is missing to a process; the seeds do not depend on which are missing."""
+    from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+    from multiprocessing import get_context
+
+    count = max(min(processes or os.cpu_count() or 1, len(missing)), 1)
+    pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=_deaf)
+    numbers = {name: seed + k for k, name in enumerate(jobs)}
+    try:
+        asked: dict[Future[list[Outcome]], str] = {
+            pool.submit(work, *jobs[n], seed=numbers[n]): n for n in missing
+        }
+        while asked:
+            ready = wait(asked, timeout=0.5, return_when=FIRST_COMPLETED).done
+            yield from ((asked.pop(future), future.result()) for future in ready)
+            if progress is not None and progress(1.0 - len(asked) / len(missing)) is False:
+                raise Interrupted("interrupted between two logs")
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _deaf() -> None:
+    """Ctrl-C is the parent's: it ends between two logs."""
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _logs(unit: Actuator, cases: Sequence[str], seed: int, seeds: int) -> list[Job]:
     from elevon.bench.procedure import load_procedure
     from elevon.bench.rig import setups
     from elevon.bench.traces import recorded
@@ -234,6 +298,7 @@ def _one(
     seed: int,
 ) -> list[Outcome]:
     runs = _model_runs(unit, log)
+    _ours(unit, log, base)["surrogate"]()  # what is loaded once in a process is not timed
     out = []
     for method, run in _ours(unit, log, base).items():
         _RECENT.clear()  # every log pays for its own model runs
