@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from elevon.recording.channel import Channel
     from elevon.scenario import Scenario
 
-__all__ = ["replay_scenario", "validate_replay"]
+__all__ = ["as_recorded", "replay_scenario", "validate_replay"]
 
 Floats = npt.NDArray[np.float64]
 _INPUTS = ("command", "load")
@@ -186,13 +186,13 @@ def _trace(
     for role in roles:
         channel, model = recording.role(role), run[shown[role]]
         measured[role] = np.interp(base.time, channel.time, channel.values)
-        simulated[role] = np.interp(time, model.time, _as_recorded(recording, model))
+        simulated[role] = np.interp(time, model.time, as_recorded(recording, model))
     units = {role: recording.role(role).unit for role in roles}
     used = (time >= transient) & (time <= float(run.meta["sim_s"]))
     return Trace(name, time, measured, simulated, used), units
 
 
-def _as_recorded(recording: Recording, model: Channel) -> Floats:
+def as_recorded(recording: Recording, model: Channel) -> Floats:
     """Return the model's channel through the filter that the log's recorder states, if any."""
     from scipy.signal import butter, sosfiltfilt
 

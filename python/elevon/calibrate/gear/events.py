@@ -38,13 +38,13 @@ def lock_travels(
             continue
         for move in log.moves:
             inside = (log.time >= move.begin) & (log.time <= move.end + 0.1)
-            place = _beyond(log, move, actuator)
-            if place is None:
+            shown = _beyond(log, move, actuator)
+            if shown is None:
                 continue
             changed = np.flatnonzero(inside[1:] & (switch[1:] != switch[:-1])) + 1
             if len(changed):
                 (engaged if move.extending else released).append(
-                    _at_switch(log, place, int(changed[0]), actuator)
+                    _at_switch(log, shown, int(changed[0]), actuator)
                 )
     levels, reasons = {}, {}
     for path, rows in (("lock.engage_travel", engaged), ("lock.release_travel", released)):
@@ -71,8 +71,11 @@ def _counted(log: GearLog, actuator: Actuator) -> Floats:
     return np.concatenate(([0.0], np.cumsum(steps))) / per_travel(actuator)
 
 
-def _beyond(log: GearLog, move: Move, actuator: Actuator) -> Floats | None:
-    """Nut beyond the stroke [m] around one end of a move; None if the ram does not pass there."""
+def _beyond(log: GearLog, move: Move, actuator: Actuator) -> tuple[Floats, Floats] | None:
+    """Nut beyond the stroke [m] around one end of a move, and the deviation of its zero.
+
+    None if the ram does not pass there.
+    """
     ram, nut = log["output_position"], _counted(log, actuator)
     stroke = actuator.parameters.value("lever.stroke")
     near, far = _BEFORE
@@ -89,20 +92,26 @@ def _beyond(log: GearLog, move: Move, actuator: Actuator) -> Floats | None:
     seat &= True if switch is None else ~switch
     if held.sum() < 20:
         return None
-    rest = float(np.mean(ram[seat])) if seat.sum() > 5 else stroke
-    if log.has("motor_position"):
-        return np.asarray(nut + float(np.mean(ram[held] - nut[held])) - rest)
+    seated = ram[seat] if seat.sum() > 5 else np.array([stroke])
+    rest, open_ = float(np.mean(seated)), float(np.std(seated)) / np.sqrt(len(seated))
     # A speed from Hall edges comes late, so that its integral lags with the speed itself.
     speed = log["motor_speed"] / per_travel(actuator)
-    design = np.stack([np.ones(int(held.sum())), speed[held]], axis=1)
-    if float(np.ptp(speed[held])) < 0.2 * float(np.max(np.abs(speed[held]))):
-        design[:, 1] = 0.0
-    shift, *_ = np.linalg.lstsq(design, (ram - nut)[held], rcond=None)
-    return np.asarray(nut + shift[0] + shift[1] * speed - rest)
+    design = np.stack([np.ones(len(speed)), speed], axis=1)
+    steady = float(np.ptp(speed[held])) < 0.2 * float(np.max(np.abs(speed[held])))
+    if log.has("motor_position") or steady:
+        design = design[:, :1]
+    shift, *_ = np.linalg.lstsq(design[held], (ram - nut)[held], rcond=None)
+    noise = float(np.std((ram - nut)[held] - design[held] @ shift))
+    inverse = noise**2 * np.linalg.inv(design[held].T @ design[held])
+    std = np.sqrt(np.einsum("ij,jk,ik->i", design, inverse, design) + open_**2)
+    return np.asarray(nut + design @ shift - rest), np.asarray(std)
 
 
-def _at_switch(log: GearLog, place: Floats, k: int, actuator: Actuator) -> tuple[float, float]:
-    """Place at which a switch acted, less its response, and the deviation that the clocks leave."""
+def _at_switch(
+    log: GearLog, shown: tuple[Floats, Floats], k: int, actuator: Actuator
+) -> tuple[float, float]:
+    """Place at which a switch acted, less its response, and what clocks and noise leave open."""
+    place, open_ = shown
     value = actuator.parameters.value
     # The unit counts whole ticks, the first of them when it first sees the change: half a tick less
     # than the delay on the mean, and half of what a sample is apart from a tick more.
@@ -112,14 +121,16 @@ def _at_switch(log: GearLog, place: Floats, k: int, actuator: Actuator) -> tuple
     at = float(np.interp(log.time[k] - late, log.time, place))
     speed = abs(float(place[min(k + 1, len(place) - 1)] - place[k - 2])) / (3.0 * log.period)
     clock = float(np.hypot(log.period, value("control.period"))) / np.sqrt(12.0)
-    return at, float(np.hypot(speed * clock, 1e-5))
+    return at, float(np.hypot(speed * clock, open_[k]))
 
 
 def _joined(rows: Sequence[tuple[float, float]]) -> Level:
     values, deviations = np.array(rows).T
     weight = deviations**-2.0
     middle = float(np.sum(weight * values) / np.sum(weight))
-    return Level(abs(middle), float(np.sum(weight)) ** -0.5)
+    # Motions further apart than their deviations say something else of these (Birge's ratio).
+    apart = float(np.sum(weight * (values - middle) ** 2)) / max(len(values) - 1, 1)
+    return Level(abs(middle), max(1.0, apart**0.5) * float(np.sum(weight)) ** -0.5)
 
 
 def brake_torque(

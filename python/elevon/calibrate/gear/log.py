@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -40,7 +40,15 @@ class Move:
 
 @dataclass(frozen=True)
 class GearLog(RoleLog):
-    """A log on the clock of the output's position; the whole load is positive towards extension."""
+    """A log on the clock of the output's position; the whole load is positive towards extension.
+
+    Attributes
+    ----------
+    recording : Recording or None
+        What it was read from: its inputs can be run again.
+    """
+
+    recording: Recording | None = field(default=None, compare=False, repr=False)
 
     @cached_property
     def moves(self) -> tuple[Move, ...]:
@@ -88,4 +96,4 @@ def gear_log(recording: Recording, name: str) -> GearLog:
     InputError
         A role that is needed is missing, or the log is too short.
     """
-    return GearLog(**role_channels(recording, name, _NEEDED))
+    return GearLog(**role_channels(recording, name, _NEEDED), recording=recording)

@@ -1,16 +1,15 @@
-"""Motor constants while the drive pushes: balance of voltage, and balance of power.
+"""Motor constants while the drive pushes: balance of voltage, or of power.
 
-``V = 2 k w + R_t i + (1 - d) V_f``, and a drop with speed for the commutation, between the
-demanded voltage and the mean current; ``P = k_T w i + R_t i^2 + (1 - d) V_f |i| + c (1 - d) w^2``
-between the link's power and the same current. The first knows the voltage constant whatever the
-commutation does to the torque; the second knows the torque that is really made: while the bridge is
-off, the third phase's EMF drives a current through its diode, which brakes with the speed (``c``).
+``V = 2 k w + (2 (R + R_on) + c p |w| L) i + (1 - d) V_f`` between the demanded voltage and the
+current of the pair, the commutations a resistance that grows with speed. Where no voltage is shown,
+``P = 2 k w i + 2 (R + R_on) i^2 + (1 - d) V_f |i|`` between the link's power and the same current.
+The pair's current is the line's less what the third phase draws (`third_phase`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +17,7 @@ import numpy.typing as npt
 
 from elevon.calibrate.gear.log import GearLog, Move
 from elevon.calibrate.gear.tables import per_travel
+from elevon.calibrate.gear.third_phase import ThirdPhase
 from elevon.calibrate.level import Level
 from elevon.calibrate.regression import Regression, robust_regression, with_deviations
 
@@ -34,6 +34,11 @@ _LEAST = 1.0  # A, motoring
 _WIDTH = 0.1  # s of the polynomials that smooth all channels alike
 _FEWEST = 300  # samples
 _CARRIES = 0.7  # of the nut's speed: the ram goes with it
+_PATHS = ("motor.emf_constant", "motor.winding_resistance", "motor.winding_inductance")
+_ROUNDS = 3  # of the third phase's part, which needs what the balance determines
+_INDUCTANCE = (0.3, 3.0)  # of the set's, for that part
+_OPEN = 0.1  # of the third phase's part: ASSUMED, its form agrees with three phases to a fiftieth
+_LEAST_STD = 5e-4  # relative
 
 
 @dataclass(frozen=True)
@@ -73,11 +78,11 @@ class Motor:
     reasons : dict of str to str
         Why one is not determined.
     torque : float
-        Torque of each ampere [N m/A], with the commutation's loss where power shows it.
+        Torque of each ampere of the pair [N m/A].
     torque_std : float
         Its deviation.
-    drag : float
-        Torque over speed and the share of the time in which the bridge is off [N m s/rad].
+    third : ThirdPhase or None
+        What the phase that is not used draws; None: nothing shows the share of the time off.
     given : bool
         Whether the torque is the set's own: nothing showed it.
     """
@@ -86,15 +91,23 @@ class Motor:
     reasons: dict[str, str]
     torque: float
     torque_std: float
-    drag: float
+    third: ThirdPhase | None
     given: bool
 
-    def torque_of(self, part: Driving, scale: float = 1.0) -> Floats:
-        """Electromagnetic torque of samples [N m]."""
-        torque = scale * self.torque * part["current"]
-        if self.drag == 0.0:
-            return np.asarray(torque)
-        return np.asarray(torque + self.drag * part["speed"] * (1.0 - _duty(part)))
+    def torque_of(self, part: Driving, scale: float = 1.0, third: float = 1.0) -> Floats:
+        """Electromagnetic torque of samples [N m], with a share of the third phase's part."""
+        beside, brakes = _beside(part, self.third)
+        way = np.sign(part["speed"])
+        pair = part["current"] - third * way * beside
+        return np.asarray(scale * (self.torque * pair - third * way * brakes))
+
+
+def _beside(part: Driving, third: ThirdPhase | None) -> tuple[Floats, Floats]:
+    """Third phase's part of the line current and of the torque, as sizes."""
+    if third is None or "link" not in part.channels:
+        nothing = np.zeros(len(part["speed"]))
+        return nothing, nothing
+    return third.means(part["speed"], _duty(part), part["link"])
 
 
 def _smooth(values: Floats, period: float, *, slope: bool = False) -> Floats:
@@ -160,85 +173,113 @@ def _used(
 
 def motor_constants(parts: Sequence[Driving], actuator: Actuator) -> Motor:
     """Return voltage constant, resistance and the torque of an ampere from what the logs show."""
-    by_voltage = _voltage_balance(
-        [p for p in parts if {"voltage", "link"} <= p.channels.keys()], actuator
-    )
-    by_power = _power_balance([p for p in parts if "power" in p.channels], actuator)
-    believed = 2.0 * actuator.parameters.value("motor.emf_constant")
-    levels: dict[str, Level] = {}
-    switches = actuator.parameters.value("inverter.on_resistance")
-    constant = by_voltage or by_power
-    if constant is None:
-        why = (
-            "no motion in which the motor drives with current and demanded voltage or supply shown"
-        )
-        paths = ("motor.emf_constant", "motor.winding_resistance", "motor.winding_inductance")
-        return Motor({}, dict.fromkeys(paths, why), believed, 0.0, 0.0, given=True)
-    emf = 0.5 * constant["constant"]
-    std = float(np.hypot(_spread(constant, "constant"), _open_choice(parts, actuator, constant)))
-    levels["motor.emf_constant"] = Level(emf, 0.5 * std, constant.degrees)
-    torque = by_power or constant
-    resistance = 0.5 * torque["resistance"] - switches
-    std = 0.5 * torque.std("resistance")
-    if by_voltage is not None and by_power is not None:
-        # The commutation is in both, in different parts: how far it carries them apart is open.
-        apart = 0.5 * (by_voltage["resistance"] - by_power["resistance"])
-        std = float(np.hypot(std, apart / np.sqrt(12.0)))
-    levels["motor.winding_resistance"] = Level(max(resistance, 0.0), std, torque.degrees)
-    reasons = {
-        "motor.winding_inductance": "its drop in the commutation is not told from resistance"
+    given = _third(actuator)
+    believed = Motor({}, {}, 2.0 * given.emf, 0.0, None, given=True)
+    by_voltage = [p for p in parts if {"voltage", "link"} <= p.channels.keys()]
+    by_power = [p for p in parts if {"power", "link"} <= p.channels.keys()]
+    if by_voltage:
+        result = _by_voltage(by_voltage, actuator, given)
+    else:
+        result = _by_power(by_power, actuator, given)
+    if result is None:
+        why = "no motion in which the motor drives with its current and the voltage or supply shown"
+        return replace(believed, reasons=dict.fromkeys(_PATHS, why))
+    return result
+
+
+def _third(actuator: Actuator) -> ThirdPhase:
+    value = actuator.parameters.value
+    paths = (_PATHS[0], _PATHS[2], "inverter.switching_period", "inverter.diode_drop")
+    return ThirdPhase(*(value(path) for path in paths))
+
+
+def _by_voltage(parts: Sequence[Driving], actuator: Actuator, given: ThirdPhase) -> Motor | None:
+    value = actuator.parameters.value
+    commutation = value("low.commutation_factor") * value("motor.pole_pairs")
+
+    def fitted(share: float) -> tuple[Regression | None, ThirdPhase]:
+        third, fit = given, None
+        for _ in range(_ROUNDS):
+            fit = _voltage_balance(parts, third, share)
+            if fit is None:
+                break
+            inductance = np.clip(fit["commutation"] / commutation / given.inductance, *_INDUCTANCE)
+            emf = 0.5 * fit["constant"]
+            third = replace(third, emf=emf, inductance=float(inductance) * given.inductance)
+        return fit, third
+
+    (fit, third), (other, _) = fitted(1.0), fitted(1.0 - _OPEN)
+    if fit is None or other is None:
+        return None
+    reasons: dict[str, str] = {}
+    levels = _levels(fit, other, value("inverter.on_resistance"))
+    slope = _open(fit, other, "commutation")
+    inductance = slope.value / commutation
+    if inductance > 0.0:
+        levels[_PATHS[2]] = Level(inductance, slope.std / commutation, slope.degrees)
+    else:
+        reasons[_PATHS[2]] = "the commutation's drop is below the noise"
+    constant = _open(fit, other, "constant")
+    return Motor(levels, reasons, constant.value, constant.std, third, given=False)
+
+
+def _by_power(parts: Sequence[Driving], actuator: Actuator, given: ThirdPhase) -> Motor | None:
+    fit, other = (_power_balance(parts, given, share) for share in (1.0, 1.0 - _OPEN))
+    if fit is None or other is None:
+        return None
+    levels = _levels(fit, other, actuator.parameters.value("inverter.on_resistance"))
+    constant = _open(fit, other, "constant")
+    reasons = {_PATHS[2]: "needs the demanded voltage: the commutation shows in it"}
+    third = replace(given, emf=0.5 * constant.value)
+    return Motor(levels, reasons, constant.value, constant.std, third, given=False)
+
+
+def _levels(fit: Regression, other: Regression, switches: float) -> dict[str, Level]:
+    constant, total = _open(fit, other, "constant"), _open(fit, other, "resistance")
+    resistance = max(0.5 * total.value - switches, 0.0)
+    return {
+        _PATHS[0]: Level(0.5 * constant.value, 0.5 * constant.std, constant.degrees),
+        _PATHS[1]: Level(resistance, 0.5 * total.std, total.degrees),
     }
-    drag = 0.0 if by_power is None else by_power["drag"]
-    return Motor(
-        levels, reasons, torque["constant"], _spread(torque, "constant"), drag, given=False
-    )
+
+
+def _open(fit: Regression, other: Regression, name: str) -> Level:
+    """A coefficient, with what a share of the third phase's part would change."""
+    std = max(fit.std(name), _LEAST_STD * abs(fit[name]))
+    return Level(fit[name], float(np.hypot(std, other[name] - fit[name])), fit.degrees)
 
 
 def _duty(part: Driving) -> Floats:
     """Share of the time in which the bridge is on."""
     if "voltage" in part.channels:
-        return np.asarray(np.abs(part["voltage"]) / part["link"])
+        return np.asarray(np.clip(np.abs(part["voltage"]) / part["link"], 0.0, 1.0))
     # Of the power itself: the link is connected for that share of the current.
     return np.asarray(np.clip(part["power"] / (part["link"] * np.abs(part["current"])), 0.0, 1.0))
 
 
-def _open_choice(parts: Sequence[Driving], actuator: Actuator, fit: Regression) -> float:
-    """What a drop with speed and the share of time off would change: no log settles its form."""
-    if "commutation" not in fit.names:
-        return 0.0
-    shown = [p for p in parts if {"voltage", "link"} <= p.channels.keys()]
-    other = _voltage_balance(shown, actuator, idle=True)
-    return 0.0 if other is None else abs(other["constant"] - fit["constant"]) / np.sqrt(12.0)
-
-
-def _spread(fit: Regression, name: str) -> float:
-    return max(fit.std(name), 5e-4 * abs(fit[name]))
+def _pair(part: Driving, third: ThirdPhase, share: float) -> Floats:
+    beside, _ = _beside(part, third)
+    return np.asarray(np.abs(part["current"]) - share * beside)
 
 
 def _voltage_balance(
-    parts: Sequence[Driving], actuator: Actuator, *, idle: bool = False
+    parts: Sequence[Driving], third: ThirdPhase, share: float
 ) -> Regression | None:
-    drop = actuator.parameters.value("inverter.diode_drop")
     rows, data = [], []
     for part in parts:
-        speed, current, duty = part["speed"], part["current"], _duty(part)
-        columns = [speed, current, np.abs(speed) * current]
-        columns += [speed * (1.0 - duty)] if idle else []
-        rows.append(np.stack(columns, axis=1))
-        data.append(part["voltage"] - part.move.way * (1.0 - duty) * drop)
-    names = ("constant", "resistance", "commutation", "idle")[: len(rows[0][0])] if rows else ()
-    return _fitted(parts, rows, data, names)
+        speed, current = np.abs(part["speed"]), _pair(part, third, share)
+        rows.append(np.stack([speed, current, speed * current], axis=1))
+        data.append(part.move.way * part["voltage"] - (1.0 - _duty(part)) * third.drop)
+    return _fitted(parts, rows, data, ("constant", "resistance", "commutation"))
 
 
-def _power_balance(parts: Sequence[Driving], actuator: Actuator) -> Regression | None:
-    drop = actuator.parameters.value("inverter.diode_drop")
+def _power_balance(parts: Sequence[Driving], third: ThirdPhase, share: float) -> Regression | None:
     rows, data = [], []
     for part in parts:
-        speed, current = part["speed"], part["current"]
-        off = 1.0 - _duty(part)
-        rows.append(np.stack([speed * current, current**2, off * speed**2], axis=1))
-        data.append(part["power"] - off * drop * np.abs(current))
-    return _fitted(parts, rows, data, ("constant", "resistance", "drag"))
+        speed, current = np.abs(part["speed"]), _pair(part, third, share)
+        rows.append(np.stack([speed * current, current**2], axis=1))
+        data.append(part["power"] - (1.0 - _duty(part)) * third.drop * current)
+    return _fitted(parts, rows, data, ("constant", "resistance"))
 
 
 def _fitted(

@@ -13,6 +13,7 @@ from elevon.calibrate.gear import events, unit
 from elevon.calibrate.gear.log import GearLog
 from elevon.calibrate.gear.motor import Motor, driving, motor_constants
 from elevon.calibrate.gear.rig import RigTest, rig_tests
+from elevon.calibrate.gear.runs import corrected, run_again, with_noise
 from elevon.calibrate.gear.tables import (
     friction_knots,
     hanging_mass,
@@ -46,6 +47,9 @@ _NEVER = {
     "gear.efficiency_second": "only the product with the screw's efficiency shows",
     "leg.inertia": "changes the torque as a hundredth of the motor's own inertia would",
 }
+_ROUNDS = 3  # of runs that correct the balances, at most
+_NOISES = 4  # draws of a run's noise, over which its readings are averaged
+_STILL = 0.25  # deviations: a change from which no further round is made
 _GIVEN = {
     "lock.engage_travel": ("proximity.delay",),
     "lock.release_travel": ("proximity.delay",),
@@ -60,6 +64,7 @@ def calibrate_gear(
     actuator: Actuator,
     *,
     free: Sequence[str] | None = None,
+    fidelity: str | None = "low",
     progress: Progress | None = None,
 ) -> PartsCalibration:
     """Estimate what logs of an actuator with a control unit determine.
@@ -72,6 +77,8 @@ def calibrate_gear(
         Values before; those that are not estimated stay.
     free : sequence of str, optional
         Paths to estimate; default: all that the logs determine.
+    fidelity : {"low", "high"}, optional
+        Of the runs of the logs' motions that correct the balances; None: none are made.
     progress : callable, optional
         Told the done fraction; returns False to stop.
 
@@ -91,7 +98,7 @@ def calibrate_gear(
     work = _Work(logs, actuator)
     work.rig()
     go(progress, 0.5)
-    work.drive()
+    work.drive(fidelity, lambda f: progress is None or progress(0.5 + 0.4 * f))
     go(progress, 0.9)
     work.ends()
     estimates, undetermined = work.answer(free)
@@ -116,8 +123,9 @@ class _Work(Parts):
         self.logs = logs
         self.tests: list[RigTest] = []
         believed = 2.0 * actuator.parameters.value("motor.emf_constant")
-        self.motor = Motor({}, {}, believed, 0.0, 0.0, given=True)
+        self.motor = Motor({}, {}, believed, 0.0, None, given=True)
         self.balance = Balance({}, {}, float("nan"))
+        self.ran = 0
 
     def facts(self) -> dict[str, Any]:
         """Return what else is known: kinds of logs, torque of an ampere, residual at the ram."""
@@ -127,6 +135,7 @@ class _Work(Parts):
         residual = self.balance.residual
         return {
             "kinds": kinds,
+            "motions_run_again": self.ran,
             "torque_per_ampere": self.motor.torque,
             "balance_residual_n": None if np.isnan(residual) else residual,
         }
@@ -160,21 +169,37 @@ class _Work(Parts):
             {"motor.detent_torque": Level(float(np.mean(sizes)), std, max(len(sizes) - 1, 1))}, {}
         )
 
-    def drive(self) -> None:
-        """Evaluate the unit's gains, the motor and the train from motions."""
+    def drive(self, fidelity: str | None, progress: Progress | None) -> None:
+        """Evaluate the unit's gains, the motor and the train from motions; runs correct them."""
         self.add(*unit.gains(self.logs, self.actuator))
         points = unit.set_points(self.logs)
         why = "no motion with the set point of the speed shown"
         paths = ("control.acceleration_limit", "control.speed_high", "control.speed_low")
         self.add(points, {path: why for path in paths if path not in points})
-        parts = driving(self.logs, self.actuator)
-        self.motor = motor_constants(parts, self.actuator)
-        self.add(self.motor.levels, self.motor.reasons)
         known = {p: v for p, v in as_values(self.levels).items() if p.startswith("friction.ffm_")}
         settled = self.settled()
         inertia = beside_motor(self.logs, settled)
-        self.balance = torque_balance(parts, Known(settled, self.motor, known, inertia))
+
+        def evaluated(logs: Sequence[GearLog]) -> tuple[Motor, Balance]:
+            parts = driving(logs, self.actuator)
+            motor = motor_constants(parts, self.actuator)
+            return motor, torque_balance(parts, Known(settled, motor, known, inertia))
+
+        self.motor, self.balance = evaluated(self.logs)
+        self.add(self.motor.levels, self.motor.reasons)
         self.add(self.balance.levels, self.balance.reasons)
+        read = {**self.motor.levels, **self.balance.levels}
+        for _ in range(_ROUNDS if fidelity is not None else 0):
+            ran, before = self.settled(), as_values(self.levels)
+            again = run_again(self.logs, ran, fidelity or "low", progress)
+            self.ran += len(again)
+            if not again:
+                return
+            shown = [evaluated(with_noise(again, self.logs, seed)) for seed in range(_NOISES)]
+            self.add(corrected(read, [{**m.levels, **b.levels} for m, b in shown], ran), {})
+            moved = max(abs(self.levels[p].value - before[p]) / self.levels[p].std for p in read)
+            if moved < _STILL:
+                return
 
     def ends(self) -> None:
         """Evaluate the lock and the brake."""

@@ -7,7 +7,7 @@ extension; ``eta`` is the gear's times the screw's, which falls with the load.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,6 +32,7 @@ _BELIEF = {_INERTIA: 0.5, _UNLOADED: 0.15, _LOADED: 0.15}
 _TABLE = 0.5  # the same, of a knot of the friction
 _SURE = 0.15  # of the belief: a deviation below which the logs have determined a number
 _NUDGE = 1e-3  # of the torque, for what its deviation moves
+_OPEN = 0.1  # of the third phase's part, as in the motor's balance
 _REACH = 0.3  # weight of a knot in the samples that come nearest to it
 _FORCE = 20.0  # N, first deviation of the residual
 
@@ -103,7 +104,7 @@ def torque_balance(parts: Sequence[Driving], known: Known) -> Balance:
     sought = _sought(known.actuator, free)
     fit = _fitted(loaded, known, sought)
     spread = np.hypot(fit.std, _choices(loaded, known, sought, fit.x))
-    reach = np.abs(_samples(loaded, known, free, 1.0).tables).max(axis=0)
+    reach = np.abs(_samples(loaded, known, free).tables).max(axis=0)
     levels, reasons = _judged(sought, fit, spread, np.concatenate(([1.0] * 3, reach)))
     idle = {
         path: f"the motor does not drive in {path.split('_')[1]}"
@@ -120,21 +121,25 @@ def _sought(actuator: Actuator, free: Sequence[str]) -> Sought:
 
 
 def _fitted(
-    parts: Sequence[Driving], known: Known, sought: Sought, *, scale: float = 1.0
+    parts: Sequence[Driving],
+    known: Known,
+    sought: Sought,
+    *,
+    scale: float = 1.0,
+    third: float = 1.0,
 ) -> Balanced:
-    samples = _samples(parts, known, sought.names[3:], scale)
+    samples = _samples(parts, known, sought.names[3:], scale, third)
     times = [(p.log.time[p.used], np.ones(int(p.used.sum())), p.log.period) for p in parts]
     return fit_balance(sought, samples.data, samples.model, times, scale=_FORCE)
 
 
 def _choices(parts: Sequence[Driving], known: Known, sought: Sought, x: Floats) -> Floats:
-    """Deviation of a point from the scale of the torque, and from the drag with the bridge off."""
+    """Deviation of a point from the scale of the torque, and from the third phase's part."""
     motor = known.motor
     nudged = _fitted(parts, known, sought, scale=1.0 + _NUDGE).x - x
     scale = nudged * (motor.torque_std / motor.torque / _NUDGE)
-    plain = replace(known, motor=replace(motor, drag=0.0))
-    drag = (_fitted(parts, plain, sought).x - x) / np.sqrt(12.0)
-    return np.asarray(np.hypot(scale, drag))
+    third = _fitted(parts, known, sought, third=1.0 - _OPEN).x - x
+    return np.asarray(np.hypot(scale, third))
 
 
 def _way(part: Driving) -> str:
@@ -161,7 +166,13 @@ def _plain(setting: object, default: float) -> float:
     return float(setting) if isinstance(setting, (int, float)) else default
 
 
-def _samples(parts: Sequence[Driving], known: Known, free: Sequence[str], scale: float) -> _Samples:
+def _samples(
+    parts: Sequence[Driving],
+    known: Known,
+    free: Sequence[str],
+    scale: float = 1.0,
+    third: float = 1.0,
+) -> _Samples:
     value = known.actuator.parameters.value
     travel = 1.0 / per_travel(known.actuator)
     data, tables = [], []
@@ -170,7 +181,7 @@ def _samples(parts: Sequence[Driving], known: Known, free: Sequence[str], scale:
         axial = axial_load(part, known.actuator)
         held, row = _friction(part, known, free)
         beside = np.interp(part["position"], *known.inertia)
-        torque = known.motor.torque_of(part, scale) - beside * part["acceleration"]
+        torque = known.motor.torque_of(part, scale, third) - beside * part["acceleration"]
         data.append(torque / travel + axial - held)
         tables.append(row)
         stacked["acceleration"].append(part["acceleration"] / travel)
