@@ -42,6 +42,8 @@ class Way:
         Recordings by name, actuator and progress to their errors.
     predicted : callable
         Whether a log is one that the model can predict.
+    runs : bool
+        Whether model runs correct what is read.
     """
 
     recordings: Mapping[str, Recording]
@@ -49,9 +51,12 @@ class Way:
     calibrate: Callable[..., PartsCalibration]
     validate: Callable[[Mapping[str, Recording], Actuator, Progress | None], Validation]
     predicted: Callable[[Any], bool]
+    runs: bool = False
 
 
-def way_by_parts(paths: Sequence[Path], model: Actuator, column_map: Path | None) -> Way | None:
+def way_by_parts(
+    paths: Sequence[Path], model: Actuator, column_map: Path | None, fidelity: str = "low"
+) -> Way | None:
     """Return how these logs are calibrated by parts, None where another way must serve.
 
     An actuator with a control unit of its own always is, a servo with a preloaded screw where every
@@ -61,7 +66,7 @@ def way_by_parts(paths: Sequence[Path], model: Actuator, column_map: Path | None
     from elevon.parameters.records import wirings
 
     if "position" not in wirings()[model.wiring]["modes"]:
-        return _unit_way(_read(paths, column_map))
+        return _unit_way(_read(paths, column_map), fidelity)
     if not preloaded(model):
         return None
     recordings = _read(paths, column_map)
@@ -77,7 +82,9 @@ def _read(paths: Sequence[Path], column_map: Path | None) -> dict[str, Recording
     return recordings
 
 
-def _unit_way(recordings: Mapping[str, Recording]) -> Way:
+def _unit_way(recordings: Mapping[str, Recording], fidelity: str) -> Way:
+    from functools import partial
+
     from elevon.calibrate.gear import calibrate_gear, gear_log
     from elevon.calibrate.replay import validate_replay
 
@@ -86,7 +93,8 @@ def _unit_way(recordings: Mapping[str, Recording]) -> Way:
     ) -> Validation:
         return validate_replay(list(some.items()), model, progress=progress)
 
-    return Way(recordings, gear_log, calibrate_gear, validate, lambda log: bool(log.moves))
+    run = partial(calibrate_gear, fidelity=fidelity)
+    return Way(recordings, gear_log, run, validate, lambda log: bool(log.moves), runs=True)
 
 
 def _screw_way(recordings: Mapping[str, Recording], model: Actuator) -> Way:

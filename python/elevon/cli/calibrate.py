@@ -155,10 +155,10 @@ def calibrate(
     model = read_actuator(actuator, settings)
     if len(logs) == 1 and is_drop_table(logs[0]):
         return _drops(logs[0], model, out, as_json=json, force=force)
-    way = way_by_parts(logs, model, column_map)
+    way = way_by_parts(logs, model, column_map, fidelity)
     if way is not None:
-        if transient is not None or fidelity != "low":
-            say("--transient and --fidelity: not used, no model runs are fitted to these logs")
+        if transient is not None or (fidelity != "low" and not way.runs):
+            say("--transient, and --fidelity without model runs: not used for these logs")
         return calibrate_by_parts(
             way, model, free=_paths(free), out=out, report=report, as_json=json, force=force,
             date=date,

@@ -20,6 +20,9 @@ __all__ = ["EXTENDING", "LOCKED", "RETRACTING", "GearLog", "Move", "gear_log"]
 EXTENDING, LOCKED, RETRACTING = 1, 2, 3
 _RIG_MOTION = 2e-3  # m at least that a rig has moved the ram
 _FOLLOWS = 0.5  # of the ram's speed: a motor that turns with it
+_RESTS = 0.02  # of the highest speed, below which a motor rests
+_SHORTEST = 0.5  # s of a motion
+_DRIVEN = 1.0  # A that drive a motor
 _NEEDED = ("output_position", "motor_speed")
 
 
@@ -52,9 +55,9 @@ class GearLog(RoleLog):
 
     @cached_property
     def moves(self) -> tuple[Move, ...]:
-        """Motions under drive, by the unit's state."""
+        """Motions under drive, by the unit's state; where it is not shown, by speed and current."""
         if "state" not in self.roles:
-            return ()
+            return self._by_speed()
         state = np.rint(self["state"]).astype(int)
         edges = np.concatenate(([0], np.flatnonzero(np.diff(state)) + 1, [len(state)]))
         moves = []
@@ -64,6 +67,22 @@ class GearLog(RoleLog):
             after = int(state[last]) if last < len(state) else None
             ends = float(self.time[min(last, len(state) - 1)])
             moves.append(Move(state[first] == EXTENDING, float(self.time[first]), ends, after))
+        return tuple(moves)
+
+    def _by_speed(self) -> tuple[Move, ...]:
+        """Motions between two rests in which a current drove the motor: no rig moved it."""
+        if "torque_current" not in self.roles:
+            return ()
+        speed, time = self["motor_speed"], self.time
+        moving = np.abs(speed) > _RESTS * float(np.max(np.abs(speed)))
+        edges = np.concatenate(([0], np.flatnonzero(np.diff(moving)) + 1, [len(moving)]))
+        moves = []
+        for first, last in itertools.pairwise(edges.tolist()):
+            long = time[last - 1] - time[first] > _SHORTEST
+            driven = np.median(np.abs(self["torque_current"][first:last])) > _DRIVEN
+            if moving[first] and long and driven:
+                way = bool(np.mean(speed[first:last]) > 0.0)
+                moves.append(Move(way, float(time[first]), float(time[last - 1]), None))
         return tuple(moves)
 
     @cached_property

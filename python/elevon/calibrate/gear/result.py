@@ -10,8 +10,11 @@ import numpy as np
 
 from elevon.calibrate.by_parts import Parts, PartsCalibration, go
 from elevon.calibrate.gear import events, unit
+from elevon.calibrate.gear.by_current import GIVEN
+from elevon.calibrate.gear.by_current import PATHS as BY_CURRENT
 from elevon.calibrate.gear.log import GearLog
-from elevon.calibrate.gear.motor import Motor, driving, motor_constants
+from elevon.calibrate.gear.motor import Motor
+from elevon.calibrate.gear.reading import Reader, Reading
 from elevon.calibrate.gear.rig import RigTest, rig_tests
 from elevon.calibrate.gear.runs import corrected, run_again, with_noise
 from elevon.calibrate.gear.tables import (
@@ -22,7 +25,7 @@ from elevon.calibrate.gear.tables import (
     knots,
     per_travel,
 )
-from elevon.calibrate.gear.train import Balance, Known, torque_balance
+from elevon.calibrate.gear.train import Balance
 from elevon.calibrate.level import Level, as_values
 from elevon.errors import InputError
 from elevon.parameters.records import record_of
@@ -179,26 +182,34 @@ class _Work(Parts):
         known = {p: v for p, v in as_values(self.levels).items() if p.startswith("friction.ffm_")}
         settled = self.settled()
         inertia = beside_motor(self.logs, settled)
+        open_ = BY_CURRENT[0] not in self.levels
+        reader = Reader(self.actuator, settled, known, inertia, gains=open_)
+        first = reader(self.logs)
+        self.motor, self.balance = first.motor, first.balance
+        self.add(first.levels, first.reasons)
+        if open_ and BY_CURRENT[0] in first.levels:
+            constants = () if "motor.emf_constant" in first.levels else ("motor.emf_constant",)
+            self.given = {**self.given, **dict.fromkeys(BY_CURRENT, (*GIVEN, *constants))}
+        if fidelity is not None:
+            self._correct(reader, first, fidelity, progress)
 
-        def evaluated(logs: Sequence[GearLog]) -> tuple[Motor, Balance]:
-            parts = driving(logs, self.actuator)
-            motor = motor_constants(parts, self.actuator)
-            return motor, torque_balance(parts, Known(settled, motor, known, inertia))
-
-        self.motor, self.balance = evaluated(self.logs)
-        self.add(self.motor.levels, self.motor.reasons)
-        self.add(self.balance.levels, self.balance.reasons)
-        read = {**self.motor.levels, **self.balance.levels}
-        for _ in range(_ROUNDS if fidelity is not None else 0):
+    def _correct(
+        self, reader: Reader, first: Reading, fidelity: str, progress: Progress | None
+    ) -> None:
+        """Take off what the balances misread in runs of the same motions."""
+        for _ in range(_ROUNDS):
             ran, before = self.settled(), as_values(self.levels)
-            again = run_again(self.logs, ran, fidelity or "low", progress)
+            again = run_again(self.logs, ran, fidelity, progress)
             self.ran += len(again)
             if not again:
                 return
-            shown = [evaluated(with_noise(again, self.logs, seed)) for seed in range(_NOISES)]
-            self.add(corrected(read, [{**m.levels, **b.levels} for m, b in shown], ran), {})
-            moved = max(abs(self.levels[p].value - before[p]) / self.levels[p].std for p in read)
-            if moved < _STILL:
+            noisy = [with_noise(again, self.logs, seed) for seed in range(_NOISES)]
+            shown = [reader(logs).levels for logs in noisy]
+            self.add(corrected(first.levels, shown, ran), {})
+            moved = [
+                abs(self.levels[p].value - before[p]) / self.levels[p].std for p in first.levels
+            ]
+            if max(moved, default=0.0) < _STILL:
                 return
 
     def ends(self) -> None:
