@@ -46,7 +46,8 @@ def interval_texts(value: float, low: float, high: float) -> tuple[str, str, str
         digits = max(place + math.floor(math.log10(largest)), 0)
         value_, low_, high_ = (f"{x:.{digits}e}" for x in numbers)
         return value_, low_, high_
-    value_, low_, high_ = (f"{round(x, place):.{max(place, 0)}f}" for x in numbers)
+    # Plus zero: what rounds to nothing has no sign.
+    value_, low_, high_ = (f"{round(x, place) + 0.0:.{max(place, 0)}f}" for x in numbers)
     return value_, low_, high_
 
 

@@ -54,7 +54,9 @@ def diagnosis_page(result: Diagnosis, actuator: str, date: str | None = None) ->
         Table(
             ("fault", "least severity seen"),
             seen + blind,
-            "Least severity that moves the evidence by three deviations of a healthy unit.",
+            "Least severity from which on 95 % of held-out single faults were named."
+            if _by_network(result)
+            else "Least severity that moves the evidence by three deviations of a healthy unit.",
         )
     )
     for text in result.findings:
@@ -68,27 +70,22 @@ def _unit(key: str) -> str:
     return next(c.unit for c in CANDIDATES if c.key == key)
 
 
+def _by_network(result: Diagnosis) -> bool:
+    """Whether nothing is said of what a cause accounts for: the surrogate has no model."""
+    return all(math.isnan(m.explained) for m in result.moved)
+
+
 def _evidence(report: Report, result: Diagnosis) -> None:
     ranked = sorted(result.moved, key=lambda item: -abs(item.score))
-    rows = [
-        (
-            m.log,
-            m.name,
-            m.unit,
-            m.value,
-            m.expected,
-            m.score,
-            None if math.isnan(m.explained) else m.explained / m.deviation,
-        )
+    rows: list[tuple[object, ...]] = [
+        (m.log, m.name, m.unit, m.value, m.expected, m.score, m.explained / m.deviation)
         for m in ranked
     ]
-    report.section("Evidence").table(
-        Table(
-            ("log", "evidence", "unit", "value", "healthy", "off by", "explained"),
-            rows,
-            "Off by: in deviations of a healthy unit from run to run. Explained: what the most "
-            "probable cause accounts for, in the same measure.",
-            digits=4,
-            formats=("", "", "", "", "", "+.2f", "+.2f"),
-        )
-    )
+    names: tuple[str, ...] = ("log", "evidence", "unit", "value", "healthy", "off by", "explained")
+    formats: tuple[str, ...] = ("", "", "", "", "", "+.2f", "+.2f")
+    text = "Off by: in deviations of a healthy unit from run to run."
+    if _by_network(result):
+        rows, names, formats = [row[:-1] for row in rows], names[:-1], formats[:-1]
+    else:
+        text += " Explained: what the most probable cause accounts for, in the same measure."
+    report.section("Evidence").table(Table(names, rows, text, digits=4, formats=formats))

@@ -215,8 +215,10 @@ def _proposal(
         for k, key in enumerate(ranked)
         if k < LEAST_PROPOSED or said.probability.get(key, 1.0) >= LISTED
     ]
-    shares = ", ".join(f"{k} {said.probability.get(k, math.nan):.2g}" for k in keys)
-    return keys, f"surrogate: proposed {shares}"
+    shares = ", ".join(f"{k} {said.probability[k]:.2g}" for k in keys if k in said.probability)
+    others = ", ".join(k for k in keys if k not in said.probability)
+    beside = f"; weighed beside them, since it was not trained on them: {others}" if others else ""
+    return keys, f"surrogate: proposed {shares}{beside}"
 
 
 def _odds(probability: float) -> float:
