@@ -165,12 +165,13 @@ def _neighbours(cell: Cell, path: str) -> Iterator[dict[str, Any]]:
     words = set(path.split(".")) | set(path.rpartition(".")[2].split("_"))
     alike = {other: len(words & set(other.rpartition(".")[2].split("_"))) for other in moved}
     moved = dict(sorted(moved.items(), key=lambda item: -alike[item[0]]))
-    for factor in FACTORS:
-        yield {
-            other: actuator.parameters.value(other) * factor
-            for other in moved
-            if records(actuator.wiring)[other].choices is None
-        }
+    known = records(actuator.wiring)
+    numbers = {
+        other: actuator.parameters.value(other) for other in moved if known[other].choices is None
+    }
+    for factor in FACTORS:  # Together, so that the knots of a table stay in order.
+        scaled = {other: value * factor for other, value in numbers.items()}
+        yield {other: value for other, value in scaled.items() if inside(known[other], value)}
     yield from ({other: value} for other, values in moved.items() for value in values)
 
 
