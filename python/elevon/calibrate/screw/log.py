@@ -26,6 +26,9 @@ _NEEDED = ("torque_current",)
 MOTION = ("motor_speed", "motor_position", "output_speed", "output_position")
 _LOAD = ("load", "load_cell")
 _WIDTH = 0.05  # s of the polynomials that smooth all channels alike
+#: Eighth order, in the order in which a convolution takes it.
+_STENCIL = np.array([-3, 32, -168, 672, 0, -672, 168, -32, 3]) / 840.0
+_SLOPES = {"acceleration": "motor_speed", "current_slope": "torque_current"}
 _SLOWEST = 0.01  # s between samples, from which a log shows temperatures only
 _MOVES = 0.05  # of the largest speed: below it the friction's sign is open
 CORNERS = (
@@ -52,18 +55,13 @@ class ScrewLog(RoleLog):
     @cached_property
     def smooth(self) -> dict[str, Floats]:
         """All channels, and slopes of speed, position and current, through one smoother."""
-        shown = {role: _smoothed(values, self.period) for role, values in self.roles.items()}
-        for role, source in (
-            ("acceleration", "motor_speed"),
-            ("current_slope", "torque_current"),
-            ("output_speed", "output_position"),
-        ):
-            if source in self.roles:
-                shown[role] = _smoothed(self.roles[source], self.period, order=1)
-        if "output_position" in self.roles:
-            position = self.roles["output_position"]
-            shown["output_acceleration"] = _smoothed(position, self.period, order=2)
-        return shown
+        slopes = {
+            slope: _slope(self.roles[role], self.period)
+            for slope, role in _SLOPES.items()
+            if role in self.roles
+        }
+        channels = {**self.roles, **slopes}
+        return {role: _smoothed(values, self.period) for role, values in channels.items()}
 
     @cached_property
     def moving(self) -> Bools:
@@ -84,11 +82,21 @@ class ScrewLog(RoleLog):
         return np.asarray(~near & ~edge)
 
 
-def _smoothed(values: Floats, period: float, *, order: int = 0) -> Floats:
+def _smoothed(values: Floats, period: float) -> Floats:
     from scipy.signal import savgol_filter
 
     width = max(5, 2 * round(0.5 * _WIDTH / period) + 1)
-    return np.asarray(savgol_filter(values, width, 3, deriv=order, delta=period), dtype=np.float64)
+    return np.asarray(savgol_filter(values, width, 3), dtype=np.float64)
+
+
+def _slope(values: Floats, period: float) -> Floats:
+    """Slope by central differences of eighth order: in a balance it is smoothed like the rest.
+
+    The slope of a polynomial through the smoother's window is smoothed more than the values are:
+    at the corners of a trapezoid that made masses 10 % too large.
+    """
+    padded = np.pad(values, 4, mode="edge")
+    return np.asarray(np.convolve(padded, _STENCIL / period, mode="valid"), dtype=np.float64)
 
 
 def screw_log(recording: Recording, name: str, ratio: float) -> ScrewLog:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from elevon.calibrate.level import Level
 from elevon.calibrate.regression import Regression, robust_regression, with_deviations
-from elevon.calibrate.screw.log import ScrewLog
+from elevon.calibrate.screw.log import CORNERS, ScrewLog
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -68,34 +68,53 @@ def flux_factor(log: ScrewLog, actuator: Actuator) -> Floats:
     return np.full(len(log.time), 1.0 + value("motor.flux_temperature_coefficient") * rise)
 
 
-def load_side(logs: Sequence[ScrewLog]) -> tuple[dict[str, Level], dict[str, str]]:
+def load_side(
+    logs: Sequence[ScrewLog], actuator: Actuator
+) -> tuple[dict[str, Level], dict[str, str]]:
     """Return mass, damping and friction of the load side: the cell less the stand's force."""
     paths = ("load.mass", "load.damping", "load.friction")
-    usable = [log for log in logs if log.quick and log.has("load", "load_cell", "output_position")]
-    rows, data = [], []
-    for log in usable:
-        s, used = log.smooth, log.moving
-        columns = [s["output_acceleration"], s["output_speed"], np.sign(s["motor_speed"])]
-        rows.append(np.stack(columns, axis=1)[used])
-        data.append((s["load_cell"] - s["load"])[used])
-    fit = _fitted(usable, rows, data, ("mass", "damping", "friction"))
-    if fit is None:
+    usable = [log for log in logs if log.quick and log.has("load", "load_cell")]
+    value = actuator.parameters.value
+    # The motor's speed is quieter than the ram's position twice differentiated.
+    travel = value("screw.lead") / value("gear.ratio")
+    names = ("mass", "damping", "friction")
+
+    def fitted(corner: float) -> Regression | None:
+        rows, data = [], []
+        for log in usable:
+            s, used = log.smooth, log.apart(corner)
+            speed = s["motor_speed"]
+            columns = [travel * s["acceleration"], travel * speed, np.sign(speed)]
+            rows.append(np.stack(columns, axis=1)[used])
+            data.append((s["load_cell"] - s["load"])[used])
+        return _fitted(usable, rows, data, names, corner)
+
+    fit, other = (fitted(corner) for corner in CORNERS)
+    if fit is None or other is None:
         why = "needs a load cell beside the stand's force: they differ by the load side"
         return {}, dict.fromkeys(paths, why)
-    names = ("mass", "damping", "friction")
+    # How near to the reversals samples count is open.
     return {
-        path: Level(fit[name], fit.std(name), fit.degrees)
+        path: Level(fit[name], fit.std(name), fit.degrees).widened(other[name] - fit[name])
         for path, name in zip(paths, names, strict=True)
     }, {}
 
 
 def _fitted(
-    logs: Sequence[ScrewLog], rows: Sequence[Floats], data: Sequence[Floats], names: tuple[str, ...]
+    logs: Sequence[ScrewLog],
+    rows: Sequence[Floats],
+    data: Sequence[Floats],
+    names: tuple[str, ...],
+    corner: float = CORNERS[0],
 ) -> Regression | None:
     if sum(len(row) for row in rows) < _FEWEST:
         return None
     design = np.vstack(rows)
     value, rest, weight, _ = robust_regression(design, np.concatenate(data))
-    times = [(g.time[g.moving], g.smooth["motor_speed"][g.moving], g.period) for g in logs]
+    used = [log.apart(corner) for log in logs]
+    times = [
+        (log.time[u], log.smooth["motor_speed"][u], log.period)
+        for log, u in zip(logs, used, strict=True)
+    ]
     fit = with_deviations(names, value, design, rest, weight, times=times)
     return fit if np.isfinite(fit.covariance).all() else None

@@ -88,7 +88,7 @@ def calibrate_screw(
     go(progress, 0.05)
     work = Parts(actuator, _GIVEN, _NEVER)
     work.add(*motor_constants(logs, actuator))
-    work.add(*load_side(logs))
+    work.add(*load_side(logs, actuator))
     go(progress, 0.2)
     constant = work.levels.get("motor.emf_constant")
     torque = None if constant is None else Level(1.5 * constant.value, 1.5 * constant.std)

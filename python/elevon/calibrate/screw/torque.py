@@ -36,6 +36,7 @@ _SENSOR = {"offset": 0.1, "lag": 1e-3}
 _BELIEF = (0.7, 3.0, 1.0, 1.0, 0.15, 0.15, 1.0, 3.0)
 _SURE = 0.15  # of the belief: a deviation below which the logs have determined a number
 _SPREAD = 0.05  # N m, first deviation of the residual
+_CLOSES = 5e-5  # of the torque: ASSUMED, to which smoothed channels' balance closes at any speed
 _NUDGE = 1e-3  # of the torque, for what its deviation moves
 _RELIEF = 2.0 * np.sqrt(2.0)
 _SERIES = (1.53960, -1.19476, 1.13376, -0.67106, 0.19246)
@@ -113,7 +114,8 @@ def torque_balance(
         return fit_balance(sought, samples.current, model, times, scale=_SPREAD / torque)
 
     fit = fitted(scale)
-    spread = np.hypot(fit.std, 0.5 * (fitted(scale, CORNERS[1]).x - fit.x))
+    # How near to the reversals samples count is open.
+    spread = np.hypot(fit.std, fitted(scale, CORNERS[1]).x - fit.x)
     if constant is not None:
         moved = (fitted(scale * (1.0 + _NUDGE)).x - fit.x) / _NUDGE
         spread = np.hypot(spread, moved * constant.std / constant.value)
@@ -180,6 +182,11 @@ def _judged(
         level = Level(float(fit.x[k]) * first, float(spread[k]) * first, fit.degrees)
         if name in _SENSOR:
             continue
+        if name == "friction.viscous":
+            # Viscous torque may be half a hundredth of all: what the balance leaves open counts.
+            level = level.widened(
+                _CLOSES * _rms(samples.torque(fit.x * sought.first)) / _rms(samples.speed)
+            )
         if spread[k] > _SURE * sought.belief[k]:
             reasons[name] = _why(name, samples)
             continue
@@ -189,6 +196,10 @@ def _judged(
         # No screw gives back more than it takes: the difference is noise.
         levels["screw.efficiency_aiding"] = replace(aiding, value=opposing.value)
     return TorqueBalance(levels, reasons, fit.residual * scale)
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _why(name: str, samples: _Samples) -> str:
