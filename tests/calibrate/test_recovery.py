@@ -221,14 +221,16 @@ def test_a_two_mass_bench_fitted_with_the_low_model(tmp_path, before):
     assert all(any(path in text for text in result.findings) for path in absorbed)
 
 
-def test_the_low_models_own_log_shows_its_filter(tmp_path):
-    """Current and motion are of one instant."""
-    command, _ = CASES["noload"]
+@pytest.mark.parametrize("case", ["noload", "chirp"])
+def test_the_low_models_own_log_shows_filter_and_controller(tmp_path, case):
+    """Current and motion are of one instant; the derivative sees the motion that relays make."""
+    command, _ = CASES[case]
     document = {"duration": "10 s", "command": {"mode": "position", "terms": [command]}}
     base = Actuator.load("torino-rotary")
     record = "drive_log,motor_position,encoder_position@400 Hz"
     log = simulate(base, Scenario.from_dict(document), fidelity="low", record=record, seed=1)
     path = log.save(tmp_path / "own.parquet")
     result = calibrate(read_logs([path]), base, model_runs=False, hold_out=False)
-    cutoff = result["sensor.filter_cutoff"].value
-    assert cutoff == pytest.approx(base.parameters.value("sensor.filter_cutoff"), rel=0.02)
+    for name in ("sensor.filter_cutoff", "control.speed_gain"):
+        true = base.parameters.value(name)
+        assert result[name].value == pytest.approx(true, rel=0.02), name

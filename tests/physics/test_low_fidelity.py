@@ -103,3 +103,29 @@ def test_low_short_raises_the_mean_current_as_high_does() -> None:
     high, low = change("high"), change("low")
     assert high > 0
     assert 0.5 * high < low < 2.0 * high
+
+
+@pytest.mark.parametrize("speed", [10.0, 50.0])
+def test_mean_error_of_the_relays_falls_with_the_voltage_needed(speed: float) -> None:
+    """Far below the link's voltage a current coasts to its band's edge; nearer to it, less."""
+    options = {"duration": 0.4, "mode": "speed", "command": [constant(f"{speed} rad/s")],
+               "record": "current_ref,current_q@10 kHz",
+               "scenario": {"initial": {"motor_speed": speed}}}  # fmt: skip
+    errors = []
+    for fidelity in ("high", "low"):
+        record = options["record"] if fidelity == "high" else "current_ref,current_q@2 kHz"
+        rec = run({}, **(options | {"record": record}), fidelity=fidelity)
+        error = rec["current_ref"].values - rec["current_q"].values
+        errors.append(float(np.mean(error[len(error) // 2 :])))
+    assert errors[1] == pytest.approx(errors[0], abs=0.025)
+
+
+def test_a_run_that_begins_at_its_set_point_has_no_jump() -> None:
+    """The derivative's filter knows nothing before the first step: no kick, nothing cut off."""
+    speeds = [
+        run({}, duration=0.03, mode="speed", command=[constant("40 rad/s")],
+            record="motor_speed@2 kHz", scenario={"initial": {"motor_speed": 40.0}},
+            fidelity=fidelity)["motor_speed"].values
+        for fidelity in ("high", "low")
+    ]  # fmt: skip
+    assert np.abs(speeds[1] - speeds[0]).max() < 0.3

@@ -130,7 +130,8 @@ pub(super) fn demand<S: Scalar, const FULL: bool>(
     if structure.control.mode == Mode::Torque {
         return none;
     }
-    let change = speed_ref - s.speed_ref - shown_beside::<S, FULL>(m, structure, s, speed);
+    let change = speed_ref - s.jumps.asked - shown_beside::<S, FULL>(m, structure, s, speed);
+    s.jumps.asked = speed_ref;
     let mut torque = c.speed_gain * error + s.integral;
     let mut cut = zero;
     if structure.control.derivative {

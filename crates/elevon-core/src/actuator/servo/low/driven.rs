@@ -6,21 +6,19 @@
 use super::model::{Model, State, Structure};
 use super::passive::{parts, per_winding};
 use super::phase::{coefficients, Phase};
+use super::relays::{aligned, Relays};
 use crate::actuator::servo::layout::DriveKind;
-use crate::inverter::hysteresis::six_step;
 use crate::motor::equivalent::quadrature;
 use crate::scalar::{three_phase, Scalar};
 use crate::three;
 
 /// Parts of a step at least: the current loop's lag is looked at by parts.
 const LEAST_PARTS: f64 = 8.0;
-/// Rounds in which the legs see what the others do.
-const ROUNDS: usize = 3;
 
 /// What a drive remembers of its legs and integrals, V.
 #[derive(Clone, Copy, Debug)]
 pub struct DrivenState<S> {
-    legs: [S; 3],
+    pub(super) legs: [S; 3],
     integral: [S; 2],
 }
 
@@ -44,16 +42,16 @@ pub(super) struct Driven<S> {
 }
 
 /// One part of a step: what the drive sees, and the windings without its voltage.
-struct Part<S> {
+pub(super) struct Part<S> {
     dt: S,
-    half_supply: S,
+    pub half_supply: S,
     /// Current at the end with all legs at zero, but for the neutral.
     free: [S; 3],
     /// Current per volt held over the part; none of an interrupted phase.
-    per_volt: [S; 3],
+    pub per_volt: [S; 3],
     /// How far each current would decay between the rails' pushes: to what its EMF drives.
-    drift: [S; 3],
-    sines: [S; 3],
+    pub drift: [S; 3],
+    pub sines: [S; 3],
     cosines: [S; 3],
     /// Speed that the drive believes.
     speed: S,
@@ -64,7 +62,7 @@ struct Part<S> {
 pub(super) fn driven_step<S: Scalar>(
     m: &Model<S>,
     structure: &Structure,
-    supply: S,
+    [supply, band]: [S; 2],
     s: &mut State<S>,
     p: &Phase<S>,
     wanted: S,
@@ -95,7 +93,9 @@ pub(super) fn driven_step<S: Scalar>(
         let mut memory = s.driven;
         let after = match structure.drive {
             DriveKind::Pwm => Carrier::of(m).step(&part, &mut memory, wanted, x.phases),
-            DriveKind::Hysteresis | DriveKind::Off => Relays::of(m, structure).step(&part, &mut memory, wanted),
+            DriveKind::Hysteresis | DriveKind::Off => {
+                Relays::of(m, structure, band * aligned(m, structure, at(k + one), sines)).step(&part, &mut memory, wanted)
+            }
         };
         let mean: [S; 3] = three!(|j| half * (x.phases[j] + after[j]));
         let sum = |total: S, value: S| S::select(running, share.fma(value, total), total);
@@ -124,78 +124,6 @@ fn shown<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, position:
         m.sensing.angle(position, s.shaft.motor_speed, s.sensed)
     } else {
         position
-    }
-}
-
-/// Mean legs of the relays: each gives what brings its phase to the edge of its band, within the rails. The mean of a band
-/// is on the side to which the current decays between the pushes. With an interrupted phase the edges are those of a play: a leg keeps
-/// its voltage until the error has left the band.
-struct Relays<S> {
-    gain: [S; 3],
-    weight: [S; 3],
-    edge: S,
-    play: S,
-    half_band: S,
-    six_step: bool,
-}
-
-impl<S: Scalar> Relays<S> {
-    #[inline(always)]
-    fn of(m: &Model<S>, structure: &Structure) -> Self {
-        let (zero, open) = (S::zero(), &m.star.open);
-        let open = S::splat(0.5).le(open[0].maximum(open[1]).maximum(open[2]));
-        // Square waves of the three edges have 4/pi of them as their quadrature component. Blocks by an angle that is not the
-        // shaft's, and references that stand apart from the rotor, leave no error in the mean.
-        let exact = structure.turned || (structure.six_step && structure.misled);
-        let edge = if exact || structure.uneven { zero } else { S::splat(std::f64::consts::FRAC_PI_4) * m.drive.band };
-        let play = if structure.uneven { m.drive.band } else { zero };
-        let kept = if exact { zero } else { m.drive.band };
-        Self {
-            gain: m.drive.gain,
-            weight: m.drive.weight,
-            edge: S::select(open, zero, edge),
-            play: S::select(open, kept, play),
-            half_band: m.drive.half_band,
-            six_step: structure.six_step,
-        }
-    }
-
-    /// Currents to which the phases are brought: the star has no error that all share.
-    #[inline(always)]
-    fn aims(&self, part: &Part<S>, wanted: S) -> [S; 3] {
-        let reference = if self.six_step { six_step(part.sines) } else { part.sines };
-        let weighted = |x: [S; 3]| self.weight[0] * x[0] + self.weight[1] * x[1] + self.weight[2] * x[2];
-        let sum = self.weight[0] + self.weight[1] + self.weight[2];
-        let (zero, one) = (S::zero(), S::one());
-        // Errors in the star have the weighted sum of the references; what lies within all bands shrinks with it.
-        let most = self.half_band * sum;
-        let beyond = (wanted * weighted(reference)).abs() / S::select(most.le(zero), one, most);
-        let edge = self.edge * (one - beyond).maximum(zero);
-        let edges: [S; 3] = three!(|j| part.drift[j].clamp_abs(edge));
-        let common = weighted(edges) / S::select(sum.equals(zero), one, sum);
-        three!(|j| wanted * reference[j] - (edges[j] - common))
-    }
-
-    #[inline(always)]
-    fn step(&self, part: &Part<S>, memory: &mut DrivenState<S>, wanted: S) -> [S; 3] {
-        let (zero, one) = (S::zero(), S::one());
-        let aims = self.aims(part, wanted);
-        let mut after = settled(part, memory.legs);
-        for _ in 0..ROUNDS {
-            for j in 0..3 {
-                let others = part.per_volt[(j + 1) % 3] + part.per_volt[(j + 2) % 3];
-                let total = part.per_volt[j] + others;
-                // Per volt of this leg, the neutral following.
-                let reach = part.per_volt[j] * others / S::select(total.equals(zero), one, total) * self.gain[j];
-                let error = aims[j] - self.gain[j] * after[j];
-                let none = reach.equals(zero);
-                let beyond = error - error.clamp_abs(self.play);
-                let change = S::select(none, zero, beyond / S::select(none, one, reach));
-                memory.legs[j] = (memory.legs[j] + change).clamp_abs(part.half_supply);
-                after = settled(part, memory.legs);
-            }
-        }
-        after
     }
 }
 
@@ -250,7 +178,7 @@ impl<S: Scalar> Carrier<S> {
 
 /// Currents after a part under leg voltages; the neutral keeps their sum at zero.
 #[inline(always)]
-fn settled<S: Scalar>(part: &Part<S>, legs: [S; 3]) -> [S; 3] {
+pub(super) fn settled<S: Scalar>(part: &Part<S>, legs: [S; 3]) -> [S; 3] {
     let (zero, one) = (S::zero(), S::one());
     let g = part.per_volt;
     let total = g[0] + g[1] + g[2];
@@ -263,7 +191,7 @@ fn settled<S: Scalar>(part: &Part<S>, legs: [S; 3]) -> [S; 3] {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     const R: f64 = 2.0;
@@ -271,7 +199,7 @@ mod tests {
     const DT: f64 = 5e-5;
 
     /// A part of the star at rest with the currents `i`, phases interrupted where `open`.
-    fn part(i: [f64; 3], open: [bool; 3], angle: f64) -> Part<f64> {
+    pub fn part(i: [f64; 3], open: [bool; 3], angle: f64) -> Part<f64> {
         let held = (1.0 - (-DT * R / L).exp()) / R;
         let per_volt = open.map(|gone| if gone { 0.0 } else { held });
         let (sines, cosines) = three_phase(angle.sin(), angle.cos());
@@ -315,75 +243,6 @@ mod tests {
         assert!((i[0] - around).abs() < 1e-12 && (i[1] + around).abs() < 1e-12, "{i:?}");
         assert_eq!(i[2], 0.0);
         assert_eq!(alone, [0.0; 3]);
-    }
-
-    #[test]
-    fn the_emf_holds_every_current_at_the_edge_of_its_band() {
-        let relays = Relays { gain: [1.0; 3], weight: [1.0; 3], edge: 0.1, play: 0.0, half_band: 0.2, six_step: false };
-        let (mut i, mut memory, wanted) = ([0.0; 3], DrivenState::rest(), 3.0);
-        let turns = 400;
-        let (mut mean, mut worst) = (0.0, 0.0_f64);
-        for k in 0..2 * turns {
-            let mut x = part(i, [false; 3], std::f64::consts::TAU * f64::from(k) / f64::from(turns));
-            x.drift = three!(|j| 50.0 * x.sines[j]);
-            i = relays.step(&x, &mut memory, wanted);
-            if k >= turns {
-                mean += quadrature(i, x.sines) / f64::from(turns);
-                worst = (0..3).map(|j| (wanted * x.sines[j] - i[j]).abs()).fold(worst, f64::max);
-            }
-        }
-        // The star has no common error: a square wave less a third of itself at three times the frequency.
-        assert!((mean - (wanted - 0.1 * 4.0 / std::f64::consts::PI)).abs() < 0.02, "{mean}");
-        assert!(worst < 0.15, "{worst}");
-    }
-
-    #[test]
-    fn relays_that_cannot_all_have_their_references_leave_no_mean_error() {
-        // One sensor shows twice its current: of blocks of 3 A with this phase in them, 1.5 A have no place.
-        let relays = |half_band| Relays { gain: [1.0, 2.0, 1.0], weight: [1.0, 0.5, 1.0], edge: 0.1, play: 0.0, half_band, six_step: true };
-        let mut x = part([0.0; 3], [false; 3], 0.1);
-        x.drift = [1.0, -1.0, 1.0];
-        let wanted = [0.0, -3.0, 3.0];
-        let aims = relays(0.5).aims(&x, 3.0);
-        assert!((0..3).all(|j| (aims[j] - wanted[j]).abs() < 1e-12), "{aims:?}");
-        // With a band wide enough for all of them half of the edge is left: 1.5 of the 3.0 within.
-        let aims = relays(1.2).aims(&x, 3.0);
-        let off: [f64; 3] = three!(|j| wanted[j] - aims[j]);
-        assert!((off[0] - off[1] - 0.1).abs() < 1e-12, "{off:?}");
-        assert!((off[0] + 0.5 * off[1] + off[2]).abs() < 1e-12, "{off:?}");
-    }
-
-    #[test]
-    fn a_leg_in_its_play_keeps_its_voltage() {
-        let relays = Relays { gain: [1.0; 3], weight: [1.0; 3], edge: 0.0, play: 0.5, half_band: 0.5, six_step: false };
-        let mut memory = DrivenState::rest();
-        relays.step(&part([0.0; 3], [false, false, true], 0.3), &mut memory, 0.4);
-        assert_eq!(memory.legs, [0.0; 3]);
-    }
-
-    #[test]
-    fn relays_out_of_reach_are_six_step() {
-        let relays = Relays { gain: [1.0; 3], weight: [1.0; 3], edge: 0.1, play: 0.0, half_band: 0.2, six_step: false };
-        let mut memory = DrivenState::rest();
-        let x = part([0.0; 3], [false; 3], 0.3);
-        relays.step(&x, &mut memory, 1e3);
-        for j in 0..3 {
-            assert_eq!(memory.legs[j], 24.0 * x.sines[j].signum());
-        }
-    }
-
-    #[test]
-    fn relays_of_an_open_phase_carry_half_the_difference_of_the_references() {
-        let relays = Relays { gain: [1.0; 3], weight: [1.0; 3], edge: 0.0, play: 0.0, half_band: 0.2, six_step: false };
-        let (mut i, mut memory) = ([0.0; 3], DrivenState::rest());
-        // Between the two references: whose leg has room left decides.
-        let x = |i| part(i, [false, false, true], 0.5 * std::f64::consts::PI - std::f64::consts::PI / 3.0);
-        for _ in 0..200 {
-            i = relays.step(&x(i), &mut memory, 3.0);
-        }
-        let sines = x(i).sines;
-        assert!(i[0] >= 3.0 * sines[0].min(-sines[1]) - 1e-9 && i[0] <= 3.0 * sines[0].max(-sines[1]) + 1e-9, "{i:?} {sines:?}");
-        assert_eq!((i[2], i[1]), (0.0, -i[0]));
     }
 
     #[test]

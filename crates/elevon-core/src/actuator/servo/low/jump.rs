@@ -33,6 +33,8 @@ pub struct Jumps<S> {
 pub struct JumpState<S> {
     change: S,
     pub(super) level: S,
+    /// Set point of the step before; before the first step the shaft's speed, of which the filter knows nothing.
+    pub(super) asked: S,
     /// Speed that the resolver showed, and that of the shaft.
     pub(super) shown: S,
     pub(super) moved: S,
@@ -99,7 +101,7 @@ impl<S: Scalar> Jumps<S> {
 
 impl<S: Scalar> JumpState<S> {
     pub(super) fn start(speed: S) -> Self {
-        Self { change: S::zero(), level: S::zero(), shown: speed, moved: speed }
+        Self { change: S::zero(), level: S::zero(), asked: speed, shown: speed, moved: speed }
     }
 }
 

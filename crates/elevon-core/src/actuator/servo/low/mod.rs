@@ -9,6 +9,7 @@ mod model;
 mod observe;
 mod passive;
 mod phase;
+mod relays;
 mod step;
 
 use self::model::{Model, State, Structure};

@@ -80,8 +80,6 @@ details! {
             DriveKind::Pwm => unseen || misled || interrupted(&parts.motor()),
             DriveKind::Off => false,
         };
-        /// Of these: the torque follows its reference but for the relays' band.
-        uneven = drive == DriveKind::Hysteresis && gains && !(six_step || unseen || misled || interrupted(&parts.motor()));
         /// The references stand apart from the rotor by an angle that does not change.
         turned = misled && parts.resolver().away(ResolverParameter::Offset);
         heat = Network::<f64>::needed(&parts.thermal());
@@ -105,6 +103,8 @@ pub struct Model<S> {
     pub drive: Drive<S>,
     pub circuits: Loops<S>,
     pub shaft: Shaft<S>,
+    /// Of the shaft alone.
+    pub per_inertia: S,
     pub sensing: Sensing<S>,
     pub filter: S,
     pub temperature: S,
@@ -244,6 +244,7 @@ impl<S: Scalar> Model<S> {
             star,
             pole: WeakPole::derive(Raw(raw).pole(), raw[MotorParameter::PolePairs.at()]),
             control,
+            per_inertia: one / shaft.inertia,
             shaft,
             sensing: Sensing::derive_low(raw, &structure.sensing),
             filter: closing(raw[CurrentSensorParameter::FilterCutoff.at()], dt.lane(0)),

@@ -6,15 +6,32 @@ use super::driven::driven_step;
 use super::model::{Model, State, Structure};
 use super::passive::passive_step;
 use super::phase::{phase, Phase};
+use super::relays::{mean_error, within_band, Asked};
 use crate::actuator::servo::advance::{Instant, Stepper};
 use crate::actuator::servo::layout::DriveKind;
 use crate::scalar::Scalar;
 use crate::sensor::filter::low_pass;
 use crate::three;
 
+/// What the drive has of its supply: its source, the link's voltage, and the mean error that its relays leave.
+struct Supply<S> {
+    source: S,
+    link: S,
+    band: S,
+}
+
+#[inline(always)]
+fn supply<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structure, x: &Instant<S>, s: &State<S>, p: &Phase<S>) -> Supply<S> {
+    let source = x.supply * m.drive.supply_scale;
+    let link = if EXTRA && structure.link { m.drive.link.voltage(&s.link, source) } else { source };
+    let band = if structure.drive == DriveKind::Hysteresis { mean_error(m, s, p, link) } else { S::zero() };
+    Supply { source, link, band }
+}
+
 /// Current and voltage of the phase after a step towards the torque reference.
 #[inline(always)]
-fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structure, x: &Instant<S>, s: &mut State<S>, p: &Phase<S>) {
+fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structure, supply: &Supply<S>, s: &mut State<S>, p: &Phase<S>) {
+    let Supply { source, link: supply, band } = *supply;
     let speed = s.shaft.motor_speed;
     let mut emf = S::splat(2.0 / 3.0) * p.torque_constant * speed;
     if EXTRA && structure.loops {
@@ -24,13 +41,11 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
     let circuit = &p.circuit;
     let target = match structure.drive {
         // The relays act only at the edges of their band; inside it the EMF drives the current.
-        DriveKind::Hysteresis => circuit.current(s.current, -emf).clamp(current_ref - m.drive.band, current_ref + m.drive.band),
+        DriveKind::Hysteresis => circuit.current(s.current, -emf).clamp(current_ref - band, current_ref + band),
         DriveKind::Pwm => s.current + m.drive.tracking * (current_ref - s.current),
         DriveKind::Off => S::zero(),
     };
     let driving = circuit.voltage(s.current, target);
-    let source = x.supply * m.drive.supply_scale;
-    let supply = if EXTRA && structure.link { m.drive.link.voltage(&s.link, source) } else { source };
     let mut cross = m.drive.electrical_inductance * speed * s.current;
     if EXTRA && structure.angle {
         cross = cross - p.direct * speed;
@@ -63,7 +78,7 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
     }
     if EXTRA && structure.driven {
         s.phases = phases;
-        let x = driven_step(m, structure, supply, s, p, current_ref);
+        let x = driven_step(m, structure, [supply, band], s, p, current_ref);
         s.phases = x.phases;
         (s.current, s.current_q, s.current_seen) = (x.seen, x.quadrature, x.seen);
         (s.motor_torque, s.voltage) = (x.torque, x.voltage);
@@ -144,7 +159,7 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
     let (mut derivative_inertia, mut per_inertia) = (m.control.derivative_inertia, p.per_effective_inertia);
     let mut torque = p.efficacy * asked.torque;
     let mut answer = p.efficacy;
-    if EXTRA && structure.driven && !structure.uneven {
+    if EXTRA && structure.driven {
         // The windings make of a reference what they can: the torque there is, and what a step adds to it.
         answer = answer.maximum(S::zero()) * m.drive.tracking;
         torque = answer.fma(asked.torque - s.torque_ref, s.motor_torque);
@@ -156,13 +171,21 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
         per_inertia = S::one() / answer.fma(derivative_inertia, m.shaft.inertia);
     }
     let mut loads = m.shaft.loads::<FULL, EXTRA>(&structure.shaft, x, &s.shaft, torque);
-    let acceleration = m.shaft.acceleration::<EXTRA>(&structure.shaft, &s.shaft, &loads, torque, per_inertia);
+    let by = |torque: S, per_inertia: S| m.shaft.acceleration::<EXTRA>(&structure.shaft, &s.shaft, &loads, torque, per_inertia);
+    let supply = supply::<S, EXTRA>(m, structure, x, s, p);
+    let relays = structure.drive == DriveKind::Hysteresis && structure.control.derivative && !(EXTRA && structure.driven);
+    let acceleration = if relays {
+        let asked = Asked { torque: asked.torque, inertia: derivative_inertia, per_inertia };
+        within_band(m, s, p, &asked, supply.band, by)
+    } else {
+        by(torque, per_inertia)
+    };
     let unlimited = asked.torque - derivative_inertia * acceleration;
     s.torque_ref = unlimited.clamp_abs(m.control.torque_limit);
     integrate(m, structure, s, &asked, unlimited);
 
     // Equivalent phase, motor and transmission dynamics.
-    electric_step::<S, EXTRA>(m, structure, x, s, p);
+    electric_step::<S, EXTRA>(m, structure, &supply, s, p);
     s.motor_torque = m.star.saturate(s.motor_torque);
     if EXTRA && structure.shaft.train.law.knows_torque() {
         // The friction knows the torque that acts, not the one that was asked for.
