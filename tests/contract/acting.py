@@ -210,16 +210,23 @@ def claims(cell: Cell, path: str) -> bool:
 
 
 def shows(cell: Cell, path: str) -> bool:
-    """Does the parameter change some signal in some company, where nothing says that it rests?"""
-    return any(_shows(replace(cell, onwards=onwards), path) for onwards in (False, True))
+    """Does the parameter change some signal in some company, where nothing says that it rests?
+
+    Against the load and with it, to and fro and onwards: a load may keep what it holds back from
+    its lock, or from falling.
+    """
+    ways = [
+        replace(cell, load=push, onwards=onwards)
+        for push in (cell.load, -cell.load)
+        for onwards in (False, True)
+    ]
+    return any(
+        _shows(way, path, base) for base in islice(companies(cell, path), MOST) for way in ways
+    )
 
 
-def _shows(cell: Cell, path: str) -> bool:
-    for base in islice(companies(cell, path), MOST):
-        if cell.refused(base):
-            continue
-        tried = [item for item in variants(cell, path, base) if not says(cell, path, item)]
-        for part in (tried[:2], tried[2:]):
-            if any(changed(cell, base, part).values()):
-                return True
-    return False
+def _shows(cell: Cell, path: str, base: Variant) -> bool:
+    if cell.refused(base):
+        return False
+    tried = [item for item in variants(cell, path, base) if not says(cell, path, item)]
+    return any(any(changed(cell, base, part).values()) for part in (tried[:2], tried[2:]))
