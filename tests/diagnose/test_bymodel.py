@@ -1,6 +1,7 @@
 """Diagnosis by the model on logs of the virtual bench."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,9 +10,12 @@ from elevon import Actuator
 from elevon.diagnose.bymodel import diagnose, read_test_logs
 from elevon.diagnose.bymodel.candidates import CANDIDATES
 from elevon.diagnose.bymodel.detection import Detector
+from elevon.diagnose.bymodel.log import prepared
 from elevon.diagnose.bymodel.posterior import marginals, posterior, quantiles
+from elevon.diagnose.bymodel.replay import replay
 from elevon.errors import InputError, UnknownNameError
 from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
+from tests.diagnose.virtual import bench_logs
 
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
 NAME = "backlash.csv"
@@ -71,6 +75,39 @@ def test_a_fault_is_isolated_with_its_severity(unit, logs, name, key, severity):
     assert cause.severity == pytest.approx(severity, rel=0.1)
     if name == "short":
         assert set(cause.equivalents) == {("short", "motor.phase_b"), ("short", "motor.phase_c")}
+
+
+def test_without_the_voltage_a_short_and_a_current_sensor_are_one_cause(unit):
+    """Both scale one phase's share of the torque; only the EMF tells them apart."""
+    pwm = unit.with_values({"drive.kind": "pwm"})
+    made = bench_logs(pwm, [(1, []), (2, ["short@motor.phase_b=0.2"])])
+    base, log = (replace(item, voltage=None) for item in made)
+    result = diagnose([log], pwm, baselines=[base])
+    assert result.status == "faulty"
+    cause = result.faults[0]
+    kinds = {cause.kind, *(kind for kind, _ in cause.equivalents)}
+    assert {"short", "gain"} <= kinds
+    assert {p for k, p in cause.equivalents if k == "gain"} >= {f"sensor.current_{p}" for p in "bc"}
+    told = {(item["kind"], item["place"]): item["reason"] for item in result.unobservable}
+    assert "3 deviations" in told["sag", "supply"]
+    assert "short" in told["open_phase", "motor.phase_a"]
+    assert ("bearing", "bearing.cage") in told
+
+
+def test_what_a_fault_leaves_alone_or_to_chance_is_no_evidence_of_it(unit, logs):
+    item = prepared(read_test_logs([logs["base"]])[0], unit)
+    turning = next(c for c in CANDIDATES if c.kind == "eccentricity_dynamic")
+    sensor = next(c for c in CANDIDATES if c.place == "sensor.current_a")
+    model = replay(item, unit, [turning, sensor])
+    names = np.array(model.healthy.names)
+    moved = model.shift(turning.key, np.array([0.3]))[0]
+    assert set(names[moved != 0.0]) == {"current_sideband", "voltage_sideband"}
+    assert model.doubt(turning.key, 0.3)[names == "inertia_current"] > 0.0
+    assert not model.doubt(turning.key, 0.3)[moved != 0.0].any()
+    still = model.shift(sensor.key, np.array([0.2]))[0]
+    assert not still[np.isin(names, sensor.still)].any()
+    assert still[names == "current_order_2"] > 0.0
+    assert not model.doubt(sensor.key, 0.2).any()
 
 
 def test_a_faulty_baseline_is_named_and_left_out(unit, logs):
@@ -189,6 +226,9 @@ def test_severities_cover_what_was_drawn():
         ("eccentricity_static@motor=0.1", ("eccentricity_static@motor",)),
         ("gain_drift@control.position=0.02", ("gain_drift@control.position",)),
         ("gain_drift@control.position=-0.02", ("gain_drift@control.position",)),
+        ("gain@sensor.current_b=0.15", ("gain@sensor.current_a",)),
+        ("eccentricity_dynamic@motor=0.2", ("eccentricity_dynamic@motor",)),
+        ("tooth_wear@gear=0.002", ("tooth_wear@gear",)),
     ],
 )
 def test_on_the_high_model_with_another_drive(unit, tmp_path, fault, best):

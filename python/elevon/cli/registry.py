@@ -42,6 +42,7 @@ COMMANDS: dict[str, Command] = {
         "elevon.cli.validate", "Check an actuator against logs it was not fitted to."
     ),
     "diagnose": Command("elevon.cli.diagnose", "Say what is wrong, where, how bad, how sure."),
+    "monitor": Command("elevon.cli.monitor", "Watch a unit's stream; alarm when a fault begins."),
     "predict": Command("elevon.cli.predict", "Say how long a unit will do what it must."),
     "diagnose-train": Command(
         "elevon.cli.diagnose_train", "Train the surrogate that diagnose --method surrogate asks."

@@ -1,4 +1,4 @@
-"""`elevon reproduce diagnosis-limits`: how small a fault the diagnosis by the model sees."""
+"""`elevon reproduce diagnosis-limits` and `monitor-delay`: how small a fault is seen, how soon."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from elevon.cli.output import Advance, print_table
-from elevon.cli.reproduce.case import Case, Options, Values, cell
+from elevon.cli.output import Advance, print_table, say
+from elevon.cli.reproduce.case import Case, Options, Values, cell, print_columns
 
 if TYPE_CHECKING:
     from elevon.report import Report
 
 __all__ = ["CASES"]
 
+_UNITS = Annotated[int, typer.Option("--units", min=1, help="Benches, 39 streams each.")]
 _RUNS = Annotated[int, typer.Option("--runs", min=1, help="Units of the bench, 95 logs each.")]
 
 
@@ -23,6 +24,25 @@ def _work(options: Options, progress: Advance) -> Any:
     return reproduce_diagnosis_limits(
         seed=options["seed"], units=options["runs"], folder=options["out"], progress=progress
     )
+
+
+def _watch(options: Options, progress: Advance) -> Any:
+    from elevon.reproduce.monitor_delay import reproduce_monitor_delay
+
+    return reproduce_monitor_delay(seed=options["seed"], units=options["units"], progress=progress)
+
+
+def _show_watch(values: Values, _result: Any) -> None:
+    columns = ("fault", "severity", "streams", "alarms", "before_onset", "delay_median",
+               "delay_largest", "named")  # fmt: skip
+    print_columns(values["rows"], columns, "streams in which a fault begins")
+    for row in values["false_alarms"]:
+        low, high = row["interval"]
+        say(
+            f"healthy, {values['healthy_seconds']:g} s, one false alarm set in "
+            f"{row['set_seconds']:g} s: {row['alarms']}, {row['per_hour']:.2g} in an hour "
+            f"({low:.2g} to {high:.2g})"
+        )
 
 
 def _page(result: Any, options: Options) -> Report:
@@ -47,5 +67,13 @@ CASES = (
         _show,
         _page,
         {"runs": (_RUNS, 8)},
+    ),
+    Case(
+        "monitor-delay",
+        "Watch streams in which a fault begins: delay against severity, and false alarms.",
+        "making and watching streams",
+        _watch,
+        _show_watch,
+        options={"units": (_UNITS, 3)},
     ),
 )

@@ -19,7 +19,7 @@ from elevon.diagnose.bymodel.replay import Replay, logged_evidence, modelled, re
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["Case", "case_of", "detector_of", "joined", "shift_of"]
+__all__ = ["Case", "case_of", "detector_of", "doubt_of", "joined", "shift_of"]
 
 Floats = npt.NDArray[np.float64]
 SUSPECT = 1e-3  # chance of a baseline below which it is called faulty
@@ -71,11 +71,16 @@ class Case:
                 out[:, k] *= min(max(own / modelled, 1.0 / _SHARE), _SHARE)
         return out
 
+    def doubt(self, key: str, severity: float) -> Floats:
+        """Return the deviation that a severity gives this unit's evidence, shape (k,)."""
+        at = [self.model.healthy.names.index(n) for n in self.unit.names]
+        return self.model.doubt(key, severity)[at]
+
 
 #: Evidence that only a measured torque current gives.
 _OF_THE_CURRENT = frozenset(
     ["dry_current", "viscous_current", "inertia_current", "brake_current", "current_order_1",
-     "current_order_2", "current_shaft", "voltage_per_current"]
+     "current_order_2", "current_shaft", "current_sideband", "voltage_per_current"]
 )  # fmt: skip
 
 
@@ -216,3 +221,8 @@ def joined(cases: Sequence[Case]) -> tuple[Floats, Floats]:
 def shift_of(cases: Sequence[Case], key: str, severity: Floats) -> Floats:
     """Return what severities, shape (m,), do to the evidence of all logs, shape (m, k)."""
     return np.hstack([case.shift(key, severity) for case in cases])
+
+
+def doubt_of(cases: Sequence[Case], key: str, severity: float) -> Floats:
+    """Return the deviation that a severity gives the evidence of all logs, shape (k,)."""
+    return np.concatenate([case.doubt(key, severity) for case in cases])

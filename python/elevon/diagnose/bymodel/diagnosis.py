@@ -10,8 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.diagnose.bymodel.answer import Diagnosis
-from elevon.diagnose.bymodel.candidates import Candidate, chosen
-from elevon.diagnose.bymodel.case import Case, case_of, detector_of, joined, shift_of
+from elevon.diagnose.bymodel.candidates import DECLINED, Candidate, chosen
+from elevon.diagnose.bymodel.case import (
+    Case,
+    case_of,
+    detector_of,
+    doubt_of,
+    joined,
+    shift_of,
+)
 from elevon.diagnose.bymodel.explain import causes, explanations, limits, moved, unexplained
 from elevon.diagnose.bymodel.log import TestLog, prepared
 from elevon.diagnose.bymodel.posterior import posterior
@@ -69,7 +76,10 @@ def diagnose(
         for item in logs
     ]
     result = answer_of(cases, candidates, false_alarm, findings)
-    return replace(result, seconds=clock.perf_counter() - begin)
+    blind = result.unobservable
+    if not faults:
+        blind += tuple({"kind": k, "place": p, "reason": reason} for k, p, reason in DECLINED)
+    return replace(result, unobservable=blind, seconds=clock.perf_counter() - begin)
 
 
 def answer_of(
@@ -101,32 +111,37 @@ def answer_of(
     _, covariance = joined(cases)
     degrees = min(case.unit.degrees for case in cases)
     errors = np.concatenate([case.errors for case in cases])
+    blind, least = limits(cases, candidates, root)
+    # What the logs cannot show would keep its prior, whatever they say: it is told apart.
+    seen = [c for c in candidates if c.key in least] or candidates
     result = posterior(
         rest,
         covariance,
         degrees,
-        candidates,
+        seen,
         lambda k, s: shift_of(cases, k, s),
         errors=errors,
+        doubt=lambda k, s: doubt_of(cases, k, s),
         pairs=pairs,
     )
     faulty = ratio > detector.threshold(rate)
     best = next(h for h in result.hypotheses if bool(h.keys) or not faulty)
-    blind, least = limits(cases, candidates, root)
     changed = moved(cases, best.keys, best.best)
+    known = {c.key: c for c in candidates}
+    named = [(known[key], value) for key, value in zip(best.keys, best.best, strict=True)]
     return Diagnosis(
         logs=tuple(case.name for case in cases),
         status="faulty" if faulty else "healthy",
         p_fault=result.faulty,
         false_alarm=rate,
         chance=detector.chance(ratio),
-        faults=causes(result, cases, candidates, root, best.keys),
+        faults=causes(result, cases, seen, root, best.keys),
         best=best.keys,
         p_best=result.probabilities[result.hypotheses.index(best)],
         unobservable=blind,
         detectable=least,
         moved=changed,
-        findings=(*findings, *unexplained(root, rest, cases, best.keys, best.best)),
+        findings=(*findings, *unexplained(covariance, rest, cases, named)),
         seconds=clock.perf_counter() - begin,
         hypotheses=explanations(result, candidates),
     )

@@ -46,10 +46,16 @@ UNITS: dict[str, tuple[str, str]] = {
     "voltage_order_2": ("1", "share of the EMF at twice the electrical angle"),
     "speed_gain": ("A s/rad", "current set point by speed error"),
     "following_gain": ("s", "following error over speed set point: 1/position gain"),
+    "current_sideband": (
+        "1",
+        "share of the current at twice the electrical angle plus the shaft's",
+    ),
+    "voltage_sideband": ("1", "share of the EMF at twice the electrical angle plus the shaft's"),
 }
 #: Amplitudes: what a unit has already and what a fault adds meet at an unknown angle.
 SIZES = frozenset(
-    ["current_order_1", "current_order_2", "current_shaft", "voltage_order_1", "voltage_order_2"]
+    ["current_order_1", "current_order_2", "current_shaft", "voltage_order_1", "voltage_order_2",
+     "current_sideband", "voltage_sideband"]
 )  # fmt: skip
 #: Rates and gains: a fault moves them by a share of the unit's own value.
 SHARES = frozenset(
@@ -67,6 +73,8 @@ OWN_ERROR: Mapping[str, float] = {
     "voltage_order_2": 0.40,
     "voltage_per_speed": 0.50,
     "voltage_per_current": 0.50,
+    "current_sideband": 0.40,
+    "voltage_sideband": 0.40,
 }
 _BLOCKS = 16  # stretches of a log whose scores give the deviations
 _LEAST = 100  # samples of a regression
@@ -160,12 +168,10 @@ def evidence(
     rows |= _positions(signals, moving, ratio, deviations)
     cosine, sine = np.cos(pole_pairs * signals.motor), np.sin(pole_pairs * signals.motor)
     waves = (cosine, sine, cosine**2 - sine**2, 2.0 * cosine * sine)
-    fit, columns = _current_fit(signals, moving, waves, width, deviations)
-    rows |= _currents(fit)
-    if shaft:
-        rows |= _shaft(signals, moving, fit, columns, deviations)
+    beside = (2.0 * pole_pairs + 1.0) * signals.motor if shaft else None
+    rows |= _currents(signals, moving, (waves, beside), width, deviations)
     if signals.voltage is not None:
-        rows |= _voltages(signals, moving, waves, emf, deviations)
+        rows |= _voltages(signals, moving, (waves, beside), emf, deviations)
     rows |= _control(signals, width, deviations)
     names = tuple(name for name in UNITS if name in rows)
     return Evidence(
@@ -263,37 +269,38 @@ def dragged(driver: Floats, width: float) -> Bools:
     return np.asarray(np.abs(driver - start) > 1.5 * width)
 
 
-def _current_fit(
-    signals: Signals, moving: Bools, waves: Sequence[Floats], width: float, deviations: bool
-) -> tuple[Fit, list[Floats]]:
+#: Cosine and sine of the electrical angle and of twice it; the sideband's angle, if it is sought.
+_Turns = tuple[Sequence[Floats], Floats | None]
+
+
+def _currents(
+    signals: Signals, moving: Bools, turns: _Turns, width: float, deviations: bool
+) -> dict[str, tuple[float, float]]:
     half = max(1, round(0.5 * _SMOOTH / width))
     rate = _slope(signals.speed, half) / width
     way = np.sign(signals.speed)
     level = _mean(signals.current, 8 * half)
     columns = [way, signals.speed, rate, np.ones_like(way)]
-    columns += [level * wave for wave in waves]
+    columns += [level * wave for wave in turns[0]]
     if signals.brake is not None and float(np.ptp(signals.brake[moving])) > 0.0:
         columns.append(way * signals.brake)
-    return _fit(columns, signals.current, moving, deviations), columns
-
-
-def _currents(fit: Fit) -> dict[str, tuple[float, float]]:
+    fit = _fit(columns, signals.current, moving, deviations)
     names = ("dry_current", "viscous_current", "inertia_current")
     rows = {name: _one(fit, k) for k, name in enumerate(names)}
     if len(fit[0]) > _BRAKE:
         rows["brake_current"] = _one(fit, _BRAKE)
     rows["current_order_1"] = _size(fit, 4)
     rows["current_order_2"] = _size(fit, 6)
-    return rows
-
-
-def _shaft(
-    signals: Signals, moving: Bools, fit: Fit, columns: Sequence[Floats], deviations: bool
-) -> dict[str, tuple[float, float]]:
-    """The shaft's turn, in what is left: in a short motion it looks like the acceleration."""
+    if turns[1] is None:
+        return rows
+    # What turns with the shaft is sought in what is left: in a short motion its turn looks like
+    # the acceleration, and the sideband like its neighbour.
     rest = signals.current - sum(b * column for b, column in zip(fit[0], columns, strict=True))
-    turn = [np.cos(signals.motor), np.sin(signals.motor)]
-    return {"current_shaft": _size(_fit(turn, rest, moving, deviations), 0)}
+    shaft = [np.cos(signals.motor), np.sin(signals.motor)]
+    beside = [level * np.cos(turns[1]), level * np.sin(turns[1])]
+    rows["current_shaft"] = _size(_fit(shaft, rest, moving, deviations), 0)
+    rows["current_sideband"] = _size(_fit(beside, rest, moving, deviations), 0)
+    return rows
 
 
 def _slope(values: Floats, half: int) -> Floats:
@@ -310,21 +317,26 @@ def _mean(values: Floats, half: int) -> Floats:
 
 
 def _voltages(
-    signals: Signals, moving: Bools, waves: Sequence[Floats], emf: float, deviations: bool
+    signals: Signals, moving: Bools, turns: _Turns, emf: float, deviations: bool
 ) -> dict[str, tuple[float, float]]:
     assert signals.voltage is not None
     use = moving & np.isfinite(signals.voltage)
     if use.sum() < 2 * _LEAST:
         return {}
     columns = [signals.speed, signals.current, np.ones_like(signals.speed)]
-    columns += [signals.speed * wave for wave in waves]
+    columns += [signals.speed * wave for wave in turns[0]]
     fit = _fit(columns, signals.voltage, use, deviations)
-    return {
+    rows = {
         "voltage_per_speed": _one(fit, 0),
         "voltage_per_current": _one(fit, 1),
         "voltage_order_1": _size(fit, 3, emf),
         "voltage_order_2": _size(fit, 5, emf),
     }
+    if turns[1] is not None:
+        rest = signals.voltage - sum(b * c for b, c in zip(fit[0], columns, strict=True))
+        beside = [signals.speed * np.cos(turns[1]), signals.speed * np.sin(turns[1])]
+        rows["voltage_sideband"] = _size(_fit(beside, rest, use, deviations), 0, emf)
+    return rows
 
 
 def _control(signals: Signals, width: float, deviations: bool) -> dict[str, tuple[float, float]]:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from elevon.diagnose.bymodel.answer import SEEN, Cause, Explanation, Moved
 from elevon.diagnose.bymodel.candidates import Candidate
-from elevon.diagnose.bymodel.case import Case, shift_of
+from elevon.diagnose.bymodel.case import Case, doubt_of, shift_of
 from elevon.diagnose.bymodel.evidence import UNITS
 from elevon.diagnose.bymodel.posterior import Posterior, marginals, quantiles
 
@@ -18,24 +18,32 @@ __all__ = ["causes", "explanations", "limits", "moved", "unexplained"]
 Floats = npt.NDArray[np.float64]
 LISTED = 0.02  # probability below which a cause is not listed
 POSSIBLE = 1e-3  # probability below which a set of faults is not listed
+UNLIKELY = 1e-3  # chance of what the named faults leave below which that is said
 ALIKE = 1.0  # deviations between two faults' shifts below which no log separates them
 
 
 def unexplained(
-    root: Floats,
+    covariance: Floats,
     rest: Floats,
     cases: Sequence[Case],
-    keys: Sequence[str],
-    values: Sequence[float],
+    faults: Sequence[tuple[Candidate, float]],
 ) -> tuple[str, ...]:
-    """Return the finding that the named faults do not explain the logs, where they do not."""
+    """Return the finding that the named faults do not explain the logs, where they do not.
+
+    What the model does not know of their shifts counts as explained.
+    """
     from scipy.stats import f as fisher
 
-    left = rest - _sum(cases, keys, values)
+    errors = np.concatenate([case.errors for case in cases])
+    left, wide = rest, covariance
+    for c, severity in faults:
+        shift = shift_of(cases, c.key, np.array([severity]))[0]
+        left = left - shift
+        own = (errors * shift) ** 2 + doubt_of(cases, c.key, severity) ** 2
+        wide = wide + np.diag(own) + c.error**2 * np.outer(shift, shift)
     degrees = min(case.unit.degrees for case in cases)
-    square = float(np.sum((root @ left) ** 2)) / len(rest)
-    chance = float(fisher.sf(square, len(rest), degrees))
-    if chance > 1e-3:
+    square = float(left @ np.linalg.solve(wide, left)) / len(rest)
+    if float(fisher.sf(square, len(rest), degrees)) > UNLIKELY:
         return ()
     return (
         "what is named does not explain all of the logs: another fault, or a set that is not "
@@ -96,16 +104,23 @@ def _alike(
     candidates: Sequence[Candidate],
     root: Floats,
 ) -> list[Candidate]:
-    """Candidates that shift the evidence as this one does at this severity, to `ALIKE`."""
-    own = root @ shift_of(cases, candidate.key, np.array([severity]))[0]
-    if np.linalg.norm(own) < SEEN:
+    """Candidates that shift the evidence as this one does at this severity, to `ALIKE`.
+
+    What the model does not know of the shift, number by number, tells nobody apart.
+    """
+    shift = shift_of(cases, candidate.key, np.array([severity]))[0]
+    if np.linalg.norm(root @ shift) < SEEN:
         return []
+    extra = root * (np.concatenate([case.errors for case in cases]) * shift)
+    lower = np.linalg.cholesky(np.eye(len(root)) + extra @ extra.T)
+    whiter: Floats = np.asarray(np.linalg.solve(lower, root), dtype=np.float64)
+    own = whiter @ shift
     out = []
     for other in candidates:
         if other.key == candidate.key:
             continue
         grid = np.linspace(other.low, other.high, 401)
-        moved = shift_of(cases, other.key, grid) @ root.T
+        moved = shift_of(cases, other.key, grid) @ whiter.T
         if float(np.linalg.norm(moved - own, axis=1).min()) < ALIKE:
             out.append(other)
     return out

@@ -34,6 +34,8 @@ MISMATCH: Mapping[str, tuple[float, float]] = {
     "voltage_order_2": (0.0, 0.006),
     "speed_gain": (0.30, 0.0),  # spikes of a derivative: 20 % off for a drive with hysteresis
     "following_gain": (0.004, 0.0),
+    "current_sideband": (0.0, 0.006),
+    "voltage_sideband": (0.0, 0.006),
 }
 #: Least deviation from run to run, beside what the draws of the model show: another start, counts,
 #: clocks, what the model has not. ASSUMED.
@@ -53,6 +55,8 @@ FLOOR: Mapping[str, tuple[float, float]] = {
     "voltage_order_2": (0.0, 0.002),
     "speed_gain": (0.02, 0.0),
     "following_gain": (0.0005, 0.0),
+    "current_sideband": (0.0, 0.003),
+    "voltage_sideband": (0.0, 0.002),
 }
 
 
@@ -74,6 +78,9 @@ class Healthy:
         Healthy logs of the same test it stands on.
     scale : ndarray, shape (k,)
         Spread over the stated one: what baselines made of it.
+    offset : ndarray, shape (k, k), or None
+        The part of the covariance that is the same in all logs of the unit: what is not known of
+        how far it stands off the model.
     """
 
     names: tuple[str, ...]
@@ -82,6 +89,7 @@ class Healthy:
     degrees: float
     baselines: int
     scale: Floats
+    offset: Floats | None = None
 
 
 #: Evidence that stands off the model by one share in all tests of a unit, and the deviation of
@@ -143,6 +151,7 @@ def healthy(
         DEGREES + max(count - 1, 0),
         count,
         np.sqrt(scale),
+        0.5 * (left + left.T),
     )
 
 

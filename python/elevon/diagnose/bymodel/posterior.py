@@ -59,6 +59,7 @@ def posterior(
     shift: Shift,
     *,
     errors: Floats | None = None,
+    doubt: Callable[[str, float], Floats] | None = None,
     pairs: bool = True,
 ) -> Posterior:
     """Weigh the hypotheses.
@@ -77,12 +78,13 @@ def posterior(
         Key and severities, shape (m,), to what they do to the evidence, shape (m, k).
     errors : ndarray, shape (k,), optional
         Deviation of each number's shift on its own, as a share of it; default: none.
+    doubt : callable, optional
+        Key and severity to a deviation that the fault gives the evidence, shape (k,).
     pairs : bool
         Whether two faults at once are weighed.
     """
-    frame = Frame(
-        rest, covariance, degrees, shift, np.zeros(len(rest)) if errors is None else errors
-    )
+    own = np.zeros(len(rest)) if errors is None else errors
+    frame = Frame(rest, covariance, degrees, shift, own, doubt)
     total = sum(c.rate for c in candidates)
     out = [healthy_alone(frame, 1.0 - PRIOR_FAULTY)]
     for c in candidates:

@@ -56,6 +56,8 @@ class Replay:
         What they do to the evidence; of sizes (`SIZES`) the part at a right angle.
     draws : ndarray, shape (d, k)
         Evidence of healthy units as they differ from run to run.
+    doubts : mapping of str to ndarray, shape (m, k)
+        What severities do to evidence that depends on an angle no log tells, by key: its deviation.
     """
 
     def __init__(
@@ -64,17 +66,29 @@ class Replay:
         severities: Mapping[str, Floats],
         shifts: Mapping[str, Floats],
         draws: Floats,
+        doubts: Mapping[str, Floats] | None = None,
     ) -> None:
         self.healthy = healthy
         self.severities = severities
         self.shifts = shifts
         self.draws = draws
+        self.doubts = {} if doubts is None else doubts
 
     def shift(self, key: str, severity: Floats) -> Floats:
         """Return what severities of shape (m,) do to the evidence, shape (m, k)."""
-        at, table = self.severities[key], self.shifts[key]
-        columns = [np.interp(severity, at, table[:, k]) for k in range(table.shape[1])]
-        return np.column_stack(columns)
+        return _read(self.severities[key], self.shifts[key], severity)
+
+    def doubt(self, key: str, severity: float) -> Floats:
+        """Return the deviation that a severity gives the evidence, shape (k,)."""
+        if key not in self.doubts:
+            return np.zeros(len(self.healthy.names))
+        table = _read(self.severities[key], self.doubts[key], np.array([severity]))
+        return np.asarray(table[0], dtype=np.float64)
+
+
+def _read(at: Floats, table: Floats, severity: Floats) -> Floats:
+    columns = [np.interp(severity, at, column) for column in table.T]
+    return np.asarray(np.column_stack(columns), dtype=np.float64)
 
 
 def logged_evidence(item: TestLog, actuator: Actuator) -> Evidence:
@@ -142,15 +156,17 @@ def _replayed(item: TestLog, actuator: Actuator, candidates: Sequence[Candidate]
     shown = [evidence(run, **constants, deviations=False) for run in _runs(item, units)]
     names = tuple(n for n in shown[0].names if all(n in s.names for s in shown))
     rows = np.array([s.only(names).values for s in shown])
-    shifts, at = {}, 1
+    shifts, doubts, at = {}, {}, 1
     for c in candidates:
         zero = severities[c.key] == 0.0
         table = np.zeros((len(zero), len(names)))
         count = int((~zero).sum())
         table[~zero] = _moved_by(rows[at : at + count], rows[0], names)
-        shifts[c.key] = table
+        shifts[c.key] = table * [n not in c.still and (not c.sure or n in c.sure) for n in names]
+        if c.sure:
+            doubts[c.key] = np.abs(table * [n not in c.sure for n in names])
         at += count
-    return Replay(shown[0].only(names), severities, shifts, rows[at:])
+    return Replay(shown[0].only(names), severities, shifts, rows[at:], doubts)
 
 
 def _moved_by(rows: Floats, healthy: Floats, names: Sequence[str]) -> Floats:

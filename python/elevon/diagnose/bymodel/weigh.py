@@ -15,7 +15,14 @@ import numpy.typing as npt
 
 from elevon.diagnose.bymodel.candidates import Candidate
 
-__all__ = ["Frame", "Hypothesis", "healthy_alone", "one_fault", "two_faults"]
+__all__ = [
+    "Frame",
+    "Hypothesis",
+    "healthy_alone",
+    "one_fault",
+    "prior_density",
+    "two_faults",
+]
 
 Floats = npt.NDArray[np.float64]
 Shift = Callable[[str, Floats], Floats]
@@ -71,6 +78,8 @@ class Frame:
         Key and severities, shape (m,), to shifts, shape (m, k).
     errors : ndarray, shape (k,)
         Deviation of each number's shift on its own, as a share of it.
+    doubt : callable, optional
+        Key and severity to a deviation of the evidence, shape (k,), beside that.
     """
 
     rest: Floats
@@ -78,6 +87,7 @@ class Frame:
     degrees: float
     raw: Shift
     errors: Floats
+    doubt: Callable[[str, float], Floats] | None = None
     root: Floats = field(init=False)
     y: Floats = field(init=False)
     log_det: float = field(init=False)
@@ -106,6 +116,8 @@ class Frame:
         extra = np.zeros(len(self.rest))
         for c, severity in faults:
             extra += (self.errors * self.raw(c.key, np.array([severity]))[0]) ** 2
+            if self.doubt is not None:
+                extra += self.doubt(c.key, severity) ** 2
         return replace(self, covariance=self.covariance + np.diag(extra))
 
     def log(self, rest: Floats, *errors: Floats) -> Floats:
@@ -148,7 +160,7 @@ def one_fault(frame: Frame, c: Candidate, prior: float) -> Hypothesis:
     moved = own.shift(c.key, fine)
     log = own.log(own.y - moved, c.error * moved)
     top = float(log.max())
-    mass = np.exp(log - top) * np.gradient(fine) * _before(c, fine)
+    mass = np.exp(log - top) * np.gradient(fine) * prior_density(c, fine)
     total = float(mass.sum())
     evidence = top + float(np.log(total))
     best = float(fine[int(np.argmax(log))])
@@ -166,7 +178,7 @@ def two_faults(frame: Frame, pair: tuple[Candidate, Candidate], prior: float) ->
     grids = [_around(b, 1.5 * w, c, _PAIR) for b, w, c in zip(at, widths, pair, strict=True)]
     log = _of_both(own, pair, own.shift(first.key, grids[0]), own.shift(second.key, grids[1]))
     top = float(log.max())
-    sides = [np.gradient(g) * _before(c, g) for g, c in zip(grids, pair, strict=True)]
+    sides = [np.gradient(g) * prior_density(c, g) for g, c in zip(grids, pair, strict=True)]
     mass = np.exp(log - top) * np.outer(*sides)
     total = float(mass.sum())
     peak = np.unravel_index(int(np.argmax(log)), log.shape)
@@ -180,7 +192,7 @@ def two_faults(frame: Frame, pair: tuple[Candidate, Candidate], prior: float) ->
     )
 
 
-def _before(c: Candidate, severity: Floats) -> Floats:
+def prior_density(c: Candidate, severity: Floats) -> Floats:
     """Density of a severity before the log: it grows, so each passes the small ones first.
 
     Proportional to 1/(|s| + s0) over the range, s0 a part of it: as often in each octave, but for

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from elevon.diagnose.bymodel.answer import Cause, Diagnosis
 
-__all__ = ["sentence", "severity_text"]
+__all__ = ["UNEXPLAINED", "sentence", "severity_text"]
 
 _NAMES = {
     "play@transmission": "Play has grown by",
@@ -21,7 +21,13 @@ _NAMES = {
     "gain_drift@control.position": "The position gain has drifted by",
     "gain_drift@control.speed": "The speed gain has drifted by",
     "gain@sensor.encoder": "The encoder's gain is off by",
+    "gain@sensor.current_a": "The gain of one current sensor is off by",
+    "eccentricity_dynamic@motor": "The rotor turns out of centre (dynamic) by",
+    "tooth_wear@gear": "Worn teeth have added a play of",
+    "sag@supply": "The supply has lost",
+    "bearing@bearing.outer": "A bearing has a defect of",
 }
+UNEXPLAINED = "does not explain"  # of the finding that the named faults leave a rest
 
 
 def severity_text(value: float, unit: str) -> str:
@@ -35,6 +41,12 @@ def severity_text(value: float, unit: str) -> str:
 
 def sentence(result: Diagnosis) -> str:
     """Return the answer in one sentence or two."""
+    left = any(UNEXPLAINED in text for text in result.findings)
+    if result.status == "healthy" and left:
+        return (
+            "No fault that is weighed stands out, but these are not logs of the healthy unit "
+            f"either: {next(t for t in result.findings if UNEXPLAINED in t)}."
+        )
     if result.status == "healthy":
         return (
             f"Nothing here is beyond a healthy unit: it deviates as much in "
@@ -45,7 +57,7 @@ def sentence(result: Diagnosis) -> str:
     parts = [_clause(key, causes[key]) for key in result.best if key in causes]
     rest = (
         "nothing else is needed to explain the logs"
-        if not any("does not explain" in text for text in result.findings)
+        if not left
         else "but that does not explain all of the logs"
     )
     return f"{' and '.join(parts)}; {rest} (probability {result.p_best:.3g})."

@@ -58,8 +58,9 @@ def planned(profile: Profile, actuator: Actuator, candidates: Sequence[Candidate
 def _frame(case: Case, possible: Possible, severity: Floats) -> Frame:
     """Return what whitens the evidence under a set of faults: the model's own errors with it."""
     plain = Frame(
-        np.zeros(len(case.unit.names)), case.covariance, case.unit.degrees, case.shift, case.errors
-    )
+        np.zeros(len(case.unit.names)), case.covariance, case.unit.degrees, case.shift,
+        case.errors, case.doubt,
+    )  # fmt: skip
     typical = [
         (_KNOWN[key], centre if np.isfinite(deviation) else float(np.mean(severity[:, k])))
         for k, (key, centre, deviation) in enumerate(

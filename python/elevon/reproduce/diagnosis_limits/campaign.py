@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.diagnose.bymodel import TestLog
 
-__all__ = ["Campaign", "run_campaign"]
+__all__ = ["Campaign", "calibrated", "run_campaign"]
 
 BLOCK = 16  # logs that are simulated together
 _LOG = "finished.log"
@@ -104,7 +104,7 @@ def _unit_rows(
         unit = draw_unit(seed, number)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ElevonWarning)
-            actuator, baselines = _calibrated(unit, seed, part(progress, 0.0, 0.2))
+            actuator, baselines = calibrated(unit, seed, part(progress, 0.0, 0.2))
             for k in range(0, len(missing), BLOCK):
                 block = missing[k : k + BLOCK]
                 share = part(progress, *(0.2 + 0.8 * x / len(missing) for x in (k, k + len(block))))
@@ -115,7 +115,7 @@ def _unit_rows(
     return [rows[p.trial.name] for p in wanted]
 
 
-def _calibrated(unit: Unit, seed: int, progress: Progress | None) -> tuple[Actuator, list[TestLog]]:
+def calibrated(unit: Unit, seed: int, progress: Progress | None) -> tuple[Actuator, list[TestLog]]:
     """One healthy log a test, each of a day of its own: calibration, then baselines."""
     from elevon.actuator import Actuator
     from elevon.calibrate.calibration import calibrate

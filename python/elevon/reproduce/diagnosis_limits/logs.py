@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from elevon.diagnose.bymodel.log import TestLog
     from elevon.progress import Progress
 
-__all__ = ["TESTS", "Trial", "bench_logs"]
+__all__ = ["STREAM", "TESTS", "Trial", "bench_logs"]
 
 _SINE = {"kind": "sine", "amplitude": "7 deg", "bias": "10 deg", "frequency": "0.2 Hz"}
 _SLOW = {"kind": "sine", "amplitude": "45 deg", "bias": "60 deg", "frequency": "0.05 Hz"}
@@ -38,6 +38,10 @@ TESTS: dict[str, tuple[dict[str, Any], ...]] = {
     "loaded": (_BRAKE, {"kind": "trace", "command": {"terms": [_SLOW]}}),
 }
 
+STREAM = "stream"  # the no-load test for 100 s: what a monitor watches
+_STEPS = {**TESTS, STREAM: TESTS["noload"]}
+_DURATION = {STREAM: "100 s"}
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -48,7 +52,7 @@ class Trial:
     name : str
         Of the log, and its key in what is finished.
     test : str
-        Key of `TESTS`.
+        Key of `TESTS`, or `STREAM`.
     faults : tuple of str
         As in ``--fault``.
     seed : int
@@ -93,6 +97,6 @@ def bench_logs(
 def _procedure(test: str) -> Procedure:
     from elevon.bench.procedure import Procedure
 
-    steps = [dict(step) for step in TESTS[test]]
-    steps[-1] |= {"name": test, "duration": "20 s"}
+    steps = [dict(step) for step in _STEPS[test]]
+    steps[-1] |= {"name": test, "duration": _DURATION.get(test, "20 s")}
     return Procedure.model_validate({"name": test, "step": steps})

@@ -1,0 +1,141 @@
+"""What healthy windows of a stream show, and what each fault does to them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.diagnose.bymodel.candidates import Candidate
+from elevon.diagnose.bymodel.case import Case
+from elevon.diagnose.bymodel.evidence import Evidence
+from elevon.diagnose.bymodel.healthy import DEGREES, healthy
+from elevon.diagnose.bymodel.log import RUN_IN, TestLog, prepared
+from elevon.diagnose.bymodel.replay import replay
+from elevon.diagnose.monitor.filter import Spread
+from elevon.diagnose.monitor.windows import cut, stretch, window_evidence
+from elevon.errors import InputError
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["MEMORY", "Reference", "reference"]
+
+Floats = npt.NDArray[np.float64]
+MEMORY = 3600.0  # s, ASSUMED: time in which a day's temperatures and friction become another day's
+_MODELLED = 20.0  # s of a baseline that the model runs
+_LEAST = 3  # windows of the baselines together
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A healthy unit's windows, each number in units of `scale`.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The evidence.
+    case : Case
+        Healthy unit and faults, SI.
+    spread : Spread
+        Of healthy windows.
+    scale : ndarray, shape (k,)
+        Deviation of a healthy window, SI.
+    directions : ndarray, shape (d, k)
+        What the severities that were run do.
+    windows : int
+        Of the baselines.
+    """
+
+    names: tuple[str, ...]
+    case: Case
+    spread: Spread
+    scale: Floats
+    directions: Floats
+    windows: int
+
+    @property
+    def noise_degrees(self) -> float:
+        """How well the noise of windows is known, in degrees of freedom."""
+        return DEGREES + self.windows - 1
+
+    def rest(self, shown: Evidence) -> Floats:
+        """Return a window's evidence less the healthy mean, NaN where it is not there."""
+        known = dict(zip(shown.names, shown.values.tolist(), strict=True))
+        values = np.array([known.get(name, np.nan) for name in self.names])
+        return (values - self.case.unit.mean) / self.scale
+
+    def shift(self, key: str, severity: Floats) -> Floats:
+        """Return what severities, shape (m,), do to a window, shape (m, k)."""
+        return self.case.shift(key, severity) / self.scale
+
+
+def reference(
+    actuator: Actuator,
+    baselines: Sequence[TestLog],
+    candidates: Sequence[Candidate],
+    width: float,
+) -> Reference:
+    """Join the model's spread with the windows of the baselines.
+
+    Raises
+    ------
+    InputError
+        Fewer than three windows in which the unit moves.
+    """
+    shown = [
+        [e for _, w in cut(b, width, start=RUN_IN) if (e := window_evidence(w, actuator))]
+        for b in baselines
+    ]
+    count = sum(map(len, shown))
+    if count < _LEAST:
+        raise InputError(
+            f"the baselines have {count} windows of {width:g} s in which the unit moves both "
+            f"ways; {_LEAST} are needed, better thirty"
+        )
+    shown = [own for own in shown if own]
+    reach = max(_MODELLED, 2.0 * width) + RUN_IN
+    model = replay(prepared(stretch(baselines[0], 0.0, reach), actuator), actuator, candidates)
+    names = [n for n in model.healthy.names if all(n in e.names for own in shown for e in own)]
+    rows = [np.array([e.only(names).values for e in own]) for own in shown]
+    noise = _noise(rows, np.array([e.only(names).std for own in shown for e in own]))
+    means = [
+        Evidence(tuple(names), own.mean(axis=0), np.sqrt(np.diag(noise) / len(own))) for own in rows
+    ]
+    unit = healthy(model, names, means)
+    case = Case(baselines[0].name, replace(means[0]), unit, model)
+    return _scaled(case, noise, width, candidates, count)
+
+
+def _noise(rows: Sequence[Floats], std: Floats) -> Floats:
+    """Covariance from window to window.
+
+    The baselines' scatter, and what each window says of itself, worth `DEGREES` windows.
+    """
+    scatter = sum((own - own.mean(axis=0)).T @ (own - own.mean(axis=0)) for own in rows)
+    free = sum(len(own) - 1 for own in rows)
+    own = np.diag(np.mean(std**2, axis=0))
+    return np.asarray((DEGREES * own + scatter) / (DEGREES + free))
+
+
+def _scaled(
+    case: Case, noise: Floats, width: float, candidates: Sequence[Candidate], count: int
+) -> Reference:
+    unit = case.unit
+    assert unit.offset is not None
+    scale = np.sqrt(np.diag(unit.covariance) + np.diag(noise))
+    outer = np.outer(scale, scale)
+    memory = float(np.exp(-width / MEMORY))
+    day = unit.covariance - unit.offset
+    spread = Spread(unit.offset / outer, day / outer, noise / outer, memory)
+    rows = []
+    for c in candidates:
+        at = case.model.severities[c.key]
+        rows.append(case.shift(c.key, at[at != 0.0]) / scale)
+    directions = np.vstack(rows)
+    size = np.linalg.norm(directions, axis=1)
+    seen = size > 1e-6
+    return Reference(unit.names, case, spread, scale, directions[seen] / size[seen, None], count)

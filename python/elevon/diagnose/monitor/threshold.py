@@ -1,0 +1,119 @@
+"""Thresholds at a set mean time between false alarms, from simulated healthy streams."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.diagnose.bymodel.healthy import DEGREES
+from elevon.diagnose.monitor.filter import ChangeFilter, Spread
+
+__all__ = ["Thresholds", "simulated"]
+
+Floats = npt.NDArray[np.float64]
+STREAMS = 2000
+_TAIL = 0.05  # share of the streams that gives the tail
+_LEAST = 10  # streams above a threshold that is read off; beyond, the tail is drawn on
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """Of the log likelihood ratio.
+
+    Attributes
+    ----------
+    opening, within : float
+        For a fault there from a day's first window on, and for one that begins within a day.
+        Half of the false alarms come from either.
+    beyond : bool
+        Whether the set time is longer than what was simulated, so that a tail was drawn on.
+    """
+
+    opening: float
+    within: float
+    beyond: bool
+
+
+def simulated(
+    spread: Spread,
+    directions: Floats,
+    *,
+    days: int,
+    windows: int,
+    width: float,
+    time: float,
+    noise_degrees: float,
+    last: int,
+) -> Thresholds:
+    """Return thresholds at which healthy streams alarm once in a mean time.
+
+    Parameters
+    ----------
+    spread : Spread
+        Of healthy windows; the unit's and the day's part are known to `DEGREES` degrees of
+        freedom, the noise to `noise_degrees`, so a stream's own spread is drawn, too.
+    directions : ndarray, shape (d, k)
+        As for `ChangeFilter`.
+    days, windows : int
+        Of a stream: days, and windows in each.
+    width : float
+        Of a window [s].
+    time : float
+        Mean time between false alarms [s].
+    last : int
+        As for `ChangeFilter`.
+    """
+    rng = np.random.default_rng(1576)
+    draw = _Drawn(spread, noise_degrees, rng)
+    watch = ChangeFilter(spread, directions, streams=STREAMS, last=last)
+    top = [np.zeros(STREAMS), np.zeros(STREAMS)]
+    for _ in range(days):
+        watch.new_day()
+        for shown in draw.day(windows):
+            watch.step(shown)
+            top = [np.maximum(a, b) for a, b in zip(top, watch.ratios(), strict=True)]
+    chance = -np.expm1(-0.5 * days * windows * width / time)
+    levels = [_level(values, float(chance)) for values in top]
+    return Thresholds(levels[0], levels[1], bool(chance * STREAMS < _LEAST))
+
+
+def _level(values: Floats, chance: float) -> float:
+    """Level that a stream exceeds with this chance; a power law where that is too seldom."""
+    ranked = np.sort(values)[::-1]
+    if chance * len(ranked) >= _LEAST:
+        return float(np.quantile(values, 1.0 - chance))
+    count = int(_TAIL * len(ranked))
+    bend = float(np.mean(np.log(ranked[:count] / ranked[count])))  # Hill (1975)
+    return float(ranked[count] * (_TAIL / chance) ** bend)
+
+
+class _Drawn:
+    """Healthy streams."""
+
+    def __init__(self, spread: Spread, noise_degrees: float, rng: np.random.Generator) -> None:
+        self._rng, self._memory = rng, spread.memory
+        self._day, self._noise = _root(spread.day), _root(spread.noise)
+        self._slow, self._fast = self._scale(DEGREES), self._scale(noise_degrees)
+        self._unit = self._slow * self._normal(_root(spread.unit))
+
+    def _scale(self, degrees: float) -> Floats:
+        return np.asarray(np.sqrt(degrees / self._rng.chisquare(degrees, (STREAMS, 1))))
+
+    def _normal(self, root: Floats) -> Floats:
+        return np.asarray(self._rng.standard_normal((STREAMS, len(root))) @ root.T)
+
+    def day(self, windows: int) -> list[Floats]:
+        """Return the windows of one day, shape (m, k) each."""
+        out, own = [], self._slow * self._normal(self._day)
+        renewed = np.sqrt(1.0 - self._memory**2)
+        for _ in range(windows):
+            out.append(self._unit + own + self._fast * self._normal(self._noise))
+            own = self._memory * own + renewed * self._slow * self._normal(self._day)
+        return out
+
+
+def _root(covariance: Floats) -> Floats:
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))

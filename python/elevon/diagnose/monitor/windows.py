@@ -1,0 +1,135 @@
+"""Windows of a stream: stretches of a log, and the evidence of each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.diagnose.bymodel.command import noted_command
+from elevon.diagnose.bymodel.evidence import Evidence
+from elevon.diagnose.bymodel.log import TestLog
+from elevon.diagnose.bymodel.replay import logged_evidence
+from elevon.errors import InputError
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.logs.command.note import CommandNote
+
+__all__ = ["CHANNELS", "cut", "motion", "of_samples", "period", "stretch", "window_evidence"]
+
+Floats = npt.NDArray[np.float64]
+_LEAST = 400  # samples of a window that may be used
+_MOVING = 0.1  # of the highest speed
+#: Signals of a stream, by the names they have everywhere, and the field of a log each fills.
+CHANNELS: Mapping[str, str] = {
+    "encoder_position": "user",
+    "resolver_position": "motor",
+    "speed_ref": "speed_ref",
+    "motor_speed": "speed",
+    "current_ref": "current_target",
+    "current_q_meas": "current",
+}
+
+
+def period(item: TestLog, window: float | None) -> float:
+    """Return the width of a window [s]: the one given, or one period of a noted sine.
+
+    Raises
+    ------
+    InputError
+        Neither is there, or a window is not positive.
+    """
+    if window is not None:
+        if not window > 0.0:
+            raise InputError(f"window of {window:g} s: must be above zero")
+        return window
+    note = item.log.note
+    frequency = note.parameters.get("frequency", 0.0) if note is not None else 0.0
+    if note is None or note.waveform != "sine" or not frequency > 0.0:
+        raise InputError(
+            f"{item.name}: its note names no sine, so the window must be given: one period of the "
+            "motion, or a whole number of them"
+        )
+    return 1.0 / frequency
+
+
+def cut(item: TestLog, width: float, *, start: float = 0.0) -> Iterator[tuple[float, TestLog]]:
+    """Yield the whole windows of a log, each with the instant it begins [s]."""
+    first = start
+    while first + width <= item.log.duration + item.log.period:
+        yield first, stretch(item, first, first + width)
+        first += width
+
+
+def stretch(item: TestLog, first: float, last: float) -> TestLog:
+    """Return a part of a log, on a clock of its own."""
+    log = item.log
+    at = (log.time >= first) & (log.time < last)
+    brake = log.brake
+    if len(brake.time):
+        near = (brake.time >= first - 1.0) & (brake.time <= last + 1.0)
+        brake = replace(brake, time=brake.time[near] - first, level=brake.level[near])
+    part = replace(
+        log,
+        start=log.start + first,
+        time=log.time[at] - first,
+        speed_ref=log.speed_ref[at],
+        speed=log.speed[at],
+        current=log.current[at],
+        current_target=log.current_target[at],
+        motor=None if log.motor is None else log.motor[at],
+        user=None if log.user is None else log.user[at],
+        brake=brake,
+        good=log.good[at],
+    )
+    return TestLog(part, None if item.voltage is None else item.voltage[at])
+
+
+def window_evidence(item: TestLog, actuator: Actuator) -> Evidence | None:
+    """Return the evidence of a window; None where it does not move both ways or lacks samples."""
+    log = item.log
+    if log.user is None or log.motor is None:
+        raise InputError(f"{item.name}: watching needs both positions")
+    good = log.good & np.isfinite(log.motor) & np.isfinite(log.user)
+    top = float(np.abs(log.speed[good]).max()) if good.any() else 0.0
+    ways = [int((good & (way * log.speed > _MOVING * top)).sum()) for way in (1.0, -1.0)]
+    if good.sum() < _LEAST or top < 1.0 or min(ways) < _LEAST // 4:
+        return None
+    noted = noted_command(log, actuator.parameters.value("control.speed_limit"))
+    gain = None if noted is None else (noted.gain, noted.gain_std)
+    return logged_evidence(TestLog(log, item.voltage, gain, None, good), actuator)
+
+
+def motion(item: TestLog) -> tuple[float, float, float]:
+    """Return what tells one motion from another: spread of position, RMS speed, brake's mean."""
+    log = item.log
+    assert log.user is not None
+    brake = float(np.mean(log.brake.level)) if item.braked and len(log.brake.level) else 0.0
+    speed = float(np.sqrt(np.nanmean(log.speed**2)))
+    return float(np.nanstd(log.user)), speed, brake
+
+
+def of_samples(samples: Mapping[str, Floats], note: CommandNote | None, name: str) -> TestLog:
+    """Return the log of samples, shape (n,) each, SI.
+
+    `time`, `CHANNELS`, and where there are any ``voltage_q_ref`` and ``brake_torque``.
+    """
+    from elevon.calibrate.brake_level import Brake
+    from elevon.calibrate.log import BenchLog
+
+    time = samples["time"] - samples["time"][0]
+    level = samples.get("brake_torque")
+    brake = (
+        Brake("off", np.zeros(0), np.zeros(0)) if level is None else Brake("torque", time, level)
+    )
+    fields = {field: samples[signal] for signal, field in CHANNELS.items()}
+    good = np.all([np.isfinite(values) for values in fields.values()], axis=0)
+    log = BenchLog(
+        name=name, start=float(samples["time"][0]), time=time, current_signal="current_q_meas",
+        brake=brake, note=note, good=good, warnings=(), **fields,
+    )  # fmt: skip
+    return TestLog(log, samples.get("voltage_q_ref"))
