@@ -114,7 +114,8 @@ def test_evidence_without_deviations_is_the_same(unit, logs):
     about = {"ratio": value("gear.ratio"), "pole_pairs": value("motor.pole_pairs"), "emf": 1.0}
     whole = evidence(signals, **about)
     quick = evidence(signals, **about, deviations=False, shaft=False)
-    assert set(whole.names) - set(quick.names) == {"current_shaft"}
+    turning = {"current_shaft", "current_sideband", "voltage_sideband"}
+    assert set(whole.names) - set(quick.names) == turning
     np.testing.assert_allclose(quick.values, whole.only(quick.names).values, rtol=1e-9)
     assert (whole.std > 0.0).all()
     assert np.isnan(quick.std[:-1]).all()  # the position gain's is given
