@@ -10,10 +10,13 @@ import pytest
 
 from elevon import Actuator
 from elevon.calibrate.closed_loop import LoopLog, calibrate_loop, predict
-from elevon.calibrate.closed_loop.fit import Searched, choose, final_fit
-from elevon.calibrate.closed_loop.free import free_list, inner
+from elevon.calibrate.closed_loop.exchange import exchanged
+from elevon.calibrate.closed_loop.fit import Fitted, Searched, choose, final_fit
+from elevon.calibrate.closed_loop.free import asked_for, free_list, inner
 from elevon.calibrate.closed_loop.held_out import held_out_errors
 from elevon.calibrate.closed_loop.intervals import known
+from elevon.calibrate.closed_loop.model import LoopModel
+from elevon.calibrate.closed_loop.objective import Objective
 from elevon.calibrate.closed_loop.refine import load_share, steps
 from elevon.calibrate.closed_loop.result import agreement
 from elevon.cli.closed_loop import calibrate_closed_loop, check_loop_options
@@ -60,7 +63,18 @@ def test_a_step_of_the_demand_stays_a_step_and_a_slope_a_slope():
     stepped = table(np.where(time < 1.0, 0.0, 0.03))
     assert np.interp(0.9985, *stepped.table) == 0.0
     fast = table(0.012 * np.sin(2 * np.pi * 1.6 * time))
-    assert len(fast.table[0]) == len(time)
+    times, values = fast.table
+    assert np.diff(times).min() > 0.003, "no jump"
+    assert values == pytest.approx(0.012 * np.sin(2 * np.pi * 1.6 * times), abs=1e-6)
+
+
+def test_between_samples_the_demand_has_no_corners():
+    """A derivative on the error would make of them a current that steps in time with the log."""
+    time = 0.01 * np.arange(200)
+    times, values = table(np.sin(10.0 * time)).table
+    bends = np.abs(np.diff(np.diff(values) / np.diff(times)))
+    straight = np.abs(np.diff(np.diff(np.sin(10.0 * time)) / 0.01))
+    assert np.max(bends) < 0.5 * np.max(straight)
 
 
 def test_what_cannot_be_a_log_is_refused():
@@ -114,11 +128,47 @@ def test_friction_grows_with_the_torque_unless_the_set_says_how_it_does(known_dr
 
 
 def test_a_step_that_stands_for_a_late_drive_is_short_against_the_log(known_drive):
-    base, data = known_drive
+    carrier, data = known_drive
+    assert steps(carrier, [data]) == [1e-3], "its current loop's lag is fitted"
+    assert "pwm.proportional_gain" in {item.path for item in free_list(carrier, [data], "pid", {})}
+    base = carrier.with_values({"drive.kind": "hysteresis"})
     assert steps(base, [data]) == [5e-4, 1e-3, 2e-3]
     slow = replace(data, time=2.0 * data.time)
     assert steps(base, [slow]) == [5e-4, 1e-3, 2e-3, 3e-3]
     assert steps(base.with_values({"low.step": 4e-3}), [slow]) == [4e-3]
+
+
+def test_a_filtered_speed_is_a_lag_and_not_only_a_delay(known_drive):
+    base, data = known_drive
+    model = LoopModel(base, [data], "pid")
+    plain, late = (
+        model.simulate([{"sensor.speed_lag": lag}])[0][0]["speed"] for lag in (0.0, 0.02)
+    )
+    area = float(np.sum(np.abs(plain))) * 0.01
+    assert np.max(np.abs(late)) < np.max(np.abs(plain))
+    assert float(np.sum(np.abs(late))) * 0.01 == pytest.approx(area, rel=0.02)
+
+
+def test_gains_that_change_places_are_both_named():
+    """With a feed-forward of one, k_v/N = 30 and T_i = 1/40 s cannot be told from 40 and 1/30 s."""
+    base, data = datasheet(CASCADE), loop("sweep", log(CASCADE, sweep, 8.0))
+    turns = CASCADE.per_metre
+    own = {"control.position_gain": 30.0 * turns, "control.integral_time": 1.0 / 40.0}
+    drive = base.with_values(
+        {**own, "control.speed_feedforward": 1.0, "control.speed_gain": 0.01,
+         "control.structure": "cascade", "control.speed_limit": 1e3}
+    )  # fmt: skip
+    free = asked_for(free_list(drive, [data], "cascade", {}), list(own))
+    free = [item for item in free if item.path in own]
+    shown = LoopModel(drive, [data], "cascade").simulate([own])[0][0]
+    objective = Objective(LoopModel(drive, [replace(data, signals=shown)], "cascade"), free)
+    swapped = {"control.position_gain": 40.0 * turns, "control.integral_time": 1.0 / 30.0}
+    settled, reasons = exchanged(Fitted(objective, inner(free, swapped)), drive)
+    assert settled.values == pytest.approx(own), "the pair nearer to the set"
+    assert reasons.keys() == own.keys()
+    assert all("cannot be separated" in reason for reason in reasons.values())
+    slow = drive.with_values({"control.speed_feedforward": 0.0})
+    assert exchanged(settled, slow)[1] == {}
 
 
 @pytest.fixture(scope="module")

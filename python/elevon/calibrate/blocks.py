@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["block_covariance", "block_length", "stroke_blocks"]
+__all__ = ["block_covariance", "block_length", "memory", "stroke_blocks"]
 
 Floats = npt.NDArray[np.float64]
 _SHORTEST = 0.25  # s
@@ -22,19 +22,24 @@ _MEMORY = 4.0  # correlation times a block is at least
 _FEWEST = 8  # blocks a log
 
 
-def block_length(residual: Floats, period: float) -> float:
-    """Length of a block [s]: several correlation times of a residual, shape (n,)."""
+def memory(residual: Floats) -> float:
+    """Samples of a coloured residual, shape (n,), that count as one."""
     centred = residual - residual.mean()
     power = float(centred @ centred)
     if power == 0.0:
-        return _SHORTEST
+        return 1.0
     size = 1 << (2 * len(centred) - 1).bit_length()
     spectrum = np.fft.rfft(centred, size)
     correlation = np.fft.irfft(np.abs(spectrum) ** 2, size)[: len(centred) // 4] / power
     below = np.flatnonzero(correlation < 0.05)
     last = int(below[0]) if below.size else len(correlation)
-    time = period * (0.5 + float(np.sum(correlation[1:last])))
-    longest = period * len(centred) / _FEWEST
+    return 1.0 + 2.0 * float(np.sum(correlation[1:last]))
+
+
+def block_length(residual: Floats, period: float) -> float:
+    """Length of a block [s]: several correlation times of a residual, shape (n,)."""
+    time = 0.5 * period * memory(residual)
+    longest = period * len(residual) / _FEWEST
     return float(min(max(_SHORTEST, _MEMORY * time), longest))
 
 

@@ -20,14 +20,14 @@ from elevon.calibrate.closed_loop.start import cloud, first_values, windows
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["Fitted", "Searched", "as_given", "choose", "final_fit", "search"]
+__all__ = ["DECIDED", "Fitted", "Searched", "as_given", "choose", "final_fit", "search"]
 
 Floats = npt.NDArray[np.float64]
 Check = Callable[[], bool]
 _STARTS = 32
 _KEEP = 3
 _MEMORY = 0.5  # s, of residuals
-_DECIDED = 3.0  # of the log-likelihood of held-out data, in nats, between two structures
+DECIDED = 3.0  # of the log-likelihood of held-out data, in nats, between two structures
 
 
 @dataclass(frozen=True)
@@ -74,10 +74,14 @@ def search(
     structure: str,
     *,
     seed: int = 0,
+    alone: bool = False,
     check: Check = lambda: True,
     advance: Callable[[float], object] = lambda _f: None,
 ) -> Searched:
-    """Search one structure on windows of the logs, and predict each window from the others."""
+    """Search one structure on windows of the logs, and predict each window from the others.
+
+    What is left out is not predicted where there is no other structure to compare with (`alone`).
+    """
     whole = LoopModel(actuator, logs, structure, check)
     parts = windows(logs, whole.per_output)
     free = free_list(actuator, logs, structure, first_values(whole))
@@ -92,7 +96,7 @@ def search(
         points = solve(objective, np.array([point.x for point in points[:2]]), rounds=6)
     best = points[0].x
     advance(0.7)
-    score, runs = _held_out(model, free, best)
+    score, runs = (math.nan, 0) if alone else _held_out(model, free, best)
     advance(1.0)
     return Searched(structure, tuple(free), best, score, model.runs + runs)
 
@@ -162,7 +166,7 @@ def choose(searched: Sequence[Searched]) -> tuple[Searched, str]:
     if len(order) == 1:
         return best, "as given"
     gap = best.held_out - order[1].held_out
-    if gap < _DECIDED:
+    if gap < DECIDED:
         return best, (
             f"not decided: the logs held out are {gap:.1f} nats more likely than with "
             f"{order[1].structure}"

@@ -16,15 +16,28 @@ from elevon.errors import unknown
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["LOAD_SHARE", "STRUCTURES", "Free", "asked_for", "free_list", "in_set", "inner", "outer"]
+__all__ = [
+    "CURRENT_GAIN",
+    "LOAD_SHARE",
+    "STRUCTURES",
+    "Free",
+    "asked_for",
+    "free_list",
+    "in_set",
+    "inner",
+    "outer",
+]
 
 Floats = npt.NDArray[np.float64]
 
 STRUCTURES = ("cascade", "pid")
+_LATEST = 2e-2  # s, lag of a current loop
 #: Static over dynamic friction: the fit's own variable, so that rest never holds less.
 STICK = "friction.stick"
 #: Friction per torque of the motor, where the law knows of it.
 LOAD_SHARE = "friction.load_motor"
+#: Of the current loop: its lag stands for all that the drive waits.
+CURRENT_GAIN = "pwm.proportional_gain"
 
 
 @dataclass(frozen=True)
@@ -34,7 +47,7 @@ class Free:
     Attributes
     ----------
     path : str
-        Parameter path, ``friction.stick``, ``sensor.CHANNEL_delay`` or ``sensor.CHANNEL_offset``.
+        Parameter path, ``friction.stick``, ``sensor.CHANNEL_delay``, ``_lag`` or ``_offset``.
     unit, register : str
         SI unit and register, for the report.
     log_scale : bool
@@ -82,7 +95,7 @@ def outer(free: Sequence[Free], x: Floats) -> dict[str, float]:
 
 def in_set(path: str) -> bool:
     """Whether a parameter set has a place for it."""
-    return not path.startswith("sensor.") or not path.endswith(("_delay", "_offset"))
+    return not path.startswith("sensor.") or not path.endswith(("_delay", "_offset", "_lag"))
 
 
 def free_list(
@@ -94,7 +107,7 @@ def free_list(
     """
     channels = {name for log in logs for name in log.signals}
     items = [*_plant(actuator), *_controller(actuator, structure)]
-    items += _limits(channels)
+    items += [*_current_loop(actuator), *_limits(channels)]
     return [_started(item, actuator, starts) for item in items] + _shown(logs, channels)
 
 
@@ -157,6 +170,16 @@ def _controller(actuator: Actuator, structure: str) -> list[Free]:
     ]
 
 
+def _current_loop(actuator: Actuator) -> list[Free]:
+    """How late the drive acts (reads, waits, holds), as the lag of its current loop."""
+    own = actuator.parameters.value(CURRENT_GAIN)
+    slowest = actuator.parameters.value("motor.winding_inductance") / _LATEST
+    if str(actuator.parameters["drive.kind"].value) != "pwm" or not own > slowest:
+        return []
+    # What waits only adds to the lag that the loop has of its own.
+    return [_row(CURRENT_GAIN, "V/A", "controller", 1.0, (slowest, own))]
+
+
 def _limits(channels: set[str]) -> list[Free]:
     rows = [_row("inverter.supply_voltage", "V", "plant", 0.2, (1e-1, 1e5))]
     if "current" in channels:
@@ -177,6 +200,10 @@ def _shown(logs: Sequence[LoopLog], channels: set[str]) -> list[Free]:
                 f"sensor.{name}_delay", "s", "sensor", False, 0.5 * period, late, -late, 20.0 * late
             )
         )
+        if name in {"speed", "motor_speed"}:
+            rows.append(
+                Free(f"sensor.{name}_lag", "s", "sensor", False, 0.0, late, 0.0, 20.0 * late)
+            )
         size = max(log.sigma(name) for log in logs if name in log.signals)
         if size > 0.0 and not any(log.magnitude for log in logs if name == "current"):
             step = 0.1 * size

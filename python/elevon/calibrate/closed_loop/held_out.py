@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.calibrate.closed_loop.fit import Fitted
+from elevon.calibrate.closed_loop.free import in_set
 from elevon.calibrate.closed_loop.log import LoopLog
 from elevon.calibrate.closed_loop.model import LoopModel
 from elevon.calibrate.closed_loop.objective import Objective
@@ -57,7 +58,7 @@ def held_out_errors(fitted: Fitted, transient: float = TRANSIENT) -> Validation:
     shown = {
         path.removeprefix("sensor."): value
         for path, value in fitted.values.items()
-        if path.startswith("sensor.") and path.endswith(("_delay", "_offset"))
+        if not in_set(path)
     }
     return Validation(
         objective.model.actuator.name, "low", transient, tuple(errors),

@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from elevon.calibrate.blocks import block_length
 from elevon.calibrate.closed_loop.fit import Fitted
-from elevon.calibrate.closed_loop.free import Free
+from elevon.calibrate.closed_loop.free import CURRENT_GAIN, Free
 from elevon.calibrate.closed_loop.model import LoopModel
-from elevon.calibrate.closed_loop.objective import SOFT, Objective
+from elevon.calibrate.closed_loop.objective import Objective
 from elevon.calibrate.closed_loop.refine import FALL
 from elevon.calibrate.closed_loop.solve import Point, jacobian
 
@@ -74,7 +74,7 @@ def known(fitted: Fitted) -> tuple[list[Known], float]:
     residual = objective.residual(x[None, :])[0]
     point = Point(x, residual, objective.cost(residual, x))
     jac = jacobian(objective, [point], central=True)[0]
-    weight = 1.0 / np.sqrt(1.0 + (residual / SOFT) ** 2)
+    weight = objective.weight(residual)
     belief = objective.belief**2 * np.eye(len(x))
     normal = jac.T @ (weight[:, None] * jac) + belief
     bread = np.linalg.inv(normal)
@@ -148,7 +148,8 @@ def _choices(objective: Objective, point: Point, gain: Floats) -> Floats:
 
     The friction may fall with speed or grow with the torque (where it does, fall over half or twice
     the speed), and a drive acts some time after it has read. Each alternative is run once at the
-    same values; the late drive as a longer step of the model, its effect scaled to `_LATE`.
+    same values; the late drive as a longer step of the model, its effect scaled to `_LATE` where
+    the lag of the current loop was not fitted.
     """
     model = objective.model
     speed = max(float(np.nanmax(np.abs(log.motion(model.per_output)[0]))) for log in model.logs)
@@ -165,6 +166,7 @@ def _choices(objective: Objective, point: Point, gain: Floats) -> Floats:
             {"friction.law": law, "friction.stribeck_speed": FALL * speed}
             for law in ("stribeck", "load_dependent")
         ]
+    lags = any(item.path == CURRENT_GAIN for item in objective.free)
     total = np.zeros((gain.shape[0], gain.shape[0]))
     for changes in alternatives:
         other = model.actuator.with_values(changes, source="calibration")
@@ -172,7 +174,8 @@ def _choices(objective: Objective, point: Point, gain: Floats) -> Floats:
         run = Objective(beside, objective.free)
         run.scales = objective.scales
         moved = gain @ (run.residual(point.x[None, :])[0] - point.residual)
-        moved = moved * (_LATE / later if "low.step" in changes else 1.0)
+        if "low.step" in changes and not lags:
+            moved = moved * (_LATE / later)
         total += np.outer(moved, moved)
     return total
 

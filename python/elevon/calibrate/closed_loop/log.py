@@ -40,6 +40,7 @@ ROLES: dict[str, tuple[str, ...]] = {
 }
 _FEWEST = 50  # samples
 _JUMP = 0.02  # of the demand's range within one sample, ...
+_BETWEEN = 3  # points of the demand a sample
 _ALONE = 5.0  # ... and so many times what changes beside it: a step, not a slope
 
 
@@ -111,15 +112,34 @@ class LoopLog:
 
     @cached_property
     def table(self) -> tuple[Floats, Floats]:
-        """The demand as points: linear between samples, but a jump stays a jump."""
+        """The demand as points: a jump stays a jump, between jumps the slope is continuous.
+
+        Straight lines between samples would have a corner at each: a derivative on the error makes
+        of them a current that steps in time with the log, always seen at the same place.
+        """
         size = np.abs(np.diff(self.command))
         beside = np.maximum(np.append(size[1:], 0.0), np.insert(size[:-1], 0, 0.0))
         jump = (size > _JUMP * float(np.ptp(self.command))) & (size > _ALONE * beside)
         steps = np.flatnonzero(jump) + 1
-        # Held until just before the sample that shows the new value.
-        edge = self.time[steps] - 1e-3 * np.diff(self.time)[steps - 1]
-        times = np.insert(self.time, steps, edge)
-        return times, np.insert(self.command, steps, self.command[steps - 1])
+        stretches = np.split(np.arange(len(self.time)), steps)
+        ends = [*self.time[steps] - 1e-3 * np.diff(self.time)[steps - 1], None]
+        points = [self._smooth(k, end) for k, end in zip(stretches, ends, strict=True)]
+        return np.concatenate([p[0] for p in points]), np.concatenate([p[1] for p in points])
+
+    def _smooth(self, k: npt.NDArray[np.intp], end: float | None) -> tuple[Floats, Floats]:
+        """Return points of a stretch without jumps, held until just before the jump at its end."""
+        from scipy.interpolate import Akima1DInterpolator
+
+        times, values = self.time[k], self.command[k]
+        if len(k) > 2 and float(np.ptp(values)) > 0.0:
+            curve = Akima1DInterpolator(times, values)
+            share = np.arange(_BETWEEN) / _BETWEEN
+            fine = (times[:-1, None] + np.diff(times)[:, None] * share).ravel()
+            times = np.append(fine, times[-1])
+            values = curve(times)
+        if end is not None:
+            times, values = np.append(times, end), np.append(values, values[-1])
+        return times, values
 
     def restricted(self, used: Bools) -> LoopLog:
         """Return the log with fewer samples that count."""

@@ -178,8 +178,20 @@ class LoopModel:
                 fine = fine / self.per_output
             if name == "current" and log.magnitude:
                 fine = np.abs(fine)
+            lag = values.get(f"sensor.{name}_lag", 0.0)
+            if lag > 0.0:
+                fine = _late(fine, lag / float(np.median(np.diff(rows["time"]))))
             at = log.time - values.get(f"sensor.{name}_delay", 0.0)
             shown[name] = np.interp(at, rows["time"], fine) + values.get(
                 f"sensor.{name}_offset", 0.0
             )
         return shown
+
+
+def _late(values: Floats, lag: float) -> Floats:
+    """Return samples behind a first-order filter, `lag` in sample times, from rest."""
+    from scipy.signal import lfilter
+
+    keep = float(np.exp(-1.0 / lag))
+    start = np.array([keep * values[0]])
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values, zi=start)[0])

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from elevon.calibrate.blocks import memory
 from elevon.calibrate.closed_loop.free import Free, outer
 from elevon.calibrate.closed_loop.model import LoopModel, Shown
 
@@ -14,6 +15,7 @@ __all__ = ["SOFT", "Objective", "robust"]
 
 Floats = npt.NDArray[np.float64]
 SOFT = 3.0  # deviations beyond which a residual weighs less
+_LEAST = 2e-4  # of a channel's spread: its deviation at least
 _BIG = 1e3  # residual of a run that left the finite numbers
 #: First deviations, as shares of a channel's spread: what a fair model of an unknown drive leaves.
 _FIRST = {"position": 0.03, "motor_position": 0.03, "speed": 0.12, "motor_speed": 0.12,
@@ -53,6 +55,7 @@ class Objective:
         }
         for k, name in self.keys:
             self.scales[k, name] = max(_FIRST[name] * model.logs[k].sigma(name), 1e-12)
+        self.share = np.ones(sum(int(mask.sum()) for mask in self.masks.values()))
 
     def runs(self, x: Floats) -> list[list[Shown]]:
         """Run points, shape (m, p)."""
@@ -83,18 +86,34 @@ class Objective:
         return np.asarray((x - self.first) * self.belief)
 
     def cost(self, residual: Floats, x: Floats) -> float:
-        """Robust cost of one point: samples thinned to what is independent count the more."""
-        return float(np.sum(robust(residual)) + np.sum(self.prior(x) ** 2))
+        """Robust cost of one point, each sample for the share of it that is independent."""
+        return float(np.sum(self.share * robust(residual)) + np.sum(self.prior(x) ** 2))
+
+    def weight(self, residual: Floats) -> Floats:
+        """Weight of each sample in the normal equations: independent share, robust."""
+        return np.asarray(self.share / np.sqrt(1.0 + (residual / SOFT) ** 2))
 
     def refresh(self, x: Floats) -> None:
-        """Set the deviations to what the residuals really have."""
+        """Set deviations and independent shares to what the residuals really have.
+
+        The position remembers an integral action for a second, the current nothing: counted alike,
+        the position would decide everything, down to single ticks of a saturated integrator.
+        """
         shown = self.runs(x)[0]
         parts = self.parts(shown)
         for key in self.keys:
             rms = float(np.sqrt(np.mean(np.minimum(parts[key] ** 2, (2.0 * SOFT) ** 2))))
             k, name = key
-            least = 1e-3 * self.model.logs[k].sigma(name)
+            least = _LEAST * self.model.logs[k].sigma(name)
             self.scales[key] = max(self.scales[key] * rms, least, 1e-12)
+        self.share = np.concatenate(
+            [np.full(len(parts[key]), _share(parts[key])) for key in self.keys]
+        )
+
+
+def _share(residual: Floats) -> float:
+    """Independent samples over samples of a coloured residual."""
+    return 1.0 / memory(np.clip(residual, -2.0 * SOFT, 2.0 * SOFT))
 
 
 def robust(residual: Floats) -> Floats:

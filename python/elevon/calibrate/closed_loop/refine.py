@@ -76,6 +76,9 @@ def steps(actuator: Actuator, logs: Sequence[LoopLog]) -> list[float]:
     """Return the steps of the model that are tried, the set's own first, s."""
     own = actuator.parameters.value("low.step")
     longest = _PERIODS * min(log.period for log in logs)
+    if str(actuator.parameters["drive.kind"].value) == "pwm":
+        # How late it acts is the current loop's lag, which is fitted: no step stands for it.
+        return [max(own, min(_TICKS[0], longest))]
     return [own, *(tick for tick in _TICKS if own < tick <= longest)]
 
 

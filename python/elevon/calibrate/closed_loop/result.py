@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elevon.calibrate.closed_loop.exchange import exchanged
 from elevon.calibrate.closed_loop.fit import (
     Fitted,
     Searched,
@@ -17,7 +18,7 @@ from elevon.calibrate.closed_loop.fit import (
     final_fit,
     search,
 )
-from elevon.calibrate.closed_loop.free import STICK, STRUCTURES, in_set
+from elevon.calibrate.closed_loop.free import CURRENT_GAIN, STICK, STRUCTURES, in_set
 from elevon.calibrate.closed_loop.held_out import held_out_errors
 from elevon.calibrate.closed_loop.intervals import SILENT, Known, known
 from elevon.calibrate.closed_loop.log import LoopLog
@@ -143,9 +144,12 @@ def calibrate_loop(
     if free is None:
         servo, chosen = refined(actuator, logs, chosen, check=say.go)
     fitted = final_fit(servo, logs, chosen, check=say.go, advance=lambda f: say(0.6 + 0.35 * f))
+    fitted, unsettled = exchanged(fitted, actuator)
     rows, degrees = known(fitted)
     held = held_out_errors(fitted)
     estimates, missing = _estimates(rows, degrees, actuator)
+    estimates = [item for item in estimates if item.path not in unsettled]
+    missing |= unsettled
     if free is not None:
         estimates = _asked(estimates, missing, free)
     if not estimates:
@@ -192,7 +196,9 @@ def _searched(
         return lambda fraction: say(each * (k + fraction))
 
     return [
-        search(actuator, logs, name, seed=seed, check=say.go, advance=share(k))
+        search(
+            actuator, logs, name, seed=seed, alone=len(tried) == 1, check=say.go, advance=share(k)
+        )
         for k, name in enumerate(tried)
     ]
 
@@ -283,6 +289,10 @@ def _with(
             values["friction.static"] = value * fitted.values["friction.dynamic"]
         elif in_set(path) and not (silent and path not in _loops(structure)):
             values[path] = value
+    if CURRENT_GAIN in values:
+        # The zero of the current loop's PI stays where it is.
+        share = float(values[CURRENT_GAIN]) / actuator.parameters.value(CURRENT_GAIN)
+        values["pwm.integral_gain"] = share * actuator.parameters.value("pwm.integral_gain")
     if "friction.dynamic" in values and "friction.static" not in values:
         values["friction.static"] = static_following(
             actuator.parameters, float(values["friction.dynamic"])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from elevon.calibrate.closed_loop.objective import SOFT, Objective
+from elevon.calibrate.closed_loop.objective import Objective
 
 __all__ = ["Point", "jacobian", "solve"]
 
@@ -120,7 +120,7 @@ def _round(objective: Objective, points: list[Point], central: bool) -> None:
 
 def _trials(objective: Objective, point: Point, jac: Floats) -> Floats:
     """Steps under each damping, from the weighted normal equations; shape (len(_LADDER), p)."""
-    weight = 1.0 / np.sqrt(1.0 + (point.residual / SOFT) ** 2)
+    weight = objective.weight(point.residual)
     normal = jac.T @ (weight[:, None] * jac) + objective.belief**2 * np.eye(len(point.x))
     slope = jac.T @ (weight * point.residual) + objective.belief * objective.prior(point.x)
     diagonal = np.diag(np.diag(normal))
