@@ -6,13 +6,15 @@ import pytest
 from elevon import Actuator, Scenario, simulate
 from elevon.cli import main
 from elevon.diagnose.byroles import diagnose_by_roles
+from elevon.diagnose.byroles.asked import same_test
 from elevon.diagnose.byroles.candidates import candidates_of, declined_of
-from elevon.diagnose.byroles.log import role_log, same_test
-from elevon.diagnose.byroles.runs import drawn
+from elevon.diagnose.byroles.log import role_log
+from elevon.diagnose.byroles.numbers import numbers_of
+from elevon.diagnose.byroles.runs import spread_of
+from elevon.diagnose.byroles.spread import drawn, factors_of
 from elevon.errors import InputError, UnknownNameError
 
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
-SINE = {"kind": "sine", "amplitude": "20 mm", "frequency": "0.4 Hz"}
 
 
 @pytest.fixture(scope="module")
@@ -20,19 +22,30 @@ def screw():
     return Actuator.load("nasa-ballscrew")
 
 
-def log(actuator, *faults, day=None):
+@pytest.fixture(scope="module")
+def gear():
+    return Actuator.load("pisa-landing-gear")
+
+
+def log(actuator, *faults, day=None, start=0.3):
+    """A low-fidelity log: a sine, or an extension, that begins at `start`."""
     unit = actuator if day is None else drawn(actuator, np.random.default_rng(day))
-    scenario = Scenario.from_dict(
-        {"duration": "5 s", "command": {"mode": "position", "terms": [SINE]}, "fault": list(faults)}
-    )
-    names = "command,encoder_position,resolver_position,resolver_speed,current_q_meas"
-    return simulate(unit, scenario, fidelity="low", record=f"{names}@200 Hz")
+    sine = {"kind": "sine", "amplitude": "20 mm", "frequency": "0.4 Hz", "start": start}
+    command = {"mode": "position", "terms": [sine]}
+    names, seconds = "encoder_position,resolver_position,resolver_speed,current_q_meas", 5
+    if actuator.wiring == "landing_gear":
+        command = {"mode": "gear", "steps": [{"time": start, "action": "extend"}]}
+        names, seconds = "state,user_position,speed_meas,current_mean,proximity_25", 4
+    scenario = Scenario.from_dict({"duration": seconds, "command": command, "fault": list(faults)})
+    return simulate(unit, scenario, fidelity="low", record=f"command,{names}@200 Hz")
 
 
 def test_play_of_a_screw_is_named_and_a_healthy_day_is_healthy(screw):
     few = ["play@transmission", "gain_drift@control.position"]
     base = [("base", log(screw, day=1))]
-    healthy = diagnose_by_roles([("h", log(screw, day=2))], screw, baselines=base, faults=few)
+    healthy = diagnose_by_roles(
+        [("h", log(screw, day=2, start=0.41))], screw, baselines=base, faults=few
+    )
     assert healthy.status == "healthy"
     fault = {"kind": "play", "place": "transmission", "severity": "0.4 mm"}
     worn = diagnose_by_roles([("w", log(screw, fault, day=3))], screw, baselines=base, faults=few)
@@ -42,26 +55,108 @@ def test_play_of_a_screw_is_named_and_a_healthy_day_is_healthy(screw):
     assert worn.unobservable == ()  # both are seen, others were not asked for
 
 
+def test_a_gear_is_diagnosed_whenever_its_action_came(gear):
+    few = ["sag@supply", "proximity_off@sensor.proximity_25", "release_cable_failed@release"]
+    base = [("base", log(gear, day=1))]
+    late = diagnose_by_roles(
+        [("h", log(gear, day=2, start=0.7))], gear, baselines=base, faults=few, false_alarm=1e-3
+    )
+    assert late.status == "healthy"
+    early = diagnose_by_roles(
+        [("h", log(gear, day=1, start=0.7))], gear, baselines=base, faults=few
+    )
+    assert max(abs(item.score) for item in early.moved) < 0.5  # its own day, begun later
+    blind = {(item["kind"], item["place"]): item["reason"] for item in late.unobservable}
+    assert "moves nothing" in blind["release_cable_failed", "release"]
+    dead = {"kind": "proximity_off", "place": "sensor.proximity_25", "severity": 1}
+    said = diagnose_by_roles([("f", log(gear, dead, day=3))], gear, baselines=base, faults=few)
+    assert (said.status, said.best) == ("faulty", ("proximity_off@sensor.proximity_25",))
+
+
+def test_a_baseline_that_is_itself_faulty_is_left_out(screw):
+    worn = {"kind": "friction", "place": "transmission", "severity": 5.0}
+    base = [("wrong", log(screw, worn, day=4)), ("right", log(screw, day=4))]
+    few = ["play@transmission", "gain_drift@control.position"]
+    for baselines, named in ((base[:1], ["wrong"]), (base[1:], [])):
+        result = diagnose_by_roles(
+            [("h", log(screw, day=2))], screw, baselines=baselines, faults=few
+        )
+        left_out = [text for text in result.findings if "looks faulty" in text]
+        assert [text.split()[1] for text in left_out] == named
+
+
+def test_a_log_is_read_from_its_first_command(screw, gear):
+    first, late = (role_log(log(screw, start=s), "a", screw) for s in (0.3, 0.412))
+    assert same_test(first.test, late.test)
+    short = min(first.test.seconds, late.test.seconds)
+    first, late = first.within(short), late.within(short)
+    np.testing.assert_allclose(first.time, late.time, atol=1e-12)
+    np.testing.assert_allclose(first.command, late.command, atol=8e-5)  # the kink at the start
+    extend = role_log(log(gear), "g", gear)
+    assert extend.test.command[0][-1] == pytest.approx(0.0, abs=1e-9)
+    assert extend.time[0] == pytest.approx(-0.1)
+
+
+def test_numbers_of_a_closed_form():
+    """Voltage R i + k w, current by dry friction and inertia, position by its gain."""
+    time = np.arange(0.0, 10.0, 0.01)
+    speed = 20.0 * np.sin(2.0 * time)
+    current = 3.0 * np.sign(speed) + 0.05 * np.gradient(speed, time)
+    shown = {
+        "torque_voltage": 0.9 * current + 1.1 * speed,
+        "torque_current": current,
+        "motor_speed": speed,
+        "speed_ref": speed,
+        "output_position": -speed / 500.0,
+        "state": np.where(time < 4.0, 0.0, 2.0),
+    }
+    units = {"torque_voltage": "V", "torque_current": "A", "motor_speed": "rad/s", "state": "1"}
+    units |= {"speed_ref": "rad/s", "output_position": "m", "command": "m"}
+    values = numbers_of(shown, np.zeros(len(time)), time, units, 4.0).values
+    assert values["torque_voltage: by speed"] == pytest.approx(1.1)
+    assert values["torque_voltage: by current"] == pytest.approx(0.9)
+    assert values["torque_current: by dry"] == pytest.approx(3.0, rel=1e-3)
+    assert values["torque_current: by acceleration"] == pytest.approx(0.05, rel=1e-3)
+    assert values["position error: by set point"] == pytest.approx(1.0 / 500.0, rel=1e-6)
+    assert (values["state: changes"], values["state: last change"]) == (1.0, pytest.approx(4.0))
+    assert "torque_current: by speed" not in values or values[
+        "torque_current: by speed"
+    ] == pytest.approx(0.0, abs=2e-3)
+
+
+def test_spread_keeps_what_is_linear_and_gives_each_number_its_rest():
+    rng = np.random.default_rng(0)
+    steps = np.linalg.qr(rng.standard_normal((400, 3)))[0] * 20.0  # unit covariance
+    draws = steps @ np.array([[1.0, 2.0, 0.0], [0.0, 0.0, 3.0], [0.0, 0.0, 0.5]])
+    steps = steps[:, :2]
+    want = [[1.0, 2.0, 0.0], [2.0, 4.0, 0.0], [0.0, 0.0, 9.25]]
+    np.testing.assert_allclose(spread_of(draws, steps), want, atol=0.05)
+
+
 def test_what_cannot_be_diagnosed_is_refused(screw):
     good = log(screw)
     with pytest.raises(InputError, match="role 'command'"):
-        role_log(good.select(["encoder_position"]), "x")
+        role_log(good.select(["encoder_position"]), "x", screw)
     with pytest.raises(UnknownNameError):
         diagnose_by_roles([("x", good)], screw, faults=["play@moon"])
-    with pytest.raises(InputError, match="commanded by actions"):
-        diagnose_by_roles([("x", good)], Actuator.load("pisa-landing-gear"))
     with pytest.raises(InputError, match="at least one"):
         diagnose_by_roles([], screw)
+    still = Scenario.from_dict({"duration": 2, "command": {"mode": "position"}})
+    with pytest.raises(InputError, match="nothing is asked"):
+        role_log(simulate(screw, still, fidelity="low", record="command,encoder_position@200 Hz"),
+                 "x", screw)  # fmt: skip
 
 
-def test_every_fault_is_a_candidate_or_declined_with_a_reason(screw):
+@pytest.mark.parametrize("name", ["nasa-ballscrew", "pisa-landing-gear", "torino-rotary"])
+def test_every_fault_is_a_candidate_or_declined_with_a_reason(name):
     from elevon.faults import catalogue
 
-    said = {(c.kind, p) for c in candidates_of(screw) for p in (c.place, *c.same)}
-    said |= {(item["kind"], item["place"]) for item in declined_of(screw)}
-    assert said == {(r.kind, p) for r in catalogue(screw.wiring) for p in r.places}
-    assert all(item["reason"] for item in declined_of(screw))
-    assert same_test(role_log(log(screw), "a"), role_log(log(screw, day=4), "b"))
+    actuator = Actuator.load(name)
+    said = {(c.kind, p) for c in candidates_of(actuator) for p in (c.place, *c.same)}
+    said |= {(item["kind"], item["place"]) for item in declined_of(actuator)}
+    assert said == {(r.kind, p) for r in catalogue(actuator.wiring) for p in r.places}
+    assert all(item["reason"] for item in declined_of(actuator))
+    assert len(factors_of(actuator)) >= 4
 
 
 def test_the_command_line(screw, tmp_path, capsys):

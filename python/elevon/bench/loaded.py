@@ -14,8 +14,9 @@ from elevon.bench.acquisition import acquire, acquired_signals, internal_steps
 from elevon.bench.force_control import ForceLoop, asked_force
 from elevon.bench.procedure import ForceStep, Procedure, RigStep, SettingsStep, TraceStep
 from elevon.bench.rig import Conditions, draw_conditions, moved
-from elevon.errors import InputError
+from elevon.errors import DivergedError, InputError
 from elevon.recording.formats import files_of
+from elevon.simulate import Run, simulate, simulate_batch, solver_step
 from elevon.units import parse_quantity
 
 if TYPE_CHECKING:
@@ -27,10 +28,11 @@ if TYPE_CHECKING:
     from elevon.scenario import Scenario
     from elevon.scenario.scenario import Term
 
-__all__ = ["LoadedSetup", "loaded_setups", "run_loaded", "write_loaded"]
+__all__ = ["LoadedSetup", "loaded_setups", "run_loaded", "run_loaded_batch", "write_loaded"]
 
 Floats = npt.NDArray[np.float64]
 _GRID = 1e-3  # s of the force table
+_FINE = 0.25  # of it between two samples of the motion
 _PASSES = 2  # runs of the low model from which the force is computed
 
 
@@ -161,23 +163,68 @@ def run_loaded(
     (Recording, Recording)
         What the recorder kept, with its roles, and the run itself.
     """
-    from elevon.simulate import simulate, solver_step
+    return run_loaded_batch([setup], fidelity, progress)[0]
 
-    rate = setup.stand.hertz(setup.trace.rate)
-    step = solver_step(setup.actuator, fidelity)
-    steps = internal_steps(rate, step, setup.scenario.seconds)
-    roles = acquired_signals(setup.actuator.wiring, fidelity, setup.stand)
-    times, force, loaded = _force(setup)
-    run = simulate(
-        setup.actuator,
-        loaded,
-        fidelity=fidelity,
-        record=f"{','.join(dict.fromkeys(roles.values()))}@{1.0 / (steps * step):.12g} Hz",
-        seed=setup.conditions.seed,
-        progress=progress,
-    )
-    log = acquire(run, roles, (times, force), setup.stand, rate=rate, seed=setup.conditions.seed)
-    return log.with_meta(**_meta(setup, run)), run
+
+def run_loaded_batch(
+    setups: Sequence[LoadedSetup], fidelity: str, progress: Progress | None = None
+) -> list[tuple[Recording, Recording]]:
+    """Carry out several logs of one stand and rate together, in lanes; each as alone.
+
+    Raises
+    ------
+    InputError
+        Logs of different rates.
+    DivergedError
+        A run left the finite numbers.
+    """
+    rates = {setup.stand.hertz(setup.trace.rate) for setup in setups}
+    if len(rates) != 1:
+        raise InputError(f"a batch of logs needs one rate, not {sorted(rates)}")
+    rate, first = rates.pop(), setups[0]
+    step = solver_step(first.actuator, fidelity)
+    steps = internal_steps(rate, step, max(s.scenario.seconds for s in setups))
+    roles = acquired_signals(first.actuator.wiring, fidelity, first.stand)
+    record = f"{','.join(dict.fromkeys(roles.values()))}@{1.0 / (steps * step):.12g} Hz"
+    forces = _forces(setups)
+    runs = _simulated(setups, [s for _, _, s in forces], fidelity, record, progress)
+    out = []
+    for setup, run, (times, force, _) in zip(setups, runs, forces, strict=True):
+        log = acquire(
+            run, roles, (times, force), setup.stand, rate=rate, seed=setup.conditions.seed
+        )
+        out.append((log.with_meta(**_meta(setup, run)), run))
+    return out
+
+
+def _simulated(
+    setups: Sequence[LoadedSetup],
+    scenarios: Sequence[Scenario],
+    fidelity: str,
+    record: str,
+    progress: Progress | None = None,
+) -> list[Recording]:
+    """Run the setups' actuators through scenarios; one that diverges is an error."""
+    runs = [
+        Run(setup.actuator, scenario, setup.conditions.seed)
+        for setup, scenario in zip(setups, scenarios, strict=True)
+    ]
+    if len(runs) == 1:
+        return [
+            simulate(
+                runs[0].actuator, runs[0].scenario, fidelity=fidelity, record=record,
+                seed=runs[0].seed, progress=progress,
+            )
+        ]  # fmt: skip
+    recordings = simulate_batch(runs, fidelity=fidelity, record=record, progress=progress)
+    for setup, recording in zip(setups, recordings, strict=True):
+        if recording.status == "diverged":
+            raise DivergedError(
+                f"{setup.trace.name}: the run stopped: {recording.meta['message']}",
+                time=recording.meta["sim_s"],
+                signal=recording.meta.get("signal", ""),
+            )
+    return recordings
 
 
 def _meta(setup: LoadedSetup, run: Recording) -> dict[str, Any]:
@@ -196,32 +243,39 @@ def _meta(setup: LoadedSetup, run: Recording) -> dict[str, Any]:
     }
 
 
-def _force(setup: LoadedSetup) -> tuple[Floats, Floats, Scenario]:
+def _forces(setups: Sequence[LoadedSetup]) -> list[tuple[Floats, Floats, Scenario]]:
     """Force on the rod over time and the scenario with it: motion and force in turn."""
-    from elevon.simulate import simulate
+    grids = [np.arange(0.0, s.scenario.seconds + _GRID, _GRID) for s in setups]
+    out = [(t, np.zeros_like(t), s.scenario) for t, s in zip(grids, setups, strict=True)]
+    at = [k for k, s in enumerate(setups) if s.force is not None and s.stand.force is not None]
+    for _ in range(_PASSES if at else 0):
+        record = _motion(setups[at[0]].actuator)
+        runs = _simulated([setups[k] for k in at], [out[k][2] for k in at], "low", record)
+        for k, run in zip(at, runs, strict=True):
+            force = _force(setups[k], run, grids[k])
+            table = {"kind": "table", "times": grids[k].tolist(), "values": force.tolist()}
+            loaded = setups[k].scenario.replaced(load={"user": {"terms": [table]}})
+            out[k] = (grids[k], force, loaded)
+    return out
 
-    seconds = setup.scenario.seconds
-    times = np.arange(0.0, seconds + _GRID, _GRID)
-    if setup.force is None or setup.stand.force is None:
-        return times, np.zeros_like(times), setup.scenario
-    loop = ForceLoop.of(setup.stand.force)
+
+def _motion(actuator: Actuator) -> str:
+    """What the force is computed from, a few times in each of its steps."""
+    step = solver_step(actuator, "low")
+    return f"user_position,user_speed@{1.0 / (max(1, int(_FINE * _GRID / step)) * step):.12g} Hz"
+
+
+def _force(setup: LoadedSetup, run: Recording, times: Floats) -> Floats:
+    """What the load actuator makes of a motion."""
+    assert setup.force is not None
+    assert setup.stand.force is not None
+    clock = run.clock().time
+    position, speed = (
+        np.interp(times, clock, run[name].values) for name in ("user_position", "user_speed")
+    )
     terms = _values(setup.force.terms, times, setup.conditions.start)
-    scenario = setup.scenario
-    force = np.zeros_like(times)
-    for _ in range(_PASSES):
-        run = simulate(
-            setup.actuator, scenario, fidelity="low", record="user_position,user_speed@every",
-            seed=setup.conditions.seed,
-        )  # fmt: skip
-        clock = run.clock().time
-        position, speed = (
-            np.interp(times, clock, run[name].values) for name in ("user_position", "user_speed")
-        )
-        asked = asked_force(setup.force, terms, position, speed)
-        force = loop.achieved(times, asked, speed)
-        table = {"kind": "table", "times": times.tolist(), "values": force.tolist()}
-        scenario = setup.scenario.replaced(load={"user": {"terms": [table]}})
-    return times, force, scenario
+    asked = asked_force(setup.force, terms, position, speed)
+    return ForceLoop.of(setup.stand.force).achieved(times, asked, speed)
 
 
 def _values(terms: Sequence[Term], times: Floats, start: float) -> Floats:

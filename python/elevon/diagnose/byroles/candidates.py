@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.faults import FaultRecord
 
-__all__ = ["candidates_of", "counted_of", "declined_of"]
+__all__ = ["candidates_of", "counted_of", "declined_of", "switched_of"]
 
 #: Largest severity considered where the catalogue's own is larger or none, by unit. ASSUMED: what a
 #: unit of this size runs with at all; shares and counts are given by the catalogue.
@@ -42,11 +42,11 @@ def candidates_of(actuator: Actuator, texts: Sequence[str] | None = None) -> tup
     from elevon.faults import catalogue
 
     out = []
-    counted = counted_of(actuator)
+    whole = counted_of(actuator) | switched_of(actuator)
     for record in catalogue(actuator.wiring):
         if "low" in record.fidelities:
             made = [_candidate(record, group) for group in _groups(record.places)]
-            out += [replace(c, high=1.0) if c.kind in counted else c for c in made]
+            out += [replace(c, high=1.0) if c.kind in whole else c for c in made]
     if not texts:
         return tuple(out)
     known = {f"{c.kind}@{place}": c for c in out for place in (c.place, *c.same)}
@@ -75,6 +75,14 @@ def counted_of(actuator: Actuator) -> frozenset[str]:
     from elevon import _core
 
     return frozenset(item["kind"] for item in _core.faults(actuator.wiring) if item["whole"])
+
+
+def switched_of(actuator: Actuator) -> frozenset[str]:
+    """Return the kinds that are there or not: they act from a severity of one half on."""
+    from elevon import _core
+
+    records = _core.faults(actuator.wiring)
+    return frozenset(item["kind"] for item in records if item["effect"].startswith("1: "))
 
 
 def _groups(places: Sequence[str]) -> list[tuple[str, ...]]:

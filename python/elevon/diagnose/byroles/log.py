@@ -1,52 +1,57 @@
-"""A log by its roles: what was asked, what loaded it, and numbers of what it shows."""
+"""A log by its roles, from the instant at which something was first asked."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from elevon.diagnose.bymodel.evidence import Evidence
+from elevon.diagnose.byroles.asked import RoleTest, action_numbers, test_of
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.recording import Recording
 
-__all__ = ["RoleLog", "evidence_of", "role_log", "same_test"]
+__all__ = ["RoleLog", "role_log"]
 
 Floats = npt.NDArray[np.float64]
 #: What is put in, not shown.
-_INPUTS = frozenset(["command", "load", "load_cell"])
+_INPUTS = frozenset(["command", "load"])
 _LEAST = 200  # samples
-_PARTS = 4  # of the log, each with a level of its own: when something happens counts, too
-_FEW = 20  # levels of a command of steps
 _MISSING = 0.2  # share of samples above which a channel is left out
+_FASTEST = 1000.0  # Hz; faster logs are averaged down: the low model shows no more
+_LONGEST = 60.0  # s after the onset that are read
+BEFORE = 0.1  # s before the onset that are read
+_LADDER = 0.1  # of the log's length: the lengths after the onset that are read differ by it
+_REST = 1e-3  # of the command's range: below it nothing is asked
 
 
 @dataclass(frozen=True)
 class RoleLog:
-    """A log on one clock.
+    """A log on one even clock, counted from its onset.
 
     Attributes
     ----------
     name : str
         Of the log.
-    time, command : ndarray, shape (n,)
-        s from zero, and what was asked.
+    time : ndarray, shape (n,)
+        s from the onset; the first is ``-BEFORE``.
+    command : ndarray, shape (n,)
+        What was asked.
     channels : mapping of str to ndarray, shape (n,)
         Role to values, SI; gaps bridged.
     units : mapping of str to str
         Role to unit.
-    load : ndarray, shape (n,), or None
-        Force or torque on the output, positive where it opposes positive motion.
     rate : float
         Hz.
-    lost : tuple of str
-        Roles left out since too many samples are missing.
+    test : RoleTest
+        What was asked and what loaded it, for the model.
+    findings : tuple of str
+        What the user should know.
     """
 
     name: str
@@ -54,27 +59,59 @@ class RoleLog:
     command: Floats
     channels: Mapping[str, Floats]
     units: Mapping[str, str]
-    load: Floats | None
     rate: float
-    lost: tuple[str, ...] = ()
+    test: RoleTest
+    findings: tuple[str, ...] = ()
+
+    def within(self, seconds: float) -> RoleLog:
+        """Return the log up to some seconds after its onset."""
+        count = int(np.searchsorted(self.time, seconds * (1.0 + 1e-9)))
+        return replace(
+            self,
+            time=self.time[:count],
+            command=self.command[:count],
+            channels={role: values[:count] for role, values in self.channels.items()},
+            test=self.test.within(seconds),
+        )
 
 
-def role_log(recording: Recording, name: str) -> RoleLog:
+def role_log(recording: Recording, name: str, actuator: Actuator) -> RoleLog:
     """Read a recording by its roles.
 
     Raises
     ------
     InputError
-        No command, nothing shown, too short, or nothing moves.
+        No command, nothing asked, nothing shown, too short, or nothing moves.
     """
+    time, shown, units, lost = _channels(recording, name)
+    command = shown["command"]
+    actions = action_numbers(actuator.wiring)
+    first = _onset(time, command, sequence=bool(actions), name=name)
+    rate = 1.0 / float(np.median(np.diff(time)))
+    seconds = _length(float(time[-1] - time[0]), float(time[-1] - first))
+    clock = np.arange(-round(BEFORE * rate), round(seconds * rate) + 1) / rate
+    at = np.clip(clock + first, time[0], time[-1])
+    used = {r: _on(at, time, v, held=units[r] == "1") for r, v in shown.items()}
+    _check_motion(used, name)
+    test = test_of(recording, actuator, clock, used, seconds)
+    seen = {r: v for r, v in used.items() if r not in _INPUTS or (r == "load" and test.own_load)}
+    said = [f"{name}: too many samples missing, left out: {', '.join(lost)}"] if lost else []
+    if time[-1] - first > _LONGEST * (1.0 + _LADDER):
+        said.append(f"{name}: read up to {_LONGEST:g} s after the first command")
+    return RoleLog(name, clock, used["command"], seen, units, rate, test, tuple(said))
+
+
+def _channels(
+    recording: Recording, name: str
+) -> tuple[Floats, dict[str, Floats], dict[str, str], list[str]]:
+    """Every role on the command's clock; those with too many gaps are named."""
     roles = recording.roles
     if "command" not in roles:
         raise InputError(
             f"{name}: no channel plays the role 'command': the test cannot be run on the model; "
             f"roles: {', '.join(roles) or 'none'}"
         )
-    clock = recording.role("command").clock
-    time = np.asarray(clock.time, dtype=np.float64)
+    time = np.asarray(recording.role("command").clock.time, dtype=np.float64)
     if len(time) < _LEAST:
         raise InputError(f"{name}: {len(time)} samples; {_LEAST} are needed")
     shown, units, lost = {}, {}, []
@@ -85,88 +122,81 @@ def role_log(recording: Recording, name: str) -> RoleLog:
         if good.mean() < 1.0 - _MISSING:
             lost.append(role)
             continue
-        at = np.asarray(channel.time, dtype=np.float64)
-        shown[role] = np.interp(time, at[good], values[good])
+        at = np.asarray(channel.time, dtype=np.float64)[good]
+        shown[role] = _on(time, at, values[good], held=channel.unit == "1")
         units[role] = channel.unit
-    load = shown.get("load")
-    seen = {role: v for role, v in shown.items() if role not in _INPUTS}
-    if not any(np.ptp(values) > 0.0 for values in seen.values()):
-        raise InputError(f"{name}: nothing moves")
-    rate = 1.0 / float(np.median(np.diff(time)))
-    return RoleLog(name, time - time[0], shown["command"], seen, units, load, rate, tuple(lost))
+    if "command" in lost:
+        raise InputError(f"{name}: too many samples of the command are missing")
+    return *_slower(time, shown, units), units, lost
 
 
-def evidence_of(channels: Mapping[str, Floats], item: RoleLog, actuator: Actuator) -> Evidence:
-    """Numbers of a log or a model run of its test: features of the catalogue, levels of every role.
+def _on(time: Floats, at: Floats, values: Floats, *, held: bool) -> Floats:
+    if len(at) == len(time) and at[0] == time[0] and at[-1] == time[-1]:
+        return values
+    if held:
+        return np.asarray(values[(np.searchsorted(at, time + 1e-9, side="right") - 1).clip(0)])
+    return np.asarray(np.interp(time, at, values), dtype=np.float64)
 
-    Parameters
-    ----------
-    channels : mapping of str to ndarray, shape (n,)
-        Role to values: the log's own, or a model's on its instants.
-    item : RoleLog
-        The log.
-    actuator : Actuator
-        For the motor's pole pairs.
+
+def _slower(
+    time: Floats, shown: Mapping[str, Floats], units: Mapping[str, str]
+) -> tuple[Floats, dict[str, Floats]]:
+    """A fast log, averaged down; states and the command are read as they stand."""
+    step = max(1, int(1.0 / (float(np.median(np.diff(time))) * _FASTEST) + 1e-6))
+    count = len(time) // step * step
+    if step == 1:
+        return time, dict(shown)
+    out = {
+        role: v[:count:step]
+        if role == "command" or units[role] == "1"
+        else v[:count].reshape(-1, step).mean(axis=1)
+        for role, v in shown.items()
+    }
+    return time[:count:step], out
+
+
+def _onset(time: Floats, command: Floats, *, sequence: bool, name: str) -> float:
+    """Instant at which something is first asked; of a motion that goes on, where it passes its mid.
+
+    Everything is counted from there, so logs may begin at any instant before it.
     """
-    rows = _levels(channels) | _features(channels, item, actuator)
-    names = tuple(name for name, value in rows.items() if np.isfinite(value))
-    values = np.array([rows[name] for name in names])
-    return Evidence(names, values, np.zeros(len(names)))
+    reach = float(np.ptp(command))
+    if reach == 0.0:
+        raise InputError(f"{name}: nothing is asked: the command never changes")
+    off = np.abs(command - command[0])
+    away = int(np.flatnonzero(off > _REST * reach)[0])
+    if sequence:
+        return float(time[away])
+    if away > 2:
+        return _begin(time, off, away)
+    level = command - 0.5 * (command.max() + command.min())
+    rising = np.flatnonzero((level[1:] >= 0.0) & (level[:-1] < 0.0)) + 1
+    if len(rising) and rising[0] < len(command) // 4:
+        return _crossing(time, level, int(rising[0]))
+    return float(time[0])
 
 
-def _levels(channels: Mapping[str, Floats]) -> dict[str, float]:
-    rows = {}
-    for role, values in channels.items():
-        if role == "motor_position":  # no log says where its zero is
-            continue
-        for k, part in enumerate(np.array_split(values, _PARTS)):
-            rows[f"{role}: mean of part {k + 1}"] = float(part.mean())
-        rows[f"{role}: rms"] = float(np.sqrt(np.mean(values**2)))
-        rows[f"{role}: last"] = float(values[-max(len(values) // 50, 1) :].mean())
-    return rows
+def _begin(time: Floats, off: Floats, first: int) -> float:
+    """Instant from which a command goes away, by the line through its first two samples."""
+    here, step = float(off[first]), float(off[min(first + 1, len(off) - 1)] - off[first])
+    back = here / step if step > 0.0 else 0.0
+    return float(time[first] - min(back, 1.0) * (time[first] - time[first - 1]))
 
 
-def _features(
-    channels: Mapping[str, Floats], item: RoleLog, actuator: Actuator
-) -> dict[str, float]:
-    from elevon.features import recording_features
-    from elevon.recording import Recording
-
-    values = {"command": item.command, **channels}
-    units = {role: item.units[role] for role in values}
-    meta: dict[str, Any] = {"roles": {role: role for role in values}}
-    even = np.arange(len(item.time)) / item.rate
-    recording = Recording.build(even, values, units, rate=item.rate, meta=meta)
-    known = actuator.parameters
-    pairs = known.value("motor.pole_pairs") if "motor.pole_pairs" in known else None
-    try:
-        shown = recording_features(recording, pole_pairs=pairs)
-    except InputError:
-        return {}
-    return dict(shown.values)
+def _crossing(time: Floats, level: Floats, after: int) -> float:
+    """Instant between two samples at which a level passes zero."""
+    low, high = float(level[after - 1]), float(level[after])
+    part = -low / (high - low) if high > low else 1.0
+    return float(time[after - 1] + part * (time[after] - time[after - 1]))
 
 
-def same_test(a: RoleLog, b: RoleLog, share: float = 0.05) -> bool:
-    """Whether two logs were asked for the same and loaded alike, whenever the command began."""
-    if abs(a.time[-1] - b.time[-1]) > share * a.time[-1]:
-        return False
-    loads = _typical(a.load), _typical(b.load)
-    if abs(loads[0] - loads[1]) > 2.0 * share * max(*map(abs, loads), 1.0):
-        return False
-    steps = _steps(a.command), _steps(b.command)
-    if min(len(s) for s in steps) <= _FEW:
-        return steps[0] == steps[1]
-    size = float(np.abs(a.command).max())
-    return all(
-        abs(float(of(a.command)) - float(of(b.command))) <= share * size for of in (np.std, np.mean)
-    )
+def _length(total: float, after: float) -> float:
+    """Seconds after the onset that are read, in steps, so that logs of one test are read alike."""
+    step = _LADDER * min(total, _LONGEST / (1.0 - _LADDER))
+    return min(float(np.floor(after / step + 1e-6)) * step, _LONGEST) or after
 
 
-def _steps(command: Floats) -> list[float]:
-    """Levels of a command in their order."""
-    turns = np.flatnonzero(np.diff(command)) + 1
-    return [float(command[0]), *np.round(command[turns], 9).tolist()]
-
-
-def _typical(load: Floats | None) -> float:
-    return 0.0 if load is None else float(np.mean(load))
+def _check_motion(used: Mapping[str, Any], name: str) -> None:
+    seen = [values for role, values in used.items() if role not in _INPUTS]
+    if not any(np.ptp(values) > 0.0 for values in seen):
+        raise InputError(f"{name}: nothing moves")

@@ -1,0 +1,182 @@
+"""The test behind a log: what was asked, what loaded it, and where it began, for the model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.recording import Recording
+
+__all__ = ["RoleTest", "action_numbers", "same_test", "test_of"]
+
+Floats = npt.NDArray[np.float64]
+_EXACT = 2e-4  # of the command's range: what straight lines may miss
+_SMOOTH = 0.05  # s over which a load is averaged before it becomes straight lines
+_ROUGH = 0.01  # of the load's size: what straight lines may miss
+_ALIKE = 0.05  # of the command's range, RMS, up to which two commands are the same
+_LOADED = 0.15  # of the load's size, RMS; a load that follows the motion differs with the unit
+_LATE = 0.1  # s between two logs' actions
+
+
+@dataclass(frozen=True)
+class RoleTest:
+    """A test, counted from its onset.
+
+    Attributes
+    ----------
+    seconds : float
+        After the onset.
+    command : (ndarray, ndarray)
+        Instants and values of straight lines; of actions, instants and numbers.
+    load : (ndarray, ndarray) or None
+        Instants and force or torque on the output, positive where it opposes positive motion.
+    own_load : bool
+        Whether the model loads itself: the log's load is then shown, not put in.
+    initial : mapping of str to float or str
+        Signal to where it starts.
+    settings : mapping of str to object
+        Parameters that the stand set.
+    """
+
+    seconds: float
+    command: tuple[Floats, Floats]
+    load: tuple[Floats, Floats] | None
+    own_load: bool
+    initial: Mapping[str, float | str]
+    settings: Mapping[str, Any]
+
+    def within(self, seconds: float) -> RoleTest:
+        """Return the test up to some seconds after its onset."""
+        return replace(self, seconds=min(seconds, self.seconds))
+
+
+def action_numbers(wiring: str) -> tuple[str, ...]:
+    """Return the actions that a wiring is asked by; none where it is asked for a position."""
+    from elevon import _core
+
+    return tuple(next(w for w in _core.wirings() if w["name"] == wiring)["actions"])
+
+
+def test_of(
+    recording: Recording,
+    actuator: Actuator,
+    time: Floats,
+    shown: Mapping[str, Floats],
+    seconds: float,
+) -> RoleTest:
+    """Return the test of a log whose roles stand on instants counted from the onset."""
+    stand = recording.meta.get("stand")
+    said: Mapping[str, Any] = stand if isinstance(stand, Mapping) else {}
+    own = not said and "scenario" in recording.meta and _shows_load(actuator.wiring)
+    settings = {p: v for p, v in said.get("parameters", {}).items() if p in actuator.parameters}
+    return RoleTest(
+        seconds,
+        _asked(time, shown["command"], sequence=bool(action_numbers(actuator.wiring))),
+        None if own or "load" not in shown else _loaded(time, shown["load"]),
+        own,
+        {**_initial(actuator, shown), **_stated(actuator.wiring, said.get("initial", {}))},
+        settings,
+    )
+
+
+def _shows_load(wiring: str) -> bool:
+    from elevon import _core
+
+    return any(signal["role"] == "load" for signal in _core.signals(wiring, "low"))
+
+
+def _asked(time: Floats, command: Floats, *, sequence: bool) -> tuple[Floats, Floats]:
+    if sequence:
+        level = np.rint(command)
+        turns = np.concatenate(([0], np.flatnonzero(np.diff(level)) + 1))
+        return time[turns], level[turns]
+    return _lines(time, command, _EXACT * float(np.ptp(command)))
+
+
+def _loaded(time: Floats, load: Floats) -> tuple[Floats, Floats]:
+    width = max(1, round(_SMOOTH / float(time[1] - time[0])))
+    padded = np.concatenate((np.full(width // 2, load[0]), load, np.full(width // 2, load[-1])))
+    smooth = np.convolve(padded, np.ones(width) / width, "same")[width // 2 :][: len(load)]
+    return _lines(time, smooth, _ROUGH * float(np.abs(smooth).max()))
+
+
+def _lines(time: Floats, values: Floats, most: float) -> tuple[Floats, Floats]:
+    """Straight lines that miss no sample by more than `most` (Douglas and Peucker)."""
+    kept = {0, len(time) - 1}
+    open_parts = [(0, len(time) - 1)]
+    while open_parts:
+        first, last = open_parts.pop()
+        if last - first < 2:
+            continue
+        inner = slice(first + 1, last)
+        line = np.interp(time[inner], time[[first, last]], values[[first, last]])
+        off = np.abs(values[inner] - line)
+        worst = int(np.argmax(off))
+        if off[worst] > most:
+            middle = first + 1 + worst
+            kept.add(middle)
+            open_parts += [(first, middle), (middle, last)]
+    at = np.array(sorted(kept))
+    return time[at], values[at]
+
+
+def _initial(actuator: Actuator, shown: Mapping[str, Floats]) -> dict[str, float | str]:
+    """Where the model starts, as far as the log shows it."""
+    from elevon import _core
+
+    names = _core.initial(actuator.wiring, "low")
+    start = {role: float(np.mean(values[:3])) for role, values in shown.items()}
+    if "output_position" not in start:
+        return {}
+    position = start["output_position"]
+    if "nut_position" in names:
+        return {"nut_position": position}
+    known = actuator.parameters
+    lead = known.value("screw.lead") if "screw.lead" in known else 1.0
+    ratio = known.value("gear.ratio") / lead
+    half = 0.45 * known.value("play.total") * ratio
+    motor = start.get("motor_position", position * ratio)
+    # Within the play: a log's zeros need not be the model's.
+    motor = min(max(motor, position * ratio - half), position * ratio + half)
+    return {
+        "motor_position": motor,
+        "user_position": position,
+        "motor_speed": start.get("motor_speed", 0.0),
+    }
+
+
+def _stated(wiring: str, given: Mapping[str, Any]) -> dict[str, Any]:
+    from elevon import _core
+
+    names = _core.initial(wiring, "low")
+    return {name: value for name, value in given.items() if name in names}
+
+
+def same_test(a: RoleTest, b: RoleTest) -> bool:
+    """Whether two logs were asked for the same and loaded alike."""
+    seconds = min(a.seconds, b.seconds)
+    if max(a.seconds, b.seconds) > 1.3 * seconds or (a.load is None) != (b.load is None):
+        return False
+    grid = np.linspace(0.0, seconds, 200)
+    size = max(float(np.ptp(a.command[1])), 1e-12)
+    apart = _held_or_lines(a, grid) - _held_or_lines(b, grid)
+    if float(np.sqrt(np.mean(apart**2))) > _ALIKE * size:
+        return False
+    if a.load is None or b.load is None:
+        return True
+    pushes = [np.interp(grid, *test) for test in (a.load, b.load)]
+    largest = max(float(np.abs(push).max()) for push in pushes)
+    off = float(np.sqrt(np.mean((pushes[0] - pushes[1]) ** 2)))
+    return off <= max(_LOADED * largest, 1.0)
+
+
+def _held_or_lines(test: RoleTest, grid: Floats) -> Floats:
+    """A command relative to where it began; actions are few and start alike."""
+    times, values = test.command
+    return np.asarray(np.interp(grid, times, values) - values[0], dtype=np.float64)

@@ -1,0 +1,55 @@
+"""What a healthy unit's numbers are in one test: the model's, or its baselines'."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.diagnose.bymodel.evidence import Evidence
+from elevon.diagnose.bymodel.healthy import DEGREES, Healthy
+from elevon.diagnose.byroles.numbers import KINDS, floors
+from elevon.diagnose.byroles.runs import RoleReplay
+
+__all__ = ["healthy_of"]
+
+Floats = npt.NDArray[np.float64]
+#: Of Student's distribution, nearly Gaussian. The least deviations are generous, so most numbers
+#: stand closer than stated; with few degrees that would count as a day of small spread, and what
+#: does vary would be called a fault.
+_FREE = 200.0
+
+
+def healthy_of(model: RoleReplay, names: Sequence[str], same: Sequence[Evidence]) -> Healthy:
+    """Return the unit's expectation: the baselines' mean where there are any, else the model's.
+
+    Two and more baselines also tell how far the stated spread holds: it is worth `DEGREES` of
+    them.
+    """
+    at = [model.healthy.names.index(n) for n in names]
+    mean = model.draws[:, at].mean(axis=0)
+    if same:
+        mean = np.array([e.only(names).values for e in same]).mean(axis=0)
+    least = floors(model.shown, names, mean)
+    own = model.spread[np.ix_(at, at)] + np.diag(least**2)
+    scale = _scale(own, mean, [e.only(names).values for e in same])
+    own = own * np.outer(scale, scale)
+    if same:
+        noise = np.array([e.only(names).std for e in same])
+        more = (own + np.diag(np.mean(noise**2, axis=0))) / len(same)
+    else:
+        more = np.diag((_mismatch(model, names) * least) ** 2)
+    return Healthy(tuple(names), mean, own + more, _FREE, len(same), scale)
+
+
+def _mismatch(model: RoleReplay, names: Sequence[str]) -> Floats:
+    return np.array([KINDS[model.shown.kinds[name]].mismatch for name in names])
+
+
+def _scale(own: Floats, mean: Floats, rows: Sequence[Floats]) -> Floats:
+    """Spread over the stated one, number by number, by what several baselines scatter."""
+    if len(rows) < 2:
+        return np.ones(len(mean))
+    square = np.sum((np.array(rows) - mean) ** 2, axis=0) / np.diag(own)
+    return np.asarray(np.sqrt((DEGREES + square) / (DEGREES + len(rows) - 1)), dtype=np.float64)

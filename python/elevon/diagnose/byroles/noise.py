@@ -1,0 +1,52 @@
+"""How far a log's noise alone moves its numbers: the log with as much noise again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.diagnose.byroles.log import RoleLog
+from elevon.diagnose.byroles.runs import numbers_of_log
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["noise_of"]
+
+Floats = npt.NDArray[np.float64]
+_AGAIN = 8  # logs with noise added
+_NORMAL = 1.4826  # deviation over the median of the size, of Gaussian noise
+
+
+def noise_of(item: RoleLog, actuator: Actuator, shown: Mapping[str, float]) -> Floats:
+    """Return each number's deviation by the noise of the log's channels, shape (k,).
+
+    What of a channel changes from sample to sample counts as its noise; ripple faster than the
+    log's clock is among it, and repeats as little.
+    """
+    sizes = {
+        role: _noise(values)
+        for role, values in item.channels.items()
+        if item.units[role] != "1" and len(values) > 3
+    }
+    rng = np.random.default_rng(15)
+    rows = []
+    for _ in range(_AGAIN):
+        channels = {
+            role: values + sizes.get(role, 0.0) * rng.standard_normal(len(values))
+            if role in sizes
+            else values
+            for role, values in item.channels.items()
+        }
+        noisy = numbers_of_log(item, actuator, channels).values
+        rows.append([noisy.get(name, value) for name, value in shown.items()])
+    return np.asarray(np.std(rows, axis=0, ddof=1), dtype=np.float64)
+
+
+def _noise(values: Floats) -> float:
+    """Deviation of what changes from sample to sample, by the second differences' median."""
+    steps = np.abs(np.diff(values, 2))
+    return float(_NORMAL * np.median(steps) / np.sqrt(6.0))

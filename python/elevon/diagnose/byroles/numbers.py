@@ -1,0 +1,363 @@
+"""Numbers of what a log shows by its roles: levels, regressions, events, features.
+
+The same code reads a log and a run of the model, so nothing has to be unbiased. A number has a
+kind, which says how well it repeats.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["KINDS", "Kind", "Numbers", "floors", "numbers_of"]
+
+Floats = npt.NDArray[np.float64]
+_SLOW = 100.0  # Hz of the means that levels and regressions are made of
+_PARTS = 6  # of a motion one way: what happens when
+_BOTH = 0.1  # share of the time in each direction from which on a motion goes both ways
+_MOVING = 0.2  # of the speed's size (95 %)
+_APART = 0.4  # of a regressor that those before it do not make up
+_FULL = 0.95  # of the largest set point: above it a loop is at its limit
+_FEW = 24  # changes of a state whose instants count; more come from a fault
+_DIGITAL = ("state", "switch", "hall", "brake_released", "locked", "fault_code")
+_TEMPERATURES = ("temperature", "surface_temperature", "nut_temperature", "drive_temperature")
+_FEATURES = ("level", "friction", "transmission", "orders", "bands")
+#: What levels here say already, and what a single moment decides.
+_LEFT_OUT = ("mean", "kurtosis", "peak", "moving")
+_TRAVEL = 0.02  # of the travel's RMS: size of a lost motion where there is none
+
+
+@dataclass(frozen=True)
+class Kind:
+    """How well a number repeats.
+
+    Attributes
+    ----------
+    share : float
+        Least deviation from day to day, of the number's size. ASSUMED.
+    least : float
+        The same, in the number's unit. ASSUMED.
+    mismatch : float
+        How far a healthy unit may stand off the low model, over that least deviation. ASSUMED,
+        from logs of the high model: what compliance and current loops do, the low model lacks.
+    """
+
+    share: float
+    least: float = 0.0
+    mismatch: float = 10.0
+
+
+#: Least deviations, beside what drawn days of the model show: counts, clocks, what the model has
+#: not. ASSUMED: amplifiers and sensors of ordinary class, filters, a control unit's millisecond.
+KINDS: Mapping[str, Kind] = {
+    "level": Kind(0.01),
+    "slope": Kind(0.01, mismatch=30.0),
+    "gain": Kind(0.01),
+    "offset": Kind(0.02, mismatch=50.0),
+    "small": Kind(0.01, mismatch=200.0),
+    "ripple": Kind(0.05, mismatch=60.0),
+    "band": Kind(0.10, mismatch=30.0),
+    "instant": Kind(0.005, 0.01),
+    "count": Kind(0.0, 0.25, mismatch=3.0),
+    "end": Kind(0.0, 0.1, mismatch=3.0),
+    "rise": Kind(0.05, 0.5),
+}
+#: Of its channel's size, the least size of a number, by kind: below it nothing repeats. ASSUMED.
+LEAST: Mapping[str, float] = {
+    "level": 0.1, "small": 0.1, "offset": 0.5, "ripple": 0.04, "band": 0.02,
+    "slope": 0.1,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """Numbers of one log.
+
+    Attributes
+    ----------
+    values : mapping of str to float
+        By name.
+    kinds : mapping of str to str
+        Name to key of `KINDS`.
+    sizes : mapping of str to float
+        Name to the size of what it is measured in: a channel's RMS, a slope's own part of it.
+    units : mapping of str to str
+        Name to unit.
+    """
+
+    values: dict[str, float]
+    kinds: dict[str, str]
+    sizes: dict[str, float]
+    units: dict[str, str]
+
+    def add(self, name: str, value: float, kind: str, size: float = 0.0, unit: str = "") -> None:
+        """Keep a number that is finite."""
+        if np.isfinite(value):
+            self.values[name] = float(value)
+            self.kinds[name] = kind
+            self.sizes[name] = float(size)
+            self.units[name] = unit
+
+
+def floors(shown: Numbers, names: Sequence[str], values: Floats) -> Floats:
+    """Least deviation of each number from day to day, shape (k,)."""
+    out: list[float] = []
+    for name, value in zip(names, values.tolist(), strict=True):
+        kind = KINDS[shown.kinds[name]]
+        size = max(abs(value), LEAST.get(shown.kinds[name], 0.0) * shown.sizes[name])
+        out.append(max(kind.share * size, kind.least, 1e-12))
+    return np.array(out, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class _Slow:
+    """Means of a log over hundredths of a second."""
+
+    time: Floats
+    shown: Mapping[str, Floats]
+    command: Floats
+    speed: Floats | None
+    forward: npt.NDArray[np.bool_]
+    backward: npt.NDArray[np.bool_]
+
+    @property
+    def both(self) -> bool:
+        """Whether the motion goes both ways."""
+        return bool(min(self.forward.mean(), self.backward.mean()) > _BOTH)
+
+
+def numbers_of(
+    channels: Mapping[str, Floats],
+    command: Floats,
+    time: Floats,
+    units: Mapping[str, str],
+    pole_pairs: float | None,
+) -> Numbers:
+    """Return the numbers of a log, or of a model run on its instants.
+
+    Parameters
+    ----------
+    channels : mapping of str to ndarray, shape (n,)
+        Role to values.
+    command, time : ndarray, shape (n,)
+        What was asked; s from the onset.
+    units : mapping of str to str
+        Role to unit.
+    pole_pairs : float or None
+        Of the motor, for orders of the electrical turn.
+    """
+    out = Numbers({}, {}, {}, {})
+    slow = _slowed(channels, command, time, units)
+    analog = [r for r in channels if units[r] != "1" and not r.startswith(_DIGITAL)]
+    for role in channels:
+        if role in _TEMPERATURES:
+            _rise(out, role, channels[role])
+        elif role in analog:
+            if role != "motor_position":  # no log says where its zero is
+                _levels(out, role, slow, units[role])
+        else:
+            _events(out, role, channels[role], time)
+    _current(out, slow)
+    _voltage(out, slow)
+    _loops(out, channels, slow)
+    _ratios(out, slow)
+    _features(out, {**channels, "command": command}, time, units, pole_pairs)
+    return out
+
+
+def _slowed(
+    channels: Mapping[str, Floats], command: Floats, time: Floats, units: Mapping[str, str]
+) -> _Slow:
+    step = max(1, round(1.0 / (_SLOW * (time[1] - time[0]))))
+    count = len(time) // step * step
+
+    def mean(values: Floats) -> Floats:
+        return np.asarray(values[:count].reshape(-1, step).mean(axis=1), dtype=np.float64)
+
+    clock = mean(time)
+    shown = {role: mean(v) for role, v in channels.items() if units[role] != "1"}
+    speed = shown.get("motor_speed", shown.get("output_speed"))
+    if speed is None and "output_position" in shown:
+        speed = np.gradient(shown["output_position"], clock)
+    if speed is None:
+        none = np.zeros(len(clock), dtype=np.bool_)
+        return _Slow(clock, shown, mean(command), None, none, none)
+    size = _MOVING * float(np.quantile(np.abs(speed), 0.95))
+    return _Slow(clock, shown, mean(command), speed, speed > size, speed < -size)
+
+
+def _levels(out: Numbers, role: str, slow: _Slow, unit: str) -> None:
+    """Means by direction; of a motion one way, by its parts."""
+    values = slow.shown[role]
+    size = float(np.sqrt(np.mean(values**2)))
+    out.add(f"{role}: rms", size, "level", size, unit)
+    if slow.both:
+        out.add(f"{role}: mean forwards", values[slow.forward].mean(), "level", size, unit)
+        out.add(f"{role}: mean backwards", values[slow.backward].mean(), "level", size, unit)
+    else:
+        for k, part in enumerate(np.array_split(values, _PARTS)):
+            out.add(f"{role}: mean of part {k + 1}", part.mean(), "level", size, unit)
+        out.add(f"{role}: last", values[-max(len(values) // 50, 1) :].mean(), "level", size, unit)
+
+
+def _rise(out: Numbers, role: str, values: Floats) -> None:
+    part = max(len(values) // 50, 1)
+    rise = values[-part:].mean() - values[:part].mean()
+    out.add(f"{role}: rise", float(rise), "rise", 0.0, "K")
+
+
+def _events(out: Numbers, role: str, values: Floats, time: Floats) -> None:
+    """How often a state changes, when last, what it is at the end; of one that ticks its mean."""
+    turns = np.flatnonzero(np.diff(np.rint(values))) + 1
+    out.add(f"{role}: changes", float(min(len(turns), _FEW)), "count")
+    out.add(f"{role}: at the end", float(np.rint(values[-1])), "end")
+    if len(turns) > _FEW:
+        out.add(f"{role}: mean", float(np.mean(values)), "end")
+    last = float(time[turns[-1]] if len(turns) else time[-1])
+    out.add(f"{role}: last change", last, "instant", 0.0, "s")
+
+
+def _fit(y: Floats, columns: Mapping[str, Floats]) -> dict[str, tuple[float, float]]:
+    """Slopes by least squares; each with the size of its own part of y.
+
+    Columns count in their order: one that those before it nearly make up is left out, since its
+    slope would be chance.
+    """
+    names: list[str] = []
+    basis: list[Floats] = []
+    for name, x in columns.items():
+        rest = x - sum((q * float(q @ x) for q in basis), np.zeros(len(x)))
+        size = float(np.linalg.norm(rest))
+        if size > _APART * float(np.linalg.norm(x)):
+            names.append(name)
+            basis.append(rest / size)
+    if not names or len(y) < 4 * (len(names) + 1):
+        return {}
+    design = np.column_stack([columns[n] for n in names])
+    norms = np.sqrt(np.mean(design**2, axis=0))
+    slopes = np.linalg.lstsq(design / norms, y, rcond=None)[0] / norms
+    part = float(np.sqrt(np.mean(y**2))) / norms
+    return {n: (float(s), float(p)) for n, s, p in zip(names, slopes, part, strict=True)}
+
+
+def _current(out: Numbers, slow: _Slow) -> None:
+    """Current by direction, speed and acceleration."""
+    if "torque_current" not in slow.shown or slow.speed is None:
+        return
+    moving = slow.forward | slow.backward
+    columns = {"dry": np.sign(slow.speed)} if slow.both else {}
+    columns |= {
+        "constant": np.ones(len(slow.time)),
+        "acceleration": np.gradient(slow.speed, slow.time),
+        "speed": slow.speed,
+    }
+    for name, (value, size) in _fit(
+        slow.shown["torque_current"][moving], {n: x[moving] for n, x in columns.items()}
+    ).items():
+        kind = "offset" if name == "constant" else "slope"
+        out.add(f"torque_current: by {name}", value, kind, size, "A")
+
+
+def _voltage(out: Numbers, slow: _Slow) -> None:
+    """Voltage by speed and current; the link's voltage by the current that is drawn."""
+    shown = slow.shown
+    moving = slow.forward | slow.backward
+    if slow.speed is not None and {"torque_voltage", "torque_current"} <= shown.keys():
+        columns = {"speed": slow.speed[moving], "current": shown["torque_current"][moving]}
+        for name, (value, size) in _fit(shown["torque_voltage"][moving], columns).items():
+            out.add(f"torque_voltage: by {name}", value, "slope", 0.2 * size, "V")
+    if {"supply_voltage", "supply_current"} <= shown.keys():
+        columns = {"constant": np.ones(len(slow.time)), "current": shown["supply_current"]}
+        for name, (value, size) in _fit(shown["supply_voltage"], columns).items():
+            out.add(f"supply_voltage: by {name}", value, "gain", 0.02 * size, "V")
+
+
+def _loops(out: Numbers, channels: Mapping[str, Floats], slow: _Slow) -> None:
+    """Gain of the position loop (set point by error) and of the speed loop (steps of both)."""
+    shown = slow.shown
+    if {"speed_ref", "output_position"} <= shown.keys() and np.ptp(shown["speed_ref"]) > 0.0:
+        ref = shown["speed_ref"]
+        free = np.abs(ref) < _FULL * np.abs(ref).max()
+        error = slow.command - shown["output_position"]
+        # The error by the set point: noise of the position is in the error.
+        columns = {"set point": ref[free], "constant": np.ones(int(free.sum()))}
+        for name, (value, size) in _fit(error[free], columns).items():
+            kind = "gain" if name == "set point" else "offset"
+            out.add(f"position error: by {name}", value, kind, size, "s")
+    asked = "current_ref" if "current_ref" in channels else "torque_current"
+    if {"speed_ref", "motor_speed", asked} <= channels.keys():
+        error = channels["speed_ref"] - channels["motor_speed"]
+        columns = {"step": np.diff(error), "error": error[1:]}
+        fitted = _fit(np.diff(channels[asked]), columns)
+        if "step" in fitted:
+            value, size = fitted["step"]
+            out.add(f"{asked}: by step of speed error", value, "ripple", 0.2 * size, "A s/rad")
+
+
+def _ratios(out: Numbers, slow: _Slow) -> None:
+    """Speed shown over the change of the position shown: gains of sensors."""
+    shown = slow.shown
+    pairs = (("motor_speed", "motor_position"), ("motor_position", "output_position"))
+    moving = slow.forward | slow.backward
+    for one, other in pairs:
+        if one not in shown or other not in shown or not moving.any():
+            continue
+        y = shown[one] if one == "motor_speed" else np.gradient(shown[one], slow.time)
+        x = np.gradient(shown[other], slow.time)
+        if np.ptp(x[moving]) > 0.0:
+            value, size = _fit(y[moving], {"rate": x[moving]}).get("rate", (np.nan, 0.0))
+            out.add(f"{one}: by {other}", value, "gain", 0.1 * size)
+
+
+def _features(
+    out: Numbers,
+    channels: Mapping[str, Floats],
+    time: Floats,
+    units: Mapping[str, str],
+    pole_pairs: float | None,
+) -> None:
+    """Features of the catalogue, as far as the roles allow them."""
+    from elevon import _core
+    from elevon.features.plan import core_plan
+    from elevon.features.records import wanted_records
+
+    served = {r: v for r, v in channels.items() if units[r] != "1"}
+    if units["command"] != units.get("output_position"):
+        served.pop("command", None)
+    rate = 1.0 / float(time[1] - time[0])
+    records = wanted_records(["all"], {r: r for r in served}, rate, "features")[0]
+    records = [
+        r
+        for r in records
+        if r.family in _FEATURES
+        and not any(word in r.name.split("_") for word in _LEFT_OUT)
+        and not (r.name.endswith("_rms") and not r.name.startswith("tracking"))
+        and ("electrical" not in r.name or pole_pairs is not None)
+    ]
+    roles = sorted({role for r in records for role in r.roles})
+    if not records:
+        return
+    names = [r.name for r in records]
+    plan = core_plan(names, roles, rate=rate, pole_pairs=pole_pairs or 1.0)
+    values = _core.features(plan, [np.ascontiguousarray(served[role]) for role in roles])
+    for record, value in zip(records, values.tolist(), strict=True):
+        kind = {"orders": "ripple", "bands": "band"}.get(record.family, "level")
+        kind = "offset" if record.name == "load_current" else kind
+        if record.name == "lost_motion" or record.name.startswith("tracking"):
+            kind = "small" if kind == "level" else kind
+        size = _channel_size(record.name, record.family, served)
+        unit = record.unit_of(dict(units))
+        out.add(record.name, value, kind, size, unit)
+
+
+def _channel_size(name: str, family: str, served: Mapping[str, Floats]) -> float:
+    """RMS of the channel that a feature is read from; of a lost motion a part of the travel."""
+    main = {"friction": "torque_current", "transmission": "output_position"}.get(family)
+    main = main or next((role for role in served if name.startswith(role)), None)
+    if main is None or name in ("friction_loop_area", "transmission_slope"):
+        return 0.0
+    share = _TRAVEL if family == "transmission" else 1.0
+    return share * float(np.sqrt(np.mean(served[main] ** 2)))
