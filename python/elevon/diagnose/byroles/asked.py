@@ -108,7 +108,7 @@ def _loaded(time: Floats, load: Floats) -> tuple[Floats, Floats]:
 
 def _lines(time: Floats, values: Floats, most: float) -> tuple[Floats, Floats]:
     """Straight lines that miss no sample by more than `most` (Douglas and Peucker)."""
-    kept = {0, len(time) - 1}
+    corners = {0, len(time) - 1}
     open_parts = [(0, len(time) - 1)]
     while open_parts:
         first, last = open_parts.pop()
@@ -120,9 +120,9 @@ def _lines(time: Floats, values: Floats, most: float) -> tuple[Floats, Floats]:
         worst = int(np.argmax(off))
         if off[worst] > most:
             middle = first + 1 + worst
-            kept.add(middle)
+            corners.add(middle)
             open_parts += [(first, middle), (middle, last)]
-    at = np.array(sorted(kept))
+    at = np.array(sorted(corners))
     return time[at], values[at]
 
 
