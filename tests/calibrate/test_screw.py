@@ -5,7 +5,8 @@ import pytest
 
 from elevon import Actuator
 from elevon.bench.procedure import Procedure
-from elevon.calibrate.screw import ScrewLog, calibrate_screw
+from elevon.calibrate.screw import ScrewLog, calibrate_screw, motor_ratio
+from elevon.calibrate.screw.loops_by_current import loops_by_current
 from elevon.calibrate.screw.torque import relieved
 from tests.calibrate.screw_bench import drawn, make_logs
 
@@ -66,6 +67,29 @@ def test_without_the_voltage_torques_are_ratios(one):
     scale = before.parameters.value("motor.emf_constant") / values["motor.emf_constant"]
     ratio = result["friction.dynamic"].value / values["friction.dynamic"]
     assert ratio == pytest.approx(scale, rel=0.3)
+
+
+def test_without_set_points_the_current_gives_the_speed_gain():
+    """A cascade written down: the gain comes out, its two roots change places, so they do not."""
+    actuator = Actuator.load("nasa-ballscrew")
+    value, ratio = actuator.parameters.value, motor_ratio(actuator)
+    step, gain, k, rate = 2e-3, 1.7, 33.0, 28.0
+    time = np.arange(8000) * step
+    command = sum(1e-2 / n * np.sin(0.9 * n * time + n**2) for n in range(1, 9))
+    error = 1e-2 * sum(np.cos(0.7 * n * time + n) for n in range(1, 30))
+    fine = 0.25e-3
+    total = np.cumsum(error) * step - 0.5 * (step - fine) * error
+    torque = gain * (np.gradient(error, step) + (k + rate) * error + k * rate * total)
+    roles = {
+        "command": command,
+        "motor_position": ratio * command - error,
+        "motor_speed": np.gradient(ratio * command - error, step),
+        "torque_current": torque / value("control.torque_constant"),
+    }
+    levels, reasons = loops_by_current([ScrewLog("pid", time, roles)], actuator)
+    assert levels["control.speed_gain"].value == pytest.approx(gain, rel=0.02)
+    for path in ("control.position_gain", "control.integral_time"):
+        assert path in levels or "change places" in reasons[path]
 
 
 def test_the_relieved_half_is_the_law_of_hertz():

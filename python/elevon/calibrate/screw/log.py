@@ -17,7 +17,16 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.recording import Recording
 
-__all__ = ["CORNERS", "ScrewLog", "balanced", "motor_ratio", "preloaded", "screw_log"]
+__all__ = [
+    "CORNERS",
+    "ScrewLog",
+    "balanced",
+    "motor_ratio",
+    "preloaded",
+    "screw_log",
+    "slope",
+    "smoothed",
+]
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -56,12 +65,12 @@ class ScrewLog(RoleLog):
     def smooth(self) -> dict[str, Floats]:
         """All channels, and slopes of speed, position and current, through one smoother."""
         slopes = {
-            slope: _slope(self.roles[role], self.period)
-            for slope, role in _SLOPES.items()
+            name: slope(self.roles[role], self.period)
+            for name, role in _SLOPES.items()
             if role in self.roles
         }
         channels = {**self.roles, **slopes}
-        return {role: _smoothed(values, self.period) for role, values in channels.items()}
+        return {role: smoothed(values, self.period) for role, values in channels.items()}
 
     @cached_property
     def moving(self) -> Bools:
@@ -82,14 +91,15 @@ class ScrewLog(RoleLog):
         return np.asarray(~near & ~edge)
 
 
-def _smoothed(values: Floats, period: float) -> Floats:
+def smoothed(values: Floats, period: float) -> Floats:
+    """Values through the polynomials that smooth all channels alike."""
     from scipy.signal import savgol_filter
 
     width = max(5, 2 * round(0.5 * _WIDTH / period) + 1)
     return np.asarray(savgol_filter(values, width, 3), dtype=np.float64)
 
 
-def _slope(values: Floats, period: float) -> Floats:
+def slope(values: Floats, period: float) -> Floats:
     """Slope by central differences of eighth order: in a balance it is smoothed like the rest.
 
     The slope of a polynomial through the smoother's window is smoothed more than the values are:
@@ -124,8 +134,8 @@ def screw_log(recording: Recording, name: str, ratio: float) -> ScrewLog:
         raise InputError(f"{name}: nothing of the motion was recorded; one of {', '.join(MOTION)}")
     if shown != "motor_speed":
         scale = 1.0 if shown == "motor_position" else ratio
-        slope = np.gradient(roles[shown], time) if shown.endswith("position") else roles[shown]
-        roles["motor_speed"] = scale * slope
+        speed = np.gradient(roles[shown], time) if shown.endswith("position") else roles[shown]
+        roles["motor_speed"] = scale * speed
     return ScrewLog(**parts)
 
 

@@ -13,6 +13,9 @@ from elevon.calibrate.level import Level
 from elevon.calibrate.screw.heat import motor_heat, nut_heat
 from elevon.calibrate.screw.log import ScrewLog
 from elevon.calibrate.screw.loops import position_loop, speed_control
+from elevon.calibrate.screw.loops_by_current import GIVEN as LOOPS_GIVEN
+from elevon.calibrate.screw.loops_by_current import PATHS as BY_CURRENT
+from elevon.calibrate.screw.loops_by_current import loops_by_current
 from elevon.calibrate.screw.motor import load_side, motor_constants
 from elevon.calibrate.screw.torque import torque_balance
 from elevon.errors import InputError
@@ -99,6 +102,9 @@ def calibrate_screw(
     go(progress, 0.5)
     work.add(*position_loop(logs, actuator))
     work.add(*speed_control(logs, actuator))
+    if BY_CURRENT[0] not in work.levels and BY_CURRENT[1] not in work.levels:
+        work.add(*loops_by_current(logs, actuator))
+        work.given = {**work.given, **dict.fromkeys(BY_CURRENT, LOOPS_GIVEN)}
     go(progress, 0.6)
     settled = work.settled()
     resistance = work.levels.get("motor.winding_resistance")
