@@ -26,6 +26,9 @@ FACTOR = 1.5
 #: ... where the high model's change is this many of its own floors (healthy against healthy) and
 #: this part of the healthy value.
 FLOORS, SEEN = 5.0, 0.05
+#: A change that passes through none as the fault grows is no measure there: within this part of the
+#: severity a hair more or less of the fault is all of it. Both sides of the passage are compared.
+BESIDE = 0.05
 #: Healthy runs of the high model that differ in nothing that matters: half the step, and a winding
 #: a ten-thousandth warmer or colder, by which relays and stick fall into another phase.
 ALIKE = 1e-4
@@ -96,44 +99,97 @@ def apart(
     push: float,
     only: Collection[str] = (),
     duration: float | None = None,
+    planted: float = 1.0,
 ) -> Iterator[str]:
     """Faults that both models carry and in which they part: sign, or a factor of 1.5.
 
     All of them, or only some, over the motion or another duration (s); where they are few, healthy
     runs are not compared among themselves: what is asked for stands far above their differences.
+    `planted` is an error of the low model's severities, to be seen.
     """
     choices = (*choices, *_shared(name))
-    high, low = (Cell(name, fidelity, choices, push) for fidelity in ("high", "low"))
-    asked = [variant for variant in _carried(high, low) if not only or variant.name in only]
-    healthy, *broken = shown(high, [Variant(), *asked], duration)
-    healthy_low, *broken_low = shown(low, [Variant(), *asked], duration)
-    floors = dict.fromkeys(healthy.sizes, 0.0) if only else _floors(high, healthy)
+    pair = Pair(*(Cell(name, fidelity, choices, push) for fidelity in ("high", "low")),
+                duration, planted)  # fmt: skip
+    asked = [variant for variant in _carried(pair) if not only or variant.name in only]
+    (healthy, *broken), (healthy_low, *broken_low) = pair.shown([Variant(), *asked])
+    floors = dict.fromkeys(healthy.sizes, 0.0) if only else _floors(pair.high, healthy)
+    before = Shows(floors, healthy, healthy_low)
     for variant, after, after_low in zip(asked, broken, broken_low, strict=True):
         if after.status != after_low.status:
             yield f"{variant.name}: high ends as {after.status}, low as {after_low.status}"
         elif after.status == "ok":
-            yield from _parted(variant.name, floors, (healthy, after), (healthy_low, after_low))
+            parted = before.parted(after, after_low)
+            yield from (
+                f"{variant.name}: {text}" for text in _standing(pair, before, variant, parted)
+            )
 
 
-def _parted(
-    name: str,
-    floors: Mapping[str, float],
-    high: tuple[Shown, Shown],
-    low: tuple[Shown, Shown],
+@dataclass(frozen=True)
+class Pair:
+    """The same cell at both fidelities."""
+
+    high: Cell
+    low: Cell
+    duration: float | None
+    planted: float
+
+    def shown(self, variants: Sequence[Variant]) -> tuple[list[Shown], list[Shown]]:
+        """What the variants show in each model."""
+        wrong = [_grown(variant, self.planted) for variant in variants]
+        return shown(self.high, variants, self.duration), shown(self.low, wrong, self.duration)
+
+
+@dataclass(frozen=True)
+class Shows:
+    """What healthy runs show, and what is no change of it."""
+
+    floors: Mapping[str, float]
+    high: Shown
+    low: Shown
+
+    def parted(self, after: Shown, after_low: Shown) -> dict[str, str]:
+        """Features of a fault in which the low model is elsewhere, and what both show."""
+        texts = {}
+        for key in sorted(self.high.sizes.keys() & self.low.sizes.keys()):
+            change = self.change(key, after)
+            change_low = after_low.sizes[key] - self.low.sizes[key]
+            if abs(change) <= max(FLOORS * self.floors[key], SEEN * self.high.sizes[key]):
+                continue
+            ratio = change_low / change
+            if not 1.0 / FACTOR <= ratio <= FACTOR:
+                texts[key] = f"{key} {change:+.3g} high, {change_low:+.3g} low ({ratio:.2f})"
+        return texts
+
+    def change(self, key: str, after: Shown) -> float:
+        """Change of a feature at high fidelity."""
+        return after.sizes[key] - self.high.sizes[key]
+
+
+def _standing(
+    pair: Pair, before: Shows, variant: Variant, parted: Mapping[str, str]
 ) -> Iterator[str]:
-    """Features of one fault in which the low model is elsewhere: healthy and broken of each."""
-    for key in sorted(high[0].sizes.keys() & low[0].sizes.keys()):
-        before = high[0].sizes[key]
-        change, change_low = (after.sizes[key] - was.sizes[key] for was, after in (high, low))
-        if abs(change) <= max(FLOORS * floors[key], SEEN * before):
-            continue
-        ratio = change_low / change
-        if not 1.0 / FACTOR <= ratio <= FACTOR:
-            yield f"{name}: {key} {change:+.3g} high, {change_low:+.3g} low ({ratio:.2f})"
+    """What is left of the features that part: not those that agree on both sides of a passage."""
+    beside = [_grown(variant, 1.0 - BESIDE), _grown(variant, 1.0 + BESIDE)]
+    if not parted or any(pair.high.refused(one) for one in beside):
+        yield from parted.values()
+        return
+    high, low = pair.shown(beside)
+    apart_too = [before.parted(*both) for both in zip(high, low, strict=True)]
+    for key, text in parted.items():
+        less, more = (before.change(key, after) for after in high)
+        if less * more > 0.0 or any(key in some for some in apart_too):
+            yield text
 
 
-def _carried(high: Cell, low: Cell) -> list[Variant]:
+def _grown(variant: Variant, factor: float) -> Variant:
+    """The same variant with faults of other severities."""
+    faults = tuple({**one, "severity": factor * one["severity"]} for one in variant.faults)
+    return Variant(variant.name, variant.values, faults)
+
+
+def _carried(pair: Pair) -> list[Variant]:
     """Every fault that runs and acts at both fidelities, severe."""
+    high, low = pair.high, pair.low
     lows = {(kind, place) for kind, place, _ in low.faults()}
     asked = [
         Variant(f"{kind}@{place}", faults=(fault(kind, place, record, severe(record)),))

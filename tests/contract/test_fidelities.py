@@ -40,3 +40,14 @@ def test_both_models_agree_on_these(
 ) -> None:
     """The same of a few faults, with an aiding load."""
     assert list(apart(name, choices, -load(name), faults, duration)) == []
+
+
+def test_an_error_beside_a_passage_is_seen() -> None:
+    """Six-step, references 1 rad away: the q current is as without the fault, by two effects.
+
+    0.95 rad adds 0.59 A, 1.05 rad takes 0.14 A away. Both models do; one whose offset is a tenth
+    too small does not.
+    """
+    cell = ("torino-rotary", SIX_STEP, 0.0, ("offset@sensor.resolver",))
+    assert list(apart(*cell)) == []
+    assert any("current_q" in line for line in apart(*cell, planted=0.9))
