@@ -1,5 +1,7 @@
 """Both filters against the exact one, and what inspections may be."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -18,12 +20,18 @@ def seen(usage, value, deviation, **fields):
     return Inspection(usage, {KEY: Seen(value, deviation, deviation)}, **fields)
 
 
+BELIEF = 2.0
+
+
 def exact(observed, deviation, rate, prior):
-    """Posterior of the growth factor where damage = factor rate usage, on a grid."""
-    factor = np.exp(np.linspace(-3.0, 3.0, 4001) * prior)
-    score = -0.5 * np.linspace(-3.0, 3.0, 4001) ** 2
-    for usage, value in observed:
-        score -= 0.5 * ((value - factor * rate * usage) / deviation) ** 2
+    """Posterior of the growth factor where damage = factor rate usage, on a grid.
+
+    With the diagnoses' scatter unknown, its square inverse-gamma of weight `BELIEF` about 1.
+    """
+    factor = np.exp(np.linspace(-4.0, 4.0, 8001) * prior)
+    misfit = sum(((value - factor * rate * usage) / deviation) ** 2 for usage, value in observed)
+    score = -0.5 * np.linspace(-4.0, 4.0, 8001) ** 2
+    score -= 0.5 * (BELIEF + len(observed)) * np.log(BELIEF + misfit)
     weight = np.exp(score - score.max())
     weight /= weight.sum()
     mean = weight @ np.log(factor)
@@ -73,6 +81,42 @@ def test_a_fault_not_seen_bounds_its_growth():
     before = flt.units.growth.mean()
     flt.update(Inspection(300.0, {KEY: Seen(None, 0.05, 0.05)}))
     assert flt.units.weight @ flt.units.growth[:, 0] < before - 0.5
+    grown = 300.0 * 1e-3 * np.exp(0.8 * np.linspace(-4.0, 4.0, 4001))
+    below = [0.5 * math.erfc((x - 0.15) / 0.05 / math.sqrt(2.0)) for x in grown]
+    mass = np.cumsum(np.exp(-0.5 * np.linspace(-4.0, 4.0, 4001) ** 2) * below)
+    highest = grown[np.searchsorted(mass, 0.95 * mass[-1])]
+    assert np.quantile(flt.units.damage, 0.95) == pytest.approx(highest, rel=0.05)
+
+
+def test_a_fault_not_seen_may_stand_anywhere_below_what_is_detectable():
+    nothing = Seen(None, 0.05, 0.05)
+    score = np.exp(nothing.log_likelihood(np.array([0.0, 0.1, 0.15, 0.2, 0.6])))
+    assert score == pytest.approx([0.9987, 0.8415, 0.5005, 0.1596, 0.001], abs=2e-4)
+
+
+def test_how_widely_diagnoses_scatter_is_learned_from_them():
+    """Intervals stated four times too wide: growth is known as well as the scatter allows."""
+    rng, rate, true = np.random.default_rng(3), 1e-3, 0.01
+    observed = [(u, rate * u + true * rng.standard_normal()) for u in np.linspace(100.0, 900.0, 25)]
+    flt = ParticleFilter(process(law(rate)), count=4000, seed=1)
+    for usage, value in observed:
+        flt.update(seen(usage, value, 4.0 * true))
+    mean, spread = exact(observed, 4.0 * true, rate, 0.8)
+    growth = flt.units.growth[:, 0]
+    assert growth.mean() == pytest.approx(mean, abs=0.5 * spread)
+    assert growth.std() == pytest.approx(spread, rel=0.35)
+    stated = 4.0 * true / np.sqrt(sum((rate * u) ** 2 for u, _ in observed))
+    assert growth.std() < 0.7 * stated
+
+
+def test_many_particles_survive_a_fault_that_others_do_not_share():
+    """Each law is drawn by its own diagnoses: what one shows costs the other no particle."""
+    flt = ParticleFilter(process(law(1e-3), law(1e-3, "friction"), limits=(1.0, 1.0)), seed=1)
+    other = flt.units.growth[:, 1].copy()
+    for usage in (100.0, 200.0, 300.0):
+        flt.update(seen(usage, 1e-3 * usage, 0.002))
+    assert np.array_equal(flt.units.growth[:, 1], other)
+    assert len(np.unique(flt.units.growth[:, 0])) == len(other)
 
 
 def test_maintenance_makes_the_part_new_and_its_growth_unknown():

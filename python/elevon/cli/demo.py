@@ -39,7 +39,10 @@ def demo(
     force: ForceOption = False,
     json: JsonOption = False,
 ) -> int:
-    """Let a unit live and predict its end from bench logs; one page tells the story."""
+    """Let a unit live and predict its end from bench logs; one page tells the story.
+
+    Interrupted, it goes on where it was when the same command is given again.
+    """
     from elevon.errors import unknown
     from elevon.report.checks import all_passed
 
@@ -49,7 +52,7 @@ def demo(
         return _bench(out, seed, force=force, as_json=json)
     from elevon.demo.life.run import run_life
 
-    with progress_bar("demo") as advance:
+    with interrupt.telling(lambda: _story(out)), progress_bar("demo") as advance:
         result = run_life(out, seed=seed, force=force, progress=advance)
     if json:
         print_json(result.to_dict())

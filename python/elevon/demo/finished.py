@@ -31,7 +31,9 @@ STEPS = {
     "calibration": "the calibration",
     "before": "the validation of the published values",
     "after": "the validation of the calibrated values",
+    "life": "the unit's life",
 }
+_INSPECTION = "inspection-"
 
 
 def work_key(seed: int, base: Actuator, hidden: Actuator) -> str:
@@ -143,6 +145,9 @@ def finished_steps(out: Path) -> list[str]:
     if log is None:
         return []
     steps = [text for name, text in STEPS.items() if name in log.items]
+    seen = sum(name.startswith(_INSPECTION) for name in log.items)
+    if seen or "life" in log.items:
+        return [*steps, *([f"{seen} diagnoses"] if seen else [])]
     procedure = demo_procedure()
     logs = len(finished_logs(state_file(out / "logs", procedure.name)))
     return [*steps, *([f"{logs} of {len(procedure.traces)} logs"] if logs else [])]

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
-import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from elevon.demo.finished import FinishedSteps, inputs_of, work_key
 from elevon.demo.hidden import RECOVERED, hidden_actuator
 from elevon.demo.procedure import HELD_OUT, LOADED, demo_procedure
-from elevon.demo.results import Plays, Recovered, Step, validation_from_json, validation_to_json
+from elevon.demo.results import Plays, Recovered, validation_from_json, validation_to_json
+from elevon.demo.steps import Story, Work
 from elevon.parameters.relations import motor_torque_constant
 from elevon.progress import Progress, part
 from elevon.report.checks import Check, all_passed
@@ -24,38 +24,15 @@ if TYPE_CHECKING:
 
 __all__ = ["Demo", "demo_files", "run_demo"]
 
-Result = TypeVar("Result")
 _PAGES = ("report.html", "backlash.html", "calibrated.toml", "truth.json")
 
 
-@dataclass(frozen=True)
-class _Work(Generic[Result]):
-    """A step that can be kept: how it is done, and its result's way to JSON and back."""
-
-    piece: str
-    do: Callable[[], Result]
-    write: Callable[[Result], Any]
-    read: Callable[[Any], Result]
-    inputs: str = ""
-    files: Sequence[Path] = ()
-
-
 @dataclass
-class Demo:
+class Demo(Story):
     """Everything the report shows.
 
     Attributes
     ----------
-    seed : int
-        Of the hidden values and of chance.
-    base, hidden : Actuator
-        The published set, and the one on the bench.
-    folder : Path
-        Of the outputs.
-    finished : FinishedSteps
-        What an interrupted run left, and this one leaves if it is interrupted.
-    steps : list of Step
-        What was done, the seconds it took, and what of it was kept from an interrupted run.
     backlash, imported, calibration : Plays, list of ImportedLog, Recovered
         Results.
     before, after : Validation
@@ -64,12 +41,6 @@ class Demo:
         True value by estimate.
     """
 
-    seed: int
-    base: Actuator
-    hidden: Actuator
-    folder: Path
-    finished: FinishedSteps
-    steps: list[Step] = field(default_factory=list)
     backlash: Plays = field(init=False)
     imported: list[ImportedLog] = field(init=False)
     logs: list[BenchLog] = field(init=False)
@@ -78,35 +49,6 @@ class Demo:
     after: Validation = field(init=False)
     truth: dict[str, float] = field(default_factory=dict)
     bench_truth: dict[str, Any] = field(default_factory=dict)
-
-    def timed(
-        self, name: str, work: Callable[[], Result], summary: Callable[[Result], str] | None = None
-    ) -> Result:
-        """Do a step and note its time, and what `summary` says of its result."""
-        begin = clock.perf_counter()
-        result = work()
-        seconds = clock.perf_counter() - begin
-        self.steps.append(Step(name, seconds, "" if summary is None else summary(result)))
-        return result
-
-    def resumed(self, name: str, work: _Work[Result]) -> Result:
-        """Take a step's result from an interrupted run, or do it and keep its result."""
-        begin = clock.perf_counter()
-        stored = self.finished.load(work.piece, work.inputs, work.read)
-        if stored is not None:
-            result, before = stored
-            text = f"kept from the interrupted run, which took {before:.1f} s for it"
-            self.steps.append(Step(name, clock.perf_counter() - begin, text))
-            return result
-        result = self.timed(name, work.do)
-        seconds = self.steps[-1].seconds
-        self.finished.save(work.piece, work.inputs, work.write(result), seconds, work.files)
-        return result
-
-    @property
-    def seconds(self) -> float:
-        """Time of all steps so far."""
-        return sum(step.seconds for step in self.steps)
 
     @property
     def checks(self) -> list[Check]:
@@ -252,7 +194,7 @@ def _backlash(demo: Demo, progress: Progress | None) -> None:
 
     demo.backlash = demo.resumed(
         "published backlash table, fifteen plays",
-        _Work("backlash", work, Plays.to_json, Plays.from_json, files=[page]),
+        Work("backlash", work, Plays.to_json, Plays.from_json, files=[page]),
     )
 
 
@@ -306,7 +248,7 @@ def _calibrate(demo: Demo, progress: Progress | None, logs: Sequence[Path]) -> N
 
     demo.calibration = demo.resumed(
         "calibration on three logs",
-        _Work(
+        Work(
             "calibration",
             work,
             lambda calibration: calibration.to_json(demo.base),
@@ -348,7 +290,7 @@ def _validate(demo: Demo, progress: Progress | None, logs: Sequence[Path]) -> No
         what = "published" if piece == "before" else "calibrated"
         return demo.resumed(
             f"validation of the {what} values on all four logs",
-            _Work(
+            Work(
                 piece,
                 lambda: validate(demo.logs, actuator, progress=share),
                 validation_to_json,

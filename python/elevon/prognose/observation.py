@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import erfc, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +22,8 @@ _SIGMAS = 1.6449  # of a 90 % interval's half width
 _DETECTED = 3.0  # deviations at which a severity counts as seen
 _AT_EDGE = 0.98
 _OUTLIER = 0.02  # share of diagnoses that say nothing true; ASSUMED
+_BELIEF = 2.0  # diagnoses that the stated deviations count for against the scatter seen; ASSUMED
+_LARGEST = 3.0  # deviations beyond which a diagnosis is taken as stray, not as scatter
 _MISSED = 1e-3  # share of diagnoses that do not see a fault that is well there; ASSUMED
 
 
@@ -33,21 +36,53 @@ class Seen:
     severity : float or None
         Median [the fault's unit]; None where the fault was not seen.
     low, high : float
-        Deviations below and above it; of a fault not seen both are the deviation of its zero.
+        Deviations below and above it; of a fault not seen both are a third of what was detectable.
     """
 
     severity: float | None
     low: float
     high: float
 
-    def log_likelihood(self, severity: Floats) -> Floats:
-        """Return it for severities of shape (n,), up to a constant."""
-        at = 0.0 if self.severity is None else self.severity
-        off = severity - at
-        score = off / np.where(off < 0.0, self.low, self.high)
+    def off(self, severity: Floats) -> Floats:
+        """Return how far severities of shape (n,) are from it, in its deviations."""
+        off = severity - (0.0 if self.severity is None else self.severity)
+        return np.asarray(off / np.where(off < 0.0, self.low, self.high))
+
+    def scatter(self, severity: Floats) -> Floats:
+        """Return the squares of `off`, as scatter counts them: nothing of a fault not seen."""
+        if self.severity is None:
+            return np.zeros(len(severity))
+        return np.asarray(np.minimum(np.abs(self.off(severity)), _LARGEST) ** 2)
+
+    def log_likelihood(
+        self, severity: Floats, misfit: Floats | float = 0.0, count: float = 0.0
+    ) -> Floats:
+        """Return it for severities of shape (n,), up to a constant.
+
+        How widely the diagnoses of a fault truly scatter, over the deviations they state, is not
+        known: with an inverse-gamma square of it the likelihood is Student's, about the misfits so
+        far (Gelman et al., Bayesian Data Analysis, 3.3). A share of diagnoses is stray. A fault
+        that was not seen is one whose diagnosis fell below what could be detected.
+
+        Parameters
+        ----------
+        severity : ndarray, shape (n,)
+            Of the units.
+        misfit : ndarray, shape (n,)
+            Sum of the squares of `off` at earlier inspections.
+        count : float
+            How many those were.
+        """
+        score = self.off(severity)
         stray = _MISSED if self.severity is None else _OUTLIER
+        if self.severity is None:
+            above = np.array([erfc(x) for x in (_DETECTED - score) / sqrt(2.0)])
+            return np.asarray(np.log(stray + (1.0 - stray) * (1.0 - 0.5 * above)))
         wide = np.log(stray / 30.0)  # evenly over thirty deviations
-        return np.asarray(np.logaddexp(np.log1p(-stray) - 0.5 * score**2, wide))
+        freedom = _BELIEF + count
+        spread = _BELIEF + np.asarray(misfit)
+        near = -0.5 * np.log(spread / freedom) - 0.5 * (freedom + 1.0) * np.log1p(score**2 / spread)
+        return np.asarray(np.logaddexp(np.log1p(-stray) + near, wide))
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from elevon.prognose.observation import Inspection
+from elevon.prognose.observation import Inspection, Seen
 from elevon.prognose.process import Population, Process
 
 __all__ = ["BIAS", "COUNT", "ParticleFilter", "resampled"]
@@ -19,13 +19,18 @@ BIAS = 0.01
 shorts and for much friction; taken as the same for all faults (ASSUMED). The model behind them is
 one and the same at each inspection, so that part of its error does not average out."""
 SURPRISE = 4.0
-_SHRINK = 0.98  # of Liu and West: what is drawn is moved, its spread stays
-_FEWEST = 0.5  # effective particles, of all, below which they are drawn anew
+_KERNEL = 0.08  # variance of what is drawn that is drawn anew, a lost share of the particles
+_FEWEST = 0.5  # effective particles, of all, that one share of a likelihood leaves
+_HALVINGS = 8  # so that a likelihood is weighed in 256 shares at most
 
 
 class ParticleFilter:
-    """Sequential importance resampling with the process as proposal (Gordon 1993), fixed
-    parameters by the kernel of Liu and West (2001).
+    """Sequential importance resampling with the process as proposal (Gordon 1993).
+
+    Law by law: faults are diagnosed one by one and hardly drive each other's growth, so that each
+    law's numbers are weighed and drawn by its own diagnoses alone (factored particles: Ng, Peshkin
+    and Pfeffer 2002), and no particle is lost in one fault for what another shows. Numbers that do
+    not change are moved by the kernel of Liu and West (2001).
 
     Parameters
     ----------
@@ -39,79 +44,125 @@ class ParticleFilter:
     Attributes
     ----------
     units : Population
-        The posterior of the moment.
+        The posterior of the moment, of equal weights.
     surprises : list of (float, str, float)
         Use, fault and deviations off of diagnoses that stood more than `SURPRISE` of them from
         what was expected.
-    """  # noqa: D205
+    """
 
     def __init__(self, process: Process, *, count: int = COUNT, seed: int = 0) -> None:
         self.process = process
         self.rng = np.random.default_rng([16, seed])
         self.units = process.start(count, self.rng)
         self.surprises: list[tuple[float, str, float]] = []
+        self._counts = [0] * len(process.laws)
 
     def update(self, item: Inspection) -> Population:
         """Grow to an inspection, weigh by what it saw, make new what was replaced after it."""
         units = self.process.to(self.units, item.usage, self.rng)
-        severity = self.process.severity(units.damage)
-        self._compare(units, severity, item)
-        score = np.log(np.maximum(units.weight, 1e-300))
         for k, law in enumerate(self.process.laws):
-            if law.key in item.seen:
-                score += item.seen[law.key].log_likelihood(severity[:, k])
-        weight = np.exp(score - score.max())
-        units = replace(units, weight=weight / weight.sum())
-        if 1.0 / float(np.sum(units.weight**2)) < _FEWEST * len(weight):
-            units = resampled(units, len(weight), self.rng, shrink=_SHRINK)
+            seen = item.seen.get(law.key)
+            if seen is None:
+                continue
+            self._compare(units, k, seen)
+            units = self._weighed(units, k, seen)
+            if seen.severity is not None:
+                units = _with_misfit(units, k, seen.scatter(self._severity(units, k)))
+                self._counts[k] += 1
         if item.reset:
             units = self.process.reset(units, item.reset, self.rng)
         self.units = units
         return units
 
-    def _compare(self, units: Population, severity: Floats, item: Inspection) -> None:
+    def _severity(self, units: Population, k: int) -> Floats:
+        return self.process.laws[k].severity(units.damage[:, k])
+
+    def _weighed(self, units: Population, k: int, seen: Seen) -> Population:
+        """Weigh and draw one law's numbers, in shares of the likelihood that leave enough of them.
+
+        A diagnosis that few particles foresaw so narrows the cloud in steps, rather than to those
+        few (tempering: Neal 2001).
+        """
+        left = 1.0
+        while left > 0.0:
+            score = seen.log_likelihood(
+                self._severity(units, k), units.misfit[:, k], self._counts[k]
+            )
+            share = _share(score, left)
+            left -= share
+            units = _drawn(units, k, _weights(share * score), self.rng)
+        return units
+
+    def _compare(self, units: Population, k: int, seen: Seen) -> None:
         """Note a diagnosis that the units expected before it hardly allow."""
-        for k, law in enumerate(self.process.laws):
-            seen = item.seen.get(law.key)
-            if seen is None or seen.severity is None:
-                continue
-            mean = float(units.weight @ severity[:, k])
-            variance = float(units.weight @ (severity[:, k] - mean) ** 2)
-            deviation = seen.low if mean < seen.severity else seen.high
-            score = (seen.severity - mean) / np.sqrt(variance + deviation**2)
-            if abs(score) > SURPRISE:
-                self.surprises.append((item.usage, law.key, float(score)))
+        if seen.severity is None:
+            return
+        severity = self._severity(units, k)
+        mean = float(severity.mean())
+        deviation = seen.low if mean < seen.severity else seen.high
+        score = (seen.severity - mean) / np.sqrt(float(severity.var()) + deviation**2)
+        if abs(score) > SURPRISE:
+            self.surprises.append((units.usage, self.process.laws[k].key, float(score)))
 
 
-def resampled(
-    units: Population, count: int, rng: np.random.Generator, *, shrink: float = 1.0
-) -> Population:
-    """Draw units by their weights (systematic); `shrink` below 1 moves what is drawn."""
-    edges = np.cumsum(units.weight)
+def resampled(units: Population, count: int, rng: np.random.Generator) -> Population:
+    """Draw units by their weights (systematic)."""
+    return units.picked(_systematic(units.weight, count, rng))
+
+
+def _systematic(weight: Floats, count: int, rng: np.random.Generator) -> npt.NDArray[np.intp]:
+    edges = np.cumsum(weight)
     at = (rng.random() + np.arange(count)) / count * edges[-1]
-    index = np.minimum(np.searchsorted(edges, at), len(edges) - 1)
-    out = units.picked(index)
-    return out if shrink >= 1.0 else _jittered(units, out, shrink, rng)
+    return np.asarray(np.minimum(np.searchsorted(edges, at), len(edges) - 1))
 
 
-def _jittered(
-    before: Population, out: Population, shrink: float, rng: np.random.Generator
-) -> Population:
-    """Move what was drawn, law by law, by a kernel that keeps mean and covariance.
+def _weights(score: Floats) -> Floats:
+    weight = np.exp(score - score.max())
+    return np.asarray(weight / weight.sum())
+
+
+def _effective(weight: Floats) -> float:
+    """Share of the particles that a set of weights leaves effective."""
+    return 1.0 / (len(weight) * float(np.sum(weight**2)))
+
+
+def _share(score: Floats, left: float) -> float:
+    """Return how much of a likelihood, of `left`, leaves `_FEWEST` of the particles effective."""
+    if _effective(_weights(left * score)) >= _FEWEST:
+        return left
+    low, high = 0.0, left
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if _effective(_weights(middle * score)) >= _FEWEST:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def _with_misfit(units: Population, k: int, added: Floats) -> Population:
+    misfit = units.misfit.copy()
+    misfit[:, k] += added
+    return replace(units, misfit=misfit)
+
+
+def _drawn(units: Population, k: int, weight: Floats, rng: np.random.Generator) -> Population:
+    """Draw one law's numbers by weights, and move them by a kernel that keeps mean and covariance.
 
     Damage moves along with growth and form: with little scatter of the growth all particles would
-    else soon descend from a few.
+    else soon descend from a few. The more particles the weights cost, the wider the kernel.
     """
+    out = units.with_law(k, _systematic(weight, len(weight), rng))
+    updated = units.active[:, k] & (units.damage[:, k] > 0.0) & (weight > 0.0)
+    moved = out.active[:, k] & (out.damage[:, k] > 0.0)
+    if updated.sum() < 10 or not moved.any():
+        return out
+    part = weight[updated] / weight[updated].sum()
+    wide = _KERNEL * (1.0 - _effective(weight))
+    new = _kernel(_rows(units, updated, k), part, _rows(out, moved, k), wide, rng)
     damage, growth, form = out.damage.copy(), out.growth.copy(), out.form.copy()
-    for k in range(damage.shape[1]):
-        updated = before.active[:, k] & (before.damage[:, k] > 0.0) & (before.weight > 0.0)
-        moved = out.active[:, k] & (out.damage[:, k] > 0.0)
-        if updated.sum() < 10 or not moved.any():
-            continue
-        weight = before.weight[updated] / before.weight[updated].sum()
-        new = _kernel(_rows(before, updated, k), weight, _rows(out, moved, k), shrink, rng)
-        damage[moved, k] = np.exp(new[:, 0])
-        growth[moved, k], form[moved, k] = new[:, 1], new[:, 2]
+    damage[moved, k] = np.exp(new[:, 0])
+    growth[moved, k], form[moved, k] = new[:, 1], new[:, 2]
     return replace(out, damage=damage, growth=growth, form=form)
 
 
@@ -122,12 +173,15 @@ def _rows(units: Population, keep: npt.NDArray[np.bool_], k: int) -> Floats:
 
 
 def _kernel(
-    before: Floats, weight: Floats, after: Floats, shrink: float, rng: np.random.Generator
+    before: Floats, weight: Floats, after: Floats, wide: float, rng: np.random.Generator
 ) -> Floats:
-    """Return rows drawn from a weighted sample, shrunk to its mean and spread again."""
+    """Return rows drawn from a weighted sample, shrunk to its mean and spread again.
+
+    `wide` is the share of the variance that is drawn anew.
+    """
     mean = weight @ before
     rest = before - mean
     values, vectors = np.linalg.eigh((rest.T * weight) @ rest)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
-    jitter = np.sqrt(1.0 - shrink**2) * rng.standard_normal(after.shape) @ root.T
-    return np.asarray(shrink * after + (1.0 - shrink) * mean + jitter)
+    jitter = np.sqrt(wide) * rng.standard_normal(after.shape) @ root.T
+    return np.asarray(mean + np.sqrt(1.0 - wide) * (after - mean) + jitter)

@@ -42,6 +42,8 @@ class Population:
         Sum 1.
     active : ndarray of bool, shape (n, k)
         Whether the fault grows.
+    misfit : ndarray, shape (n, k)
+        Sum of the squared distances, in stated deviations, from the diagnoses that saw the fault.
     usage : float
         Use so far, in the mission's unit.
     """
@@ -51,6 +53,7 @@ class Population:
     form: Floats
     weight: Floats
     active: npt.NDArray[np.bool_]
+    misfit: Floats
     usage: float = 0.0
 
     def picked(self, index: npt.NDArray[np.intp]) -> Population:
@@ -63,6 +66,20 @@ class Population:
             form=self.form[index],
             weight=even,
             active=self.active[index],
+            misfit=self.misfit[index],
+        )
+
+    def with_law(self, k: int, index: npt.NDArray[np.intp]) -> Population:
+        """Return the units with the numbers of one law from those of an index, shape (n,)."""
+        columns = np.arange(self.damage.shape[1])
+        rows = np.where(columns == k, index[:, None], np.arange(len(index))[:, None])
+        return replace(
+            self,
+            damage=self.damage[rows, columns],
+            growth=self.growth[rows, columns],
+            form=self.form[rows, columns],
+            active=self.active[rows, columns],
+            misfit=self.misfit[rows, columns],
         )
 
 
@@ -102,6 +119,7 @@ class Process:
             form * rng.standard_normal((count, size)),
             np.full(count, 1.0 / count),
             rng.random((count, size)) >= np.array([law.dormant for law in self.laws]),
+            np.zeros((count, size)),
         )
 
     def severity(self, damage: Floats) -> Floats:

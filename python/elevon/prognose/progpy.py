@@ -120,6 +120,7 @@ def from_samples(samples: Any, process: Process, *, usage: float = 0.0) -> Popul
         form=table[:, :, 2],
         weight=np.full(len(table), 1.0 / len(table)),
         active=active,
+        misfit=np.zeros_like(growth),
         usage=usage,
     )
 
@@ -141,6 +142,7 @@ def _units(x: Mapping[str, Any], keys: list[str]) -> Population:
         form=rows[None, :, 2],
         weight=np.ones(1),
         active=np.ones_like(growth, dtype=np.bool_),
+        misfit=np.zeros_like(growth),
     )
 
 

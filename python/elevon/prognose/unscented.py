@@ -54,30 +54,40 @@ class UnscentedFilter:
             seen = item.seen.get(law.key)
             if seen is None:
                 continue
-            level = 0.0 if seen.severity is None else seen.severity
             points, mean_weight, weight = _sigma(self.mean, self.covariance)
             shown = self.process.severity(np.maximum(points[:, : len(self.process.laws)], 0.0))
             at = shown[:, k]
             centre = float(mean_weight @ at)
+            level = min(centre, 3.0 * seen.high) if seen.severity is None else seen.severity
             deviation = seen.low if level < centre else seen.high
             variance = float(weight @ (at - centre) ** 2) + deviation**2
             gain = ((points - self.mean).T * weight) @ (at - centre) / variance
             self.mean = self.mean + gain * (level - centre)
             self.covariance = _even(self.covariance - np.outer(gain, gain) * variance)
 
+    def sampled(self, count: int, rng: np.random.Generator) -> Population:
+        """Draw units from the mean and the covariance, to look ahead with."""
+        size = len(self.process.laws)
+        rows = rng.multivariate_normal(self.mean, self.covariance, size=count, method="eigh")
+        return self._population(rows[:, :size], rows[:, size:])
+
+    def _population(self, damage: Floats, growth: Floats) -> Population:
+        return Population(
+            np.maximum(damage, 0.0),
+            growth,
+            np.zeros_like(growth),
+            np.full(len(growth), 1.0 / len(growth)),
+            np.ones(growth.shape, dtype=np.bool_),
+            np.zeros_like(growth),
+            self.usage,
+        )
+
     def _grow(self, usage: float) -> None:
         if usage <= self.usage:
             return
         size = len(self.process.laws)
         points, mean_weight, weight = _sigma(self.mean, self.covariance)
-        before = Population(
-            np.maximum(points[:, :size], 0.0),
-            points[:, size:],
-            np.zeros((len(points), size)),
-            np.full(len(points), 1.0 / len(points)),
-            np.ones((len(points), size), dtype=np.bool_),
-            self.usage,
-        )
+        before = self._population(points[:, :size], points[:, size:])
         after = self.process.to(before, usage, None)
         grown = np.column_stack((after.damage, after.growth))
         self.mean = mean_weight @ grown

@@ -32,7 +32,8 @@ def _page(result: Any, options: Options) -> Report:
 
 
 def _show(values: Values, result: Any) -> None:
-    columns = ("law", "histories", "accuracy", "coverage", "horizon", "unaided_accuracy")
+    columns = ("law", "histories", "accuracy", "coverage", "horizon", "unscented_accuracy",
+               "unaided_accuracy")  # fmt: skip
     rows = [[cell(row[name]) for name in columns] for row in values["summary"]]
     print_table([name.replace("_", " ") for name in columns], rows)
     for text in result.left_out:

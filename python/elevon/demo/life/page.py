@@ -12,7 +12,6 @@ from elevon.demo.life.figures import (
 )
 from elevon.demo.life.mechanism import mechanism, motion
 from elevon.diagnose.bymodel import read_test_logs
-from elevon.diagnose.bymodel.words import sentence
 from elevon.prognose.figures import shown_unit
 from elevon.report import Report, Table
 from elevon.reproduce.provenance import provenance
@@ -117,7 +116,7 @@ def _signals(report: Report, demo: LifeDemo) -> None:
 
 
 def _diagnoses(report: Report, demo: LifeDemo) -> None:
-    section = report.section("What the diagnoses say", sentence(demo.visits[-1].diagnosis))
+    section = report.section("What the diagnoses say", demo.visits[-1].diagnosis.text)
     section.figure(
         diagnoses_figure(demo),
         "Severities by the diagnosis of each log, with 90 % intervals, and the truth that no "
@@ -202,8 +201,8 @@ def _calibration(report: Report, demo: LifeDemo) -> None:
 
 
 def _times(report: Report, demo: LifeDemo) -> None:
-    rows = [[step.name, step.seconds] for step in demo.steps]
-    rows.append(["all", demo.seconds])
+    rows: list[list[object]] = [[step.name, step.seconds, step.reused] for step in demo.steps]
+    rows.append(["all", demo.seconds, ""])
     report.section("Time of each step").table(
-        Table(("step", "time [s]"), rows, "Wall time of this run.", formats=["", ".1f"])
+        Table(("step", "time [s]", ""), rows, "Wall time of this run.", formats=["", ".1f", ""])
     )

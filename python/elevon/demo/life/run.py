@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import shutil
-import time as clock
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elevon.demo.finished import FinishedSteps, inputs_of, work_key
 from elevon.demo.life.unit import (
     INSPECTED,
     demo_mission,
@@ -21,21 +20,20 @@ from elevon.demo.life.unit import (
     mission_file,
     of_day,
 )
-from elevon.demo.results import Step
+from elevon.demo.results import Recovered
+from elevon.demo.steps import Story, Work
+from elevon.errors import Interrupted
 from elevon.prognose.metrics import Track, cumulative_relative_accuracy
 from elevon.progress import Progress, part
 from elevon.report.checks import Check, all_passed
 
 if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.calibrate import Calibration
     from elevon.diagnose.bymodel import Diagnosis, TestLog
     from elevon.prognose import Inspection, Prognosis, Response
     from elevon.prognose.life import Life
 
 __all__ = ["LifeDemo", "Visit", "life_files", "run_life"]
 
-Result = TypeVar("Result")
 _PAGES = (
     "report.html",
     "calibrated.toml",
@@ -49,6 +47,44 @@ _TEST = "backlash"
 
 
 @dataclass(frozen=True)
+class Said:
+    """What a diagnosis says, as it is kept.
+
+    Attributes
+    ----------
+    data : dict
+        Its JSON form.
+    text : str
+        In words.
+    """
+
+    data: dict[str, Any]
+    text: str
+
+    @classmethod
+    def of(cls, answer: Diagnosis) -> Said:
+        """Take it from the whole answer."""
+        from elevon.diagnose.bymodel.words import sentence
+
+        return cls(answer.to_dict(), sentence(answer))
+
+    @classmethod
+    def from_json(cls, data: Any) -> Said:
+        """Return it again."""
+        return cls(dict(data["data"]), str(data["text"]))
+
+    @property
+    def status(self) -> str:
+        """``healthy`` or ``faulty``."""
+        return str(self.data["status"])
+
+    @property
+    def best(self) -> list[str]:
+        """Faults of the best explanation, ``KIND@PLACE``."""
+        return list(self.data["best"]["faults"])
+
+
+@dataclass(frozen=True)
 class Visit:
     """One inspection.
 
@@ -58,7 +94,7 @@ class Visit:
         Flights.
     log : Path
         What the bench wrote.
-    diagnosis : Diagnosis
+    diagnosis : Said
         Of it.
     inspection : Inspection
         As the filter takes it.
@@ -68,28 +104,20 @@ class Visit:
 
     usage: float
     log: Path
-    diagnosis: Diagnosis
+    diagnosis: Said
     inspection: Inspection
     prognosis: Prognosis
 
 
 @dataclass
-class LifeDemo:
+class LifeDemo(Story):
     """Everything the report shows.
 
     Attributes
     ----------
-    seed : int
-        Of everything hidden.
-    base, hidden : Actuator
-        The published set, and the unit.
-    folder : Path
-        Of the outputs.
-    steps : list of Step
-        What was done, and the time it took.
     life : Life
         The true course.
-    calibration : Calibration
+    calibration : Recovered
         The healthy unit as its logs show it.
     response : Response
         The calibrated unit's tables.
@@ -97,33 +125,11 @@ class LifeDemo:
         In the order of flights.
     """
 
-    seed: int
-    base: Actuator
-    hidden: Actuator
-    folder: Path
-    steps: list[Step] = field(default_factory=list)
     life: Life = field(init=False)
-    calibration: Calibration = field(init=False)
+    calibration: Recovered = field(init=False)
     response: Response = field(init=False)
     healthy: list[Path] = field(default_factory=list)
     visits: list[Visit] = field(default_factory=list)
-
-    def timed(self, name: str, work: Callable[[], Result]) -> Result:
-        """Do a step and note its time; steps of one name are added up."""
-        begin = clock.perf_counter()
-        result = work()
-        seconds = clock.perf_counter() - begin
-        for k, step in enumerate(self.steps):
-            if step.name == name:
-                self.steps[k] = Step(name, step.seconds + seconds)
-                return result
-        self.steps.append(Step(name, seconds))
-        return result
-
-    @property
-    def seconds(self) -> float:
-        """Time of all steps so far."""
-        return sum(step.seconds for step in self.steps)
 
     @property
     def track(self) -> Track:
@@ -172,7 +178,7 @@ class LifeDemo:
                 {
                     "usage": v.usage,
                     "status": v.diagnosis.status,
-                    "faults": list(v.diagnosis.best),
+                    "faults": v.diagnosis.best,
                     "rul": v.prognosis.median,
                     "low": v.prognosis.interval[0],
                     "high": v.prognosis.interval[1],
@@ -200,6 +206,9 @@ def run_life(
 ) -> LifeDemo:
     """Run the demonstration and write its report.
 
+    A run that was interrupted goes on where it stopped when it is started again with the same
+    arguments, as `elevon.demo.run.run_demo` does.
+
     Parameters
     ----------
     out : path
@@ -207,7 +216,7 @@ def run_life(
     seed : int
         Of the unit, its life and its bench.
     force : bool
-        Whether what is there may be replaced.
+        Whether what an earlier, complete run or other work left may be replaced.
     progress : callable, optional
         Told the done fraction; returns False to stop.
 
@@ -222,34 +231,57 @@ def run_life(
 
     base = Actuator.load("torino-rotary")
     folder = Path(out).expanduser()
-    _claim(folder, force=force)
-    demo = LifeDemo(seed, base, hidden_unit(base, seed), folder)
-    demo.life = demo.timed(
+    hidden = hidden_unit(base, seed)
+    demo = LifeDemo(seed, base, hidden, folder, FinishedSteps(folder, work_key(seed, base, hidden)))
+    _claim(demo, force=force)
+    demo.life = demo.resumed(
         "the unit flies until it fails (high-fidelity snapshots)",
-        lambda: live(demo.hidden, seed, part(progress, 0.0, 0.15)),
+        Work(
+            "life",
+            lambda: live(hidden, seed, part(progress, 0.0, 0.15)),
+            _life_to_json,
+            _life_from_json,
+        ),
     )
     _calibrate(demo, part(progress, 0.15, 0.4))
     _tables(demo, part(progress, 0.4, 0.5))
     _inspect(demo, part(progress, 0.5, 0.97))
     _finish(demo, force=force)
+    demo.finished.clear()
     if progress is not None:
         progress(1.0)
     return demo
 
 
-def _claim(folder: Path, *, force: bool) -> None:
-    """Refuse what may not be replaced; clear what an earlier demonstration left."""
+def _life_to_json(life: Life) -> dict[str, Any]:
+    data = asdict(life)
+    return {**data, "usage": life.usage.tolist(), "severity": life.severity.tolist()}
+
+
+def _life_from_json(data: Any) -> Life:
+    from elevon.prognose.life import Life
+
+    usage, severity = np.array(data["usage"]), np.array(data["severity"])
+    return Life(usage, severity, float(data["end"]), int(data["first"]))
+
+
+def _claim(demo: LifeDemo, *, force: bool) -> None:
+    """Refuse what may not be replaced; clear what earlier work left; or go on with this work."""
     from elevon.errors import OutputExistsError
     from elevon.files import check_output
 
-    for path in life_files(folder):
+    if demo.finished.begun(force=force):
+        check_output(demo.folder / "report.html", force=force)
+        return
+    for path in life_files(demo.folder):
         check_output(path, force=force)
     for name in ("logs", "history"):
-        place = folder / name
+        place = demo.folder / name
         if place.exists() and any(place.iterdir()):
             if not force:
                 raise OutputExistsError(f"{place}: is there; use force (--force) to replace it")
             shutil.rmtree(place)
+    demo.finished.begin()
 
 
 def _log(demo: LifeDemo, name: str, usage: float, number: int) -> Path:
@@ -287,14 +319,27 @@ def _calibrate(demo: LifeDemo, progress: Progress | None) -> None:
 
     demo.timed("virtual bench: logs of the new unit", bench)
 
-    def work() -> Calibration:
-        names = [trace.name for trace in demo_procedure().traces if trace.name != HELD_OUT]
-        used = [bench_log(import_log(logs / f"{name}.csv")) for name in names]
-        result = calibrate(used, demo.base, progress=part(progress, 0.4, 1.0))
-        write_calibration(demo.folder / "calibrated.toml", result, force=True)
-        return result
+    target = demo.folder / "calibrated.toml"
+    names = [trace.name for trace in demo_procedure().traces if trace.name != HELD_OUT]
+    files = [logs / f"{name}.csv" for name in names]
 
-    demo.calibration = demo.timed("calibration on the first healthy logs", work)
+    def work() -> Recovered:
+        used = [bench_log(import_log(path)) for path in files]
+        result = calibrate(used, demo.base, progress=part(progress, 0.4, 1.0))
+        write_calibration(target, result, force=True)
+        return Recovered.of(result)
+
+    demo.calibration = demo.resumed(
+        "calibration on the first healthy logs",
+        Work(
+            "calibration",
+            work,
+            lambda calibration: calibration.to_json(demo.base),
+            lambda data: Recovered.from_json(data, demo.base),
+            inputs_of(files),
+            [target],
+        ),
+    )
 
 
 def _tables(demo: LifeDemo, progress: Progress | None) -> None:
@@ -323,8 +368,8 @@ def _inspect(demo: LifeDemo, progress: Progress | None) -> None:
         if usage >= demo.life.end:
             return
         _visit(demo, baselines, flt, usage, number)
-        if progress is not None:
-            progress(min(usage / demo.life.end, 1.0))
+        if progress is not None and progress(min(usage / demo.life.end, 1.0)) is False:
+            raise Interrupted("interrupted between two inspections")
 
 
 def _visit(demo: LifeDemo, baselines: list[TestLog], flt: Any, usage: float, number: int) -> None:
@@ -337,11 +382,18 @@ def _visit(demo: LifeDemo, baselines: list[TestLog], flt: Any, usage: float, num
         "virtual bench: a log at each inspection",
         lambda: _log(demo, f"flight-{usage:05.0f}", usage, number),
     )
-    answer = demo.timed(
+    actuator = demo.calibration.actuator
+    said = demo.resumed(
         "diagnosis of each log",
-        lambda: diagnose(read_test_logs([log]), demo.calibration.actuator, baselines=baselines),
+        Work(
+            f"inspection-{number}",
+            lambda: Said.of(diagnose(read_test_logs([log]), actuator, baselines=baselines)),
+            asdict,
+            Said.from_json,
+            inputs_of([log, *demo.healthy], actuator.hash),
+        ),
     )
-    seen = inspection(answer.to_dict(), demo.response.laws, usage=usage, name=log.parent.name)
+    seen = inspection(said.data, demo.response.laws, usage=usage, name=log.parent.name)
 
     def look() -> Prognosis:
         flt.update(seen)
@@ -349,27 +401,28 @@ def _visit(demo: LifeDemo, baselines: list[TestLog], flt: Any, usage: float, num
         return prognosis(flt, demo_mission(), [*past, seen], seed=demo.seed, serial=_UNIT)
 
     result = demo.timed("prediction at each inspection", look)
-    demo.visits.append(Visit(usage, log, answer, seen, result))
+    demo.visits.append(Visit(usage, log, said, seen, result))
     stamp = demo.folder / "history" / f"flight-{usage:05.0f}.json"
-    write_stamp(stamp, answer.to_dict(), usage=usage, unit="flights", serial=_UNIT)
+    write_stamp(stamp, said.data, usage=usage, unit="flights", serial=_UNIT, force=True)
 
 
 def _finish(demo: LifeDemo, *, force: bool) -> None:
-    """Write what a user goes on with, the truth, and the page."""
+    """Write what a user goes on with, the truth, and the page; `_claim` has asked for leave."""
     from elevon.demo.life.figures import cone_figure
     from elevon.demo.life.page import life_report, moving_picture
     from elevon.files import write_text
     from elevon.report.figures import save_figure
 
-    write_text(demo.folder / "mission.toml", mission_file().read_text("utf-8"), force=force)
+    write_text(demo.folder / "mission.toml", mission_file().read_text("utf-8"), force=True)
     truth = {
         "end": demo.life.end,
         "usage": demo.life.usage.tolist(),
         "severity": demo.life.severity.tolist(),
         "faults": [law.key for law in demo.response.laws],
     }
-    write_text(demo.folder / "truth.json", json.dumps(truth) + "\n", force=force)
+    write_text(demo.folder / "truth.json", json.dumps(truth) + "\n", force=True)
     report = demo.timed("drawing the page", lambda: life_report(demo))
+    save_figure(cone_figure(demo), demo.folder / "cone.svg", force=True)
+    write_text(demo.folder / "mechanism.svg", str(moving_picture(demo)), force=True)
+    # Last: where it stands, the demonstration is complete.
     report.save(demo.folder / "report.html", force=force)
-    save_figure(cone_figure(demo), demo.folder / "cone.svg", force=force)
-    write_text(demo.folder / "mechanism.svg", str(moving_picture(demo)), force=force)

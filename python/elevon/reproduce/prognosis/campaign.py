@@ -15,7 +15,15 @@ import numpy.typing as npt
 
 from elevon.actuator import Actuator
 from elevon.errors import InputError
-from elevon.prognose import Inspection, Mission, ParticleFilter, Process, Response, respond
+from elevon.prognose import (
+    Inspection,
+    Mission,
+    ParticleFilter,
+    Process,
+    Response,
+    UnscentedFilter,
+    respond,
+)
 from elevon.prognose.future import MODEL_ERROR, look_ahead
 from elevon.prognose.metrics import (
     Track,
@@ -28,6 +36,7 @@ from elevon.prognose.metrics import (
 )
 from elevon.prognose.particle import BIAS, resampled
 from elevon.prognose.predict import LEVEL
+from elevon.prognose.process import Population
 from elevon.progress import Progress
 from elevon.report.checks import Check, all_passed
 from elevon.reproduce.prognosis.truth import FAULTS, UnitTruth, inspections_of, true_unit
@@ -58,6 +67,8 @@ class UnitResult:
         By particles.
     unaided : Track
         By the laws alone, without a diagnosis: what a prediction must beat.
+    unscented : Track
+        By the unscented filter, from the inspections that `SHARES` ask for.
     seconds : float
         Largest processor time of an update and a look ahead.
     """
@@ -67,6 +78,7 @@ class UnitResult:
     first: str
     track: Track
     unaided: Track
+    unscented: Track
     seconds: float
 
     def to_dict(self) -> dict[str, Any]:
@@ -105,10 +117,9 @@ class PrognosisResult:
     seconds: float = field(compare=False)
     left_out: tuple[str, ...] = ()
 
-    def accuracy(self, law: str | None = None, *, unaided: bool = False) -> float:
-        """Return the mean relative accuracy over units and `SHARES`."""
-        chosen = self._chosen(law)
-        tracks = [u.unaided if unaided else u.track for u in chosen]
+    def accuracy(self, law: str | None = None, track: str = "track") -> float:
+        """Return the mean relative accuracy over units and `SHARES`; of another track by name."""
+        tracks = [getattr(unit, track) for unit in self._chosen(law)]
         return float(np.mean([cumulative_relative_accuracy(t, SHARES) for t in tracks]))
 
     def covered(self, law: str | None = None) -> float:
@@ -176,7 +187,8 @@ class PrognosisResult:
                     "histories": len(chosen),
                     "accuracy": self.accuracy(law),
                     "accuracy_interval": [self.accuracy(law) - half, self.accuracy(law) + half],
-                    "unaided_accuracy": self.accuracy(law, unaided=True),
+                    "unaided_accuracy": self.accuracy(law, "unaided"),
+                    "unscented_accuracy": self.accuracy(law, "unscented"),
                     "coverage": hits,
                     "coverage_interval": list(wilson(hits, len(chosen))),
                     "horizon": float(np.median([prognostic_horizon(u.track) for u in chosen])),
@@ -263,6 +275,7 @@ def predicted(
         mission.requirement[_first(truth, mission)].name,
         track,
         _unaided(response, mission, seen, truth, seed),
+        _by_sigma_points(response, mission, seen, truth.life.end, seed),
         seconds,
     )
 
@@ -284,12 +297,41 @@ def tracked(
         begin = clock.process_time()
         flt.update(item)
         rng = np.random.default_rng([20, seed])
-        units = flt.process.scaled(resampled(flt.units, _SAMPLES, rng), BIAS, rng)
-        future = look_ahead(flt.process, units, mission.usage, rng, model_error=MODEL_ERROR)
-        rows.append(_quantiles(future.remaining))
+        units = resampled(flt.units, _SAMPLES, rng)
+        rows.append(_remaining(flt.process, units, mission, rng))
         longest = max(longest, clock.process_time() - begin)
+    return _track(seen, rows, end), longest
+
+
+def _remaining(
+    process: Process, units: Population, mission: Mission, rng: np.random.Generator
+) -> list[float]:
+    """Return low, median, high of the remaining life, as `elevon predict` draws it."""
+    units = process.scaled(units, BIAS, rng)
+    future = look_ahead(process, units, mission.usage, rng, model_error=MODEL_ERROR)
+    return _quantiles(future.remaining)
+
+
+def _track(seen: Sequence[Inspection], rows: Sequence[Sequence[float]], end: float) -> Track:
     low, median, high = np.array(rows).T
-    return Track(np.array([item.usage for item in seen]), median, low, high, end), longest
+    return Track(np.array([item.usage for item in seen]), median, low, high, end)
+
+
+def _by_sigma_points(
+    response: Response, mission: Mission, seen: Sequence[Inspection], end: float, seed: int
+) -> Track:
+    """Return the unscented filter's predictions, at the last inspection before each of `SHARES`."""
+    flt = UnscentedFilter(Process(response))
+    usage = np.array([item.usage for item in seen])
+    asked = set(np.searchsorted(usage, np.array(SHARES) * end, side="right") - 1)
+    rows, at = [], []
+    for k, item in enumerate(seen):
+        flt.update(item)
+        if k in asked:
+            rng = np.random.default_rng([22, seed])
+            rows.append(_remaining(flt.process, flt.sampled(_SAMPLES, rng), mission, rng))
+            at.append(item)
+    return _track(at, rows, end)
 
 
 def _quantiles(remaining: Floats) -> list[float]:
@@ -313,6 +355,5 @@ def _unaided(
     others = [k for k, law in enumerate(process.laws) if law.name != truth.law]
     units.active[:, others] = False
     life = _quantiles(look_ahead(process, units, mission.usage, rng).end)
-    usage = np.array([item.usage for item in seen])
-    low, median, high = (np.maximum(value - usage, 0.0) for value in life)
-    return Track(usage, median, low, high, truth.life.end)
+    rows = [[max(value - item.usage, 0.0) for value in life] for item in seen]
+    return _track(seen, rows, truth.life.end)

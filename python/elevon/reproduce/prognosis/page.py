@@ -29,15 +29,15 @@ def prognosis_report(result: PrognosisResult, *, seed: int, date: str | None = N
     )
     report.fact("Mean relative accuracy", f"{result.accuracy():.3f}", "50 to 90 % of life")
     report.fact("Coverage", f"{result.covered():.3f}", "of 90 % intervals")
-    report.fact("Laws alone", f"{result.accuracy(unaided=True):.3f}", "without a diagnosis")
+    report.fact("Laws alone", f"{result.accuracy(track='unaided'):.3f}", "without a diagnosis")
     section = report.section("By law of growth")
     rows = [
         [r["law"], r["histories"], r["accuracy"], *(r[_key(s)] for s in SHARES), r["coverage"],
-         r["horizon"], r["unaided_accuracy"]]
+         r["horizon"], r["unscented_accuracy"], r["unaided_accuracy"]]
         for r in result.summary()
     ]  # fmt: skip
     columns = ["law", "histories", "mean", *(f"{s:.0%}" for s in SHARES)]
-    columns += ["coverage", "horizon (20 %)", "laws alone"]
+    columns += ["coverage", "horizon (20 %)", "sigma points", "laws alone"]
     section.table(
         Table(columns, rows, "Relative accuracy by share of life; horizon: median, strict.",
               digits=3)

@@ -1,0 +1,179 @@
+"""An interrupted life goes on with what is finished, and ends as if it had not been interrupted."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from elevon import Actuator
+from elevon.cli import main
+from elevon.demo.life import run as life_run
+from elevon.demo.life.run import Said
+from elevon.demo.life.unit import demo_mission
+from elevon.demo.results import Recovered
+from elevon.prognose import Response
+from elevon.prognose.grid import Grid
+from elevon.prognose.life import Life
+from elevon.prognose.requirement import Requirement
+from elevon.report import Report
+
+KEY = "play@transmission"
+
+
+def tables():
+    laws = demo_mission().laws()
+    grid = Grid(tuple(np.array([0.0, law.highest]) for law in laws))
+    names = dict.fromkeys(name for law in laws for name in law.drivers)
+    drivers = {name: np.full(4, 30000.0 if name == "friction_work" else 300.0) for name in names}
+    asked = (Requirement(name="play", measure="severity", fault=KEY, limit=0.015),)
+    return Response(laws, asked, (0.015,), ("rad",), grid, drivers, np.zeros((4, 1)), 4, "low")
+
+
+class Answer(SimpleNamespace):
+    """A diagnosis of a play."""
+
+    def __init__(self, severity):
+        super().__init__(
+            status="healthy", chance=0.5, false_alarm=0.01, p_fault=0.1, severity=severity
+        )
+
+    def to_dict(self):
+        cause = {"kind": "play", "place": "transmission", "unit": "rad", "probability": 0.9,
+                 "severity": self.severity, "interval": [0.9 * self.severity, 1.1 * self.severity],
+                 "equivalents": []}  # fmt: skip
+        return {"status": "faulty", "faults": [cause], "best": {"faults": [KEY]}, "detectable": {}}
+
+
+class Story:
+    """The demonstration with its costly functions replaced; one of them presses Ctrl-C."""
+
+    def __init__(self, monkeypatch):
+        self.calls, self.stop = [], None
+        usage = np.array([0.0, 750.0, 1500.0])
+        severity = np.column_stack((1e-5 * usage, 1e-4 * usage))
+        replaced = {
+            "elevon.demo.life.run.live": self.step("life", Life(usage, severity, 1500.0, 0)),
+            "elevon.demo.life.run._log": self.log,
+            "elevon.bench.run.run_procedure": self.bench,
+            "elevon.logs.importing.import_log": lambda path: path,
+            "elevon.calibrate.log.bench_log": lambda path: path,
+            "elevon.calibrate.calibrate": self.calibrate,
+            "elevon.calibrate.write.write_calibration": self.write,
+            "elevon.prognose.respond": self.step("tables", tables()),
+            "elevon.diagnose.bymodel.read_test_logs": lambda paths: paths,
+            "elevon.diagnose.bymodel.diagnose": self.diagnose,
+            "elevon.demo.life.page.life_report": self.step("report", Report("life")),
+            "elevon.demo.life.page.moving_picture": lambda _demo: "<svg/>",
+            "elevon.demo.life.figures.cone_figure": lambda _demo: None,
+            "elevon.report.figures.save_figure": lambda *_args, **_options: None,
+        }
+        for name, function in replaced.items():
+            monkeypatch.setattr(name, function)
+
+    def step(self, name, result=None):
+        def work(*_args, **_options):
+            self.calls.append(name)
+            if self.stop == name:
+                raise KeyboardInterrupt
+            return result
+
+        return work
+
+    def bench(self, procedure, _actuator, out, **_options):
+        out.mkdir(parents=True, exist_ok=True)
+        for trace in procedure.traces:
+            (out / f"{trace.name}.csv").write_text(trace.name)
+
+    def log(self, demo, name, usage, _number):
+        path = demo.folder / "logs" / name / "log.csv"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"{usage}")
+        return path
+
+    def calibrate(self, _logs, base, **_options):
+        self.step("calibration")()
+        return Recovered(base.with_values({"play.total": 0.001}, source="calibration"), (), ())
+
+    def write(self, path, _result, *, force):
+        assert force
+        path.write_text("set")
+
+    def diagnose(self, logs, _actuator, *, baselines):
+        assert len(baselines) == 2
+        usage = float(logs[0].read_text())
+        number = 1 + sum(call.startswith("diagnosis") for call in self.all)
+        self.step(f"diagnosis {number}")()
+        self.all.append(f"diagnosis {number}")
+        return Answer(1e-5 * usage)
+
+    def run(self, out, *, stop=None, fresh=False):
+        if fresh:
+            self.all = []
+        self.stop, self.calls = stop, []
+        return main(["demo", "--out", str(out), "--json"]), self.calls
+
+
+@pytest.fixture
+def story(monkeypatch):
+    return Story(monkeypatch)
+
+
+def test_every_interruption_keeps_what_is_finished(story, tmp_path, capsys):
+    out = tmp_path / "demo"
+    tail = [f"diagnosis {n}" for n in (1, 2, 3, 4)]
+    done = [
+        ("life", ["life"], "no step is finished"),
+        ("calibration", ["life", "calibration"], "the unit's life"),
+        ("diagnosis 3", ["calibration", "tables", *tail[:3]], "the unit's life, 2 diagnoses"),
+        ("report", ["tables", *tail[2:], "report"], "the unit's life, 4 diagnoses"),
+    ]
+    for k, (place, calls, text) in enumerate(done):
+        assert story.run(out, stop=place, fresh=k == 0) == (130, calls)
+        captured = capsys.readouterr()
+        assert captured.out == ""
+        assert text in captured.err.splitlines()[-1]
+        assert not (out / "report.html").exists()
+    code, calls = story.run(out)
+    resumed = json.loads(capsys.readouterr().out)
+    assert calls == ["tables", "report"]
+    assert not (out / "unfinished.log").exists()
+    assert [s["resumed"] for s in resumed["steps"] if s["name"].startswith("diagnosis")] == [True]
+    once_code, calls = story.run(tmp_path / "once", fresh=True)
+    once = json.loads(capsys.readouterr().out)
+    assert calls == ["life", "calibration", "tables", *tail, "report"]
+    assert not any(step["resumed"] for step in once["steps"])
+    assert once_code == code
+    for key in ("status", "checks", "rows", "end"):
+        assert json.dumps(resumed[key]) == json.dumps(once[key])
+
+
+def test_an_edited_log_is_diagnosed_anew(story, tmp_path, monkeypatch):
+    out = tmp_path / "demo"
+    story.run(out, stop="report", fresh=True)
+    story.all = []
+    monkeypatch.setattr(
+        life_run, "_log", lambda *args: (path := story.log(*args), path.write_text("400"))[0]
+    )
+    _, calls = story.run(out, stop="report")
+    assert [call for call in calls if call.startswith("diagnosis")] == [
+        f"diagnosis {n}" for n in (1, 2, 3, 4)
+    ]
+
+
+def test_what_a_diagnosis_says_comes_back_from_json():
+    said = Said.of(Answer(0.01))
+    again = Said.from_json(json.loads(json.dumps({"data": said.data, "text": said.text})))
+    assert again == said
+    assert (again.status, again.best) == ("faulty", [KEY])
+
+
+def test_other_work_is_refused(story, tmp_path, capsys):
+    out = tmp_path / "demo"
+    assert story.run(out, stop="calibration", fresh=True)[0] == 130
+    capsys.readouterr()
+    story.calls = []
+    assert main(["demo", "--out", str(out), "--seed", "1", "--json"]) == 2
+    assert story.calls == []
+    assert "other work" in capsys.readouterr().err
+    assert Actuator.load("torino-rotary").hash
