@@ -86,7 +86,7 @@ def predict(
 
 def _print(result: Prognosis, horizons: list[float] | tuple[float, ...]) -> None:
     from elevon.prognose.answer import survival
-    from elevon.prognose.figures import shown_unit
+    from elevon.prognose.figures import severity_unit
     from elevon.prognose.page import sentence
     from elevon.units import to_display
 
@@ -97,7 +97,7 @@ def _print(result: Prognosis, horizons: list[float] | tuple[float, ...]) -> None
     )
     rows = []
     for item in result.reserve:
-        unit = shown_unit(item["unit"])
+        unit = severity_unit(item["unit"])
         now, end = (f"{to_display(item[key], unit):.4g}" for key in ("value", "threshold"))
         rows.append((item["name"], now, end, unit, f"{result.first[item['name']]:.3f}"))
     print_table(("requirement", "now", "life ends at", "unit", "fails first"), rows)

@@ -9,7 +9,7 @@ import numpy as np
 
 from elevon.prognose.observation import Inspection
 from elevon.report.figures import COLOURS, new_figure
-from elevon.units import to_display
+from elevon.units import shown_unit, to_display
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from elevon.prognose.answer import Prognosis
     from elevon.prognose.law import Law
 
-__all__ = ["course_figure", "shown_unit", "survival_figure"]
+__all__ = ["course_figure", "severity_unit", "survival_figure"]
 
 
-def shown_unit(unit: str) -> str:
-    """Return the unit severities are shown in."""
-    return {"rad": "deg", "1": "%", "m": "mm"}.get(unit, unit)
+def severity_unit(unit: str) -> str:
+    """Return the unit severities are shown in: shares in percent, lengths in millimetres."""
+    return {"1": "%", "m": "mm"}.get(unit, shown_unit(unit))
 
 
 def course_figure(
@@ -32,7 +32,7 @@ def course_figure(
     with new_figure(len(laws), 1, height=1.2 + 2.2 * len(laws), sharex=True) as (figure, axes):
         far = result.usage + max(result.interval[1], 1.0) * 1.15
         for k, (law, axis) in enumerate(zip(laws, np.atleast_1d(axes), strict=True)):
-            unit = shown_unit(law.unit)
+            unit = severity_unit(law.unit)
             course = to_display(result.future.course[:, k, :], unit)
             at = result.future.at
             near = at <= far if np.isfinite(far) else np.ones(len(at), dtype=np.bool_)

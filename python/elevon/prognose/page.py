@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.prognose.answer import survival
-from elevon.prognose.figures import course_figure, shown_unit, survival_figure
+from elevon.prognose.figures import course_figure, severity_unit, survival_figure
 from elevon.prognose.observation import Inspection
 from elevon.report import Report, Table
 from elevon.units import to_display
@@ -69,7 +69,7 @@ def prognosis_page(
 def _requirements(report: Report, result: Prognosis) -> None:
     rows = []
     for item in result.reserve:
-        unit = shown_unit(item["unit"])
+        unit = severity_unit(item["unit"])
         rows.append(
             (
                 item["name"],
@@ -92,7 +92,7 @@ def _requirements(report: Report, result: Prognosis) -> None:
 def _faults(report: Report, result: Prognosis) -> None:
     rows = []
     for item in result.known:
-        unit = shown_unit(item.unit)
+        unit = severity_unit(item.unit)
         low, high = (f"{to_display(v, unit):.3g}" for v in item.interval)
         slow, fast = (f"{v:.3g}" for v in item.factor_interval)
         rows.append(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from elevon.prognose.figures import shown_unit
+from elevon.prognose.figures import severity_unit
 from elevon.report.figures import COLOURS, new_figure
 from elevon.units import to_display
 
@@ -76,7 +76,7 @@ def diagnoses_figure(demo: LifeDemo) -> Figure:
     laws = demo.response.laws
     with new_figure(1, len(laws), width=9.0, height=3.4) as (figure, axes):
         for k, (law, axis) in enumerate(zip(laws, np.atleast_1d(axes), strict=True)):
-            unit = shown_unit(law.unit)
+            unit = severity_unit(law.unit)
             truth = to_display(demo.life.severity[:, k], unit)
             axis.plot(demo.life.usage, truth, color=COLOURS["green"], label="truth")
             rows = [

@@ -12,7 +12,7 @@ from elevon.demo.life.figures import (
 )
 from elevon.demo.life.mechanism import mechanism, motion
 from elevon.diagnose.bymodel import read_test_logs
-from elevon.prognose.figures import shown_unit
+from elevon.prognose.figures import severity_unit
 from elevon.report import Report, Table
 from elevon.reproduce.provenance import provenance
 from elevon.units import to_display
@@ -127,7 +127,7 @@ def _diagnoses(report: Report, demo: LifeDemo) -> None:
     for visit in demo.visits:
         cells: list[object] = [_n(visit.usage), visit.diagnosis.status]
         for law, true in zip(laws, demo.life.at(visit.usage), strict=True):
-            unit = shown_unit(law.unit)
+            unit = severity_unit(law.unit)
             seen = visit.inspection.seen.get(law.key)
             value = None if seen is None else seen.severity
             text = "not seen" if value is None else f"{to_display(value, unit):.3g}"
@@ -163,7 +163,7 @@ def _prediction(report: Report, demo: LifeDemo) -> None:
     section.table(Table(columns, rows))
     held = []
     for item in demo.visits[-1].prognosis.reserve:
-        unit = shown_unit(item["unit"])
+        unit = severity_unit(item["unit"])
         now, end = to_display(item["value"], unit), to_display(item["threshold"], unit)
         held.append((item["name"], f"{now:.3g} {unit}", f"{end:.3g} {unit}"))
     section.table(
