@@ -61,6 +61,14 @@ def test_check_tells_values_that_cannot_stand_together(elevon_cli, tmp_path):
     assert "electrical pole" in result.out
 
 
+def test_a_set_with_a_load_is_no_scenario(elevon_cli, tmp_path):
+    text = 'base = "nasa-ballscrew"\n[load.mass]\nvalue = 5.0\nunit = "kg"\nsource = "mine"\n'
+    text += 'confidence = "assumed"\n'
+    (tmp_path / "drive.toml").write_text(text)
+    result = elevon_cli("check", "drive.toml", "--json")
+    assert (result.code, result.json["kind"]) == (0, "set")
+
+
 def test_check_of_a_scenario(elevon_cli, tmp_path):
     (tmp_path / "s.toml").write_text(
         "duration = 1\n[[command.terms]]\nkind = 'constant'\nvalue = 7\n[initial]\nspeed = 1\n"

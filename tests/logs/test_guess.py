@@ -106,6 +106,8 @@ def test_hints():
     assert role_hint("current_a") == "current_a"
     assert role_hint("current_A") == "torque_current"
     assert role_hint("DC bus voltage") == "supply_voltage"
+    assert (role_hint("Speed_mm_s"), unit_hint("Speed_mm_s", "")) == ("motor_speed", "mm/s")
+    assert unit_hint("ramp_s", "") == "s"
     assert role_hint("column_3") == ""
     assert unit_hint("x", "nonsense") == ""
     assert unit_hint("pos_mm", "") == "mm"

@@ -201,8 +201,9 @@ def _shown(logs: Sequence[LoopLog], channels: set[str]) -> list[Free]:
             )
         )
         if name in {"speed", "motor_speed"}:
+            # Not from zero: there a lag is a delay, to first order.
             rows.append(
-                Free(f"sensor.{name}_lag", "s", "sensor", False, 0.0, late, 0.0, 20.0 * late)
+                Free(f"sensor.{name}_lag", "s", "sensor", False, period, late, 0.0, 20.0 * late)
             )
         size = max(log.sigma(name) for log in logs if name in log.signals)
         if size > 0.0 and not any(log.magnitude for log in logs if name == "current"):

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from elevon.calibrate.blocks import block_length
 from elevon.calibrate.closed_loop.fit import Fitted
-from elevon.calibrate.closed_loop.free import CURRENT_GAIN, Free
+from elevon.calibrate.closed_loop.free import CURRENT_GAIN, LOAD_SHARE, STICK, Free, outer
 from elevon.calibrate.closed_loop.model import LoopModel
 from elevon.calibrate.closed_loop.objective import Objective
 from elevon.calibrate.closed_loop.refine import FALL
@@ -146,29 +146,14 @@ def _misfit(objective: Objective, point: Point, jac: Floats, weight: Floats) -> 
 def _choices(objective: Objective, point: Point, gain: Floats) -> Floats:
     """What choices of the model that no slow log settles would change, by one step of Newton each.
 
-    The friction may fall with speed or grow with the torque (where it does, fall over half or twice
-    the speed), and a drive acts some time after it has read. Each alternative is run once at the
-    same values; the late drive as a longer step of the model, its effect scaled to `_LATE` where
-    the lag of the current loop was not fitted.
+    Each alternative is run once at the same values; the late drive as a longer step of the model,
+    its effect scaled to `_LATE` where the lag of the current loop was not fitted.
     """
     model = objective.model
-    speed = max(float(np.nanmax(np.abs(log.motion(model.per_output)[0]))) for log in model.logs)
-    parameters = model.actuator.parameters
-    later = max(0.5 * parameters.value("low.step"), _LEAST_LATER)
-    alternatives: list[dict[str, str | float]] = [
-        {"low.step": parameters.value("low.step") + later}
-    ]
-    if str(parameters["friction.law"].value) == "load_dependent":
-        fall = parameters.value("friction.stribeck_speed")
-        alternatives += [{"friction.stribeck_speed": factor * fall} for factor in (0.5, 2.0)]
-    else:
-        alternatives += [
-            {"friction.law": law, "friction.stribeck_speed": FALL * speed}
-            for law in ("stribeck", "load_dependent")
-        ]
+    later = _later(model)
     lags = any(item.path == CURRENT_GAIN for item in objective.free)
     total = np.zeros((gain.shape[0], gain.shape[0]))
-    for changes in alternatives:
+    for changes in _alternatives(objective, point.x):
         other = model.actuator.with_values(changes, source="calibration")
         beside = LoopModel(other, model.logs, model.structure, model.check)
         run = Objective(beside, objective.free)
@@ -178,6 +163,35 @@ def _choices(objective: Objective, point: Point, gain: Floats) -> Floats:
             moved = moved * (_LATE / later)
         total += np.outer(moved, moved)
     return total
+
+
+def _later(model: LoopModel) -> float:
+    return max(0.5 * model.actuator.parameters.value("low.step"), _LEAST_LATER)
+
+
+def _alternatives(objective: Objective, x: Floats) -> list[dict[str, str | float]]:
+    """List other models that would follow the logs as well.
+
+    A drive acts some time after it has read; friction may fall with speed or grow with the torque.
+    Where it does, it may fall over half or twice the speed, and what the torque adds to it may
+    stick as much above its moving value as the rest.
+    """
+    model = objective.model
+    parameters = model.actuator.parameters
+    steps: list[dict[str, str | float]] = [
+        {"low.step": parameters.value("low.step") + _later(model)}
+    ]
+    if str(parameters["friction.law"].value) != "load_dependent":
+        speed = max(float(np.nanmax(np.abs(log.motion(model.per_output)[0]))) for log in model.logs)
+        return steps + [
+            {"friction.law": law, "friction.stribeck_speed": FALL * speed}
+            for law in ("stribeck", "load_dependent")
+        ]
+    fall, values = parameters.value("friction.stribeck_speed"), outer(objective.free, x)
+    share = values.get(LOAD_SHARE, parameters.value(LOAD_SHARE))
+    sticking = min((values.get(STICK, 1.0) - 1.0) * share, 0.98 - share)
+    falls = [{"friction.stribeck_speed": factor * fall} for factor in (0.5, 2.0)]
+    return steps + falls + [{"friction.load_motor_stribeck": max(sticking, 0.0)}]
 
 
 def _reasons(objective: Objective, x: Floats, covariance: Floats, strength: Floats) -> list[str]:

@@ -32,6 +32,8 @@ _SUFFIXES = {
     "n": "N", "kn": "kN", "nm": "N m", "degc": "degC", "mms": "mm/s", "mmps": "mm/s",
     "rads": "rad/s", "radps": "rad/s", "kgf": "kgf", "hz": "Hz",
 }  # fmt: skip
+#: What stands before a last word `s` and makes a speed of it: ``speed_mm_s``.
+_PER_SECOND = frozenset({"mm", "cm", "m", "rad", "deg", "rev"})
 
 
 def role_hint(header: str) -> str:
@@ -52,6 +54,9 @@ def role_hint(header: str) -> str:
 def _without_unit(header: str) -> str:
     """Leave out a last word that is a unit; single letters only where they are capitals."""
     head, _, last = header.strip().rpartition("_")
+    first, _, per = head.rpartition("_")
+    if first and last == "s" and per.lower() in _PER_SECOND:
+        return first
     if head and last.lower() in _SUFFIXES and (len(last) > 1 or last.isupper()):
         return head
     return header
@@ -116,6 +121,8 @@ def unit_hint(header: str, stated: str) -> str:
         return drive_columns()[key].unit or ""
     words = re.split(r"[^A-Za-z0-9]+", name)
     suffix = words[-1].lower()
+    if len(words) > 2 and suffix == "s" and words[-2].lower() in _PER_SECOND:
+        return f"{words[-2].lower()}/s"
     return _SUFFIXES.get(suffix, "") if len(words) > 1 or suffix in {"ms", "mm", "rpm"} else ""
 
 
