@@ -73,6 +73,12 @@ def test_a_fault_is_isolated_with_its_severity(unit, logs, name, key, severity):
     assert f"{cause.kind}@{cause.place}" == key
     assert cause.interval[0] < severity < cause.interval[1]
     assert cause.severity == pytest.approx(severity, rel=0.1)
+    against = {item.fault: item for item in result.alternatives}
+    assert key not in against
+    moved = "lost_motion" if name == "play" else "voltage_order_2"
+    assert against[""].name in (moved, "current_order_2")
+    assert against[""].left > 3.0
+    assert against["friction@transmission"].probability < 0.01
     if name == "short":
         assert set(cause.equivalents) == {("short", "motor.phase_b"), ("short", "motor.phase_c")}
 
@@ -126,6 +132,7 @@ def test_the_command_line(elevon_cli, logs, tmp_path):  # noqa: F811
     assert document["status"] == "faulty"
     assert document["faults"][0]["kind"] == "play"
     assert "Play has grown by" in page.read_text()
+    assert "what speaks against each" in page.read_text()
     refused = elevon_cli("diagnose", logs["play"], "--actuator", "torino-rotary", "--fault", "rust")
     assert refused.code == 2
     assert (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-__all__ = ["SEEN", "Cause", "Diagnosis", "Explanation", "Moved"]
+__all__ = ["SEEN", "Alternative", "Cause", "Diagnosis", "Explanation", "Moved"]
 
 SEEN = 3.0  # deviations that a fault's shift must reach to be observable
 
@@ -83,6 +83,39 @@ class Explanation:
 
 
 @dataclass(frozen=True)
+class Alternative:
+    """A healthy unit or a single fault that is not the answer, and what speaks against it.
+
+    Attributes
+    ----------
+    fault : str
+        ``KIND@PLACE``; empty for a healthy unit.
+    probability : float
+        Of this and no other.
+    severity : float or None
+        At which it explains the logs best.
+    unit : str
+        Of it.
+    log, name : str
+        Log and number of the evidence that it explains worst.
+    left : float
+        What it leaves of that number, in deviations with its own model error.
+    """
+
+    fault: str
+    probability: float
+    severity: float | None
+    unit: str
+    log: str
+    name: str
+    left: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form."""
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+
+@dataclass(frozen=True)
 class Moved:
     """One number of the evidence against the healthy unit."""
 
@@ -147,6 +180,8 @@ class Diagnosis:
         Wall time from the logs in memory to the answer.
     hypotheses : tuple of Explanation
         Sets of faults that are still possible, most probable first.
+    alternatives : tuple of Alternative
+        A healthy unit and the other single faults, and what speaks against each.
     """
 
     logs: tuple[str, ...]
@@ -163,6 +198,7 @@ class Diagnosis:
     findings: tuple[str, ...]
     seconds: float = field(compare=False)
     hypotheses: tuple[Explanation, ...] = ()
+    alternatives: tuple[Alternative, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
@@ -174,6 +210,7 @@ class Diagnosis:
             "faults": [cause.to_dict() for cause in self.faults],
             "best": {"faults": list(self.best), "probability": self.p_best},
             "hypotheses": [item.to_dict() for item in self.hypotheses],
+            "alternatives": [item.to_dict() for item in self.alternatives],
             "unobservable": [dict(item) for item in self.unobservable],
             "detectable": dict(self.detectable),
             "evidence": [item.to_dict() for item in self.moved],

@@ -19,7 +19,14 @@ from elevon.diagnose.bymodel.case import (
     joined,
     shift_of,
 )
-from elevon.diagnose.bymodel.explain import causes, explanations, limits, moved, unexplained
+from elevon.diagnose.bymodel.explain import (
+    alternatives,
+    causes,
+    explanations,
+    limits,
+    moved,
+    unexplained,
+)
 from elevon.diagnose.bymodel.log import TestLog, prepared
 from elevon.diagnose.bymodel.posterior import posterior
 from elevon.errors import InputError
@@ -144,4 +151,5 @@ def answer_of(
         findings=(*findings, *unexplained(covariance, rest, cases, named)),
         seconds=clock.perf_counter() - begin,
         hypotheses=explanations(result, candidates),
+        alternatives=alternatives(result, cases, candidates, best.keys),
     )

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from elevon.diagnose.bymodel.answer import SEEN, Cause, Explanation, Moved
+from elevon.diagnose.bymodel.answer import SEEN, Alternative, Cause, Explanation, Moved
 from elevon.diagnose.bymodel.candidates import Candidate
-from elevon.diagnose.bymodel.case import Case, doubt_of, shift_of
+from elevon.diagnose.bymodel.case import Case, doubt_of, joined, shift_of
 from elevon.diagnose.bymodel.evidence import UNITS
 from elevon.diagnose.bymodel.posterior import Posterior, marginals, quantiles
 
-__all__ = ["causes", "explanations", "limits", "moved", "unexplained"]
+__all__ = ["alternatives", "causes", "explanations", "limits", "moved", "unexplained"]
 
 Floats = npt.NDArray[np.float64]
 LISTED = 0.02  # probability below which a cause is not listed
@@ -34,13 +34,7 @@ def unexplained(
     """
     from scipy.stats import f as fisher
 
-    errors = np.concatenate([case.errors for case in cases])
-    left, wide = rest, covariance
-    for c, severity in faults:
-        shift = shift_of(cases, c.key, np.array([severity]))[0]
-        left = left - shift
-        own = (errors * shift) ** 2 + doubt_of(cases, c.key, severity) ** 2
-        wide = wide + np.diag(own) + c.error**2 * np.outer(shift, shift)
+    left, wide = _left(covariance, rest, cases, faults)
     degrees = min(case.unit.degrees for case in cases)
     square = float(left @ np.linalg.solve(wide, left)) / len(rest)
     if float(fisher.sf(square, len(rest), degrees)) > UNLIKELY:
@@ -81,6 +75,44 @@ def causes(
         names += [(o.kind, p) for o in alike for p in (o.place, *o.same)]
         out.append(Cause(c.kind, c.place, c.unit, probability, middle, (low, high), tuple(names)))
     return tuple(sorted(out, key=lambda cause: -cause.probability))
+
+
+def _left(
+    covariance: Floats,
+    rest: Floats,
+    cases: Sequence[Case],
+    faults: Sequence[tuple[Candidate, float]],
+) -> tuple[Floats, Floats]:
+    """Return what faults leave of the evidence, and its covariance with their model errors."""
+    errors = np.concatenate([case.errors for case in cases])
+    left, wide = rest, covariance
+    for c, severity in faults:
+        shift = shift_of(cases, c.key, np.array([severity]))[0]
+        left = left - shift
+        own = (errors * shift) ** 2 + doubt_of(cases, c.key, severity) ** 2
+        wide = wide + np.diag(own) + c.error**2 * np.outer(shift, shift)
+    return left, wide
+
+
+def alternatives(
+    result: Posterior, cases: Sequence[Case], candidates: Sequence[Candidate], best: Sequence[str]
+) -> tuple[Alternative, ...]:
+    """Return the healthy unit and the single faults that are not the answer, likely ones first."""
+    rest, covariance = joined(cases)
+    known = {c.key: c for c in candidates}
+    places = [(case.name, name) for case in cases for name in case.unit.names]
+    out = []
+    for h, p in zip(result.hypotheses, result.probabilities, strict=True):
+        if len(h.keys) > 1 or h.keys == tuple(best):
+            continue
+        faults = [(known[key], value) for key, value in zip(h.keys, h.best, strict=True)]
+        left, wide = _left(covariance, rest, cases, faults)
+        score = left / np.sqrt(np.diag(wide))
+        worst = int(np.argmax(np.abs(score)))
+        key, severity = (h.keys[0], h.best[0]) if h.keys else ("", None)
+        unit = known[key].unit if key else ""
+        out.append(Alternative(key, p, severity, unit, *places[worst], float(score[worst])))
+    return tuple(out)
 
 
 def explanations(result: Posterior, candidates: Sequence[Candidate]) -> tuple[Explanation, ...]:

@@ -47,6 +47,8 @@ def diagnosis_page(result: Diagnosis, actuator: str, date: str | None = None) ->
         )
     )
     _evidence(report, result)
+    if result.alternatives:
+        _alternatives(report, result)
     limits = report.section("What these logs can tell")
     seen = [(key, severity_text(value, _unit(key))) for key, value in result.detectable.items()]
     blind = [(f"{i['kind']}@{i['place']}", i["reason"]) for i in result.unobservable]
@@ -73,6 +75,30 @@ def _unit(key: str) -> str:
 def _by_network(result: Diagnosis) -> bool:
     """Whether nothing is said of what a cause accounts for: the surrogate has no model."""
     return all(math.isnan(m.explained) for m in result.moved)
+
+
+def _alternatives(report: Report, result: Diagnosis) -> None:
+    rows = [
+        (
+            a.fault or "healthy",
+            a.probability,
+            "" if a.severity is None else severity_text(a.severity, a.unit),
+            f"{a.name}, {a.log}" if len(result.logs) > 1 else a.name,
+            a.left,
+        )
+        for a in result.alternatives
+    ]
+    report.section("Alternatives, and what speaks against each").table(
+        Table(
+            ("alternative", "probability", "fits best at", "explains worst", "left"),
+            rows,
+            "Alone, at the severity that fits best. Left: what it leaves of the evidence that it "
+            "explains worst, in deviations of a healthy unit with the model's own error. Beyond "
+            "three it speaks against the alternative; within, only the prior and the sum do.",
+            digits=2,
+            formats=("", "", "", "", "+.1f"),
+        )
+    )
 
 
 def _evidence(report: Report, result: Diagnosis) -> None:

@@ -55,6 +55,7 @@ def sentence(result: Diagnosis) -> str:
         )
     causes = {f"{c.kind}@{c.place}": c for c in result.faults}
     parts = [_clause(key, causes[key]) for key in result.best if key in causes]
+    parts[1:] = [text[0].lower() + text[1:] for text in parts[1:]]
     rest = (
         "nothing else is needed to explain the logs"
         if not left
@@ -65,7 +66,11 @@ def sentence(result: Diagnosis) -> str:
 
 def _clause(key: str, cause: Cause) -> str:
     low, high = (severity_text(v, cause.unit) for v in cause.interval)
-    text = f"{_NAMES.get(key, key)} {severity_text(cause.severity, cause.unit)} ({low} to {high})"
+    unit = low.partition(" ")[2]
+    text = (
+        f"{_NAMES.get(key, key)} {severity_text(cause.severity, cause.unit)} "
+        f"({low.removesuffix(f' {unit}')} to {high})"
+    )
     if not cause.equivalents:
         return text
     names = ", ".join(f"{kind}@{place}" for kind, place in cause.equivalents)
