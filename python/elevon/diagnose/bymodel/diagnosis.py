@@ -34,7 +34,7 @@ from elevon.errors import InputError
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["answer_of", "diagnose"]
+__all__ = ["answer_of", "check_asked", "diagnose"]
 
 
 def diagnose(
@@ -66,15 +66,7 @@ def diagnose(
         A log that cannot be diagnosed, no candidate, a rate outside 0 to 1.
     """
     begin = clock.perf_counter()
-    if not logs:
-        raise InputError("diagnosis needs at least one log")
-    if not 0.0 < false_alarm < 1.0:
-        raise InputError(f"false-alarm rate {false_alarm:g} must be between 0 and 1")
-    if actuator.wiring != "rotary":
-        raise InputError(
-            f"{actuator.name}: diagnosis by the model serves the wiring 'rotary' so far, "
-            f"not {actuator.wiring!r}"
-        )
+    check_asked(logs, actuator, false_alarm, "diagnosis by the model")
     candidates = chosen(faults)
     findings: list[str] = []
     healthy_logs = [prepared(item, actuator) for item in baselines]
@@ -87,6 +79,18 @@ def diagnose(
     if not faults:
         blind += tuple({"kind": k, "place": p, "reason": reason} for k, p, reason in DECLINED)
     return replace(result, unobservable=blind, seconds=clock.perf_counter() - begin)
+
+
+def check_asked(logs: Sequence[TestLog], actuator: Actuator, rate: float, who: str) -> None:
+    """Refuse what no method for rotary actuators can answer; `who` is the method."""
+    if not logs:
+        raise InputError("diagnosis needs at least one log")
+    if not 0.0 < rate < 1.0:
+        raise InputError(f"false-alarm rate {rate:g} must be between 0 and 1")
+    if actuator.wiring != "rotary":
+        raise InputError(
+            f"{actuator.name}: {who} serves the wiring 'rotary' so far, not {actuator.wiring!r}"
+        )
 
 
 def answer_of(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -77,7 +77,7 @@ def read_test_logs(
     """Read logs and what stands beside them; errors as `elevon.calibrate.read_logs`."""
     from elevon.logs.importing import import_log
 
-    out = []
+    out, files = [], [Path(path).name for path in paths]
     for k, path in enumerate(paths):
         imported = import_log(
             path,
@@ -86,6 +86,8 @@ def read_test_logs(
             command=commands[k] if k < len(commands) else None,
         )
         log = bench_log(imported)
+        if files.count(log.name) > 1:
+            log = replace(log, name=f"{Path(path).resolve().parent.name}/{log.name}")
         voltage = None
         if "voltage_q_ref" in imported.recording:
             values = np.array(imported.recording["voltage_q_ref"].values, dtype=np.float64)
@@ -147,7 +149,10 @@ def _check_motion(log: BenchLog, good: npt.NDArray[np.bool_], actuator: Actuator
     top = float(np.abs(log.speed[good]).max()) if good.any() else 0.0
     count = actuator.parameters.value("gear.ratio") * 1e-3
     if top < 1.0 or float(np.ptp(log.motor[good])) < count:
-        raise InputError(f"{log.name}: nothing moves (motor up to {top:.3g} rad/s)")
+        raise InputError(
+            f"{log.name}: nothing moves (motor up to {top:.3g} rad/s); a jam, an open phase or a "
+            "supply that is gone would do that, and more cannot be told without motion"
+        )
     for way, text in ((1.0, "forwards"), (-1.0, "backwards")):
         if (good & (way * log.speed > _MOVING * top)).sum() < 100:
             raise InputError(f"{log.name}: hardly any motion {text}; friction and play need both")

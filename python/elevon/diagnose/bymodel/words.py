@@ -50,7 +50,7 @@ def sentence(result: Diagnosis) -> str:
     if result.status == "healthy":
         return (
             f"Nothing here is beyond a healthy unit: it deviates as much in "
-            f"{100 * result.chance:.2g} % of logs (called faulty below "
+            f"{100 * result.chance:.3g} % of logs (called faulty below "
             f"{100 * result.false_alarm:g} %); a fault has a probability of {result.p_fault:.2g}."
         )
     causes = {f"{c.kind}@{c.place}": c for c in result.faults}

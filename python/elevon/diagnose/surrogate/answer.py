@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from elevon.diagnose.bymodel.answer import Cause, Diagnosis, Explanation
 from elevon.diagnose.bymodel.candidates import Candidate, chosen
+from elevon.diagnose.bymodel.diagnosis import check_asked
 from elevon.diagnose.bymodel.explain import POSSIBLE
 from elevon.diagnose.surrogate.model import Surrogate
 from elevon.diagnose.surrogate.population import FAULTS, learned
@@ -62,7 +63,7 @@ def diagnose_by_surrogate(
         A fault that is no candidate.
     """
     begin = clock.perf_counter()
-    _check(logs, actuator, false_alarm)
+    check_asked(logs, actuator, false_alarm, "the surrogate")
     candidates = _known(faults)
     said = proposed(logs, actuator, baselines=baselines, surrogate=surrogate)
     faulty = said.chance <= false_alarm
@@ -93,18 +94,6 @@ def diagnose_by_surrogate(
         seconds=clock.perf_counter() - begin,
         hypotheses=_explanations(said, candidates),
     )
-
-
-def _check(logs: Sequence[TestLog], actuator: Actuator, rate: float) -> None:
-    if not logs:
-        raise InputError("diagnosis needs at least one log")
-    if not 0.0 < rate < 1.0:
-        raise InputError(f"false-alarm rate {rate:g} must be between 0 and 1")
-    if actuator.wiring != "rotary":
-        raise InputError(
-            f"{actuator.name}: the surrogate serves the wiring 'rotary' so far, "
-            f"not {actuator.wiring!r}"
-        )
 
 
 def _known(faults: Sequence[str] | None) -> list[Candidate]:
@@ -184,7 +173,7 @@ def diagnose_by_both(
     from elevon.diagnose.bymodel import diagnose
 
     begin = clock.perf_counter()
-    _check(logs, actuator, false_alarm)
+    check_asked(logs, actuator, false_alarm, "the surrogate")
     candidates = chosen(faults)
     keys, note = _proposal(logs, actuator, baselines, candidates, surrogate)
     result = diagnose(logs, actuator, baselines=baselines, faults=keys, false_alarm=false_alarm)
