@@ -31,7 +31,7 @@ _KEYS = frozenset({"usage", "unit", "date", "serial", "reset", "logs", "healthy"
 _OF_DIAGNOSIS = frozenset(
     {
         "status", "p_fault", "false_alarm", "chance", "faults", "best", "unobservable",
-        "detectable", "evidence", "findings", "hypotheses", "seconds", "method",
+        "detectable", "evidence", "findings", "hypotheses", "alternatives", "seconds", "method",
     }
 )  # fmt: skip
 
