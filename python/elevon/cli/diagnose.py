@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from elevon.actuator import Actuator
+    from elevon.diagnose.bymodel import TestLog
     from elevon.diagnose.bymodel.answer import Diagnosis
     from elevon.recording import Recording
 
@@ -87,15 +88,28 @@ def diagnose(
             model, logs, baseline or [], column_map, faults=fault, false_alarm=false_alarm
         )
         return _shown(result, method, model.name, report, json=json, force=force)
-    data = read_test_logs(
+    data = read_with(logs, loadcell, command, column_map)
+    healthy = read_test_logs(without_companions(baseline or []), column_map=column_map)
+    result = run(data, model, baselines=healthy, faults=fault, false_alarm=false_alarm)
+    return _shown(result, method, model.name, report, json=json, force=force)
+
+
+def read_with(
+    logs: list[Path],
+    loadcell: list[Path] | None,
+    command: list[Path] | None,
+    column_map: Path | None,
+) -> list[TestLog]:
+    """Read logs with what stands beside them, given or found by name."""
+    from elevon.diagnose.bymodel import read_test_logs
+
+    logs = without_companions(logs)
+    return read_test_logs(
         logs,
         loadcells=one_each("--loadcell", loadcell, len(logs)),
         commands=one_each("--command", command, len(logs), shared=True),
         column_map=column_map,
     )
-    healthy = read_test_logs(without_companions(baseline or []), column_map=column_map)
-    result = run(data, model, baselines=healthy, faults=fault, false_alarm=false_alarm)
-    return _shown(result, method, model.name, report, json=json, force=force)
 
 
 def _by_roles(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from elevon.cli.calibrate import CommandOption, LoadcellOption, LogsArgument, MapOption, one_each
+from elevon.cli.calibrate import CommandOption, LoadcellOption, LogsArgument, MapOption
 from elevon.cli.common import (
     ActuatorOption,
     JsonOption,
@@ -17,12 +17,14 @@ from elevon.cli.common import (
     read_actuator,
     without_companions,
 )
+from elevon.cli.diagnose import read_with
 from elevon.cli.output import print_json, say
 from elevon.errors import InputError
 from elevon.number_text import severity_texts
 from elevon.units import parse_quantity
 
 if TYPE_CHECKING:
+    from elevon.diagnose.bymodel import TestLog
     from elevon.diagnose.monitor import Alarm, Monitor
 
 app = typer.Typer(rich_markup_mode=None)
@@ -63,18 +65,20 @@ def monitor(
     width = None if window is None else parse_quantity(window, "s", "--window")
     between = parse_quantity(false_alarm_time, "s", "--false-alarm-time")
     model = read_actuator(actuator, settings)
-    logs = without_companions(logs)
-    stream = read_test_logs(
-        logs,
-        loadcells=one_each("--loadcell", loadcell, len(logs)),
-        commands=one_each("--command", command, len(logs), shared=True),
-        column_map=column_map,
-    )
+    stream = read_with(logs, loadcell, command, column_map)
     healthy = read_test_logs(without_companions(baseline), column_map=column_map)
     watch = Monitor(
         model, healthy, window=width, false_alarm_time=between, faults=fault, days=len(stream),
         longest=max(item.log.duration for item in stream),
     )  # fmt: skip
+    _follow(watch, stream)
+    if json:
+        print_json({**watch.to_dict(), "seconds": clock.perf_counter() - begin})
+        return
+    _print(watch)
+
+
+def _follow(watch: Monitor, stream: list[TestLog]) -> None:
     for item in stream:
         watch.feed_log(item)
     if all(step.skipped for step in watch.steps):
@@ -82,10 +86,6 @@ def monitor(
             f"no window of {watch.width:g} s could be used: "
             + (watch.steps[0].skipped if watch.steps else "the logs are shorter than one")
         )
-    if json:
-        print_json({**watch.to_dict(), "seconds": clock.perf_counter() - begin})
-        return
-    _print(watch)
 
 
 def _print(watch: Monitor) -> None:

@@ -28,7 +28,7 @@ from elevon.diagnose.bymodel.explain import (
     unexplained,
 )
 from elevon.diagnose.bymodel.log import TestLog, prepared
-from elevon.diagnose.bymodel.posterior import posterior
+from elevon.diagnose.bymodel.posterior import Posterior, posterior
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
@@ -119,25 +119,12 @@ def answer_of(
     begin = clock.perf_counter()
     rest, root, detector = detector_of(cases, candidates)
     ratio = float(detector.ratio((root @ rest)[None, :])[0])
-    _, covariance = joined(cases)
-    degrees = min(case.unit.degrees for case in cases)
-    errors = np.concatenate([case.errors for case in cases])
     blind, least = limits(cases, candidates, root)
     # What the logs cannot show would keep its prior, whatever they say: it is told apart.
     seen = [c for c in candidates if c.key in least] or candidates
-    result = posterior(
-        rest,
-        covariance,
-        degrees,
-        seen,
-        lambda k, s: shift_of(cases, k, s),
-        errors=errors,
-        doubt=lambda k, s: doubt_of(cases, k, s),
-        pairs=pairs,
-    )
+    result = _weighed(cases, seen, pairs=pairs)
     faulty = ratio > detector.threshold(rate)
     best = next(h for h in result.hypotheses if bool(h.keys) or not faulty)
-    changed = moved(cases, best.keys, best.best)
     known = {c.key: c for c in candidates}
     named = [(known[key], value) for key, value in zip(best.keys, best.best, strict=True)]
     return Diagnosis(
@@ -151,9 +138,23 @@ def answer_of(
         p_best=result.probabilities[result.hypotheses.index(best)],
         unobservable=blind,
         detectable=least,
-        moved=changed,
-        findings=(*findings, *unexplained(covariance, rest, cases, named)),
+        moved=moved(cases, best.keys, best.best),
+        findings=(*findings, *unexplained(cases, named)),
         seconds=clock.perf_counter() - begin,
         hypotheses=explanations(result, candidates),
         alternatives=alternatives(result, cases, candidates, best.keys),
+    )
+
+
+def _weighed(cases: Sequence[Case], candidates: Sequence[Candidate], *, pairs: bool) -> Posterior:
+    rest, covariance = joined(cases)
+    return posterior(
+        rest,
+        covariance,
+        min(case.unit.degrees for case in cases),
+        candidates,
+        lambda k, s: shift_of(cases, k, s),
+        errors=np.concatenate([case.errors for case in cases]),
+        doubt=lambda k, s: doubt_of(cases, k, s),
+        pairs=pairs,
     )

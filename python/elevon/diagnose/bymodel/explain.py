@@ -23,10 +23,7 @@ ALIKE = 1.0  # deviations between two faults' shifts below which no log separate
 
 
 def unexplained(
-    covariance: Floats,
-    rest: Floats,
-    cases: Sequence[Case],
-    faults: Sequence[tuple[Candidate, float]],
+    cases: Sequence[Case], faults: Sequence[tuple[Candidate, float]]
 ) -> tuple[str, ...]:
     """Return the finding that the named faults do not explain the logs, where they do not.
 
@@ -34,10 +31,10 @@ def unexplained(
     """
     from scipy.stats import f as fisher
 
-    left, wide = _left(covariance, rest, cases, faults)
+    left, wide = _left(cases, faults)
     degrees = min(case.unit.degrees for case in cases)
-    square = float(left @ np.linalg.solve(wide, left)) / len(rest)
-    if float(fisher.sf(square, len(rest), degrees)) > UNLIKELY:
+    square = float(left @ np.linalg.solve(wide, left)) / len(left)
+    if float(fisher.sf(square, len(left), degrees)) > UNLIKELY:
         return ()
     return (
         "what is named does not explain all of the logs: another fault, or a set that is not "
@@ -78,14 +75,11 @@ def causes(
 
 
 def _left(
-    covariance: Floats,
-    rest: Floats,
-    cases: Sequence[Case],
-    faults: Sequence[tuple[Candidate, float]],
+    cases: Sequence[Case], faults: Sequence[tuple[Candidate, float]]
 ) -> tuple[Floats, Floats]:
     """Return what faults leave of the evidence, and its covariance with their model errors."""
     errors = np.concatenate([case.errors for case in cases])
-    left, wide = rest, covariance
+    left, wide = joined(cases)
     for c, severity in faults:
         shift = shift_of(cases, c.key, np.array([severity]))[0]
         left = left - shift
@@ -98,7 +92,6 @@ def alternatives(
     result: Posterior, cases: Sequence[Case], candidates: Sequence[Candidate], best: Sequence[str]
 ) -> tuple[Alternative, ...]:
     """Return the healthy unit and the single faults that are not the answer, likely ones first."""
-    rest, covariance = joined(cases)
     known = {c.key: c for c in candidates}
     places = [(case.name, name) for case in cases for name in case.unit.names]
     out = []
@@ -106,7 +99,7 @@ def alternatives(
         if len(h.keys) > 1 or h.keys == tuple(best):
             continue
         faults = [(known[key], value) for key, value in zip(h.keys, h.best, strict=True)]
-        left, wide = _left(covariance, rest, cases, faults)
+        left, wide = _left(cases, faults)
         score = left / np.sqrt(np.diag(wide))
         worst = int(np.argmax(np.abs(score)))
         key, severity = (h.keys[0], h.best[0]) if h.keys else ("", None)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -134,16 +134,10 @@ def healthy(
         own *= np.sqrt(np.outer(scale, scale))
         gain = off @ np.linalg.inv(off + (own + np.diag(noise)) / count)
         left, moved = off - gain @ off, gain @ centre
-    for name, between in POOLED.items():
-        for other in elsewhere:
-            said = _said_elsewhere(name, other) if name in names else None
-            if said is None:
-                continue
-            k = list(names).index(name)
-            error = own[k, k] + (mean[k] ** 2) * (said[1] ** 2 + between**2)
-            gain = left[:, k] / (left[k, k] + error)
-            moved = moved + gain * (said[0] * mean[k] - moved[k])
-            left = left - np.outer(gain, left[k])
+    for k, said, std in _pooled(names, mean, elsewhere):
+        gain = left[:, k] / (left[k, k] + own[k, k] + std**2)
+        moved = moved + gain * (said - moved[k])
+        left = left - np.outer(gain, left[k])
     return Healthy(
         tuple(names),
         mean + moved,
@@ -153,6 +147,19 @@ def healthy(
         np.sqrt(scale),
         0.5 * (left + left.T),
     )
+
+
+def _pooled(
+    names: Sequence[str], mean: Floats, elsewhere: Sequence[Elsewhere]
+) -> Iterator[tuple[int, float, float]]:
+    """Yield what other tests say of a number's offset: its place, the offset, its deviation."""
+    for name, between in POOLED.items():
+        for other in elsewhere:
+            said = _said_elsewhere(name, other) if name in names else None
+            if said is not None:
+                k = list(names).index(name)
+                size = abs(float(mean[k]))
+                yield k, said[0] * float(mean[k]), size * float(np.hypot(said[1], between))
 
 
 def _said_elsewhere(name: str, other: Elsewhere) -> tuple[float, float] | None:
