@@ -163,15 +163,18 @@ def _neighbours(cell: Cell, path: str) -> Iterator[dict[str, Any]]:
         if other.rpartition(".")[0] == group and other != path
     }
     words = set(path.split(".")) | set(path.rpartition(".")[2].split("_"))
-    alike = {other: len(words & set(other.rpartition(".")[2].split("_"))) for other in moved}
-    moved = dict(sorted(moved.items(), key=lambda item: -alike[item[0]]))
+    common = {other: len(words & set(other.rpartition(".")[2].split("_"))) for other in moved}
+    moved = dict(sorted(moved.items(), key=lambda item: -common[item[0]]))
     known = records(actuator.wiring)
     numbers = {
         other: actuator.parameters.value(other) for other in moved if known[other].choices is None
     }
-    for factor in FACTORS:  # Together, so that the knots of a table stay in order.
-        scaled = {other: value * factor for other, value in numbers.items()}
-        yield {other: value for other, value in scaled.items() if inside(known[other], value)}
+    # Together, and those of one unit alone, so that the knots of a table stay in order.
+    for unit in (None, *dict.fromkeys(known[other].unit for other in numbers)):
+        alike = [other for other in numbers if unit in (None, known[other].unit)]
+        for factor in FACTORS:
+            scaled = {other: numbers[other] * factor for other in alike}
+            yield {other: value for other, value in scaled.items() if inside(known[other], value)}
     yield from ({other: value} for other, values in moved.items() for value in values)
 
 
