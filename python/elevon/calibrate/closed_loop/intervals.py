@@ -183,15 +183,16 @@ def _alternatives(objective: Objective, x: Floats) -> list[dict[str, str | float
     ]
     if str(parameters["friction.law"].value) != "load_dependent":
         speed = max(float(np.nanmax(np.abs(log.motion(model.per_output)[0]))) for log in model.logs)
-        return steps + [
+        steps += [
             {"friction.law": law, "friction.stribeck_speed": FALL * speed}
             for law in ("stribeck", "load_dependent")
         ]
+        return steps
     fall, values = parameters.value("friction.stribeck_speed"), outer(objective.free, x)
     share = values.get(LOAD_SHARE, parameters.value(LOAD_SHARE))
     sticking = min((values.get(STICK, 1.0) - 1.0) * share, 0.98 - share)
-    falls = [{"friction.stribeck_speed": factor * fall} for factor in (0.5, 2.0)]
-    return steps + falls + [{"friction.load_motor_stribeck": max(sticking, 0.0)}]
+    steps += [{"friction.stribeck_speed": factor * fall} for factor in (0.5, 2.0)]
+    return [*steps, {"friction.load_motor_stribeck": max(sticking, 0.0)}]
 
 
 def _reasons(objective: Objective, x: Floats, covariance: Floats, strength: Floats) -> list[str]:
