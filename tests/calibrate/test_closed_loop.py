@@ -112,6 +112,8 @@ def test_from_a_good_start_a_short_log_is_followed():
     rows, _ = known(fitted)
     reasons = {row.free.path: row.reason for row in rows}
     assert not reasons["control.pid_derivative_time"]
+    ratio = next(row for row in rows if row.free.path == "friction.reverse_scale")
+    assert ratio.std >= 1.0, "a constant load can take friction from one way to the other"
     held = held_out_errors(fitted)
     assert {error.signal for error in held.errors} == {"position", "speed", "current"}
 
@@ -289,6 +291,10 @@ def test_logs_of_fewer_channels():
     result = calibrate_loop(slow, datasheet(PID), structure="pid")
     assert above(result.agreement, BAR) == {}
     assert "control.current_limit" not in {item.path for item in result.estimates}
+    assert "ratios" in result.undetermined["motor.inertia"]
+    assert result["control.pid_derivative_time"].value == pytest.approx(
+        truth(PID)["control.pid_derivative_time"], rel=0.1
+    )
 
 
 @pytest.mark.long

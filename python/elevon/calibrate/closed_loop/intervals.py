@@ -28,6 +28,7 @@ _LATE = 1.5e-3  # s between reading and acting of a drive with a tick of a milli
 _WEIGHTS = (0.25, 4.0)  # of a channel or log against the others: what a misfit would change
 #: Reasons of numbers that the logs do not feel: they stay as given.
 SILENT = ("changes nothing that the logs show", "the logs do not reach this limit")
+_RATIO = "friction.reverse_scale"
 _LIMITS = ("control.current_limit", "control.speed_limit", "inverter.supply_voltage")
 
 
@@ -83,6 +84,7 @@ def known(fitted: Fitted) -> tuple[list[Known], float]:
     colour = sums.T @ sums * (len(sums) / degrees)
     covariance = bread @ (colour + belief) @ bread + _misfit(objective, point, jac, weight)
     covariance = covariance + _choices(objective, point, bread @ (jac.T * weight))
+    covariance = covariance + _directions(objective, x)
     strength = np.sqrt(np.einsum("np,n,np->p", jac, weight, jac))
     return [
         Known(f, float(x[k]), float(np.sqrt(covariance[k, k])), reason)
@@ -163,6 +165,30 @@ def _choices(objective: Objective, point: Point, gain: Floats) -> Floats:
             moved = moved * (_LATE / later)
         total += np.outer(moved, moved)
     return total
+
+
+def _directions(objective: Objective, x: Floats) -> Floats:
+    """What a constant load may take from the friction of both directions.
+
+    Friction f and load L show as f + L one way and r f - L the other, whatever moves: two sums of
+    three numbers. The third comes from what is believed of the ratio r, and from laws of friction.
+    """
+    values = outer(objective.free, x)
+    total = np.zeros((len(x), len(x)))
+    if not {"friction.dynamic", _RATIO, "load.constant"} <= values.keys():
+        return total
+    dry, ratio = values["friction.dynamic"], values[_RATIO]
+    place = {item.path: k for k, item in enumerate(objective.free)}
+    change = -objective.free[place[_RATIO]].spread * ratio / (1.0 + ratio)
+    moved = np.zeros(len(x))
+    for path, amount in (
+        ("friction.dynamic", change * dry),
+        ("load.constant", -change * dry * objective.model.per_output),
+        (_RATIO, -change * (1.0 + ratio)),
+    ):
+        k = place[path]
+        moved[k] = amount / objective.free[k].slope(float(x[k]))
+    return np.asarray(total + np.outer(moved, moved))
 
 
 def _later(model: LoopModel) -> float:

@@ -148,6 +148,8 @@ def calibrate_loop(
     rows, degrees = known(fitted)
     held = held_out_errors(fitted)
     estimates, missing = _estimates(rows, degrees, actuator)
+    if free is None:
+        unsettled |= _ratios_only(estimates, logs, fitted)
     estimates = [item for item in estimates if item.path not in unsettled]
     missing |= unsettled
     if free is not None:
@@ -169,6 +171,21 @@ def calibrate_loop(
         held_out=held,
         wall_s=clock.perf_counter() - begin,
     )
+
+
+def _ratios_only(
+    estimates: Sequence[Estimate], logs: Sequence[LoopLog], fitted: Fitted
+) -> dict[str, str]:
+    """Why torques are not determined where neither current nor voltage was logged."""
+    if any({"current", "voltage"} & log.signals.keys() for log in logs):
+        return {}
+    limit = fitted.objective.model.actuator.parameters.value("control.current_limit")
+    return {
+        item.path: f"no current was logged: torques, inertia and gains are known by their ratios; "
+        f"{item.value:.4g} {item.unit} if control.current_limit is {limit:g} A, as given"
+        for item in estimates
+        if item.path in _SCALED
+    }
 
 
 def _late(logs: Sequence[LoopLog], transient: float | None) -> list[LoopLog]:
@@ -260,7 +277,7 @@ def _estimates(
         estimates.append(
             Estimate(
                 path=path, value=seen.value, std=seen.deviation, interval=seen.interval(width),
-                unit=row.free.unit, register=row.free.register, old=old, method="simulation",
+                unit=seen.free.unit, register=row.free.register, old=old, method="simulation",
                 given=("control.torque_constant",) if path in _SCALED else (),
                 in_set=in_set(path),
             )
