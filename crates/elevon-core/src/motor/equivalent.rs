@@ -61,6 +61,7 @@ pub fn quadrature<S: Scalar>(x: [S; 3], sines: [S; 3]) -> S {
 /// diagonal Pade form of order 3 (error x^7 / 100800, x = R dt / L).
 #[derive(Clone, Copy, Debug)]
 pub struct Circuit<S> {
+    pub resistance: S,
     pub per_resistance: S,
     /// exp(-x).
     decay: S,
@@ -77,6 +78,7 @@ impl<S: Scalar> Circuit<S> {
         let odd = x * (S::splat(0.5) + square * S::splat(1.0 / 120.0));
         let per_denominator = S::one() / (even + odd);
         Self {
+            resistance,
             per_resistance: S::one() / resistance,
             decay: (even - odd) * per_denominator,
             // 1 - (even - odd) / (even + odd), without cancellation.

@@ -4,6 +4,7 @@
 use super::driven::{settled, DrivenState, Part};
 use super::model::{Model, State, Structure};
 use super::phase::Phase;
+use crate::actuator::servo::shaft::Loads;
 use crate::inverter::hysteresis::six_step;
 use crate::motor::equivalent::quadrature;
 use crate::scalar::{three_phase, Scalar};
@@ -15,16 +16,33 @@ const FALL: f64 = 11.0;
 const ROUNDS: usize = 3;
 
 /// Mean error of a current before its relay acts. A link far above what the phase needs lets it coast slowly to the edge;
-/// nearer to it the three relays follow each other within their bands, about the reference. 1/exp(y) by its series.
+/// nearer to it the three relays follow each other within their bands, about the reference: b/(1 + y + y^2/2 + y^3/6) with
+/// y = n/V, in one division.
 #[inline(always)]
 pub(super) fn mean_error<S: Scalar>(m: &Model<S>, s: &State<S>, p: &Phase<S>, supply: S) -> S {
-    let (zero, one) = (S::zero(), S::one());
     let emf = S::splat(2.0 / 3.0) * p.torque_constant * s.shaft.motor_speed;
-    let needed = S::splat(FALL) * (emf + s.current / p.circuit.per_resistance).abs();
-    let there = zero.lt(supply);
-    let y = S::select(there, needed / S::select(there, supply, one), zero);
-    let falls = y.fma(y.fma(y.fma(S::splat(1.0 / 6.0), S::splat(0.5)), one), one);
-    m.drive.band / falls
+    let needed = S::splat(FALL) * p.circuit.resistance.fma(s.current, emf).abs();
+    let (square, cube) = (S::splat(0.5) * needed * needed, S::splat(1.0 / 6.0) * needed * needed * needed);
+    let falls = supply.fma(supply.fma(supply + needed, square), cube);
+    let there = S::zero().lt(supply);
+    let left = m.drive.band * (supply * supply * supply) / S::select(there, falls, S::one());
+    S::select(there, left, m.drive.band)
+}
+
+/// The shaft as it is pushed. No closure: one is compiled by itself, without the vector instructions of its caller.
+struct Pushed<'a, S, const EXTRA: bool> {
+    m: &'a Model<S>,
+    structure: &'a Structure,
+    s: &'a State<S>,
+    loads: &'a Loads<S>,
+}
+
+impl<S: Scalar, const EXTRA: bool> Pushed<'_, S, EXTRA> {
+    /// Acceleration by a torque, with one over an inertia.
+    #[inline(always)]
+    fn torque(&self, torque: S, per_inertia: S) -> S {
+        self.m.shaft.acceleration::<EXTRA>(&self.structure.shaft, &self.s.shaft, self.loads, torque, per_inertia)
+    }
 }
 
 /// What the controller asks for but for its derivative, the derivative as inertia, 1/(J + eta D).
@@ -35,21 +53,29 @@ pub(super) struct Asked<S> {
 }
 
 /// Acceleration under the torque that the relays leave anywhere within `band` of a current reference that contains the
-/// acceleration: T_ref = A - D a, J a = clamp(T_drift, eta T_ref +- b) - L. Monotone and piecewise linear in a; `by` is the
-/// acceleration by a torque and one over an inertia.
+/// acceleration: T_ref = A - D a, J a = clamp(T_drift, eta T_ref +- b) - L. Monotone and piecewise linear in a.
 #[inline(always)]
-pub(super) fn within_band<S: Scalar>(m: &Model<S>, s: &State<S>, p: &Phase<S>, asked: &Asked<S>, band: S, by: impl Fn(S, S) -> S) -> S {
+pub(super) fn within_band<S: Scalar, const EXTRA: bool>(
+    m: &Model<S>,
+    structure: &Structure,
+    s: &State<S>,
+    p: &Phase<S>,
+    asked: &Asked<S>,
+    band: S,
+    loads: &Loads<S>,
+) -> S {
+    let by = Pushed::<S, EXTRA> { m, structure, s, loads };
     let emf = S::splat(2.0 / 3.0) * p.torque_constant * s.shaft.motor_speed;
     let drift = p.torque_constant * p.circuit.current(s.current, -emf);
     let band = p.torque_constant * band;
-    let coasting = by(drift, m.per_inertia);
+    let coasting = by.torque(drift, m.per_inertia);
     let gap = drift - p.efficacy * (asked.torque - asked.inertia * coasting);
     let push = gap.signed(band);
-    let mut edge = by(p.efficacy.fma(asked.torque, push), asked.per_inertia);
+    let mut edge = by.torque(p.efficacy.fma(asked.torque, push), asked.per_inertia);
     let reference = asked.torque - asked.inertia * edge;
     let limited = m.control.torque_limit.lt(reference.abs());
     if S::any(limited) {
-        let held = by(p.efficacy.fma(reference.clamp_abs(m.control.torque_limit), push), m.per_inertia);
+        let held = by.torque(p.efficacy.fma(reference.clamp_abs(m.control.torque_limit), push), m.per_inertia);
         edge = S::select(limited, held, edge);
     }
     S::select(gap.abs().le(band), coasting, edge)

@@ -69,7 +69,7 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
     s.motor_torque = p.torque_constant * reached;
     // Sum of R_j i_j^2 of the three phases, at the step's middle.
     let middle = S::splat(0.5) * (before + reached);
-    let mut loss = S::splat(1.5) * middle * middle / p.circuit.per_resistance;
+    let mut loss = S::splat(1.5) * middle * middle * p.circuit.resistance;
     // Terminal power of the three phases, 3/2 v_q i_q.
     let mut power = S::splat(1.5) * s.voltage * middle;
     let phases = s.phases;
@@ -171,14 +171,13 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
         per_inertia = S::one() / answer.fma(derivative_inertia, m.shaft.inertia);
     }
     let mut loads = m.shaft.loads::<FULL, EXTRA>(&structure.shaft, x, &s.shaft, torque);
-    let by = |torque: S, per_inertia: S| m.shaft.acceleration::<EXTRA>(&structure.shaft, &s.shaft, &loads, torque, per_inertia);
     let supply = supply::<S, EXTRA>(m, structure, x, s, p);
     let relays = structure.drive == DriveKind::Hysteresis && structure.control.derivative && !(EXTRA && structure.driven);
     let acceleration = if relays {
         let asked = Asked { torque: asked.torque, inertia: derivative_inertia, per_inertia };
-        within_band(m, s, p, &asked, supply.band, by)
+        within_band::<S, EXTRA>(m, structure, s, p, &asked, supply.band, &loads)
     } else {
-        by(torque, per_inertia)
+        m.shaft.acceleration::<EXTRA>(&structure.shaft, &s.shaft, &loads, torque, per_inertia)
     };
     let unlimited = asked.torque - derivative_inertia * acceleration;
     s.torque_ref = unlimited.clamp_abs(m.control.torque_limit);

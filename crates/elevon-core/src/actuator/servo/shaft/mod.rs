@@ -7,6 +7,7 @@ mod show;
 mod step;
 mod train;
 
+pub(super) use self::loads::Loads;
 pub(super) use self::show::Shown;
 pub(super) use self::train::TRAIN;
 use self::train::{Train, TrainDetails};
