@@ -20,10 +20,19 @@ from elevon.diagnose.surrogate.campaign import Table
 from elevon.diagnose.surrogate.features import NAMES, changes, log_features
 from elevon.diagnose.surrogate.fit import Plan, fitted, judged
 from elevon.diagnose.surrogate.network import Batch, either, honest, loss_and_gradient, train
-from elevon.diagnose.surrogate.population import FAULTS, day_of, drawn_faults, learned, unit_of
+from elevon.diagnose.surrogate.population import (
+    FAULTS,
+    _stable,
+    build_of,
+    day_of,
+    drawn_faults,
+    learned,
+    unit_of,
+)
 from elevon.diagnose.surrogate.sampling import Rows, severities, sizes
 from elevon.errors import FormatError, InputError
 from elevon.prognose.history import _KEYS, _OF_DIAGNOSIS
+from elevon.simulate.acting import check_values
 from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
 from tests.diagnose.virtual import bench_logs
 
@@ -294,11 +303,26 @@ def test_references_are_other_days_of_the_same_unit():
 
 def test_units_and_days_differ(unit):
     rng = np.random.default_rng(5)
-    first, second = unit_of(unit, rng), unit_of(unit, rng)
+    build = build_of(rng)
+    first, second = unit_of(unit, build, rng), unit_of(unit, build, rng)
     day = day_of(first, rng).actuator
     dry = [u.parameters.value("friction.dynamic") for u in (first, second, day)]
     assert len(set(dry)) == 3
     assert dry[2] / dry[0] == pytest.approx(1.0, abs=0.3)
+    assert first.parameters["drive.kind"].value == build["drive.kind"]
+
+
+def test_a_unit_whose_current_loop_bears_no_such_derivative_gets_a_slower_one(unit):
+    gain, time = (unit.parameters.value(f"control.{n}") for n in ("speed_gain", "derivative_time"))
+    ticks = {"drive.kind": "hysteresis", "control.sample_time": 1e-3}
+    hard = {**ticks, "control.speed_gain": 1.5 * gain, "control.derivative_time": 1.2 * time}
+    with pytest.raises(InputError, match="current loop bears"):
+        check_values(unit.with_values(hard), "high")
+    slower = _stable(unit.with_values(hard))
+    assert slower.parameters.value("control.derivative_time") < time
+    assert slower.parameters.value("control.speed_gain") == 1.5 * gain
+    check_values(slower.with_values({"control.speed_gain": 1.6 * gain}), "high")
+    assert _stable(unit) is unit
 
 
 def test_the_command_line(elevon_cli, tmp_path):  # noqa: F811

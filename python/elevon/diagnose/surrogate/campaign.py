@@ -1,4 +1,4 @@
-"""The runs a surrogate learns from: drawn units on the bench's own tests, high fidelity."""
+"""The runs a surrogate learns from: drawn units on the bench's own tests."""
 
 from __future__ import annotations
 
@@ -16,9 +16,11 @@ from elevon.bench.rig import Setup, setups
 from elevon.bench.traces import recorded
 from elevon.diagnose.surrogate.features import NAMES, LogFeatures, log_features
 from elevon.diagnose.surrogate.population import (
+    ALIKE,
     FAULTS,
     NOISE,
     Day,
+    build_of,
     day_of,
     drawn_faults,
     learned,
@@ -40,7 +42,7 @@ TESTS = ("backlash", "loaded")
 HEALTHY_DAYS = 3
 FAULTY_DAYS = 7
 _UNITS = 16  # of a block: what is run, and written, at a time
-_VERSION = 1
+_VERSION = 2
 
 
 @dataclass(frozen=True)
@@ -205,7 +207,8 @@ class _Planned:
 def _unit_runs(actuator: Actuator, test: str, seed: int, number: int) -> Iterator[_Planned]:
     """One unit, drawn alike for every test, and its days, which are not."""
     own = np.random.default_rng([seed, number])
-    unit = unit_of(actuator, own)
+    build = build_of(np.random.default_rng([seed, len(TESTS), number // ALIKE]))
+    unit = unit_of(actuator, build, own)
     noise = {name: most * float(own.random()) for name, most in NOISE.items()}
     procedure, candidates = first_trace(load_procedure(test)), learned()
     for k in range(HEALTHY_DAYS + FAULTY_DAYS):

@@ -16,11 +16,11 @@ from elevon.diagnose.surrogate.network import Batch, Ensemble, Opinion, either, 
 from elevon.diagnose.surrogate.population import FAULTS
 from elevon.diagnose.surrogate.sampling import Rows, sizes
 from elevon.diagnose.surrogate.view import VIEWS, View
+from elevon.progress import Progress, part
 
 __all__ = ["Plan", "fitted", "judged"]
 
 Floats = npt.NDArray[np.float64]
-Progress = Callable[[float], object]
 FALSE_ALARM = 0.05
 HIGH = 0.25  # of a batch are runs of the high model, where there are low ones
 _KNOWN = 1500  # training runs kept to tell what is unlike them
@@ -45,7 +45,7 @@ class Plan:
 
     folds: int = 4
     members: int = 2
-    rounds: int = 1500
+    rounds: int = 1200
     batch: int = 256
     seed: int = 0
 
@@ -75,19 +75,15 @@ def fitted(
     steps = len(high) * len(VIEWS)
     for number, (name, table) in enumerate(high.items()):
         heads = {}
-        for k, view in enumerate(VIEWS):
+        for at, view in enumerate(VIEWS, number * len(VIEWS)):
             heads[view], said[f"{name}.{view}"] = _head(
                 Rows.of(table), Rows.of(low[name]) if name in low else None, view == "relative",
-                plan, _part(progress, (number * len(VIEWS) + k) / steps, 1.0 / steps),
+                plan, part(progress, at / steps, (at + 1) / steps),
             )  # fmt: skip
         first = np.flatnonzero(table.baseline)
         travel, speed = np.median(table.about[first], axis=0)
         tests[name] = TestModel(name == "loaded", float(travel), float(speed), heads)
     return Surrogate(tests, {**report, "cross_validation": said})
-
-
-def _part(progress: Progress | None, first: float, share: float) -> Progress | None:
-    return None if progress is None else lambda done: progress(first + share * done)
 
 
 def _head(
@@ -107,7 +103,7 @@ def _head(
                 members=plan.members,
                 rounds=plan.rounds,
                 seed=plan.seed + 1000 * k,
-                progress=_part(progress, k / plan.folds, 1.0 / plan.folds),
+                progress=part(progress, k / plan.folds, (k + 1) / plan.folds),
             )
         )
         held = usable[fold == k]

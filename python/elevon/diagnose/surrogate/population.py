@@ -7,6 +7,7 @@ spread of diagnosis by the model (`elevon.diagnose.bymodel.replay.SPREAD`).
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,11 +17,14 @@ import numpy as np
 
 from elevon.diagnose.bymodel.candidates import CANDIDATES, Candidate
 from elevon.diagnose.bymodel.replay import SPREAD
+from elevon.errors import InputError
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["FAULTS", "NOISE", "Day", "day_of", "drawn_faults", "learned", "unit_of"]
+__all__ = [
+    "ALIKE", "FAULTS", "NOISE", "Day", "build_of", "day_of", "drawn_faults", "learned", "unit_of",
+]  # fmt: skip
 
 #: What the surrogate knows, in the order of its answers.
 FAULTS = (
@@ -35,6 +39,7 @@ FAULTS = (
     "gain@sensor.encoder",
 )
 HEALTHY, SINGLE = 0.1, 0.65  # ASSUMED shares of the runs that may be faulty; the rest are pairs
+ALIKE = 8  # units in a row that are built alike
 LEAST = 0.1  # root of the least severity over the greatest
 
 #: Factors of a unit's values, drawn between the two evenly in their logarithm. ASSUMED.
@@ -68,10 +73,22 @@ _STATIC = (1.0, 1.6)  # over the dynamic friction
 _USER_FRICTION = (0.1, 1.0)  # N m behind an elastic play: without any the user swings freely
 #: Greatest deviation of a unit's noise on the log. ASSUMED.
 NOISE: Mapping[str, float] = {"motor_speed": 0.1, "current_q_meas": 0.05, "voltage_q_ref": 1.0}
+#: How units are built, and how often. ASSUMED.
 _SHARES: Mapping[str, tuple[tuple[str, ...], tuple[float, ...]]] = {
     "drive.kind": (("pwm", "hysteresis"), (0.6, 0.4)),
     "play.model": (("operator", "elastic"), (0.5, 0.5)),
+    "friction.law": (("borello", "stribeck", "lugre"), (0.7, 0.15, 0.15)),
+    "control.position_feedback": (("user", "encoder"), (0.5, 0.5)),
 }
+_SAMPLED = (0.0, 125e-6, 1e-3)  # s; of the controller, 0: continuous. ASSUMED, equally often
+_STRIBECK, _BRISTLES = (0.5, 3.0), (100.0, 300.0)  # rad/s; N m/rad. ASSUMED
+#: What makes runs eight times faster: semi-implicit steps [s], and the derivative's filter that
+#: they ask for. The features are those of steps of 1 us but for the voltage's ripple, which is up
+#: to three times as large in a healthy unit: the carrier's edges fall on whole steps.
+_STEPS: Mapping[str, float] = {"pwm": 2.5e-6, "hysteresis": 5e-6}
+_DERIVATIVE_FILTER = 100.0
+_ROOM = 1.15  # gain over the drawn one at which the speed loop must still be accepted
+_SHORTEST = 1e-4  # s of derivative time
 
 
 @dataclass(frozen=True)
@@ -96,20 +113,51 @@ def learned() -> list[Candidate]:
     return [known[key] for key in FAULTS]
 
 
-def unit_of(actuator: Actuator, rng: np.random.Generator) -> Actuator:
-    """Return another unit of the kind."""
-    values: dict[str, float | str] = {}
+def build_of(rng: np.random.Generator) -> dict[str, float | str]:
+    """Return how units are built: drive, play, friction's law, controller.
+
+    Units that are built alike run side by side in lanes.
+    """
+    out: dict[str, float | str] = {}
     for path, (names, shares) in _SHARES.items():
-        values[path] = str(rng.choice(names, p=shares))
+        out[path] = str(rng.choice(names, p=shares))
+    out["control.sample_time"] = float(rng.choice(_SAMPLED))
+    out["control.derivative_filter"] = _DERIVATIVE_FILTER
+    out["solver.method"] = "semi_implicit"
+    out["solver.step"] = _STEPS[str(out["drive.kind"])]
+    return out
+
+
+def unit_of(
+    actuator: Actuator, build: Mapping[str, float | str], rng: np.random.Generator
+) -> Actuator:
+    """Return another unit of the kind, built as `build_of` says."""
+    values = dict(build)
     for path, (low, high) in _FACTORS.items():
         factor = math.exp(rng.uniform(math.log(low), math.log(high)))
         values[path] = actuator.parameters.value(path) * factor
     for path, (low, high) in _VALUES.items():
         values[path] = float(rng.uniform(low, high))
     values["friction.static"] = float(values["friction.dynamic"]) * rng.uniform(*_STATIC)
+    values["friction.stribeck_speed"] = float(rng.uniform(*_STRIBECK))
+    values["friction.bristle_stiffness"] = float(rng.uniform(*_BRISTLES))
     if values["play.model"] == "elastic":
         values["load.friction"] = float(rng.uniform(*_USER_FRICTION))
-    return actuator.with_values(values, source="drawn unit")
+    return _stable(actuator.with_values(values, source="drawn unit"))
+
+
+def _stable(unit: Actuator) -> Actuator:
+    """Return the unit with a derivative that its current loop bears, on warmer days as well."""
+    from elevon.simulate.acting import check_values
+
+    gain, time = (unit.parameters.value(f"control.{n}") for n in ("speed_gain", "derivative_time"))
+    while time > _SHORTEST:
+        with contextlib.suppress(InputError):
+            check_values(unit.with_values({"control.speed_gain": _ROOM * gain}), "high")
+            break
+        time *= 0.7
+        unit = unit.with_values({"control.derivative_time": time}, source="drawn unit")
+    return unit
 
 
 def day_of(unit: Actuator, rng: np.random.Generator) -> Day:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from elevon.diagnose.surrogate.campaign import TESTS, Table, gathered
 from elevon.diagnose.surrogate.fit import Plan, fitted, judged
 from elevon.diagnose.surrogate.model import Surrogate
 from elevon.errors import InputError
+from elevon.progress import Progress, part
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -29,7 +29,7 @@ def trained(
     rounds: int,
     seed: int = 0,
     folder: Path | None = None,
-    progress: Callable[[float], Any] | None = None,
+    progress: Progress | None = None,
 ) -> Surrogate:
     """Simulate, train, test.
 
@@ -65,10 +65,10 @@ def trained(
     ]
     jobs = [job for job in jobs if job[1]]
     tables: dict[str, dict[str, Table]] = {name: {} for name, _, _ in jobs}
+    steps = len(jobs) * len(TESTS)
     for number, (name, count, own) in enumerate(jobs):
-        for k, test in enumerate(TESTS):
-            done = (number + k / len(TESTS)) / len(jobs)
-            share = _part(progress, _RUNS * done, _RUNS / len(jobs) / len(TESTS))
+        for at, test in enumerate(TESTS, number * len(TESTS)):
+            share = part(progress, _RUNS * at / steps, _RUNS * (at + 1) / steps)
             tables[name][test] = gathered(
                 actuator, test, units=count, seed=own, folder=folder, progress=share,
                 fidelity="low" if name == "low" else "high",
@@ -77,15 +77,7 @@ def trained(
         "actuator": actuator.name, "units": units, "low_units": low_units,
         "test_units": test_units, "rounds": rounds, "seed": seed,
     }  # fmt: skip
-    result = fitted(
-        tables["high"], tables.get("low", {}), plan, report, _part(progress, _RUNS, 1.0 - _RUNS)
-    )
+    result = fitted(tables["high"], tables.get("low", {}), plan, report, part(progress, _RUNS, 1.0))
     if not test_units:
         return result
     return Surrogate(result.tests, {**result.report, "test": judged(result, tables["test"])})
-
-
-def _part(
-    progress: Callable[[float], Any] | None, first: float, share: float
-) -> Callable[[float], Any] | None:
-    return None if progress is None else lambda done: progress(first + share * done)
