@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,7 +28,7 @@ from elevon.diagnose.surrogate.population import (
     unit_of,
 )
 from elevon.diagnose.virtual import first_trace, traced
-from elevon.errors import InputError
+from elevon.errors import ElevonWarning, InputError
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -178,7 +179,10 @@ def _block(
     planned = [row for number in block for row in _unit_runs(actuator, test, seed, number)]
     runs = [Run(p.setup.actuator, p.setup.scenario, p.setup.conditions.seed) for p in planned]
     record = recorded(list(signal_records(actuator.wiring, fidelity)))
-    shown = simulate_batch(runs, fidelity=fidelity, record=record, progress=progress)
+    with warnings.catch_warnings():
+        # Units are drawn for both fidelities: what does not act in one of them is no news.
+        warnings.simplefilter("ignore", ElevonWarning)
+        shown = simulate_batch(runs, fidelity=fidelity, record=record, progress=progress)
     rows = []
     for p, recording in zip(planned, shown, strict=True):
         if recording.status == "ok" and (row := _row(p, recording)) is not None:
