@@ -21,11 +21,11 @@ def diagnose_train(
     ] = "torino-rotary",
     out: Annotated[Path, typer.Option(metavar="FILE", help="Surrogate to write (.npz).")],
     units: Annotated[int, typer.Option(min=8, help="Units on the high model.")] = 64,
-    low_units: Annotated[int, typer.Option(min=0, help="More units, on the low model.")] = 96,
+    low_units: Annotated[int, typer.Option(min=0, help="More units, on the low model.")] = 32,
     test_units: Annotated[
         int, typer.Option(min=0, help="Units of another seed that only judge it.")
     ] = 32,
-    rounds: Annotated[int, typer.Option(min=10, help="Training steps of a network.")] = 1200,
+    rounds: Annotated[int, typer.Option(min=10, help="Training steps of a network.")] = 600,
     runs: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Keeps the runs, and goes on from there.")
     ] = None,

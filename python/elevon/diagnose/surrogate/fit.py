@@ -22,7 +22,7 @@ __all__ = ["Plan", "fitted", "judged"]
 
 Floats = npt.NDArray[np.float64]
 FALSE_ALARM = 0.05
-HIGH = 0.25  # of a batch are runs of the high model, where there are low ones
+HIGH = 0.25  # of a batch at least are runs of the high model
 _KNOWN = 1500  # training runs kept to tell what is unlike them
 _FAR = 0.995  # of held-out runs lie nearer to a training run
 _ROOM = 0.1  # of the trained range beyond its ends
@@ -45,7 +45,7 @@ class Plan:
 
     folds: int = 4
     members: int = 2
-    rounds: int = 1200
+    rounds: int = 600
     batch: int = 256
     seed: int = 0
 
@@ -116,11 +116,12 @@ def _head(
 def _sampler(
     high: Rows, rows: npt.NDArray[np.int64], low: Rows | None, view: View, size: int
 ) -> Callable[[np.random.Generator], Batch]:
-    """Batches of the high model's runs, most of them the low model's where there are any."""
+    """Batches of both models' runs: as many of each as there are, a quarter high ones at least."""
     others = None if low is None else low.usable()
+    share = 1.0 if others is None else max(HIGH, len(rows) / (len(rows) + len(others)))
 
     def batch(rng: np.random.Generator) -> Batch:
-        count = size if others is None else round(HIGH * size)
+        count = round(share * size)
         first = high.batch(view, rng.choice(rows, count), rng)
         if others is None or low is None:
             return first
