@@ -113,7 +113,7 @@ def apart(
     asked = [variant for variant in _carried(pair) if not only or variant.name in only]
     (healthy, *broken), (healthy_low, *broken_low) = pair.shown([Variant(), *asked])
     floors = dict.fromkeys(healthy.sizes, 0.0) if only else _floors(pair.high, healthy)
-    before = Shows(floors, healthy, healthy_low)
+    before = Healthy(floors, healthy, healthy_low)
     for variant, after, after_low in zip(asked, broken, broken_low, strict=True):
         if after.status != after_low.status:
             yield f"{variant.name}: high ends as {after.status}, low as {after_low.status}"
@@ -140,7 +140,7 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class Shows:
+class Healthy:
     """What healthy runs show, and what is no change of it."""
 
     floors: Mapping[str, float]
@@ -166,7 +166,7 @@ class Shows:
 
 
 def _standing(
-    pair: Pair, before: Shows, variant: Variant, parted: Mapping[str, str]
+    pair: Pair, before: Healthy, variant: Variant, parted: Mapping[str, str]
 ) -> Iterator[str]:
     """What is left of the features that part: not those that agree on both sides of a passage."""
     beside = [_grown(variant, 1.0 - BESIDE), _grown(variant, 1.0 + BESIDE)]
@@ -174,10 +174,11 @@ def _standing(
         yield from parted.values()
         return
     high, low = pair.shown(beside)
+    whole = all(after.status == "ok" for after in (*high, *low))
     apart_too = [before.parted(*both) for both in zip(high, low, strict=True)]
     for key, text in parted.items():
         less, more = (before.change(key, after) for after in high)
-        if less * more > 0.0 or any(key in some for some in apart_too):
+        if not whole or less * more > 0.0 or any(key in some for some in apart_too):
             yield text
 
 
