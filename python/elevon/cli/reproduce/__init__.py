@@ -8,6 +8,7 @@ from elevon.cli.groups import NamingGroup
 from elevon.cli.reproduce.case import add_command
 from elevon.cli.reproduce.cranfield import CASES as _CRANFIELD
 from elevon.cli.reproduce.diagnosis import CASES as _DIAGNOSIS
+from elevon.cli.reproduce.fault_limits import CASES as _FAULT_LIMITS
 from elevon.cli.reproduce.nasa import CASES as _NASA
 from elevon.cli.reproduce.next_test import CASES as _NEXT_TEST
 from elevon.cli.reproduce.optimisers import CASES as _OPTIMISERS
@@ -35,6 +36,7 @@ _CASES = (
     *_PISA,
     *_CRANFIELD,
     *_DIAGNOSIS,
+    *_FAULT_LIMITS,
     *_NEXT_TEST,
     *_SIGNATURES,
     *_OPTIMISERS,

@@ -1,0 +1,112 @@
+"""Every fault of every actuator, injected into its stand's tests, is found or said to be unseen.
+
+The registry of actuators and their stands' procedures say what is run; none is known by name. Logs
+are the low model's, of another day than the baseline's.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import pytest
+
+from elevon import _core
+from elevon.bench.stand import stand_of
+from elevon.diagnose.bymodel.candidates import CANDIDATES
+from elevon.diagnose.byroles.candidates import candidates_of, counted_of, switched_of
+from elevon.diagnose.standard import Day, StandardTest, day_logs, diagnosed, standard_tests
+from tests.contract import sets
+
+TESTED = [name for name in sets.names() if standard_tests(sets.actuator(name))]
+#: Severities, of the largest that is considered.
+PARTS = (1.0, 0.25, 0.0625)
+
+
+def every(count: int | None, name: str) -> list[Any]:
+    """Faults that the low model has, or some of them, spread over the catalogue."""
+    known = candidates_of(sets.actuator(name))
+    return list(known if count is None else known[:: max(1, len(known) // count)][:count])
+
+
+@cache
+def baseline(name: str, title: str) -> Any:
+    """The healthy log of a test, of a day of its own."""
+    test = next(t for t in standard_tests(sets.actuator(name)) if t.name == title)
+    return day_logs(sets.actuator(name), test, [Day((), 1)])[0]
+
+
+def severities(name: str, fault: Any, parts: tuple[float, ...]) -> tuple[float, ...]:
+    """What is there or not is there; the rest at parts of the largest."""
+    actuator = sets.actuator(name)
+    there = fault.kind in counted_of(actuator) | switched_of(actuator)
+    return (1.0,) if there else tuple(part * fault.high for part in parts)
+
+
+def missed(
+    name: str, test: StandardTest, faults: list[Any], parts: tuple[float, ...], limited: bool
+) -> list[str]:
+    """Faults that are neither named, nor among equivalents, nor said to be unseen with a reason."""
+    actuator = sets.actuator(name)
+    asked = [f.key for f in faults] if limited else None
+    wanted = [(f, s) for f in faults for s in severities(name, f, parts)]
+    days = [Day((f.text(s),), 10 + k) for k, (f, s) in enumerate(wanted)]
+    out = []
+    for (fault, severity), log in zip(wanted, day_logs(actuator, test, days), strict=True):
+        answer = diagnosed(actuator, log, [baseline(name, test.name)], asked)
+        named = {n for c in answer.faults for n in ((c.kind, c.place), *c.equivalents)}
+        if answer.status == "faulty" and (fault.kind, fault.place) in named:
+            continue
+        unseen = {(i["kind"], i["place"]): i["reason"] for i in answer.unobservable}
+        limit = answer.detectable.get(fault.key)
+        if unseen.get((fault.kind, fault.place)) or (limit is not None and severity < limit):
+            continue
+        out.append(f"{test.name}: {fault.key}={severity:g} (limit {limit}): said {answer.best}")
+    return out
+
+
+@pytest.mark.parametrize("name", TESTED)
+def test_some_faults_are_found_or_said_to_be_unseen(name: str) -> None:
+    """The largest severity of a few faults of the catalogue, in one test."""
+    test = standard_tests(sets.actuator(name))[0]
+    able = [fault for fault in every(None, name) if weighed(name, fault.key)]
+    few = able[:: max(1, len(able) // 3)][:3]
+    assert missed(name, test, few, PARTS[:1], limited=True) == []
+
+
+def weighed(name: str, key: str) -> bool:
+    """Whether a fault is a candidate of an actuator's diagnosis; the long test asks for all."""
+    by_model = stand_of(sets.actuator(name).wiring).equipment == "rotary"
+    return not by_model or key in {c.key for c in CANDIDATES}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("name", "test"),
+    [
+        pytest.param(name, test, id=f"{name}-{test.name}")
+        for name in TESTED
+        for test in standard_tests(sets.actuator(name))
+    ],
+)
+def test_every_fault_at_three_severities(name: str, test: StandardTest) -> None:
+    """Named, among equivalents, below its stated limit, or unseen with the reason."""
+    assert missed(name, test, every(None, name), PARTS, limited=False) == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", TESTED)
+def test_every_fault_of_the_catalogue_is_weighed_or_said_to_be_unseen(name: str) -> None:
+    """What the healthy log's answer says covers the catalogue, each with a limit or a reason."""
+    actuator = sets.actuator(name)
+    test = standard_tests(actuator)[0]
+    answer = diagnosed(
+        actuator, day_logs(actuator, test, [Day((), 2)])[0], [baseline(name, test.name)]
+    )
+    said = {(i["kind"], i["place"]) for i in answer.unobservable if i["reason"]}
+    for key in answer.detectable:
+        kind, _, place = key.partition("@")
+        same = next(c.same for c in candidates_of(actuator) if c.key == key)
+        said |= {(kind, p) for p in (place, *same)}
+    whole = {(r["kind"], p) for r in _core.faults(actuator.wiring) for p in r["places"]}
+    assert whole - said == set()
