@@ -97,11 +97,11 @@ class Belief:
         not weigh counts as absent, as it would on a log that cannot show it.
         """
         prior = cls.prior().possible
-        told = [Told.of(result) for result in results]
+        answered = [Answered.of(result) for result in results]
         out = []
         for before in prior:
-            weight = before.weight * math.prod(t.ratio(before) for t in told)
-            known = [t.possible[before.keys] for t in told if before.keys in t.possible]
+            weight = before.weight * math.prod(t.ratio(before) for t in answered)
+            known = [t.possible[before.keys] for t in answered if before.keys in t.possible]
             out.append(_merged(replace(before, weight=weight), known))
         return cls.of([p for p in out if p.weight > 0.0])
 
@@ -139,7 +139,7 @@ def read_result(path: str | Path) -> dict[str, Any]:
     """
     try:
         data = json.loads(Path(path).read_text("utf-8"))
-        Told.of(data)
+        Answered.of(data)
     except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
         why = f"no {error}" if isinstance(error, KeyError) else str(error)
         raise FormatError(
@@ -149,7 +149,7 @@ def read_result(path: str | Path) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Told:
+class Answered:
     """What one result says.
 
     Attributes
@@ -170,7 +170,7 @@ class Told:
     prior: dict[tuple[str, ...], float]
 
     @classmethod
-    def of(cls, result: Mapping[str, Any]) -> Told:
+    def of(cls, result: Mapping[str, Any]) -> Answered:
         """Read a result."""
         possible = {one.keys: one for one in map(_possible, result["hypotheses"])}
         seen = {*result["detectable"], *chain.from_iterable(possible)}
