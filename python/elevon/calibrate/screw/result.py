@@ -106,13 +106,7 @@ def calibrate_screw(
         work.add(*loops_by_current(logs, actuator))
         work.given = {**work.given, **dict.fromkeys(BY_CURRENT, LOOPS_GIVEN)}
     go(progress, 0.6)
-    settled = work.settled()
-    resistance = work.levels.get("motor.winding_resistance")
-    if resistance is None:
-        given = work.value("motor.winding_resistance")
-        resistance = Level(given, _COPPER * given)
-    work.add(*motor_heat(logs, settled, resistance))
-    work.add(*nut_heat(logs, settled, work.levels))
+    _thermal(work, logs)
     go(progress, 0.95)
     estimates, undetermined = work.answer(free)
     values: dict[str, str | float] = {item.path: item.value for item in estimates}
@@ -127,3 +121,14 @@ def calibrate_screw(
         facts={"balance_residual_nm": residual},
         wall_s=clock.perf_counter() - begin,
     )
+
+
+def _thermal(work: Parts, logs: Sequence[ScrewLog]) -> None:
+    """Evaluate the motor's two nodes and the nut, with what the balances have determined."""
+    settled = work.settled()
+    resistance = work.levels.get("motor.winding_resistance")
+    if resistance is None:
+        given = work.value("motor.winding_resistance")
+        resistance = Level(given, _COPPER * given)
+    work.add(*motor_heat(logs, settled, resistance))
+    work.add(*nut_heat(logs, settled, work.levels))
