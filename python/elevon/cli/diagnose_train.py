@@ -20,12 +20,12 @@ def diagnose_train(
         str, typer.Option(metavar="ACTUATOR", help="Units are drawn about it.")
     ] = "torino-rotary",
     out: Annotated[Path, typer.Option(metavar="FILE", help="Surrogate to write (.npz).")],
-    units: Annotated[int, typer.Option(min=8, help="Units on the high model.")] = 64,
-    low_units: Annotated[int, typer.Option(min=0, help="More units, on the low model.")] = 32,
+    units: Annotated[int, typer.Option(min=8, help="Units on the high model.")] = 96,
+    low_units: Annotated[int, typer.Option(min=0, help="More units, on the low model.")] = 240,
     test_units: Annotated[
         int, typer.Option(min=0, help="Units of another seed that only judge it.")
     ] = 32,
-    rounds: Annotated[int, typer.Option(min=10, help="Training steps of a network.")] = 600,
+    rounds: Annotated[int, typer.Option(min=10, help="Training steps of a network.")] = 1500,
     runs: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Keeps the runs, and goes on from there.")
     ] = None,

@@ -45,7 +45,7 @@ class Plan:
 
     folds: int = 4
     members: int = 2
-    rounds: int = 600
+    rounds: int = 1500
     batch: int = 256
     seed: int = 0
 
