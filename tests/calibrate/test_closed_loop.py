@@ -13,7 +13,7 @@ from elevon.calibrate.closed_loop import LoopLog, calibrate_loop, predict
 from elevon.calibrate.closed_loop.exchange import exchanged
 from elevon.calibrate.closed_loop.fit import Fitted, Searched, choose, final_fit
 from elevon.calibrate.closed_loop.free import asked_for, free_list, inner
-from elevon.calibrate.closed_loop.held_out import held_out_errors
+from elevon.calibrate.closed_loop.held_out import held_out_errors, validate_loop
 from elevon.calibrate.closed_loop.intervals import known
 from elevon.calibrate.closed_loop.model import LoopModel
 from elevon.calibrate.closed_loop.objective import Objective
@@ -149,6 +149,17 @@ def test_a_filtered_speed_is_a_lag_and_not_only_a_delay(known_drive):
     area = float(np.sum(np.abs(plain))) * 0.01
     assert np.max(np.abs(late)) < np.max(np.abs(plain))
     assert float(np.sum(np.abs(late))) * 0.01 == pytest.approx(area, rel=0.02)
+
+
+def test_what_the_logger_adds_is_part_of_a_validation(known_drive):
+    base, data = known_drive
+    late = {"speed_delay": 0.012, "speed_lag": 0.015}
+    plain, shown = (
+        {error.signal: error.rms for error in validate_loop([data], base, 0.0, given).errors}
+        for given in ({}, late)
+    )
+    assert shown["speed"] < 0.5 * plain["speed"]
+    assert shown["position"] == pytest.approx(plain["position"])
 
 
 def test_gains_that_change_places_are_both_named():

@@ -68,7 +68,7 @@ def calibrate_closed_loop(
         advance(1.0)
     if out is not None:
         say(f"set: {write_calibration(out, result, validation=result.held_out, force=force)}")
-    after = validate_loop(logs, result.actuator, transient)
+    after = validate_loop(logs, result.actuator, transient, result.held_out.offsets)
     if report is not None:
         say(f"report: {_page(result, after, date).save(report, force=force)}")
     if as_json:

@@ -93,7 +93,7 @@ def validate(
             ("log", "signal", "RMS", "max", "unit", "% of RMS", "% of range", "limit %", ""), rows
         )
         for name, offset in result.offsets.items():
-            say(f"{name}: the sensor's offset of {offset:.4g} is taken off the logs")
+            say(_sensor_text(name, offset))
         say(
             "% of RMS: RMS error over the logged signal's RMS about its mean; "
             "% of range: over its range"
@@ -102,3 +102,13 @@ def validate(
     for name, text in result.notes.items():
         say(f"{name}: {text}")
     return 1 if result.status == "fail" else 0
+
+
+def _sensor_text(name: str, value: float) -> str:
+    """Say in words what a log's sensor adds: an offset, a delay or a filter."""
+    channel, _, kind = name.rpartition("_")
+    if kind == "delay" and channel:
+        return f"{channel}: the log shows it {1e3 * value:.3g} ms late"
+    if kind == "lag" and channel:
+        return f"{channel}: the log shows it behind a filter of {1e3 * value:.3g} ms"
+    return f"{name}: the sensor's offset of {value:.4g} is taken off the logs"

@@ -76,7 +76,10 @@ def _folds(logs: Sequence[LoopLog], transient: float) -> list[tuple[list[LoopLog
 
 
 def validate_loop(
-    logs: Sequence[LoopLog], actuator: Actuator, transient: float | None = None
+    logs: Sequence[LoopLog],
+    actuator: Actuator,
+    transient: float | None = None,
+    shown: Mapping[str, float] | None = None,
 ) -> Validation:
     """Hold a servo against logs in its own closed loop on the recorded demand.
 
@@ -88,6 +91,8 @@ def validate_loop(
         Its ``[validation]`` table has the thresholds, and the logger's delays and offsets.
     transient : float, optional
         Seconds left out; default: the set's, else one.
+    shown : mapping of str to float, optional
+        The logger's delays, lags and offsets (`Validation.offsets`); default: the set's.
 
     Raises
     ------
@@ -95,7 +100,8 @@ def validate_loop(
         A transient longer than a log, a threshold of a channel that is none.
     """
     promised = actuator.validation or {}
-    limits, offsets = dict(promised.get("limits", {})), dict(promised.get("offsets", {}))
+    limits = dict(promised.get("limits", {}))
+    offsets = dict(promised.get("offsets", {}) if shown is None else shown)
     for name in limits:
         if name not in _UNITS:
             raise unknown("signal", name, _UNITS, f"{actuator.name}: validation.limits")
