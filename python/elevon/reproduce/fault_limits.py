@@ -16,7 +16,7 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.diagnose.modelfree.scores import share_interval
 from elevon.diagnose.standard import Day, StandardTest, day_logs, diagnosed, standard_tests
-from elevon.errors import InputError, unknown
+from elevon.errors import DivergedError, InputError, unknown
 from elevon.progress import part
 from elevon.report import Check, all_passed
 
@@ -207,9 +207,14 @@ def _test_limits(
         Day((f"{rows[k].kind}@{rows[k].place}={severity!r}",), first + 500 + k)
         for k, severity in zip(tried, severities, strict=True)
     ]
-    faulty = day_logs(actuator, test, broken, plan.fidelity, part(progress, 0.5, 0.7))
-    for k, severity, log in zip(tried, severities, faulty, strict=True):
+    for k, severity, day in zip(tried, severities, broken, strict=True):
+        try:
+            log = day_logs(actuator, test, [day], plan.fidelity)[0]
+        except (InputError, DivergedError):  # not a severity of this fidelity: left unchecked
+            continue
         rows[k] = _judged(rows[k], severity, diagnosed(actuator, log, [base]))
+    if progress is not None:
+        progress(1.0)
     return rows, sum(answer.status == "faulty" for answer in answers)
 
 
