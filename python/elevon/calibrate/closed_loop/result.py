@@ -145,17 +145,8 @@ def calibrate_loop(
         servo, chosen = refined(actuator, logs, chosen, check=say.go)
     fitted = final_fit(servo, logs, chosen, check=say.go, advance=lambda f: say(0.6 + 0.35 * f))
     fitted, unsettled = exchanged(fitted, actuator)
-    rows, degrees = known(fitted)
     held = held_out_errors(fitted)
-    estimates, missing = _estimates(rows, degrees, actuator)
-    if free is None:
-        unsettled |= _ratios_only(estimates, logs, fitted)
-    estimates = [item for item in estimates if item.path not in unsettled]
-    missing |= unsettled
-    if free is not None:
-        estimates = _asked(estimates, missing, free)
-    if not estimates:
-        raise InputError("the logs determine no parameter: nothing in them moves enough")
+    estimates, missing = _settled(fitted, logs, actuator, unsettled, free)
     say(1.0)
     return LoopCalibration(
         actuator=_with(servo, fitted, chosen.structure, missing),
@@ -171,6 +162,27 @@ def calibrate_loop(
         held_out=held,
         wall_s=clock.perf_counter() - begin,
     )
+
+
+def _settled(
+    fitted: Fitted,
+    logs: Sequence[LoopLog],
+    actuator: Actuator,
+    unsettled: Mapping[str, str],
+    free: Sequence[str] | None,
+) -> tuple[list[Estimate], dict[str, str]]:
+    """What the logs determine (of what was asked for), and what they do not."""
+    estimates, missing = _estimates(*known(fitted), actuator)
+    more = dict(unsettled)
+    if free is None:
+        more |= _ratios_only(estimates, logs, fitted)
+    estimates = [item for item in estimates if item.path not in more]
+    missing |= more
+    if free is not None:
+        estimates = _asked(estimates, missing, free)
+    if not estimates:
+        raise InputError("the logs determine no parameter: nothing in them moves enough")
+    return estimates, missing
 
 
 def _ratios_only(
