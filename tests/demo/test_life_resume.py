@@ -35,7 +35,12 @@ class Answer(SimpleNamespace):
 
     def __init__(self, severity):
         super().__init__(
-            status="healthy", chance=0.5, false_alarm=0.01, p_fault=0.1, severity=severity
+            status="healthy",
+            chance=0.5,
+            false_alarm=0.01,
+            p_fault=0.1,
+            findings=(),
+            severity=severity,
         )
 
     def to_dict(self):
