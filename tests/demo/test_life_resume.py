@@ -9,7 +9,7 @@ import pytest
 from elevon import Actuator
 from elevon.cli import main
 from elevon.demo.life import run as life_run
-from elevon.demo.life.run import Said
+from elevon.demo.life.results import Said
 from elevon.demo.life.unit import demo_mission
 from elevon.demo.results import Recovered
 from elevon.prognose import Response

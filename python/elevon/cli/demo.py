@@ -13,7 +13,7 @@ from elevon.cli.common import ForceOption, JsonOption, SeedOption
 from elevon.cli.output import print_json, print_table, progress_bar, say
 
 if TYPE_CHECKING:
-    from elevon.demo.life.run import LifeDemo
+    from elevon.demo.life.results import LifeDemo
     from elevon.demo.run import Demo
     from elevon.report.checks import Check
 

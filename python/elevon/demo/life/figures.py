@@ -14,7 +14,7 @@ from elevon.units import to_display
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from elevon.demo.life.run import LifeDemo
+    from elevon.demo.life.results import LifeDemo
     from elevon.diagnose.bymodel import TestLog
 
 __all__ = ["cone_figure", "diagnoses_figure", "remaining_figure", "signals_figure"]

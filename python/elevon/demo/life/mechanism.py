@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
     from elevon.actuator import Actuator
-    from elevon.demo.life.run import LifeDemo
+    from elevon.demo.life.results import LifeDemo
 
 __all__ = ["Motion", "mechanism", "motion"]
 

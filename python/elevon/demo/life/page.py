@@ -20,7 +20,7 @@ from elevon.units import to_display
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-    from elevon.demo.life.run import LifeDemo, Visit
+    from elevon.demo.life.results import LifeDemo, Visit
 
 __all__ = ["lead", "life_report", "moving_picture"]
 

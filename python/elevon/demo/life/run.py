@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import shutil
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from elevon.demo.finished import FinishedSteps, inputs_of, work_key
+from elevon.demo.life.results import LifeDemo, Said, Visit, life_from_json, life_to_json
 from elevon.demo.life.unit import (
     INSPECTED,
     demo_mission,
@@ -21,18 +22,15 @@ from elevon.demo.life.unit import (
     of_day,
 )
 from elevon.demo.results import Recovered
-from elevon.demo.steps import Story, Work
+from elevon.demo.steps import Work
 from elevon.errors import Interrupted
-from elevon.prognose.metrics import Track, cumulative_relative_accuracy
 from elevon.progress import Progress, part
-from elevon.report.checks import Check, all_passed
 
 if TYPE_CHECKING:
-    from elevon.diagnose.bymodel import Diagnosis, TestLog
-    from elevon.prognose import Inspection, Prognosis, Response
-    from elevon.prognose.life import Life
+    from elevon.diagnose.bymodel import TestLog
+    from elevon.prognose import Prognosis
 
-__all__ = ["LifeDemo", "Visit", "life_files", "run_life"]
+__all__ = ["life_files", "run_life"]
 
 _PAGES = (
     "report.html",
@@ -44,152 +42,6 @@ _PAGES = (
 )
 _UNIT = "torino-rotary SN 0042"
 _TEST = "backlash"
-
-
-@dataclass(frozen=True)
-class Said:
-    """What a diagnosis says, as it is kept.
-
-    Attributes
-    ----------
-    data : dict
-        Its JSON form.
-    text : str
-        In words.
-    """
-
-    data: dict[str, Any]
-    text: str
-
-    @classmethod
-    def of(cls, answer: Diagnosis) -> Said:
-        """Take it from the whole answer."""
-        from elevon.diagnose.bymodel.words import sentence
-
-        return cls(answer.to_dict(), sentence(answer))
-
-    @classmethod
-    def from_json(cls, data: Any) -> Said:
-        """Return it again."""
-        return cls(dict(data["data"]), str(data["text"]))
-
-    @property
-    def status(self) -> str:
-        """``healthy`` or ``faulty``."""
-        return str(self.data["status"])
-
-    @property
-    def best(self) -> list[str]:
-        """Faults of the best explanation, ``KIND@PLACE``."""
-        return list(self.data["best"]["faults"])
-
-
-@dataclass(frozen=True)
-class Visit:
-    """One inspection.
-
-    Attributes
-    ----------
-    usage : float
-        Flights.
-    log : Path
-        What the bench wrote.
-    diagnosis : Said
-        Of it.
-    inspection : Inspection
-        As the filter takes it.
-    prognosis : Prognosis
-        From all inspections up to this one.
-    """
-
-    usage: float
-    log: Path
-    diagnosis: Said
-    inspection: Inspection
-    prognosis: Prognosis
-
-
-@dataclass
-class LifeDemo(Story):
-    """Everything the report shows.
-
-    Attributes
-    ----------
-    life : Life
-        The true course.
-    calibration : Recovered
-        The healthy unit as its logs show it.
-    response : Response
-        The calibrated unit's tables.
-    visits : list of Visit
-        In the order of flights.
-    """
-
-    life: Life = field(init=False)
-    calibration: Recovered = field(init=False)
-    response: Response = field(init=False)
-    healthy: list[Path] = field(default_factory=list)
-    visits: list[Visit] = field(default_factory=list)
-
-    @property
-    def track(self) -> Track:
-        """The predictions against the end that came."""
-        rows = [(v.usage, v.prognosis.median, *v.prognosis.interval) for v in self.visits]
-        usage, median, low, high = np.array(rows).T
-        return Track(usage, median, low, high, self.life.end)
-
-    @property
-    def accuracy(self) -> float:
-        """Mean relative accuracy over 50 to 90 % of life."""
-        return cumulative_relative_accuracy(self.track, (0.5, 0.6, 0.7, 0.8, 0.9))
-
-    @property
-    def inside(self) -> float:
-        """Share of the predictions whose 90 % interval holds the true end of life."""
-        track = self.track
-        return float(np.mean((track.low <= track.true) & (track.true <= track.high)))
-
-    @property
-    def checks(self) -> list[Check]:
-        """What must hold of any one life; how well it was predicted is shown, and judged by many.
-
-        `elevon reproduce prognosis` asks for accuracy and coverage, of sixty lives.
-        """
-        track = self.track
-        named = np.mean([v.diagnosis.status == "faulty" for v in self.visits[1:]])
-        width = (track.high - track.low)[[len(track.usage) // 3, -1]]
-        return [
-            Check("last interval's width over that at a third of the inspections",
-                  float(width[1] / width[0]), 1.0),
-            Check("inspections after the first that name a fault", float(named), 0.8,
-                  at_least=True),
-        ]  # fmt: skip
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {
-            "status": "pass" if all_passed(self.checks) else "fail",
-            "checks": [check.to_dict() for check in self.checks],
-            "seed": self.seed,
-            "end": self.life.end,
-            "cumulative_relative_accuracy": self.accuracy,
-            "inside": self.inside,
-            "rows": [
-                {
-                    "usage": v.usage,
-                    "status": v.diagnosis.status,
-                    "faults": v.diagnosis.best,
-                    "rul": v.prognosis.median,
-                    "low": v.prognosis.interval[0],
-                    "high": v.prognosis.interval[1],
-                    "truth": self.life.end - v.usage,
-                }
-                for v in self.visits
-            ],
-            "steps": [step.to_dict() for step in self.steps],
-            "wall_s": self.seconds,
-            "report": str(self.folder / "report.html"),
-        }
 
 
 def life_files(out: str | Path) -> list[Path]:
@@ -239,8 +91,8 @@ def run_life(
         Work(
             "life",
             lambda: live(hidden, seed, part(progress, 0.0, 0.15)),
-            _life_to_json,
-            _life_from_json,
+            life_to_json,
+            life_from_json,
         ),
     )
     _calibrate(demo, part(progress, 0.15, 0.4))
@@ -251,18 +103,6 @@ def run_life(
     if progress is not None:
         progress(1.0)
     return demo
-
-
-def _life_to_json(life: Life) -> dict[str, Any]:
-    data = asdict(life)
-    return {**data, "usage": life.usage.tolist(), "severity": life.severity.tolist()}
-
-
-def _life_from_json(data: Any) -> Life:
-    from elevon.prognose.life import Life
-
-    usage, severity = np.array(data["usage"]), np.array(data["severity"])
-    return Life(usage, severity, float(data["end"]), int(data["first"]))
 
 
 def _claim(demo: LifeDemo, *, force: bool) -> None:

@@ -1,0 +1,179 @@
+"""What the demonstration of a life holds: its unit, its inspections, its predictions."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elevon.demo.results import Recovered
+from elevon.demo.steps import Story
+from elevon.prognose.life import Life
+from elevon.prognose.metrics import Track, cumulative_relative_accuracy
+from elevon.report.checks import Check, all_passed
+
+if TYPE_CHECKING:
+    from elevon.diagnose.bymodel import Diagnosis
+    from elevon.prognose import Inspection, Prognosis, Response
+
+__all__ = ["LifeDemo", "Said", "Visit", "life_from_json", "life_to_json"]
+
+
+@dataclass(frozen=True)
+class Said:
+    """What a diagnosis says, as it is kept.
+
+    Attributes
+    ----------
+    data : dict
+        Its JSON form.
+    text : str
+        In words.
+    """
+
+    data: dict[str, Any]
+    text: str
+
+    @classmethod
+    def of(cls, answer: Diagnosis) -> Said:
+        """Take it from the whole answer."""
+        from elevon.diagnose.bymodel.words import sentence
+
+        return cls(answer.to_dict(), sentence(answer))
+
+    @classmethod
+    def from_json(cls, data: Any) -> Said:
+        """Return it again."""
+        return cls(dict(data["data"]), str(data["text"]))
+
+    @property
+    def status(self) -> str:
+        """``healthy`` or ``faulty``."""
+        return str(self.data["status"])
+
+    @property
+    def best(self) -> list[str]:
+        """Faults of the best explanation, ``KIND@PLACE``."""
+        return list(self.data["best"]["faults"])
+
+
+@dataclass(frozen=True)
+class Visit:
+    """One inspection.
+
+    Attributes
+    ----------
+    usage : float
+        Flights.
+    log : Path
+        What the bench wrote.
+    diagnosis : Said
+        Of it.
+    inspection : Inspection
+        As the filter takes it.
+    prognosis : Prognosis
+        From all inspections up to this one.
+    """
+
+    usage: float
+    log: Path
+    diagnosis: Said
+    inspection: Inspection
+    prognosis: Prognosis
+
+
+@dataclass
+class LifeDemo(Story):
+    """Everything the report shows.
+
+    Attributes
+    ----------
+    life : Life
+        The true course.
+    calibration : Recovered
+        The healthy unit as its logs show it.
+    response : Response
+        The calibrated unit's tables.
+    visits : list of Visit
+        In the order of flights.
+    """
+
+    life: Life = field(init=False)
+    calibration: Recovered = field(init=False)
+    response: Response = field(init=False)
+    healthy: list[Path] = field(default_factory=list)
+    visits: list[Visit] = field(default_factory=list)
+
+    @property
+    def track(self) -> Track:
+        """The predictions against the end that came."""
+        rows = [(v.usage, v.prognosis.median, *v.prognosis.interval) for v in self.visits]
+        usage, median, low, high = np.array(rows).T
+        return Track(usage, median, low, high, self.life.end)
+
+    @property
+    def accuracy(self) -> float:
+        """Mean relative accuracy over 50 to 90 % of life."""
+        return cumulative_relative_accuracy(self.track, (0.5, 0.6, 0.7, 0.8, 0.9))
+
+    @property
+    def inside(self) -> float:
+        """Share of the predictions whose 90 % interval holds the true end of life."""
+        track = self.track
+        return float(np.mean((track.low <= track.true) & (track.true <= track.high)))
+
+    @property
+    def checks(self) -> list[Check]:
+        """What must hold of any one life; how well it was predicted is shown, and judged by many.
+
+        `elevon reproduce prognosis` asks for accuracy and coverage, of sixty lives.
+        """
+        track = self.track
+        named = np.mean([v.diagnosis.status == "faulty" for v in self.visits[1:]])
+        width = (track.high - track.low)[[len(track.usage) // 3, -1]]
+        return [
+            Check("last interval's width over that at a third of the inspections",
+                  float(width[1] / width[0]), 1.0),
+            Check("inspections after the first that name a fault", float(named), 0.8,
+                  at_least=True),
+        ]  # fmt: skip
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form."""
+        return {
+            "status": "pass" if all_passed(self.checks) else "fail",
+            "checks": [check.to_dict() for check in self.checks],
+            "seed": self.seed,
+            "end": self.life.end,
+            "cumulative_relative_accuracy": self.accuracy,
+            "inside": self.inside,
+            "rows": [
+                {
+                    "usage": v.usage,
+                    "status": v.diagnosis.status,
+                    "faults": v.diagnosis.best,
+                    "rul": v.prognosis.median,
+                    "low": v.prognosis.interval[0],
+                    "high": v.prognosis.interval[1],
+                    "truth": self.life.end - v.usage,
+                }
+                for v in self.visits
+            ],
+            "steps": [step.to_dict() for step in self.steps],
+            "wall_s": self.seconds,
+            "report": str(self.folder / "report.html"),
+        }
+
+
+def life_to_json(life: Life) -> dict[str, Any]:
+    """Return a life as plain types."""
+    data = asdict(life)
+    return {**data, "usage": life.usage.tolist(), "severity": life.severity.tolist()}
+
+
+def life_from_json(data: Any) -> Life:
+    """Return the life again."""
+    usage, severity = np.array(data["usage"]), np.array(data["severity"])
+    return Life(usage, severity, float(data["end"]), int(data["first"]))
