@@ -9,7 +9,7 @@ import pytest
 from elevon import Actuator
 from elevon.diagnose.bymodel.candidates import CANDIDATES
 from elevon.diagnose.bymodel.evidence import UNITS, Signals, dragged, evidence
-from elevon.diagnose.nexttest.belief import Told
+from elevon.diagnose.nexttest.belief import Answered
 from elevon.diagnose.surrogate import (
     Surrogate,
     diagnose_by_both,
@@ -182,7 +182,7 @@ def test_sets_of_faults_share_the_probability(unit, logs):
         first = result.hypotheses[0]
         assert [f"{kind}@{place}" for kind, place, _ in first.faults] == list(result.best)
         assert first.interval[0][0] < first.severity[0] < first.interval[0][1]
-        told = Told.of(json.loads(json.dumps(result.to_dict())))
+        told = Answered.of(json.loads(json.dumps(result.to_dict())))
         assert told.possible[result.best].weight == shares[0]
 
 
