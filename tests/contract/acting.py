@@ -17,6 +17,10 @@ FACTORS = (1.3, 0.7, 0.02, 50.0)
 SIZES = (0.1, 1e-3, 1.0, 30.0, 1e-6, 1e3, -0.1, -1.0, 0.0)
 #: Companies tried before a parameter counts as idle: more would only cost time.
 MOST = 80
+#: Supplies of the run that a set does by default: what watches speed and supply acts there.
+WHOLE = (1.0, 1.3, 0.5)
+#: Parameters of other groups that are tried because a parameter's text names them.
+SPOKEN = 6
 #: What a companion that must be away from neutral is set to, tried in this order.
 COMPANY = (0.2, 1e-3, 1.0, 20.0, 1e-5)
 
@@ -123,7 +127,7 @@ def companies(cell: Cell, path: str) -> Iterator[Variant]:
     plain = [Variant(values=one) for one in _accepted(cell, path)]
     yield from plain
     first = plain[0] if plain else Variant()
-    for broken in _faults(cell, path):
+    for broken in (*_faults(cell, path), *_spoken_faults(cell, path)):
         yield Variant(values=first.values, faults=(broken,))
     for company in plain[:2] or [Variant()]:
         for values in _neighbours(cell, path):
@@ -175,18 +179,64 @@ def _neighbours(cell: Cell, path: str) -> Iterator[dict[str, Any]]:
         for factor in FACTORS:
             scaled = {other: numbers[other] * factor for other in alike}
             yield {other: value for other, value in scaled.items() if inside(known[other], value)}
+    yield from _spoken_of(cell, path)
     yield from ({other: value} for other, values in moved.items() for value in values)
+
+
+def _words(cell: Cell, path: str) -> set[str]:
+    """Words of a parameter's text, without a plural's s."""
+    text = records(cell.actuator().wiring)[path].text.lower()
+    return {word.removesuffix("es").removesuffix("s") for word in re.findall(r"[a-z]{4,}", text)}
+
+
+def _spoken_faults(cell: Cell, path: str) -> Iterator[Any]:
+    """Yield severe faults of what the parameter's own text names."""
+    words, half = _words(cell, path), 0.5 * cell.scenario().seconds
+    for kind, place, record in cell.faults():
+        if words & set(re.findall(r"[a-z]+", f"{kind} {place}".replace("proximity", "switch"))):
+            yield fault(kind, place, record, severe(record), {"kind": "step", "time": half})
+
+
+def _spoken_of(cell: Cell, path: str) -> Iterator[dict[str, Any]]:
+    """Yield other values of what the text names: a limit of the supply needs a supply."""
+    known = records(cell.actuator().wiring)
+    words = _words(cell, path)
+    named = [other for other in known
+             if other.rpartition(".")[0] != path.rpartition(".")[0]
+             and words & set(other.rpartition(".")[2].split("_"))]  # fmt: skip
+    for other in named[:SPOKEN]:
+        value = cell.actuator().parameters[other].value
+        yield from ({other: number} for number in others(known[other], value)[: len(FACTORS)])
 
 
 def variants(cell: Cell, path: str, base: Variant) -> list[Variant]:
     """Other values of a parameter in some company, those that the cell accepts."""
     actuator = cell.actuator(base.values)
     record = records(actuator.wiring)[path]
-    found = [
+    asked = [
         Variant(f"{path}={value}", {**base.values, path: value}, base.faults)
         for value in others(record, actuator.parameters[path].value)
     ]
-    return [variant for variant in found if not cell.refused(variant)]
+    refused = [bool(cell.refused(variant)) for variant in asked]
+    accepted = [variant for variant, no in zip(asked, refused, strict=True) if not no]
+    if base.values or base.faults:
+        return accepted
+    return accepted + [
+        _nearest(cell, path, actuator.parameters[path].value, variant.values[path])
+        for variant, no in zip(asked[: len(FACTORS)], refused, strict=False)
+        if no and record.choices is None
+    ]
+
+
+def _nearest(cell: Cell, path: str, accepted: float, refused: float) -> Variant:
+    """The value next to one that another parameter forbids: a limit acts where it is reached."""
+    for _ in range(12):
+        middle = 0.5 * (accepted + refused)
+        if cell.refused(Variant(values={path: middle})):
+            refused = middle
+        else:
+            accepted = middle
+    return Variant(f"{path}={accepted}", {path: accepted})
 
 
 def changed(cell: Cell, base: Variant, tried: Sequence[Variant]) -> dict[str, list[str]]:
@@ -225,7 +275,7 @@ def shows(cell: Cell, path: str) -> bool:
     ]
     return any(
         _shows(way, path, base) for base in islice(companies(cell, path), MOST) for way in ways
-    )
+    ) or any(_shows(replace(cell, load=0.0, whole=supply), path, Variant()) for supply in WHOLE)
 
 
 def _shows(cell: Cell, path: str, base: Variant) -> bool:

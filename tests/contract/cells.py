@@ -62,7 +62,8 @@ class Outcome:
 class Cell:
     """An actuator at one fidelity, in one drive, under one load (SI, at its output).
 
-    It swings, or with `onwards` it moves in the positive direction only, up to its stops.
+    It swings, or with `onwards` it moves in the positive direction only, up to its stops; with
+    `whole` it does what its set does by default, under a supply that is so many times the set's.
     """
 
     name: str
@@ -70,6 +71,7 @@ class Cell:
     choices: Choices = ()
     load: float = 0.0
     onwards: bool = False
+    whole: float = 0.0
 
     @property
     def title(self) -> str:
@@ -94,6 +96,8 @@ class Cell:
         What the motion itself sets of the parameters `given` gives way to theirs.
         """
         data = sets.onwards(self.name) if self.onwards else sets.motion(self.name)
+        if self.whole:
+            data = sets.default(self.name, self.whole)
         own = data.get("parameters", {})
         data["parameters"] = {path: value for path, value in own.items() if path not in given}
         if self.load:

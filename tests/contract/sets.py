@@ -106,6 +106,14 @@ def motion(name: str) -> dict[str, Any]:
     return copy.deepcopy(data)
 
 
+def default(name: str, supply: float) -> dict[str, Any]:
+    """What a set does by default, as data, its supply so many times as high."""
+    chosen = actuator(name)
+    data = dict(copy.deepcopy(chosen.default_scenario) or onwards(name))
+    volts = supply * chosen.parameters.value("inverter.supply_voltage")
+    return {**data, "supply": {"terms": [{"kind": "constant", "value": volts}]}}
+
+
 def step(time: float, action: str) -> dict[str, Any]:
     """One action of a sequence."""
     return {"time": time, "action": action}
