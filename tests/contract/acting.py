@@ -275,7 +275,16 @@ def shows(cell: Cell, path: str) -> bool:
     ]
     return any(
         _shows(way, path, base) for base in islice(companies(cell, path), MOST) for way in ways
-    ) or any(_shows(replace(cell, load=0.0, whole=supply), path, Variant()) for supply in WHOLE)
+    ) or _shows_over_the_whole(cell, path)
+
+
+def _shows_over_the_whole(cell: Cell, path: str) -> bool:
+    """In the set's own run: under its supply and others, with each severe fault from the start."""
+    if any(_shows(replace(cell, load=0.0, whole=supply), path, Variant()) for supply in WHOLE):
+        return True
+    whole = replace(cell, load=0.0, whole=1.0)
+    broken = (fault(kind, place, record, severe(record)) for kind, place, record in cell.faults())
+    return any(_shows(whole, path, Variant(faults=(one,))) for one in broken)
 
 
 def _shows(cell: Cell, path: str, base: Variant) -> bool:

@@ -107,9 +107,12 @@ def motion(name: str) -> dict[str, Any]:
 
 
 def default(name: str, supply: float) -> dict[str, Any]:
-    """What a set does by default, as data, its supply so many times as high."""
+    """What a set does by default, its supply so many times as high; actions end in a stop."""
     chosen = actuator(name)
-    data = dict(copy.deepcopy(chosen.default_scenario) or onwards(name))
+    data = copy.deepcopy(dict(chosen.default_scenario or onwards(name)))
+    if takes_actions(name):
+        data["command"]["steps"].append(step(1.6, "stop"))
+        data["duration"] = "3 s"
     volts = supply * chosen.parameters.value("inverter.supply_voltage")
     return {**data, "supply": {"terms": [{"kind": "constant", "value": volts}]}}
 
