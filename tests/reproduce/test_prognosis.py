@@ -1,22 +1,22 @@
 """The run-to-failure histories: what inspections say of them, the figures, the command."""
 
 import json
+import math
+from functools import partial
 
 import numpy as np
 import pytest
 
 from elevon import Actuator
 from elevon.cli import main
-from elevon.errors import InputError
+from elevon.errors import InputError, Interrupted
 from elevon.prognose.life import Life
 from elevon.prognose.metrics import Track
-from elevon.reproduce.prognosis.campaign import (
-    PrognosisResult,
-    UnitResult,
-    campaign_mission,
-    reproduce_prognosis,
-)
+from elevon.reproduce.prognosis import campaign
+from elevon.reproduce.prognosis.campaign import campaign_mission, reproduce_prognosis
+from elevon.reproduce.prognosis.result import PrognosisResult, UnitResult
 from elevon.reproduce.prognosis.truth import FAULTS, UnitTruth, inspections_of, other_law
+from elevon.reproduce.side_by_side import side_by_side
 
 
 def unit(law, error, number=0):
@@ -74,10 +74,48 @@ def test_too_few_histories_are_refused():
         reproduce_prognosis(histories=2)
 
 
+def test_an_interrupted_campaign_goes_on_from_its_finished_histories(tmp_path, monkeypatch):
+    """Each history is done once, and what is noted gives the same figures to the last bit."""
+    asked = []
+
+    def history(number, seed, _expected):
+        asked.append(number)
+        if number == 4:
+            return {"left_out": "history 4: no inspection"}
+        return {"unit": unit(FAULTS[number % 3], 0.01 * number + 1e-3 * seed, number).noted()}
+
+    monkeypatch.setattr(campaign, "_history", history)
+    monkeypatch.setattr(campaign, "_expected", dict)
+    work = {"histories": 6, "seed": 7, "processes": 1}
+    whole = reproduce_prognosis(**work)
+    with pytest.raises(Interrupted):
+        reproduce_prognosis(**work, folder=tmp_path, progress=lambda done: done < 0.4)
+    assert asked[6:] == [0, 1, 2]
+    again = reproduce_prognosis(**work, folder=tmp_path)
+    assert asked[9:] == [3, 4, 5]
+    assert {**again.to_dict(), "seconds": 0.0} == {**whole.to_dict(), "seconds": 0.0}
+    assert again.left_out == ("history 4: no inspection",)
+    assert len(reproduce_prognosis(**{**work, "histories": 3}, folder=tmp_path).units) == 3
+    assert len(asked) == 12
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_work_side_by_side_is_the_same_work(processes):
+    calls = {f"root of {n}": partial(math.sqrt, n) for n in range(5)}
+    done = []
+    results = side_by_side(calls, processes=processes, progress=lambda d: done.append(d) or True)
+    assert dict(results) == {f"root of {n}": math.sqrt(n) for n in range(5)}
+    assert done[-1] == 1.0
+
+
 @pytest.mark.long
 def test_the_command(tmp_path, capsys):
-    code = main(["reproduce", "prognosis", "--histories", "3", "--out", str(tmp_path), "--json"])
+    asked = ["reproduce", "prognosis", "--histories", "3", "--out", str(tmp_path), "--json"]
+    code = main(asked)
     values = json.loads(capsys.readouterr().out)
     assert code in (0, 1)  # three lives decide nothing
     assert [row["law"] for row in values["rows"]] == list(FAULTS)
     assert (tmp_path / "report.html").is_file()
+    assert main([*asked, "--force", "--processes", "1"]) == code
+    again = json.loads(capsys.readouterr().out)
+    assert {**again, "seconds": 0.0} == {**values, "seconds": 0.0}  # from the finished histories

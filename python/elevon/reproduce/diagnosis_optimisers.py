@@ -9,9 +9,8 @@ as the bench writes it and one healthy log of the same test.
 from __future__ import annotations
 
 import math
-import os
 import time as clock
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -23,8 +22,8 @@ import numpy.typing as npt
 from elevon.diagnose.bymodel.replay import _RECENT
 from elevon.diagnose.optimisers import CAUSES, METHODS, Monitor, search
 from elevon.diagnose.optimisers.cost import limits
-from elevon.errors import Interrupted
 from elevon.report import Check, all_passed
+from elevon.reproduce.side_by_side import side_by_side
 from elevon.worklog import finished
 
 if TYPE_CHECKING:
@@ -208,10 +207,10 @@ def reproduce_optimisers(
         known = {n: done.items[n].data["rows"] for n in names if done and n in done.items}
         missing = [n for n in names if n not in known]
         jobs = dict(zip(names, _logs(unit, cases, seed, seeds) if missing else (), strict=False))
-        work = partial(_one, unit, budget=budget)
-        for name, rows in _worked(
-            work, jobs, missing, seed=seed, processes=processes, progress=progress
-        ):
+        # The seeds do not depend on which are missing.
+        numbers = {name: seed + k for k, name in enumerate(jobs)}
+        calls = {n: partial(_one, unit, *jobs[n], budget=budget, seed=numbers[n]) for n in missing}
+        for name, rows in side_by_side(calls, processes=processes, progress=progress):
             known[name] = [row.to_dict() for row in rows]
             if done is not None:
                 done.note(name, [], rows=known[name])
@@ -219,42 +218,6 @@ def reproduce_optimisers(
 
 
 Job = tuple[str, "Setup", "TestLog", "TestLog"]
-
-
-def _worked(
-    work: Callable[..., list[Outcome]],
-    jobs: Mapping[str, Job],
-    missing: Sequence[str],
-    *,
-    seed: int,
-    processes: int | None,
-    progress: Progress | None,
-) -> Iterator[tuple[str, list[Outcome]]]:
-    """Give each log that is missing to a process; the seeds do not depend on which are missing."""
-    from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-    from multiprocessing import get_context
-
-    count = max(min(processes or os.cpu_count() or 1, len(missing)), 1)
-    pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=_deaf)
-    numbers = {name: seed + k for k, name in enumerate(jobs)}
-    try:
-        asked: dict[Future[list[Outcome]], str] = {
-            pool.submit(work, *jobs[n], seed=numbers[n]): n for n in missing
-        }
-        while asked:
-            ready = wait(asked, timeout=0.5, return_when=FIRST_COMPLETED).done
-            yield from ((asked.pop(future), future.result()) for future in ready)
-            if progress is not None and progress(1.0 - len(asked) / len(missing)) is False:
-                raise Interrupted("interrupted between two logs")
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _deaf() -> None:
-    """Ctrl-C is the parent's: it ends between two logs."""
-    import signal
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _logs(unit: Actuator, cases: Sequence[str], seed: int, seeds: int) -> list[Job]:

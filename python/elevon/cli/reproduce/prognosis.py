@@ -15,13 +15,20 @@ if TYPE_CHECKING:
 __all__ = ["CASES"]
 
 _HISTORIES = Annotated[int, typer.Option("--histories", min=3, help="Lives, over three faults.")]
+_PROCESSES = Annotated[
+    int | None, typer.Option("--processes", min=1, help="Side by side; default: all processors.")
+]
 
 
 def _work(options: Options, progress: Advance) -> Any:
     from elevon.reproduce.prognosis import reproduce_prognosis
 
     return reproduce_prognosis(
-        histories=options["histories"], seed=options["seed"], progress=progress
+        histories=options["histories"],
+        seed=options["seed"],
+        processes=options["processes"],
+        folder=options["out"],
+        progress=progress,
     )
 
 
@@ -49,6 +56,6 @@ CASES = (
         _work,
         _show,
         _page,
-        {"histories": (_HISTORIES, 60)},
+        {"histories": (_HISTORIES, 60), "processes": (_PROCESSES, None)},
     ),
 )

@@ -9,7 +9,7 @@ import numpy as np
 from elevon.prognose.metrics import Track
 from elevon.report import Report, Table
 from elevon.report.figures import COLOURS, new_figure
-from elevon.reproduce.prognosis.campaign import SHARES, PrognosisResult
+from elevon.reproduce.prognosis.result import SHARES, PrognosisResult
 from elevon.reproduce.provenance import provenance
 
 if TYPE_CHECKING:
