@@ -8,7 +8,8 @@ import pytest
 
 from elevon import Actuator
 from elevon.diagnose.bymodel.candidates import CANDIDATES
-from elevon.diagnose.bymodel.evidence import UNITS, Signals, dragged, evidence
+from elevon.diagnose.bymodel.evidence import UNITS, Signals, evidence
+from elevon.diagnose.bymodel.lost_motion import dragged
 from elevon.diagnose.nexttest.belief import Answered
 from elevon.diagnose.surrogate import (
     Surrogate,

@@ -108,6 +108,11 @@ def case_of(
     ]
     sound = _sound(model, names, proofs, candidates, findings)
     _lost(item, same, findings)
+    if shown.floats:
+        findings.append(
+            f"{item.name}: the user is not dragged through its play but flies in it on its own; "
+            "the play is read from the width of the two positions' difference"
+        )
     return Case(item.name, shown.only(names), healthy(model, names, sound, elsewhere), model)
 
 

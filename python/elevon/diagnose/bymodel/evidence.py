@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from elevon.diagnose.bymodel.lost_motion import dragged, floats, spanned
+
 __all__ = [
     "OWN_ERROR",
     "SHARES",
@@ -20,7 +22,6 @@ __all__ = [
     "UNITS",
     "Evidence",
     "Signals",
-    "dragged",
     "evidence",
     "regress",
 ]
@@ -123,16 +124,20 @@ class Evidence:
         Keys of `UNITS`.
     values, std : ndarray, shape (k,)
         With the deviation that the noise within the log gives them.
+    floats : bool
+        Whether the user flies in its play on its own: its lost motion is then the width in which
+        the two positions' difference lies.
     """
 
     names: tuple[str, ...]
     values: Floats
     std: Floats
+    floats: bool = False
 
     def only(self, names: Sequence[str]) -> Evidence:
         """Return some of it, in the order given."""
         at = [self.names.index(name) for name in names]
-        return Evidence(tuple(names), self.values[at], self.std[at])
+        return Evidence(tuple(names), self.values[at], self.std[at], self.floats)
 
 
 def evidence(
@@ -162,10 +167,9 @@ def evidence(
     shaft : bool
         Whether what turns with the shaft is sought.
     """
-    rows: dict[str, tuple[float, float]] = {}
     width = float(np.median(np.diff(signals.time)))
     moving = signals.good & (np.abs(signals.speed) > _SLOW * np.abs(signals.speed).max())
-    rows |= _positions(signals, moving, ratio, deviations)
+    rows, flies = _positions(signals, moving, ratio, deviations)
     cosine, sine = np.cos(pole_pairs * signals.motor), np.sin(pole_pairs * signals.motor)
     waves = (cosine, sine, cosine**2 - sine**2, 2.0 * cosine * sine)
     beside = (2.0 * pole_pairs + 1.0) * signals.motor if shaft else None
@@ -178,6 +182,7 @@ def evidence(
         names,
         np.array([rows[name][0] for name in names]),
         np.array([rows[name][1] for name in names]),
+        flies,
     )
 
 
@@ -248,7 +253,8 @@ def _root(variance: float) -> float:
 
 def _positions(
     signals: Signals, moving: Bools, ratio: float, deviations: bool
-) -> dict[str, tuple[float, float]]:
+) -> tuple[dict[str, tuple[float, float]], bool]:
+    """Lost motion and scale, and whether the user flies in its play on its own."""
     gap = signals.motor / ratio - signals.user
     use = moving & dragged(signals.motor / ratio, float(np.ptp(gap[moving])))
     if use.sum() < _LEAST:
@@ -256,17 +262,11 @@ def _positions(
     centred = signals.user - float(np.mean(signals.user[use]))
     columns = [np.sign(signals.speed), centred, np.ones_like(gap)]
     fit = _fit(columns, gap, use, deviations)
-    return {"lost_motion": _one(fit, 0, 2.0), "position_scale": _one(fit, 1)}
-
-
-def dragged(driver: Floats, width: float) -> Bools:
-    """Return the samples after the driver has passed the whole gap since it turned."""
-    way = np.sign(np.gradient(driver))
-    last = np.zeros(len(driver), dtype=np.intp)
-    turns = np.flatnonzero(np.diff(way) != 0) + 1
-    last[turns] = turns
-    start = driver[np.maximum.accumulate(last)]
-    return np.asarray(np.abs(driver - start) > 1.5 * width)
+    lost, scale = _one(fit, 0, 2.0), _one(fit, 1)
+    flies = floats((gap - scale[0] * centred)[use], columns[0][use])
+    if flies:
+        lost, scale = spanned(gap[use], signals.user[use])
+    return {"lost_motion": lost, "position_scale": scale}, flies
 
 
 #: Cosine and sine of the electrical angle and of twice it; the sideband's angle, if it is sought.

@@ -13,7 +13,8 @@ import numpy.typing as npt
 from elevon.calibrate.kinematics import command_fit
 from elevon.calibrate.log import BenchLog, bench_log
 from elevon.diagnose.bymodel.command import noted_command
-from elevon.diagnose.bymodel.evidence import dragged, regress
+from elevon.diagnose.bymodel.evidence import regress
+from elevon.diagnose.bymodel.lost_motion import dragged
 from elevon.errors import InputError
 from elevon.logs.command.reconstruct import reconstruct
 

@@ -1,0 +1,78 @@
+"""Lost motion from the difference of the two positions: of a user that is dragged, or flies."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["dragged", "floats", "spanned"]
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+_AFLOAT = 0.15  # of the difference's width: what it scatters in one direction if nothing drags it
+_LEAST = 3e-4  # rad of that scatter: four counts of the bench's encoder, more than rounding leaves
+_ROUNDS = 4  # of which end is nearer, and of the slope
+
+
+def dragged(driver: Floats, width: float) -> Bools:
+    """Return the samples after the driver has passed the whole gap since it turned."""
+    way = np.sign(np.gradient(driver))
+    last = np.zeros(len(driver), dtype=np.intp)
+    turns = np.flatnonzero(np.diff(way) != 0) + 1
+    last[turns] = turns
+    start = driver[np.maximum.accumulate(last)]
+    return np.asarray(np.abs(driver - start) > 1.5 * width)
+
+
+def floats(gap: Floats, way: Floats) -> bool:
+    """Return whether the user flies in its play on its own instead of being dragged through it.
+
+    Parameters
+    ----------
+    gap : ndarray, shape (n,)
+        Difference of the two positions [rad], where a dragged user lies at one end of the play.
+    way : ndarray, shape (n,)
+        Direction of the motion.
+    """
+    ends = [gap[way > 0.0], gap[way < 0.0]]
+    if min(len(end) for end in ends) < 2:
+        return False
+    scatter = math.sqrt(0.5 * (float(np.var(ends[0])) + float(np.var(ends[1]))))
+    return scatter > _LEAST and scatter > _AFLOAT * _width(gap)
+
+
+def spanned(gap: Floats, user: Floats) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return lost motion and scale of such a user, each with its deviation.
+
+    The difference piles up at both ends of the play: which end is nearer, and not the direction,
+    stands beside the user's position. The lost motion is the width of what is left; one sample in
+    ten is on the way or presses a contact. The quarters of the log give the deviations.
+
+    Parameters
+    ----------
+    gap, user : ndarray, shape (n,)
+        Difference of the two positions and the user's position [rad].
+    """
+    width, slope = _ends(gap, user)
+    parts = zip(np.array_split(gap, 4), np.array_split(user, 4), strict=True)
+    widths, slopes = np.array([_ends(*part) for part in parts]).T
+    return (width, 0.5 * float(widths.std(ddof=1))), (slope, 0.5 * float(slopes.std(ddof=1)))
+
+
+def _ends(gap: Floats, user: Floats) -> tuple[float, float]:
+    """Width of the difference, and its slope over the user's position at either end."""
+    centred, slope = user - float(np.mean(user)), 0.0
+    for _ in range(_ROUNDS):
+        rest = gap - slope * centred
+        low, high = np.percentile(rest, [5.0, 95.0])
+        end = np.sign(rest - 0.5 * (low + high))
+        columns = np.column_stack([centred, end, np.ones_like(gap)])
+        slope = float(np.linalg.lstsq(columns, gap, rcond=None)[0][0])
+    return _width(gap - slope * centred), slope
+
+
+def _width(gap: Floats) -> float:
+    low, high = np.percentile(gap, [5.0, 95.0])
+    return float(high - low)
