@@ -1,6 +1,7 @@
 """Maintenance of a fleet against costs that can be worked out by hand."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -47,6 +48,21 @@ def test_neighbours_share_a_visit_where_it_saves_more_than_their_lives():
     together = plan_fleet(fleet, Costs(1.0, 1e6, visit=1e5))
     assert len(together.visits) == 1
     assert fleet_figure(two).axes
+
+
+def test_a_unit_that_ends_soon_beside_one_that_lasts_is_done_when_it_would_be_alone():
+    ends = np.linspace(1000.0, 2000.0, 101)
+    costs = Costs(early=1.0, late=1e6, visit=0.0)
+    alone = plan_fleet({"a": unit(*ends)}, costs)
+    beside = plan_fleet({"a": unit(*ends), "b": unit(1e7)}, costs)
+    assert beside.alone["a"] == pytest.approx(alone.alone["a"])
+    assert beside.visit_of("b") == pytest.approx(1e7, rel=0.01)
+
+
+def test_what_a_prediction_must_be_read_with_is_said_of_the_fleet():
+    thin = replace(unit(1000.0), findings=("two are needed",))
+    plan = plan_fleet({"a": unit(900.0), "b": thin}, Costs(1.0, 1e6, visit=50.0))
+    assert plan.to_dict()["findings"] == ["b: two are needed"]
 
 
 def test_fleets_that_are_none():

@@ -97,6 +97,8 @@ def _rows(plan: FleetPlan) -> list[tuple[str, ...]]:
 def _print(plan: FleetPlan) -> None:
     print_table(_COLUMNS, _rows(plan), title=f"{plan.unit} from now")
     say(_sentence(plan))
+    for text in plan.findings:
+        say(text)
 
 
 def _sentence(plan: FleetPlan) -> str:
@@ -116,4 +118,6 @@ def _page(plan: FleetPlan, visit: float) -> Report:
         fleet_figure(plan), "Remaining life: median and 90 %; blue: the visit at which it is done."
     )
     section.table(Table(_COLUMNS, _rows(plan), f"A visit costs {visit:g}."))
+    if plan.findings:
+        section.points(plan.findings)
     return report

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["Costs", "FleetPlan", "Visit", "fleet_figure", "plan_fleet"]
 
 Floats = npt.NDArray[np.float64]
-_INSTANTS = 400  # at which a visit may be
+_INSTANTS = 400  # at which a visit may be, of each unit's remaining life
 
 
 @dataclass(frozen=True)
@@ -84,6 +84,11 @@ class FleetPlan:
         """Return when a unit is done."""
         return next(visit.use for visit in self.visits if name in visit.units)
 
+    @property
+    def findings(self) -> list[str]:
+        """What each unit's prediction must be read with, its name before it."""
+        return [f"{name}: {text}" for name, item in self.units.items() for text in item.findings]
+
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
         rows = []
@@ -106,6 +111,7 @@ class FleetPlan:
             "visits": [{"use": v.use, "units": list(v.units)} for v in self.visits],
             "cost": self.cost,
             "cost_alone": self.cost_alone,
+            "findings": self.findings,
         }
 
 
@@ -132,14 +138,19 @@ def plan_fleet(units: Mapping[str, Prognosis], costs: Costs) -> FleetPlan:
     kinds = {item.unit for item in units.values()}
     if len(kinds) > 1:
         raise InputError(f"the fleet is counted in several units: {', '.join(sorted(kinds))}")
-    far = max(float(np.quantile(_finite(item), 0.95)) for item in units.values())
-    instants = np.linspace(0.0, max(far, 1.0), _INSTANTS)
+    instants = _instants(units.values())
     table = {name: _expected(item, instants, costs) for name, item in units.items()}
     alone = {name: float(instants[cost.argmin()]) for name, cost in table.items()}
     order = sorted(units, key=lambda name: alone[name])
     visits, cost = _grouped(order, table, instants, costs.visit)
     single = sum(float(c.min()) for c in table.values()) + costs.visit * len(units)
     return FleetPlan(next(iter(kinds)), units, alone, visits, cost, single)
+
+
+def _instants(units: Iterable[Prognosis]) -> Floats:
+    """Return when a visit may be: as finely as each unit's life asks, one that ends soon, too."""
+    ends = [max(float(np.quantile(_finite(item), 0.95)), 1.0) for item in units]
+    return np.unique(np.concatenate([np.linspace(0.0, end, _INSTANTS) for end in ends]))
 
 
 def _finite(item: Prognosis) -> Floats:
@@ -151,9 +162,10 @@ def _finite(item: Prognosis) -> Floats:
 
 def _expected(item: Prognosis, instants: Floats, costs: Costs) -> Floats:
     """Expected cost of doing a unit at each instant, shape (t,)."""
-    rest = _finite(item)[:, None]
-    lost = np.maximum(rest - instants, 0.0).mean(axis=0)
-    failed = (rest < instants).mean(axis=0)
+    rest = np.sort(_finite(item))
+    failed = np.searchsorted(rest, instants, side="left") / len(rest)
+    left = np.append(np.cumsum(rest[::-1])[::-1], 0.0)[np.searchsorted(rest, instants)]
+    lost = left / len(rest) - (1.0 - failed) * instants
     return np.asarray(costs.early * lost + costs.late * failed)
 
 

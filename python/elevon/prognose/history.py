@@ -16,14 +16,17 @@ from datetime import date as calendar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from elevon.errors import FormatError, InputError
+from elevon.errors import FormatError, InputError, Interrupted, unknown
+from elevon.prognose.laws import LAWS
 from elevon.prognose.mission import UNITS_OF_USE
 from elevon.prognose.observation import Inspection, inspection
 from elevon.prognose.predict import check_order
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
+    from elevon.diagnose.bymodel import Diagnosis
     from elevon.prognose.law import Law
+    from elevon.recording import Recording
 
 __all__ = ["Entry", "History", "diagnosed", "read_history", "write_stamp"]
 
@@ -77,9 +80,16 @@ class History:
     serial: str
 
     def inspections(self, laws: Sequence[Law]) -> list[Inspection]:
-        """Return what the filters take; every entry must have its diagnosis."""
+        """Return what the filters take.
+
+        Raises
+        ------
+        InputError
+            An entry has no diagnosis yet, or one that is none; a part made new that no fault has.
+        """
         out = []
         for entry in self.entries:
+            _check_reset(entry, laws)
             if entry.diagnosis is None:
                 raise InputError(f"{entry.path.name}: its logs have not been diagnosed")
             out.append(
@@ -93,6 +103,17 @@ class History:
                 )
             )
         return out
+
+
+def _check_reset(entry: Entry, laws: Sequence[Law]) -> None:
+    """Refuse a part made new that neither the laws nor diagnosis know: it is a slip of the pen."""
+    from elevon.diagnose.bymodel.candidates import CANDIDATES
+
+    known = {law.key for law in (*LAWS.values(), *laws)}
+    known |= {f"{c.kind}@{place}" for c in CANDIDATES for place in (c.place, *c.same)}
+    for key in entry.reset:
+        if key not in known:
+            raise unknown("fault", key, sorted(known), f"{entry.path}: reset")
 
 
 def read_history(folder: str | Path, *, unit: str) -> History:
@@ -219,26 +240,62 @@ def diagnosed(
 ) -> History:
     """Diagnose the logs of a history that stand there without their diagnosis.
 
-    Logs marked healthy serve as baseline for all.
+    All logs of an inspection are diagnosed together, as one unit in one condition. Logs of
+    inspections marked healthy serve as baselines for all, each for the logs of its own test.
+
+    Raises
+    ------
+    InputError
+        A log that cannot be diagnosed; its inspection is named.
+    Interrupted
+        `progress` returned False.
     """
     from dataclasses import replace
 
-    from elevon.diagnose.bymodel import diagnose, read_test_logs
-
     if all(entry.diagnosis is not None for entry in history.entries):
         return history
-    healthy = [log for entry in history.entries if entry.healthy for log in entry.logs]
-    baselines = read_test_logs(healthy) if healthy else []
+    answer = _diagnosis_by(
+        actuator, [log for entry in history.entries if entry.healthy for log in entry.logs]
+    )
     out = []
     for k, entry in enumerate(history.entries):
         if entry.diagnosis is None:
-            logs = read_test_logs(entry.logs)
-            answer = diagnose(logs, actuator, baselines=baselines)
-            entry = replace(entry, diagnosis=answer.to_dict())  # noqa: PLW2901
+            try:
+                entry = replace(entry, diagnosis=answer(entry.logs).to_dict())  # noqa: PLW2901
+            except InputError as error:
+                raise InputError(f"{entry.path}: {error}") from error
         out.append(entry)
-        if progress is not None:
-            progress((k + 1) / len(history.entries))
+        if progress is not None and progress((k + 1) / len(history.entries)) is False:
+            raise Interrupted("the diagnoses were stopped")
     return replace(history, entries=tuple(out))
+
+
+def _diagnosis_by(
+    actuator: Actuator, healthy: Sequence[Path]
+) -> Callable[[Sequence[Path]], Diagnosis]:
+    """Return what diagnoses logs together, against healthy ones: as `elevon diagnose` does."""
+    if actuator.wiring == "rotary":
+        from elevon.diagnose.bymodel import diagnose, read_test_logs
+
+        baselines = read_test_logs(healthy)
+        return lambda logs: diagnose(read_test_logs(logs), actuator, baselines=baselines)
+    from elevon.diagnose.byroles import diagnose_by_roles
+
+    others = _recordings(healthy)
+    return lambda logs: diagnose_by_roles(_recordings(logs), actuator, baselines=others)
+
+
+def _recordings(paths: Sequence[Path]) -> list[tuple[str, Recording]]:
+    from elevon.logs.importing import import_log
+    from elevon.recording import Recording
+
+    out = []
+    for path in paths:
+        try:
+            out.append((path.name, Recording.load(path)))
+        except (FormatError, InputError):
+            out.append((path.name, import_log(path).recording))
+    return out
 
 
 def write_stamp(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.errors import InputError
+from elevon.errors import InputError, quoted
 
 if TYPE_CHECKING:
     from elevon.prognose.law import Law
@@ -137,8 +137,8 @@ def inspection(
     """
     seen = {}
     for law in laws:
-        cause = _cause(data, law)
-        limit = _detectable(data, law)
+        cause = _cause(data, law, name)
+        limit = _detectable(data, law, name)
         if cause is not None:
             seen[law.key] = _read(cause, limit, f"{name}: {law.key}")
         elif limit is not None:
@@ -146,25 +146,51 @@ def inspection(
     return Inspection(usage, seen, tuple(reset), name, date)
 
 
-def _cause(data: Mapping[str, Any], law: Law) -> Mapping[str, Any] | None:
+def _cause(data: Mapping[str, Any], law: Law, place: str) -> Mapping[str, Any] | None:
     """Return the cause that is the law's fault, also by a place not to be told from it.
 
     A cause that is less likely than not is none: its severity is that of a guess.
     """
-    for cause in data.get("faults", []):
-        names = [cause, *cause.get("equivalents", [])]
-        same = any((n["kind"], n["place"]) == (law.kind, law.place) for n in names)
-        if same and float(cause["probability"]) >= 0.5:
+    given = data.get("faults", [])
+    if not isinstance(given, list):
+        raise InputError(f"{place}: faults = {given!r} is not a list of causes")
+    for k, cause in enumerate(given):
+        names, probability = _named(cause, f"{place}: faults[{k}]")
+        if probability >= 0.5 and (law.kind, law.place) in names:
             return dict(cause)
     return None
 
 
-def _detectable(data: Mapping[str, Any], law: Law) -> float | None:
-    known: Mapping[str, float] = data.get("detectable", {})
-    if law.key in known:
-        return float(known[law.key])
-    kin = [value for key, value in known.items() if key.partition("@")[0] == law.kind]
-    return float(kin[0]) if len(kin) == 1 else None
+def _named(cause: Any, place: str) -> tuple[list[tuple[str, str]], float]:
+    """Return kind and place of a cause and of those like it, and its probability."""
+    try:
+        names = [(str(n["kind"]), str(n["place"])) for n in (cause, *cause.get("equivalents", []))]
+        probability = float(cause["probability"])
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{place}: {quoted(str(cause))} has not kind, place and a number as probability, as "
+            "`elevon diagnose` gives them"
+        ) from error
+    if not 0.0 <= probability <= 1.0:
+        raise InputError(f"{place}: probability = {probability:g} is outside 0 to 1")
+    return names, probability
+
+
+def _detectable(data: Mapping[str, Any], law: Law, place: str) -> float | None:
+    known = data.get("detectable", {})
+    if not isinstance(known, dict):
+        raise InputError(f"{place}: detectable = {known!r} is not KIND@PLACE with a severity each")
+    kin = [key for key in known if key.partition("@")[0] == law.kind]
+    name = law.key if law.key in known else kin[0] if len(kin) == 1 else None
+    if name is None:
+        return None
+    try:
+        limit = float(known[name])
+    except (TypeError, ValueError):
+        limit = float("nan")
+    if not 0.0 < limit < np.inf:
+        raise InputError(f"{place}: detectable {name} = {known[name]!r} is no number above 0")
+    return limit
 
 
 def _edge(kind: str) -> float:

@@ -213,6 +213,7 @@ def _with_findings(
         for usage, key, score in flt.surprises
     ]
     seen = {key for item in inspections for key in item.seen}
+    findings += _stray(flt, inspections)
     findings += [
         f"{law.key}: no inspection looked for it; its course is the law's alone"
         for law in process.laws
@@ -228,6 +229,26 @@ def _with_findings(
         findings.append(f"no end of life is in sight in {100.0 * far:.3g} % of the futures")
     findings += _beyond(result, process)
     return replace(result, findings=tuple(findings))
+
+
+def _stray(flt: ParticleFilter, inspections: Sequence[Inspection]) -> list[str]:
+    """Say where the last diagnosis is taken as stray and, if it is true, the unit has failed."""
+    if not inspections:
+        return []
+    last, response = inspections[-1], flt.process.response
+    stray = [key for usage, key, score in flt.surprises if usage == last.usage and score > 0.0]
+    severity = np.zeros(len(response.laws))
+    for k, law in enumerate(response.laws):
+        said = last.seen.get(law.key)
+        if law.key in stray and said is not None and said.severity is not None:
+            severity[k] = said.severity
+    broken = check_start(response, severity) if severity.any() else []
+    if not broken:
+        return []
+    return [
+        f"{last.name}: if what it says of {', '.join(stray)} is true, the unit has failed already "
+        f"({'; '.join(broken)}); one diagnosis so far off is taken as stray until another agrees"
+    ]
 
 
 def _thin(result: Prognosis) -> list[str]:

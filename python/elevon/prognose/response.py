@@ -11,6 +11,7 @@ import numpy.typing as npt
 from elevon.prognose.grid import Grid
 from elevon.prognose.law import Law
 from elevon.prognose.requirement import SEVERITY, Requirement
+from elevon.units import shown_unit, to_display
 
 __all__ = ["Response", "check_start"]
 
@@ -101,8 +102,9 @@ def check_start(response: Response, severity: Floats) -> list[str]:
     for k, requirement in enumerate(response.requirements):
         if reserve[k] < 0.0:
             sign = "least" if requirement.at_least else "limit"
-            out.append(
-                f"requirement {requirement.name}: {values[k]:.4g} {response.units[k]}, {sign} "
-                f"{response.thresholds[k]:.4g} {response.units[k]}"
+            unit = shown_unit(response.units[k])
+            value, limit = (
+                f"{to_display(x, unit):.4g} {unit}" for x in (values[k], response.thresholds[k])
             )
+            out.append(f"requirement {requirement.name}: {value}, {sign} {limit}")
     return out

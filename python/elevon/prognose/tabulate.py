@@ -16,6 +16,7 @@ from elevon.prognose.law import Law
 from elevon.prognose.requirement import MEASURES, SEVERITY, Requirement, Shown
 from elevon.prognose.response import Response
 from elevon.progress import Progress
+from elevon.units import shown_unit, to_display
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -122,10 +123,11 @@ def _check_capability(actuator: Actuator, flown: Shown) -> None:
         return
     asked, done = (float(np.ptp(flown[role])) for role in ("command", "output_position"))
     if done < _FOLLOWED * asked:
-        unit = units["output_position"]
+        unit = shown_unit(units["output_position"])
         raise InputError(
             f"the mission is outside the capability of {actuator.name}: the healthy unit travels "
-            f"{done:.4g} {unit} of the {asked:.4g} {unit} asked for"
+            f"{to_display(done, unit):.4g} {unit} of the {to_display(asked, unit):.4g} {unit} "
+            f"asked for; at least {_FOLLOWED:.0%} are needed"
         )
 
 
