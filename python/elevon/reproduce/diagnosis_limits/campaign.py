@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from elevon.errors import ElevonWarning, InputError, Interrupted
 from elevon.progress import Progress, part
 from elevon.reproduce.diagnosis_limits.judge import Injected, Row, judged
-from elevon.reproduce.diagnosis_limits.logs import TESTS, bench_logs
+from elevon.reproduce.diagnosis_limits.logs import TESTS, Trial, bench_logs
 from elevon.reproduce.diagnosis_limits.plan import Planned, planned, trials_of
 from elevon.reproduce.diagnosis_limits.unit import BASE, Unit, draw_unit
 from elevon.worklog import WorkLog, locked
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.diagnose.bymodel import TestLog
 
-__all__ = ["Campaign", "calibrated", "run_campaign"]
+__all__ = ["Campaign", "calibrated", "calibrated_on", "run_campaign"]
 
 BLOCK = 16  # logs that are simulated together
 _LOG = "finished.log"
@@ -117,16 +117,23 @@ def _unit_rows(
 
 def calibrated(unit: Unit, seed: int, progress: Progress | None) -> tuple[Actuator, list[TestLog]]:
     """One healthy log a test, each of a day of its own: calibration, then baselines."""
+    key = (seed * 1000 + unit.number) * 1000
+    trials = [trials_of(test, key + k, f"base-{test}") for k, test in enumerate(TESTS)]
+    return calibrated_on(unit, trials, len(trials), progress)
+
+
+def calibrated_on(
+    unit: Unit, trials: Sequence[Trial], first: int, progress: Progress | None
+) -> tuple[Actuator, list[TestLog]]:
+    """Calibrate on the first of some healthy trials; all of them are baselines."""
     from elevon.actuator import Actuator
     from elevon.calibrate.calibration import calibrate
     from elevon.diagnose.bymodel.log import prepared
 
-    key = (seed * 1000 + unit.number) * 1000
-    trials = [trials_of(test, key + k, f"base-{test}") for k, test in enumerate(TESTS)]
     with tempfile.TemporaryDirectory() as folder:
         logs = bench_logs(unit, trials, Path(folder), part(progress, 0.0, 0.3))
     result = calibrate(
-        [log.log for log in logs], Actuator.load(BASE), progress=part(progress, 0.3, 1.0)
+        [log.log for log in logs[:first]], Actuator.load(BASE), progress=part(progress, 0.3, 1.0)
     )
     return result.actuator, [prepared(log, result.actuator) for log in logs]
 

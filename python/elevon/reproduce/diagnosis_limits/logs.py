@@ -56,13 +56,16 @@ class Trial:
     faults : tuple of str
         As in ``--fault``.
     seed : int
-        Of the day, the command's start, noise.
+        Of the command's start, noise, and the day.
+    day : int, optional
+        Seed of the day, for logs of one day; default: `seed`.
     """
 
     name: str
     test: str
     faults: tuple[str, ...]
     seed: int
+    day: int | None = None
 
 
 def bench_logs(
@@ -78,7 +81,7 @@ def bench_logs(
 
     setups: list[Setup] = []
     for trial in trials:
-        ready = of_the_day(unit, trial.seed)
+        ready = of_the_day(unit, trial.seed if trial.day is None else trial.day)
         setups += stand_setups(_procedure(trial.test), ready, faults=trial.faults, seed=trial.seed)  # type: ignore[arg-type]
     record = recorded(list(signal_records("rotary", "high")))
     runs = [Run(s.actuator, s.scenario, s.conditions.seed) for s in setups]
