@@ -14,7 +14,7 @@ LAW, PROGPY = re.findall(
 def test_a_law_of_ones_own(monkeypatch):
     monkeypatch.chdir(ROOT)
     names = {}
-    exec(LAW, names)  # noqa: S102 - our own page
+    exec(LAW, names)
     result = names["result"]
     assert result.known[0].law == "creep"
     assert result.known[0].severity == pytest.approx(0.006, rel=0.1)
@@ -26,6 +26,6 @@ def test_the_actuator_as_a_model_of_progpy(monkeypatch):
     pytest.importorskip("progpy")
     monkeypatch.chdir(ROOT)
     names = {}
-    exec(PROGPY, names)  # noqa: S102 - our own page
+    exec(PROGPY, names)
     assert min(names["result"].event_states[-1].values()) == pytest.approx(0.0, abs=0.02)
     assert len(names["units"].weight) == 2000
