@@ -134,6 +134,7 @@ def test_the_command_line(elevon_cli, logs, tmp_path):  # noqa: F811
     assert document["faults"][0]["kind"] == "play"
     assert "Play has grown by" in page.read_text()
     assert "what speaks against each" in page.read_text()
+    assert "Signals against the healthy model" in page.read_text()
     refused = elevon_cli("diagnose", logs["play"], "--actuator", "torino-rotary", "--fault", "rust")
     assert refused.code == 2
     assert (
@@ -142,6 +143,20 @@ def test_the_command_line(elevon_cli, logs, tmp_path):  # noqa: F811
         ).code
         == 2
     )
+
+
+def test_the_model_with_what_is_named_shows_what_the_log_shows(unit, logs):
+    """The page's signals: the healthy model misses the play that the log has, the named one not."""
+    from elevon.diagnose.bymodel.traces import traces_of
+
+    items = read_test_logs([logs["play"]])
+    result = diagnose(items, unit, baselines=read_test_logs([logs["base"]]), faults=FEW)
+    (traces,) = traces_of(items, unit, result)
+    gap = traces.panels[0]
+    misses = [float(np.std(gap.log - line)) for line in (gap.healthy, gap.named)]
+    assert gap.unit == "deg"
+    assert misses[0] > 0.05
+    assert misses[1] < 0.3 * misses[0]
 
 
 def _edited(source, target, change):
@@ -171,10 +186,18 @@ def test_logs_that_cannot_be_diagnosed(unit, logs, tmp_path):
     still = _edited(logs["healthy"], tmp_path / "b" / NAME, at_rest)
     with pytest.raises(InputError, match="nothing moves"):
         answer(unit, still)
+    gaps = _edited(
+        logs["healthy"], tmp_path / "c" / NAME,
+        lambda rows: [*rows[:900], *([r[0], *["NaN"] * (len(r) - 1)] for r in rows[900:])],
+    )  # fmt: skip
+    with pytest.raises(InputError, match="can be used"):
+        answer(unit, gaps)
     with pytest.raises(InputError, match="rotary"):
         answer(Actuator.load("nasa-ballscrew"), logs["healthy"])
     with pytest.raises(UnknownNameError):
         answer(unit, logs["healthy"], faults=["play@moon"])
+    with pytest.raises(InputError, match="not weighed by the model: with it"):
+        answer(unit, logs["healthy"], faults=["open_phase@motor.phase_a"])
 
 
 def test_a_log_without_measured_current_tells_what_is_left(unit, logs, tmp_path):

@@ -29,11 +29,12 @@ from elevon.errors import InputError, unknown
 from elevon.number_text import severity_texts
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from elevon.actuator import Actuator
     from elevon.diagnose.bymodel import TestLog
     from elevon.diagnose.bymodel.answer import Diagnosis
+    from elevon.diagnose.pictures import Traces
     from elevon.recording import Recording
 
 app = typer.Typer(rich_markup_mode=None)
@@ -74,6 +75,7 @@ def diagnose(
 ) -> int:
     """Diagnose the unit that wrote the logs, all in one condition."""
     from elevon.diagnose.bymodel import read_test_logs
+    from elevon.diagnose.bymodel.traces import traces_of
 
     check_outputs([report], force=force)
     run = _method(method, surrogate)
@@ -91,7 +93,8 @@ def diagnose(
     data = read_with(logs, loadcell, command, column_map)
     healthy = read_test_logs(without_companions(baseline or []), column_map=column_map)
     result = run(data, model, baselines=healthy, faults=fault, false_alarm=false_alarm)
-    return _shown(result, method, model.name, report, json=json, force=force)
+    traces = traces_of(data, model, result) if report is not None else []
+    return _shown(result, method, model.name, report, traces=traces, json=json, force=force)
 
 
 def read_with(
@@ -134,13 +137,21 @@ def _by_roles(
 
 
 def _shown(
-    result: Diagnosis, method: str, name: str, report: Path | None, *, json: bool, force: bool
+    result: Diagnosis,
+    method: str,
+    name: str,
+    report: Path | None,
+    *,
+    traces: Sequence[Traces] = (),
+    json: bool,
+    force: bool,
 ) -> int:
     """Write the report and print the answer."""
     if report is not None:
         from elevon.diagnose.bymodel.page import diagnosis_page
 
-        say(f"report: {diagnosis_page(result, name).save(report, force=force)}")
+        page = diagnosis_page(result, name, traces=traces)
+        say(f"report: {page.save(report, force=force)}")
     if json:
         print_json({**result.to_dict(), "method": method})
         return 0

@@ -109,7 +109,7 @@ def chosen(texts: Sequence[str] | None) -> tuple[Candidate, ...]:
     UnknownNameError
         None of that name is weighed by the model.
     InputError
-        One is named twice.
+        One is named twice, or is not weighed, with the reason.
     """
     if not texts:
         return CANDIDATES
@@ -117,6 +117,9 @@ def chosen(texts: Sequence[str] | None) -> tuple[Candidate, ...]:
     names = [f"{c.kind}@{p}" for c in CANDIDATES for p in (c.place, *c.same)]
     for text in texts:
         key = text.strip()
+        for kind, place, reason in DECLINED:
+            if key == f"{kind}@{place}":
+                raise InputError(f"--fault {key}: not weighed by the model: {reason}")
         if key not in names:
             raise unknown("fault", key, names, "--fault")
         item = next(c for c in CANDIDATES if key in {f"{c.kind}@{p}" for p in (c.place, *c.same)})

@@ -27,6 +27,7 @@ Floats = npt.NDArray[np.float64]
 RUN_IN = 1.0  # s left out: the start of the motion
 _RATIO = 0.05  # relative: a gear ratio seen in the log this far off is another actuator's
 _LEAST_TIME = 4.0  # s of log
+_LEAST_LEFT = _LEAST_TIME - RUN_IN  # s of it that can be used
 _MOVING = 0.1  # of the highest speed
 
 
@@ -114,6 +115,12 @@ def prepared(item: TestLog, actuator: Actuator) -> TestLog:
     if log.duration < _LEAST_TIME:
         raise InputError(f"{log.name}: lasts {log.duration:.3g} s; {_LEAST_TIME:g} s are needed")
     good = log.good & (log.time >= RUN_IN) & np.isfinite(log.motor) & np.isfinite(log.user)
+    left = float(good.mean()) * log.duration
+    if left < _LEAST_LEFT:
+        raise InputError(
+            f"{log.name}: only {left:.2g} s of {log.duration:.3g} s can be used, the rest is "
+            f"missing or run-in; {_LEAST_LEFT:g} s are needed"
+        )
     _check_motion(log, good, actuator)
     value = actuator.parameters.value
     gain, limit = value("control.position_gain"), value("control.speed_limit")

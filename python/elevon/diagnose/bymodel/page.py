@@ -6,15 +6,23 @@ import math
 from typing import TYPE_CHECKING
 
 from elevon.diagnose.bymodel.words import sentence, severity_text
+from elevon.diagnose.pictures import evidence_figure, traces_figure
 from elevon.report import Report, Table
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from elevon.diagnose.bymodel.answer import Diagnosis
+    from elevon.diagnose.pictures import Traces
 
 __all__ = ["diagnosis_page"]
 
+_DRAWN = 4  # logs
 
-def diagnosis_page(result: Diagnosis, actuator: str, date: str | None = None) -> Report:
+
+def diagnosis_page(
+    result: Diagnosis, actuator: str, date: str | None = None, *, traces: Sequence[Traces] = ()
+) -> Report:
     """Return the report of a diagnosis.
 
     Parameters
@@ -25,6 +33,8 @@ def diagnosis_page(result: Diagnosis, actuator: str, date: str | None = None) ->
         Name of the set.
     date : str, optional
         Printed on the page.
+    traces : sequence of Traces, optional
+        Of the logs; the first four are drawn.
     """
     report = Report(f"Diagnosis of {actuator}", sentence(result), date=date)
     rows = [
@@ -46,6 +56,7 @@ def diagnosis_page(result: Diagnosis, actuator: str, date: str | None = None) ->
             digits=3,
         )
     )
+    _signals(report, traces[:_DRAWN])
     _evidence(report, result)
     if result.alternatives:
         _alternatives(report, result)
@@ -101,6 +112,18 @@ def _alternatives(report: Report, result: Diagnosis) -> None:
     )
 
 
+def _signals(report: Report, traces: Sequence[Traces]) -> None:
+    if not traces:
+        return
+    section = report.section("Signals against the healthy model")
+    for item in traces:
+        named = ", and with what is named" if item.panels[0].named is not None else ""
+        text = "The log, the calibrated healthy model in the same test"
+        section.figure(
+            traces_figure(item), f"{item.name}. {text}{named}; means of short stretches."
+        )
+
+
 def _evidence(report: Report, result: Diagnosis) -> None:
     ranked = sorted(result.moved, key=lambda item: -abs(item.score))
     rows: list[tuple[object, ...]] = [
@@ -114,4 +137,10 @@ def _evidence(report: Report, result: Diagnosis) -> None:
         rows, names, formats = [row[:-1] for row in rows], names[:-1], formats[:-1]
     else:
         text += " Explained: what the most probable cause accounts for, in the same measure."
-    report.section("Evidence").table(Table(names, rows, text, digits=4, formats=formats))
+    section = report.section("Evidence")
+    section.figure(
+        evidence_figure(result.moved),
+        "How far the numbers of the logs are off a healthy unit: bars, in its deviations from run "
+        "to run; diamonds, what the most probable cause accounts for.",
+    )
+    section.table(Table(names, rows, text, digits=4, formats=formats))

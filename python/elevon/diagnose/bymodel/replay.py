@@ -17,7 +17,9 @@ from elevon.diagnose.bymodel.log import TestLog
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["SPREAD", "Replay", "logged_evidence", "modelled", "replay"]
+__all__ = [
+    "SPREAD", "Replay", "Unit", "logged_evidence", "modelled", "replay", "runs", "signals_of",
+]  # fmt: skip
 
 Floats = npt.NDArray[np.float64]
 _SIGNALS = (
@@ -93,16 +95,20 @@ def _read(at: Floats, table: Floats, severity: Floats) -> Floats:
 
 def logged_evidence(item: TestLog, actuator: Actuator) -> Evidence:
     """Return the evidence of a log."""
+    return evidence(signals_of(item), **_constants(actuator))
+
+
+def signals_of(item: TestLog) -> Signals:
+    """Return what a prepared log shows."""
     log = item.log
     assert log.user is not None
     assert log.motor is not None
     assert item.good is not None
     brake = np.interp(log.time, log.brake.time, log.brake.level) if item.braked else None
-    signals = Signals(
+    return Signals(
         log.time, log.user, log.motor, log.speed_ref, log.speed, log.current_target,
         log.current, item.voltage, brake, None, item.gain, item.good,
     )  # fmt: skip
-    return evidence(signals, **_constants(actuator))
 
 
 def replay(item: TestLog, actuator: Actuator, candidates: Sequence[Candidate]) -> Replay:
@@ -147,13 +153,13 @@ def _test_key(item: TestLog, actuator: Actuator, candidates: Sequence[Candidate]
 
 def _replayed(item: TestLog, actuator: Actuator, candidates: Sequence[Candidate]) -> Replay:
     severities = {c.key: _severities(c) for c in candidates}
-    units = [_Unit(actuator)]
+    units = [Unit(actuator)]
     for c in candidates:
-        units += [_Unit(actuator, (c.text(float(s)),)) for s in severities[c.key] if s != 0.0]
+        units += [Unit(actuator, (c.text(float(s)),)) for s in severities[c.key] if s != 0.0]
     if candidates:
         units += [_drawn(actuator, np.random.default_rng([15, k])) for k in range(_DRAWS)]
     constants = _constants(actuator)
-    shown = [evidence(run, **constants, deviations=False) for run in _runs(item, units)]
+    shown = [evidence(run, **constants, deviations=False) for run in runs(item, units)]
     names = tuple(n for n in shown[0].names if all(n in s.names for s in shown))
     rows = np.array([s.only(names).values for s in shown])
     shifts, doubts, at = {}, {}, 1
@@ -204,7 +210,7 @@ def _severities(candidate: Candidate) -> Floats:
 
 
 @dataclass(frozen=True)
-class _Unit:
+class Unit:
     """A unit of the replay: values, faults, brake over the logged one, where its motor starts."""
 
     actuator: Actuator
@@ -213,7 +219,7 @@ class _Unit:
     turn: float = 0.0
 
 
-def _runs(item: TestLog, units: Sequence[_Unit]) -> Iterator[Signals]:
+def runs(item: TestLog, units: Sequence[Unit]) -> Iterator[Signals]:
     """Run all units through the log's test, on the log's instants.
 
     Names and units are the scenario's; the arrays are exchanged in what goes to the core, since
@@ -245,7 +251,7 @@ def _runs(item: TestLog, units: Sequence[_Unit]) -> Iterator[Signals]:
         yield _shown(rows["time"], dict(zip(plan.signals, rows["values"].T, strict=False)), item)
 
 
-def _with_arrays(core: Mapping[str, Any], item: TestLog, unit: _Unit) -> dict[str, Any]:
+def _with_arrays(core: Mapping[str, Any], item: TestLog, unit: Unit) -> dict[str, Any]:
     log = item.log
     assert log.user is not None
     assert item.replay is not None
@@ -270,7 +276,7 @@ def _table(term: Mapping[str, Any], times: Floats, values: Floats) -> dict[str, 
     return {**term, "times": np.ascontiguousarray(times), "values": np.ascontiguousarray(values)}
 
 
-def _drawn(actuator: Actuator, rng: np.random.Generator) -> _Unit:
+def _drawn(actuator: Actuator, rng: np.random.Generator) -> Unit:
     """Return a healthy unit of another day; `turn` moves its motor: no log tells the zero."""
     values: dict[str, float | str] = {}
     faults, brake = [], 1.0
@@ -293,7 +299,7 @@ def _drawn(actuator: Actuator, rng: np.random.Generator) -> _Unit:
     )
     turn = float(rng.uniform(-most, most))
     unit = actuator.with_values(values, source="run-to-run spread")
-    return _Unit(unit, tuple(faults), brake, turn)
+    return Unit(unit, tuple(faults), brake, turn)
 
 
 def _shown(clock: Floats, values: Mapping[str, Floats], item: TestLog) -> Signals:
