@@ -110,7 +110,7 @@ def loaded_setups(
         elif isinstance(step, TraceStep):
             conditions = draw_conditions(seed, len(logs))
             ready = actuator.with_values(settings, source="set on the bench", place=step.name)
-            scenario = _scenario(step, rig, conditions, faults)
+            scenario = _scenario(step, ready, rig, conditions, faults)
             asked = None if rig else force
             logs.append(
                 LoadedSetup(step, ready, scenario, conditions, stand, asked, dict(settings))
@@ -125,6 +125,7 @@ def loaded_setups(
 
 def _scenario(
     step: TraceStep,
+    actuator: Actuator,
     rig: tuple[Term, ...],
     conditions: Conditions,
     faults: Sequence[Fault | str],
@@ -134,13 +135,23 @@ def _scenario(
     data: dict[str, Any] = {
         "duration": parse_quantity(step.duration, "s", "duration"),
         "command": _command(step, conditions.start),
-        "initial": dict(step.initial),
+        "initial": dict(step.initial) or _begin(step, actuator, conditions.start),
     }
     if rig:
         terms = [term.model_dump(exclude_unset=True, mode="json") for term in rig]
         data["load"] = {"rig_speed": {"terms": terms}}
     scenario = Scenario.from_dict(data, f"trace {step.name}")
     return scenario.with_faults(list(faults)) if faults else scenario
+
+
+def _begin(step: TraceStep, actuator: Actuator, start: float) -> dict[str, Any]:
+    """Where a commanded position begins: the operator has brought the output there."""
+    known = actuator.parameters
+    if step.command.mode != "position" or "screw.lead" not in known:
+        return {}
+    at = float(_values(step.command.terms, np.zeros(1), start, "m")[0])
+    turned = at * known.value("gear.ratio") / known.value("screw.lead")
+    return {} if at == 0.0 else {"motor_position": turned, "user_position": at}
 
 
 def _command(step: TraceStep, start: float) -> dict[str, Any]:
@@ -278,7 +289,7 @@ def _force(setup: LoadedSetup, run: Recording, times: Floats) -> Floats:
     return ForceLoop.of(setup.stand.force).achieved(times, asked, speed)
 
 
-def _values(terms: Sequence[Term], times: Floats, start: float) -> Floats:
+def _values(terms: Sequence[Term], times: Floats, start: float, unit: str = "N") -> Floats:
     """Return the sum of waveforms at instants."""
     from elevon import _core
     from elevon.scenario.compile import compile_term
@@ -286,7 +297,7 @@ def _values(terms: Sequence[Term], times: Floats, start: float) -> Floats:
     total = np.zeros_like(times)
     for term in terms:
         data = moved(term.model_dump(exclude_unset=True, mode="json"), start)
-        core = compile_term(type(term).model_validate(data), "N", "force")
+        core = compile_term(type(term).model_validate(data), unit, "term")
         if core["kind"] == "table":
             total += np.interp(times, core["times"], core["values"])
         else:

@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.diagnose.byroles.load import OverStroke, load_alike, read_load
+from elevon.diagnose.byroles.series import lines
+
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.recording import Recording
@@ -17,10 +20,7 @@ __all__ = ["RoleTest", "action_numbers", "same_test", "test_of"]
 
 Floats = npt.NDArray[np.float64]
 _EXACT = 2e-4  # of the command's range: what straight lines may miss
-_SMOOTH = 0.05  # s over which a load is averaged before it becomes straight lines
-_ROUGH = 0.01  # of the load's size: what straight lines may miss
 _ALIKE = 0.05  # of the command's range, RMS, up to which two commands are the same
-_LOADED = 0.15  # of the load's size, RMS; a load that follows the motion differs with the unit
 _LATE = 0.1  # s between two logs' actions
 
 
@@ -35,7 +35,10 @@ class RoleTest:
     command : (ndarray, ndarray)
         Instants and values of straight lines; of actions, instants and numbers.
     load : (ndarray, ndarray) or None
-        Instants and force or torque on the output, positive where it opposes positive motion.
+        Instants and force or torque on the output, positive where it opposes positive motion; with
+        a load over the stroke what that leaves.
+    stroke : OverStroke or None
+        Load over the position, for a model that has one.
     own_load : bool
         Whether the model loads itself: the log's load is then shown, not put in.
     initial : mapping of str to float or str
@@ -47,6 +50,7 @@ class RoleTest:
     seconds: float
     command: tuple[Floats, Floats]
     load: tuple[Floats, Floats] | None
+    stroke: OverStroke | None
     own_load: bool
     initial: Mapping[str, float | str]
     settings: Mapping[str, Any]
@@ -75,10 +79,13 @@ def test_of(
     said: Mapping[str, Any] = stand if isinstance(stand, Mapping) else {}
     own = not said and "scenario" in recording.meta and _shows_load(actuator.wiring)
     settings = {p: v for p, v in said.get("parameters", {}).items() if p in actuator.parameters}
+    none = own or "load" not in shown
+    load, stroke = (None, None) if none else read_load(actuator, time, shown)
     return RoleTest(
         seconds,
         _asked(time, shown["command"], sequence=bool(action_numbers(actuator.wiring))),
-        None if own or "load" not in shown else _loaded(time, shown["load"]),
+        load,
+        stroke,
         own,
         {**_initial(actuator, shown), **_stated(actuator.wiring, said.get("initial", {}))},
         settings,
@@ -96,34 +103,7 @@ def _asked(time: Floats, command: Floats, *, sequence: bool) -> tuple[Floats, Fl
         level = np.rint(command)
         turns = np.concatenate(([0], np.flatnonzero(np.diff(level)) + 1))
         return time[turns], level[turns]
-    return _lines(time, command, _EXACT * float(np.ptp(command)))
-
-
-def _loaded(time: Floats, load: Floats) -> tuple[Floats, Floats]:
-    width = max(1, round(_SMOOTH / float(time[1] - time[0])))
-    padded = np.concatenate((np.full(width // 2, load[0]), load, np.full(width // 2, load[-1])))
-    smooth = np.convolve(padded, np.ones(width) / width, "same")[width // 2 :][: len(load)]
-    return _lines(time, smooth, _ROUGH * float(np.abs(smooth).max()))
-
-
-def _lines(time: Floats, values: Floats, most: float) -> tuple[Floats, Floats]:
-    """Straight lines that miss no sample by more than `most` (Douglas and Peucker)."""
-    corners = {0, len(time) - 1}
-    open_parts = [(0, len(time) - 1)]
-    while open_parts:
-        first, last = open_parts.pop()
-        if last - first < 2:
-            continue
-        inner = slice(first + 1, last)
-        line = np.interp(time[inner], time[[first, last]], values[[first, last]])
-        off = np.abs(values[inner] - line)
-        worst = int(np.argmax(off))
-        if off[worst] > most:
-            middle = first + 1 + worst
-            corners.add(middle)
-            open_parts += [(first, middle), (middle, last)]
-    at = np.array(sorted(corners))
-    return time[at], values[at]
+    return lines(time, command, _EXACT * float(np.ptp(command)))
 
 
 def _initial(actuator: Actuator, shown: Mapping[str, Floats]) -> dict[str, float | str]:
@@ -161,19 +141,14 @@ def _stated(wiring: str, given: Mapping[str, Any]) -> dict[str, Any]:
 def same_test(a: RoleTest, b: RoleTest) -> bool:
     """Whether two logs were asked for the same and loaded alike."""
     seconds = min(a.seconds, b.seconds)
-    if max(a.seconds, b.seconds) > 1.3 * seconds or (a.load is None) != (b.load is None):
+    if max(a.seconds, b.seconds) > 1.3 * seconds:
         return False
     grid = np.linspace(0.0, seconds, 200)
     size = max(float(np.ptp(a.command[1])), 1e-12)
     apart = _held_or_lines(a, grid) - _held_or_lines(b, grid)
     if float(np.sqrt(np.mean(apart**2))) > _ALIKE * size:
         return False
-    if a.load is None or b.load is None:
-        return True
-    pushes = [np.interp(grid, *test) for test in (a.load, b.load)]
-    largest = max(float(np.abs(push).max()) for push in pushes)
-    off = float(np.sqrt(np.mean((pushes[0] - pushes[1]) ** 2)))
-    return off <= max(_LOADED * largest, 1.0)
+    return load_alike((a.load, a.stroke), (b.load, b.stroke), grid)
 
 
 def _held_or_lines(test: RoleTest, grid: Floats) -> Floats:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 from elevon.diagnose.bymodel.candidates import Candidate
 from elevon.errors import unknown
@@ -72,17 +73,21 @@ def declined_of(actuator: Actuator) -> list[dict[str, str]]:
 
 def counted_of(actuator: Actuator) -> frozenset[str]:
     """Return the kinds whose severity is a whole number; one is weighed against none."""
-    from elevon import _core
-
-    return frozenset(item["kind"] for item in _core.faults(actuator.wiring) if item["whole"])
+    return frozenset(item["kind"] for item in _records(actuator.wiring) if item["whole"])
 
 
 def switched_of(actuator: Actuator) -> frozenset[str]:
     """Return the kinds that are there or not: they act from a severity of one half on."""
+    records = _records(actuator.wiring)
+    return frozenset(item["kind"] for item in records if item["effect"].startswith("1: "))
+
+
+@lru_cache(maxsize=8)
+def _records(wiring: str) -> tuple[dict[str, Any], ...]:
+    """The core's catalogue, which does not change."""
     from elevon import _core
 
-    records = _core.faults(actuator.wiring)
-    return frozenset(item["kind"] for item in records if item["effect"].startswith("1: "))
+    return tuple(_core.faults(wiring))
 
 
 def _groups(places: Sequence[str]) -> list[tuple[str, ...]]:

@@ -166,8 +166,9 @@ def _chance(
 
     unit = healthy_of(model, names, others)
     rest = shown.only(names).values - unit.mean
-    square = float(rest @ np.linalg.solve(unit.covariance, rest)) / len(rest)
+    wide = unit.covariance + np.diag(shown.only(names).std ** 2)
+    square = float(rest @ np.linalg.solve(wide, rest)) / len(rest)
     together = float(fdtrc(len(rest), unit.degrees, square))
-    most = float(np.max(np.abs(rest) / np.sqrt(np.diag(unit.covariance))))
+    most = float(np.max(np.abs(rest) / np.sqrt(np.diag(wide))))
     alone = 1.0 - (1.0 - 2.0 * float(stdtr(unit.degrees, -most))) ** len(rest)
     return min(2.0 * min(together, alone), 1.0)

@@ -28,7 +28,7 @@ def healthy_of(model: RoleReplay, names: Sequence[str], same: Sequence[Evidence]
     them.
     """
     at = [model.healthy.names.index(n) for n in names]
-    mean = model.draws[:, at].mean(axis=0)
+    mean = np.median(model.draws[:, at], axis=0)  # rare days are drawn more often than they are
     if same:
         mean = np.array([e.only(names).values for e in same]).mean(axis=0)
     least = floors(model.shown, names, mean)

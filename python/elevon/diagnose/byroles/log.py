@@ -177,10 +177,14 @@ def _onset(time: Floats, command: Floats, *, sequence: bool, name: str) -> float
 
 
 def _begin(time: Floats, off: Floats, first: int) -> float:
-    """Instant from which a command goes away, by the line through its first two samples."""
+    """Instant from which a command goes away, by the line through its first two samples.
+
+    Samples before them are too near to count, yet may be away already; a step has none.
+    """
     here, step = float(off[first]), float(off[min(first + 1, len(off) - 1)] - off[first])
     back = here / step if step > 0.0 else 0.0
-    return float(time[first] - min(back, 1.0) * (time[first] - time[first - 1]))
+    before = int(np.count_nonzero(off[:first]))
+    return float(time[first] - min(back, before + 1.0) * (time[first] - time[first - 1]))
 
 
 def _crossing(time: Floats, level: Floats, after: int) -> float:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from elevon.diagnose.byroles.log import RoleLog
 from elevon.diagnose.byroles.runs import numbers_of_log
+from elevon.diagnose.byroles.series import noise_deviation
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -18,7 +19,6 @@ __all__ = ["noise_of"]
 
 Floats = npt.NDArray[np.float64]
 _AGAIN = 8  # logs with noise added
-_NORMAL = 1.4826  # deviation over the median of the size, of Gaussian noise
 
 
 def noise_of(item: RoleLog, actuator: Actuator, shown: Mapping[str, float]) -> Floats:
@@ -28,7 +28,7 @@ def noise_of(item: RoleLog, actuator: Actuator, shown: Mapping[str, float]) -> F
     log's clock is among it, and repeats as little.
     """
     sizes = {
-        role: _noise(values)
+        role: noise_deviation(values)
         for role, values in item.channels.items()
         if item.units[role] != "1" and len(values) > 3
     }
@@ -44,9 +44,3 @@ def noise_of(item: RoleLog, actuator: Actuator, shown: Mapping[str, float]) -> F
         noisy = numbers_of_log(item, actuator, channels).values
         rows.append([noisy.get(name, value) for name, value in shown.items()])
     return np.asarray(np.std(rows, axis=0, ddof=1), dtype=np.float64)
-
-
-def _noise(values: Floats) -> float:
-    """Deviation of what changes from sample to sample, by the second differences' median."""
-    steps = np.abs(np.diff(values, 2))
-    return float(_NORMAL * np.median(steps) / np.sqrt(6.0))

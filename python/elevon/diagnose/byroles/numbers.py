@@ -57,7 +57,7 @@ KINDS: Mapping[str, Kind] = {
     "slope": Kind(0.01, mismatch=30.0),
     "gain": Kind(0.01),
     "offset": Kind(0.02, mismatch=50.0),
-    "small": Kind(0.01, mismatch=200.0),
+    "small": Kind(0.02, mismatch=100.0),
     "ripple": Kind(0.05, mismatch=60.0),
     "band": Kind(0.10, mismatch=30.0),
     "instant": Kind(0.005, 0.01),

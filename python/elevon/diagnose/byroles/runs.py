@@ -25,9 +25,12 @@ __all__ = ["RoleReplay", "Unit", "numbers_of_log", "replay_by_roles", "shown_by"
 
 Floats = npt.NDArray[np.float64]
 _DRAWS = 28
+#: Deviations of the days that are run over those stated: what sets in on a rare day is seen, and
+#: counts in full; what is linear counts as stated.
+_WIDE = 2.0
 _POINTS = 4  # severities of each candidate, one way
 _ACTS = 0.5  # severity from which on a fault that is there or not acts
-_LATE = 0.5  # deviation, in samples, of where a log is seen to begin
+_LATE = 0.1  # deviation, in samples, of where a log is seen to begin. ASSUMED: straight onsets
 _CHUNK = 64  # runs held at once
 _REMEMBERED = 16  # tests
 _MOST = 1e4  # least deviations that a fault moves a number by: beyond it nothing more is learnt
@@ -67,11 +70,28 @@ class RoleReplay(Replay):
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit of the replay: what differs from the set, its faults, how late it is seen to begin."""
+    """A unit of the replay.
+
+    Attributes
+    ----------
+    values : mapping of str to float
+        What differs from the set.
+    faults : tuple of str
+        As in ``--fault``.
+    late : float
+        Samples that it is seen to begin too late.
+    phase : float
+        Samples by which the recorder's instants precede those of the log: kinks and steps of
+        the command fall between samples.
+    number : int
+        Of its random numbers; healthy days differ in them, faults do not.
+    """
 
     values: Mapping[str, float]
     faults: tuple[str, ...] = ()
     late: float = 0.0
+    phase: float = 0.0
+    number: int = 0
 
 
 @dataclass(frozen=True)
@@ -123,11 +143,8 @@ def _replayed(item: RoleLog, actuator: Actuator, candidates: Sequence[Candidate]
     for c in candidates:
         units += [Unit({}, (c.text(float(s)),)) for s in severities[c.key] if s != 0.0]
     ready = _as_on_stand(actuator, item.test)
-    factors = factors_of(ready)
-    steps = np.random.default_rng(15).standard_normal((_DRAWS, len(factors) + 1))
-    for row in steps.tolist():
-        values = daily(ready, dict(zip(factors, row[1:], strict=True)))
-        units.append(Unit(values, late=_LATE * row[0] / item.rate))
+    steps = _steps_of_days(len(factors_of(ready)))
+    units += _days(ready, steps)
     shown = list(shown_by(item, actuator, units))
     names = tuple(shown[0].values)
     rows = np.array([[s.values.get(n, np.nan) for n in names] for s in shown])
@@ -149,6 +166,32 @@ def _replayed(item: RoleLog, actuator: Actuator, candidates: Sequence[Candidate]
         spread=spread_of(draws, steps),
         switched=switched_of(actuator),
     )
+
+
+def _steps_of_days(factors: int) -> Floats:
+    """Draws in deviations, shape (d, factors + 2): factors, where it begins, the clock's phase.
+
+    The factors are drawn `_WIDE` times as far as they are; the phase is even over a sample.
+    """
+    rng = np.random.default_rng(15)
+    wide = _WIDE * rng.standard_normal((_DRAWS, factors))
+    phase = np.sqrt(12.0) * (rng.random(_DRAWS) - 0.5)
+    return np.column_stack([wide, rng.standard_normal(_DRAWS), phase])
+
+
+def _days(ready: Actuator, steps: Floats) -> list[Unit]:
+    """Healthy units of other days; an action is seen at a sample, so it has no other lateness."""
+    factors = factors_of(ready)
+    late = 0.0 if action_numbers(ready.wiring) else _LATE
+    return [
+        Unit(
+            daily(ready, dict(zip(factors, row, strict=False))),
+            late=late * row[-2],
+            phase=row[-1] / np.sqrt(12.0),
+            number=k + 1,
+        )
+        for k, row in enumerate(steps.tolist())
+    ]
 
 
 def spread_of(draws: Floats, steps: Floats) -> Floats:
@@ -175,7 +218,10 @@ def _severities(c: Candidate, actuator: Actuator) -> Floats:
 
 
 def _as_on_stand(actuator: Actuator, test: RoleTest) -> Actuator:
-    return actuator.with_values(dict(test.settings), source="stand of the log")
+    ready = actuator.with_values(dict(test.settings), source="stand of the log")
+    if test.stroke is None:
+        return ready
+    return ready.with_values(test.stroke.settings(ready), source="load of the log")
 
 
 def _evidence(shown: Numbers) -> Evidence:
@@ -205,20 +251,22 @@ def shown_by(item: RoleLog, actuator: Actuator, units: Sequence[Unit]) -> Iterat
     base = prepare(Run(ready, _scenario(item, actuator)), "low", record, doubts=False)
     base = replace(base, core=_with_arrays(base.core, item, actuator))
     places = {path: k for k, path in enumerate(ready.parameters)}
+    actions = action_numbers(actuator.wiring)
     for first in range(0, len(units), _CHUNK):
         runs = [
-            replace(base, core=_of_unit(base.core, unit, places, actuator.wiring))
+            replace(base, core=_of_unit(base.core, unit, places, item, actuator.wiring))
             for unit in units[first : first + _CHUNK]
         ]
         shown = simulate_prepared(runs, fidelity="low")
         for unit, result in zip(units[first : first + _CHUNK], shown, strict=True):
             rows = result["clocks"][base.plan[0].name]
-            channels = _channels(item, rows, base.plan[0].signals, signals, unit.late)
+            late = unit.late if actions else unit.late + unit.phase
+            channels = _channels(item, rows, base.plan[0].signals, signals, late / item.rate)
             yield numbers_of_log(item, actuator, channels)
 
 
 def _of_unit(
-    core: Mapping[str, Any], unit: Unit, places: Mapping[str, int], wiring: str
+    core: Mapping[str, Any], unit: Unit, places: Mapping[str, int], item: RoleLog, wiring: str
 ) -> dict[str, Any]:
     from elevon.faults import Fault
 
@@ -229,7 +277,14 @@ def _of_unit(
         Fault.parse(text).resolved(wiring, "low", f"fault[{k}]")
         for k, text in enumerate(unit.faults)
     ]
-    return {**core, "parameters": vector, "faults": faults}
+    out = {**core, "parameters": vector, "faults": faults, "run": unit.number}
+    if unit.phase != 0.0:
+        later = unit.phase / item.rate
+        out["inputs"] = {
+            port: [{**t, "times": np.asarray(t["times"]) + later} for t in terms]
+            for port, terms in core["inputs"].items()
+        }
+    return out
 
 
 def _channels(
