@@ -265,6 +265,27 @@ def test_a_history_of_logs_is_diagnosed_on_the_way(elevon_cli, tmp_path):  # noq
     assert play["inspections"] == 3
 
 
+def test_the_airs_temperature_sets_what_the_actuator_has():
+    warm = mission(temperature="45 degC")
+    every = warm.scenarios().parameters
+    assert set(every) == {"thermal.ambient", "motor.winding_temperature"}
+    assert set(warm.scenarios(known=["motor.winding_temperature"]).parameters) < set(every)
+    with pytest.raises(InputError, match=r"temperature: the actuator has neither thermal.ambient"):
+        warm.scenarios(known=["play.total"])
+
+
+def test_the_time_of_the_tables_is_told_whoever_made_them(unit, tables):
+    result = predict(inspections(), unit, mission(), response=tables)
+    assert result.seconds["tables"] == tables.seconds > 0.0
+
+
+def test_a_part_made_new_is_known_since_then(unit, tables):
+    worn = inspections()
+    new = Inspection(2000, worn[-1].seen, reset=(KEY,), name="new.json")
+    result = predict([*worn[:-1], new], unit, mission(), response=tables)
+    assert "0 inspection(s) saw a growing fault since its part was made new" in result.findings[0]
+
+
 def test_a_ball_screw_and_its_stall_load():
     actuator = Actuator.load("nasa-ballscrew")
     asked = Mission.from_dict({

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -184,8 +184,18 @@ class Mission(_Frozen):
         mission.scenarios(document)
         return mission
 
-    def scenarios(self, document: Document | None = None) -> Scenario:
-        """Return the mission's scenario, with its temperature."""
+    def scenarios(
+        self, document: Document | None = None, known: Container[str] | None = None
+    ) -> Scenario:
+        """Return the mission's scenario, with its temperature.
+
+        Parameters
+        ----------
+        document : Document, optional
+            Where it stands, for messages.
+        known : container of str, optional
+            Parameter paths of the actuator; the temperature sets those of them that it concerns.
+        """
         document = document or Document(self.name or "mission", "", {})
         scenario = validated(Scenario, self.scenario, document.within(("scenario",)))
         if scenario.fault:
@@ -195,7 +205,11 @@ class Mission(_Frozen):
         if self.temperature is None:
             return scenario
         kelvin = parse_quantity(self.temperature, "K", document.place(("temperature",)))
-        values = {"thermal.ambient": kelvin, "motor.winding_temperature": kelvin}
+        paths = ["thermal.ambient", "motor.winding_temperature"]
+        values = {path: kelvin for path in paths if known is None or path in known}
+        if not values:
+            place = document.place(("temperature",))
+            raise InputError(f"{place}: the actuator has neither {' nor '.join(paths)}")
         return scenario.replaced(parameters={**values, **scenario.parameters})
 
     def laws(self, more: Mapping[str, Law] | None = None) -> tuple[Law, ...]:

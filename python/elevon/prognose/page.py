@@ -50,13 +50,14 @@ def prognosis_page(
     future = report.section("What is to come")
     future.figure(
         course_figure(result, inspections, laws),
-        "Severities that the inspections saw, and those to come: median and 90 % of the futures.",
+        "Severities that the inspections saw, and those to come: median and 90 % of the futures; a "
+        "future stays where it is once it has failed.",
     )
     future.figure(
         survival_figure(result),
         "Probability of surviving the next N; lines: median and interval of the remaining life.",
     )
-    rows = [(n, p) for n, p in survival(result)]
+    rows = [(f"{n:g}", p) for n, p in survival(result)]
     future.table(Table((f"next N {result.unit}", "probability"), rows, digits=3))
     _requirements(report, result)
     _faults(report, result)

@@ -73,7 +73,6 @@ def predict(
     """
     if not 0.0 < level < 1.0:
         raise InputError(f"level {level:g} must be between 0 and 1")
-    begin = clock.perf_counter()
     tables = response or respond(actuator, mission, snapshots=snapshots)
     _check_new(tables)
     made = clock.perf_counter()
@@ -85,7 +84,7 @@ def predict(
     result = prognosis(flt, mission, inspections, level=level, seed=seed, serial=serial)
     done = clock.perf_counter()
     result.seconds.update(  # type: ignore[attr-defined]
-        {"tables": made - begin, "updates": updated - made, "prediction": done - updated}
+        {"tables": tables.seconds, "updates": updated - made, "prediction": done - updated}
     )
     return result
 
@@ -206,7 +205,7 @@ def _with_findings(
     from dataclasses import replace
 
     process = flt.process
-    findings = list(_thin(result))
+    findings = list(_thin(result, inspections))
     findings += [
         f"{key} at {usage:g} {result.unit} stands {abs(score):.3g} deviations "
         f"{'above' if score > 0.0 else 'below'} what law and history expected"
@@ -251,7 +250,7 @@ def _stray(flt: ParticleFilter, inspections: Sequence[Inspection]) -> list[str]:
     ]
 
 
-def _thin(result: Prognosis) -> list[str]:
+def _thin(result: Prognosis, inspections: Sequence[Inspection]) -> list[str]:
     """Say where the history is too short, and how wide the answer is."""
     most = max((item.inspections for item in result.known), default=0)
     if most >= _LEAST:
@@ -261,9 +260,11 @@ def _thin(result: Prognosis) -> list[str]:
         wide = f"{low:.4g} to {high:.4g} {result.unit}"
     else:
         wide = f"{low:.4g} {result.unit} to no end in sight"
+    renewed = " since its part was made new" if any(item.reset for item in inspections) else ""
     return [
-        f"{most} inspection(s) saw a growing fault; {_LEAST} are needed before its growth is "
-        f"known. Until then the answer is as wide as the laws' spread: {wide} at {result.level:.0%}"
+        f"{most} inspection(s) saw a growing fault{renewed}; {_LEAST} are needed before its growth "
+        "is known. Until then the answer is as wide as the laws' spread: "
+        f"{wide} at {result.level:.0%}"
     ]
 
 

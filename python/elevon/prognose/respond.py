@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time as clock
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from elevon.prognose.grid import axis_points
@@ -48,9 +50,10 @@ def respond(
     InputError
         A fault the actuator has not, a requirement it cannot be asked, a mission it cannot do.
     """
+    begin = clock.perf_counter()
     acting = tuple(mission.laws() if laws is None else laws)
     grid = severity_grid(acting, mission, axis_points(len(acting)))
-    base = tabulate(actuator, mission, acting, grid, fidelity=fidelity, progress=progress)
-    if not snapshots or fidelity == "high":
-        return base
-    return correction(actuator, mission, base, progress).of(base)
+    made = tabulate(actuator, mission, acting, grid, fidelity=fidelity, progress=progress)
+    if snapshots and fidelity != "high":
+        made = correction(actuator, mission, made, progress).of(made)
+    return replace(made, seconds=clock.perf_counter() - begin)

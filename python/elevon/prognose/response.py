@@ -40,6 +40,8 @@ class Response:
         Model runs behind it.
     fidelity : str
         Of the runs; ``low, corrected by high`` with snapshots.
+    seconds : float
+        Wall time that they took.
     """
 
     laws: tuple[Law, ...]
@@ -52,6 +54,7 @@ class Response:
     runs: int
     fidelity: str
     _tables: tuple[Floats, Floats] = field(init=False, repr=False)
+    seconds: float = field(default=0.0, compare=False)
 
     def __post_init__(self) -> None:
         reserves = [

@@ -51,7 +51,7 @@ def tabulate(
     points: Sequence[tuple[float, ...]] | None = None,
 ) -> Response:
     """Run every point of the grid, or those given."""
-    base = mission.scenarios()
+    base = mission.scenarios(known=actuator.parameters)
     requirements = mission.requirement
     plans = [_own_runs(item, base) for item in requirements]
     output, load = _units(actuator)
