@@ -9,6 +9,7 @@ from elevon.errors import InputError
 from elevon.prognose import Inspection, ParticleFilter, Seen, UnscentedFilter, inspection
 from elevon.prognose.future import look_ahead
 from elevon.prognose.mission import Usage
+from elevon.prognose.observation import COMMON
 from elevon.prognose.particle import resampled
 from elevon.prognose.predict import check_order
 from tests.prognose.units import law, process
@@ -109,6 +110,45 @@ def test_how_widely_diagnoses_scatter_is_learned_from_them():
     assert growth.std() < 0.7 * stated
 
 
+def test_what_all_diagnoses_err_by_alike_is_learned_from_where_growth_began():
+    """A new unit has no fault: what its diagnoses show beyond the growth is their common error."""
+    rate, off, own = 1e-3, 0.06, 0.002
+    rng = np.random.default_rng(5)
+    flt = ParticleFilter(process(law(rate)), count=4000, seed=1)
+    deaf = ParticleFilter(process(law(rate)), count=4000, seed=1)
+    for usage in np.linspace(50.0, 400.0, 15):
+        value = rate * usage + off + own * rng.standard_normal()
+        flt.update(Inspection(usage, {KEY: Seen(value, own, own, 0.05)}))
+        deaf.update(seen(usage, value, own))
+    assert 0.05 * flt.units.common[:, 0].mean() == pytest.approx(off, abs=0.006)
+    assert flt.units.damage.mean() == pytest.approx(0.4, abs=0.008)
+    assert deaf.units.damage.mean() > 0.43
+
+
+def test_a_coefficient_that_differs_from_unit_to_unit_is_learned():
+    """Its spread does what the law's own spread does; a new part has a value of its own."""
+    rate, rng = 1e-3, np.random.default_rng(4)
+    observed = [(u, 1.3 * rate * u + 0.02 * rng.standard_normal()) for u in range(100, 900, 90)]
+    mean, spread = exact(observed, 0.02, rate, 0.4)
+    flt = ParticleFilter(process(law(rate, spread=0.0, rate_spread=0.4)), count=4000, seed=1)
+    for usage, value in observed:
+        flt.update(seen(usage, value, 0.02))
+    own = flt.units.own[:, 0, 0]
+    assert own.mean() == pytest.approx(mean, abs=0.3 * spread)
+    assert own.std() == pytest.approx(spread, rel=0.35)
+    renewed = flt.update(Inspection(1000.0, {}, reset=(KEY,))).own[:, 0, 0]
+    assert renewed.std() == pytest.approx(0.4, rel=0.1)
+
+
+def test_growth_hastens_beyond_the_law_and_never_slows():
+    flt = ParticleFilter(process(law(1e-3, form_spread=0.3, highest=2.0)), count=4000, seed=1)
+    assert flt.units.form.min() >= 0.0
+    for usage in (100.0, 300.0, 500.0, 700.0, 900.0):
+        flt.update(seen(usage, 1e-3 * usage, 0.01))
+    assert flt.units.form.min() >= 0.0
+    assert flt.units.form.mean() < 0.15  # steady growth: less than the prior's 0.24
+
+
 def test_many_particles_survive_a_fault_that_others_do_not_share():
     """Each law is drawn by its own diagnoses: what one shows costs the other no particle."""
     flt = ParticleFilter(process(law(1e-3), law(1e-3, "friction"), limits=(1.0, 1.0)), seed=1)
@@ -168,6 +208,11 @@ def test_a_diagnosis_becomes_an_inspection():
     assert more.seen["friction@transmission"].high > 2.0  # diagnosis looks up to 2
     unlikely = {"faults": [{**cause, "probability": 0.3}], "detectable": {KEY: 0.003}}
     assert inspection(unlikely, [item], usage=5.0).seen[KEY] == Seen(None, 0.001, 0.001)
+    assert got.common == pytest.approx(COMMON["play"][0] * 0.015)
+    relative, absolute = COMMON["friction"]
+    assert more.seen["friction@transmission"].common == pytest.approx(
+        math.hypot(relative * 1.98, absolute)
+    )
     assert inspection({"faults": []}, [item], usage=5.0).seen == {}
     with pytest.raises(InputError, match="not within"):
         inspection({"faults": [{**cause, "interval": [0.016, 0.02]}]}, [item], usage=5.0)

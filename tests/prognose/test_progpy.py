@@ -37,11 +37,14 @@ class TestWithProgpy:
         np.testing.assert_allclose(shown, expected, rtol=1e-4, atol=1e-6)
 
     def test_samples_go_there_and_back(self):
-        unit = process(law(1e-3, dormant=0.4), law(2e-3, "friction"), limits=(1.0, 1.0))
+        unit = process(
+            law(1e-3, dormant=0.4), law(2e-3, "friction", rate_spread=0.2), limits=(1.0, 1.0)
+        )
         units = unit.start(50, np.random.default_rng(0))
         back = from_samples(to_samples(units, unit), unit, usage=units.usage)
         np.testing.assert_array_equal(back.damage, units.damage)
         np.testing.assert_array_equal(back.active, units.active)
+        np.testing.assert_array_equal(back.own[:, 1], units.own[:, 1])
         np.testing.assert_allclose(back.growth[back.active], units.growth[units.active])
         with pytest.raises(InputError, match="damage friction"):
             from_samples([{"damage play@transmission": 0.0, "growth play@transmission": 0.0,

@@ -7,13 +7,13 @@ from elevon.prognose.grid import Grid
 from elevon.prognose.requirement import Requirement
 
 
-def law(rate=1e-3, kind="play", *, power=0.0, **fields):
+def law(rate=1e-3, kind="play", *, power=0.0, rate_spread=0.0, **fields):
     """Growth rate x (1 + damage)^power a repetition; the closed form is in `end`."""
     fields = {"form_spread": 0.0, "highest": 4.0, **fields}
     return Law(
         name=f"law of {kind}", text="", source="", kind=kind, place="transmission", unit="1",
         rate=lambda d, _x, c: c["rate"] * (1.0 + d) ** power, drivers=("hours",),
-        coefficients={"rate": Coefficient(rate, "1", "test")}, **fields,
+        coefficients={"rate": Coefficient(rate, "1", "test", rate_spread)}, **fields,
     )  # fmt: skip
 
 

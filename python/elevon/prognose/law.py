@@ -14,7 +14,7 @@ from elevon.errors import RangeError, unknown
 __all__ = ["DRIVERS", "Coefficient", "Law"]
 
 Floats = npt.NDArray[np.float64]
-Rate = Callable[[Floats, Mapping[str, Floats], Mapping[str, float]], Floats]
+Rate = Callable[[Floats, Mapping[str, Floats], Mapping[str, Any]], Floats]
 
 #: What one repetition of a mission does to the actuator: name to unit and text.
 DRIVERS: dict[str, tuple[str, str]] = {
@@ -43,11 +43,15 @@ class Coefficient:
         SI, but for hours.
     source : str
         Where it comes from; ``ASSUMED:`` and the reason where nowhere.
+    spread : float
+        Deviation of its logarithm from unit to unit; the filter then carries the unit's own value.
+        What only scales the whole rate belongs in the law's `spread` instead.
     """
 
     value: float
     unit: str
     source: str
+    spread: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -66,7 +70,8 @@ class Law:
         The fault it drives, of the catalogue; the severity's unit.
     rate : callable
         Damage, shape (n,), drivers of the mission by name, shape (n,) each, and coefficients by
-        name, to damage a repetition, shape (n,), never negative.
+        name (numbers; of shape (n,) where they differ from unit to unit), to damage a repetition,
+        shape (n,), never negative.
     drivers : tuple of str
         Keys of `DRIVERS` that it reads.
     coefficients : mapping of str to Coefficient
@@ -74,8 +79,10 @@ class Law:
     spread : float
         Deviation of the logarithm of the unit's own factor before anything is known of it.
     form_spread : float
-        Deviation of the exponent f in (1 + severity / (highest / 4))^f, by which the growth may
-        differ from the law's as the fault grows.
+        Of the exponent f in (1 + severity / (highest / 4))^f, by which a unit's growth hastens as
+        the fault grows beyond what the law says: f is the magnitude of a normal number of this
+        deviation. One-sided, since what a law leaves out (debris, impacts, heat) feeds growth;
+        ASSUMED.
     grain : float
         Scale of the gamma process [damage]: growth by D has the variance D times `grain`.
     start : float
@@ -116,6 +123,8 @@ class Law:
                 raise unknown("driver", name, DRIVERS, f"law {self.name}")
         for name in ("spread", "form_spread", "grain", "start", "start_spread"):
             _not_negative(f"law {self.name}: {name}", getattr(self, name))
+        for name, item in self.coefficients.items():
+            _not_negative(f"law {self.name}: spread of {name}", item.spread)
         if not 0.0 <= self.dormant <= 1.0:
             raise RangeError(f"law {self.name}: dormant = {self.dormant:g} is outside 0 to 1")
         if not self.highest > 0.0:
@@ -131,9 +140,26 @@ class Law:
         """Damage at the greatest severity that predictions look at."""
         return float(self.damage(np.array([self.highest]))[0])
 
-    def growth(self, damage: Floats, drivers: Mapping[str, Floats]) -> Floats:
-        """Return the mean growth of the damage in one repetition, shape (n,)."""
-        values = {name: item.value for name, item in self.coefficients.items()}
+    @property
+    def spreading(self) -> tuple[str, ...]:
+        """Coefficients that differ from unit to unit."""
+        return tuple(name for name, item in self.coefficients.items() if item.spread > 0.0)
+
+    def growth(
+        self, damage: Floats, drivers: Mapping[str, Floats], own: Mapping[str, Floats] | None = None
+    ) -> Floats:
+        """Return the mean growth of the damage in one repetition, shape (n,).
+
+        Parameters
+        ----------
+        damage, drivers
+            As `rate` takes them.
+        own : mapping of str to ndarray, shape (n,), optional
+            Factors of units on coefficients.
+        """
+        values: dict[str, Any] = {name: item.value for name, item in self.coefficients.items()}
+        for name, factor in (own or {}).items():
+            values[name] = values[name] * factor
         return np.maximum(self.rate(damage, drivers, values), 0.0)
 
     def with_values(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import erfc, sqrt
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ from elevon.errors import InputError, quoted
 if TYPE_CHECKING:
     from elevon.prognose.law import Law
 
-__all__ = ["Inspection", "Seen", "inspection"]
+__all__ = ["COMMON", "Inspection", "Seen", "inspection"]
 
 Floats = npt.NDArray[np.float64]
 _SIGMAS = 1.6449  # of a 90 % interval's half width
@@ -25,6 +25,17 @@ _OUTLIER = 0.02  # share of diagnoses that say nothing true; ASSUMED
 _BELIEF = 2.0  # diagnoses that the stated deviations count for against the scatter seen; ASSUMED
 _LARGEST = 3.0  # deviations beyond which a diagnosis is taken as stray, not as scatter
 _MISSED = 1e-3  # share of diagnoses that do not see a fault that is well there; ASSUMED
+
+
+#: What all diagnoses of a unit's fault err by alike, by kind: deviation relative to the severity,
+#: and absolute [the fault's unit]. Baselines and model are the same at each inspection, so that
+#: this part of the error does not average out. Measured (docs/prognosis.md).
+COMMON: Mapping[str, tuple[float, float]] = {
+    "play": (0.005, 0.0),
+    "friction": (0.01, 0.02),
+    "short": (0.01, 0.0),
+}
+_COMMON = (0.01, 0.0)  # of other faults; ASSUMED
 
 
 @dataclass(frozen=True)
@@ -37,11 +48,15 @@ class Seen:
         Median [the fault's unit]; None where the fault was not seen.
     low, high : float
         Deviations below and above it; of a fault not seen both are a third of what was detectable.
+    common : float
+        Deviation of what this and all other diagnoses of the unit's fault err by alike, from one
+        and the same baselines and model; beside `low` and `high`.
     """
 
     severity: float | None
     low: float
     high: float
+    common: float = 0.0
 
     def off(self, severity: Floats) -> Floats:
         """Return how far severities of shape (n,) are from it, in its deviations."""
@@ -140,10 +155,18 @@ def inspection(
         cause = _cause(data, law, name)
         limit = _detectable(data, law, name)
         if cause is not None:
-            seen[law.key] = _read(cause, limit, f"{name}: {law.key}")
+            read = _read(cause, limit, f"{name}: {law.key}")
         elif limit is not None:
-            seen[law.key] = Seen(None, limit / _DETECTED, limit / _DETECTED)
+            read = Seen(None, limit / _DETECTED, limit / _DETECTED)
+        else:
+            continue
+        seen[law.key] = replace(read, common=_common(law.kind, read.severity or 0.0))
     return Inspection(usage, seen, tuple(reset), name, date)
+
+
+def _common(kind: str, severity: float) -> float:
+    relative, absolute = COMMON.get(kind, _COMMON)
+    return float(np.hypot(relative * severity, absolute))
 
 
 def _cause(data: Mapping[str, Any], law: Law, place: str) -> Mapping[str, Any] | None:

@@ -10,14 +10,10 @@ import numpy.typing as npt
 from elevon.prognose.observation import Inspection, Seen
 from elevon.prognose.process import Population, Process
 
-__all__ = ["BIAS", "COUNT", "ParticleFilter", "resampled"]
+__all__ = ["COUNT", "ParticleFilter", "resampled"]
 
 Floats = npt.NDArray[np.float64]
 COUNT = 2000
-BIAS = 0.01
-"""Deviation of the diagnoses' common relative error. Measured: 0.3 to 1 % for play, about 1 % for
-shorts and for much friction; taken as the same for all faults (ASSUMED). The model behind them is
-one and the same at each inspection, so that part of its error does not average out."""
 SURPRISE = 4.0
 _KERNEL = 0.08  # variance of what is drawn that is drawn anew, a lost share of the particles
 _FEWEST = 0.5  # effective particles, of all, that one share of a likelihood leaves
@@ -67,15 +63,17 @@ class ParticleFilter:
             self._compare(units, k, seen)
             units = self._weighed(units, k, seen)
             if seen.severity is not None:
-                units = _with_misfit(units, k, seen.scatter(self._severity(units, k)))
+                units = _with_misfit(units, k, seen.scatter(self._shown(units, k, seen)))
                 self._counts[k] += 1
         if item.reset:
             units = self.process.reset(units, item.reset, self.rng)
         self.units = units
         return units
 
-    def _severity(self, units: Population, k: int) -> Floats:
-        return self.process.laws[k].severity(units.damage[:, k])
+    def _shown(self, units: Population, k: int, seen: Seen) -> Floats:
+        """Return what diagnoses without scatter would say of units, shape (n,)."""
+        severity = self.process.laws[k].severity(units.damage[:, k])
+        return severity + seen.common * units.common[:, k]
 
     def _weighed(self, units: Population, k: int, seen: Seen) -> Population:
         """Weigh and draw one law's numbers, in shares of the likelihood that leave enough of them.
@@ -86,7 +84,7 @@ class ParticleFilter:
         left = 1.0
         while left > 0.0:
             score = seen.log_likelihood(
-                self._severity(units, k), units.misfit[:, k], self._counts[k]
+                self._shown(units, k, seen), units.misfit[:, k], self._counts[k]
             )
             share = _share(score, left)
             left -= share
@@ -97,7 +95,7 @@ class ParticleFilter:
         """Note a diagnosis that the units expected before it hardly allow."""
         if seen.severity is None:
             return
-        severity = self._severity(units, k)
+        severity = self._shown(units, k, seen)
         mean = float(severity.mean())
         deviation = seen.low if mean < seen.severity else seen.high
         score = (seen.severity - mean) / np.sqrt(float(severity.var()) + deviation**2)
@@ -158,18 +156,22 @@ def _drawn(units: Population, k: int, weight: Floats, rng: np.random.Generator) 
     if updated.sum() < 10 or not moved.any():
         return out
     part = weight[updated] / weight[updated].sum()
-    wide = _KERNEL * (1.0 - _effective(weight))
+    wide = _KERNEL * max(1.0 - _effective(weight), 0.0)  # equal weights round to just below zero
     new = _kernel(_rows(units, updated, k), part, _rows(out, moved, k), wide, rng)
     damage, growth, form = out.damage.copy(), out.growth.copy(), out.form.copy()
-    damage[moved, k] = np.exp(new[:, 0])
-    growth[moved, k], form[moved, k] = new[:, 1], new[:, 2]
-    return replace(out, damage=damage, growth=growth, form=form)
+    common, own = out.common.copy(), out.own.copy()
+    damage[moved, k], growth[moved, k] = np.exp(new[:, 0]), new[:, 1]
+    form[moved, k] = np.abs(new[:, 2])  # one-sided as its prior
+    common[moved, k], own[moved, k] = new[:, 3], new[:, 4:]
+    return replace(out, damage=damage, growth=growth, form=form, common=common, own=own)
 
 
 def _rows(units: Population, keep: npt.NDArray[np.bool_], k: int) -> Floats:
-    """Logarithm of the damage, growth, form of one law, shape (n, 3)."""
-    columns = (np.log(units.damage[keep, k]), units.growth[keep, k], units.form[keep, k])
-    return np.column_stack(columns)
+    """Logarithm of the damage and all fixed numbers of one law, shape (n, 4 + c)."""
+    fixed = (units.growth, units.form, units.common)
+    return np.column_stack(
+        (np.log(units.damage[keep, k]), *(v[keep, k] for v in fixed), units.own[keep, k])
+    )
 
 
 def _kernel(

@@ -13,7 +13,7 @@ from elevon.errors import InputError
 from elevon.prognose.answer import Known, Prognosis
 from elevon.prognose.future import MODEL_ERROR, look_ahead
 from elevon.prognose.observation import Inspection
-from elevon.prognose.particle import BIAS, COUNT, ParticleFilter, resampled
+from elevon.prognose.particle import COUNT, ParticleFilter, resampled
 from elevon.prognose.process import Process
 from elevon.prognose.respond import respond
 from elevon.prognose.response import Response, check_start
@@ -100,7 +100,7 @@ def prognosis(
 ) -> Prognosis:
     """Look ahead from where a filter stands."""
     rng = np.random.default_rng([17, seed])
-    units = flt.process.scaled(resampled(flt.units, _SAMPLES, rng), BIAS, rng)
+    units = resampled(flt.units, _SAMPLES, rng)
     future = look_ahead(flt.process, units, mission.usage, rng, model_error=MODEL_ERROR)
     response = flt.process.response
     known = _known(flt.process, units, inspections, level)

@@ -26,6 +26,9 @@ ONSET = 0.05
 """Rate at which a dormant fault begins to grow, for each e-fold of use. ASSUMED."""
 
 
+_OF_LAWS = ("damage", "growth", "form", "active", "misfit", "common", "own")  # unit and law first
+
+
 @dataclass(frozen=True)
 class Population:
     """Units that may be the true one, n of them, with k laws.
@@ -44,6 +47,11 @@ class Population:
         Whether the fault grows.
     misfit : ndarray, shape (n, k)
         Sum of the squared distances, in stated deviations, from the diagnoses that saw the fault.
+    common : ndarray, shape (n, k)
+        What all diagnoses of the fault err by alike, in deviations of it (`Seen.common`).
+    own : ndarray, shape (n, k, c)
+        Logarithms of the unit's factors on the coefficients that differ from unit to unit, in the
+        order of `Law.spreading`; the rest of c is unused.
     usage : float
         Use so far, in the mission's unit.
     """
@@ -54,33 +62,38 @@ class Population:
     weight: Floats
     active: npt.NDArray[np.bool_]
     misfit: Floats
+    common: Floats
+    own: Floats
     usage: float = 0.0
+
+    @classmethod
+    def of(
+        cls, damage: Floats, growth: Floats, *, form: Floats | None = None, usage: float = 0.0
+    ) -> Population:
+        """Return growing units of equal weight, shape (n, k), with the laws' coefficients."""
+        zeros = np.zeros_like(growth)
+        return cls(
+            damage=damage,
+            growth=growth,
+            form=zeros if form is None else form,
+            weight=np.full(len(growth), 1.0 / len(growth)),
+            active=np.ones(growth.shape, dtype=np.bool_),
+            misfit=zeros,
+            common=zeros,
+            own=np.zeros((*growth.shape, 0)),
+            usage=usage,
+        )
 
     def picked(self, index: npt.NDArray[np.intp]) -> Population:
         """Return those of an index, all with the same weight."""
         even = np.full(len(index), 1.0 / max(len(index), 1))
-        return replace(
-            self,
-            damage=self.damage[index],
-            growth=self.growth[index],
-            form=self.form[index],
-            weight=even,
-            active=self.active[index],
-            misfit=self.misfit[index],
-        )
+        return replace(self, weight=even, **{name: getattr(self, name)[index] for name in _OF_LAWS})
 
     def with_law(self, k: int, index: npt.NDArray[np.intp]) -> Population:
         """Return the units with the numbers of one law from those of an index, shape (n,)."""
         columns = np.arange(self.damage.shape[1])
         rows = np.where(columns == k, index[:, None], np.arange(len(index))[:, None])
-        return replace(
-            self,
-            damage=self.damage[rows, columns],
-            growth=self.growth[rows, columns],
-            form=self.form[rows, columns],
-            active=self.active[rows, columns],
-            misfit=self.misfit[rows, columns],
-        )
+        return replace(self, **{name: getattr(self, name)[rows, columns] for name in _OF_LAWS})
 
 
 class Process:
@@ -103,6 +116,7 @@ class Process:
         self.range = np.array([law.highest_damage - law.start for law in self.laws])
         """Damage from new to the greatest severity of the tables, shape (k,)."""
         self._most = np.array([2.0 * law.highest_damage for law in self.laws])
+        self._spreads = _spreads(self.laws)
 
     def start(self, count: int, rng: np.random.Generator) -> Population:
         """Draw new units."""
@@ -114,12 +128,14 @@ class Process:
         growth = np.array([law.spread for law in self.laws])
         form = np.array([law.form_spread for law in self.laws])
         return Population(
-            np.maximum(start + spread * rng.standard_normal((count, size)), 0.0),
-            growth * rng.standard_normal((count, size)),
-            form * rng.standard_normal((count, size)),
-            np.full(count, 1.0 / count),
-            rng.random((count, size)) >= np.array([law.dormant for law in self.laws]),
-            np.zeros((count, size)),
+            damage=np.maximum(start + spread * rng.standard_normal((count, size)), 0.0),
+            growth=growth * rng.standard_normal((count, size)),
+            form=np.abs(form * rng.standard_normal((count, size))),
+            weight=np.full(count, 1.0 / count),
+            active=rng.random((count, size)) >= np.array([law.dormant for law in self.laws]),
+            misfit=np.zeros((count, size)),
+            common=rng.standard_normal((count, size)),
+            own=self._spreads * rng.standard_normal((count, *self._spreads.shape)),
         )
 
     def severity(self, damage: Floats) -> Floats:
@@ -142,9 +158,17 @@ class Process:
         damage = np.minimum(damage, self._most)
         severity = self.severity(damage)
         drivers = self.response.exposed(severity, load)
-        columns = [law.growth(damage[:, k], drivers) for k, law in enumerate(self.laws)]
+        columns = [
+            law.growth(damage[:, k], drivers, self._own(units, k))
+            for k, law in enumerate(self.laws)
+        ]
         factor = np.exp(units.growth + units.form * np.log1p(severity / self._quarter))
         return np.asarray(np.column_stack(columns) * factor * units.active)
+
+    def _own(self, units: Population, k: int) -> dict[str, Floats]:
+        """Return units' factors on one law's coefficients; none where they carry none."""
+        names = self.laws[k].spreading[: units.own.shape[2]]
+        return {name: np.exp(units.own[:, k, c]) for c, name in enumerate(names)}
 
     def advance(
         self,
@@ -177,28 +201,6 @@ class Process:
             usage=units.usage + steps,
         )
 
-    def scaled(self, units: Population, deviation: float, rng: np.random.Generator) -> Population:
-        """Return the units with severities that differ by a factor common to all diagnoses.
-
-        What all diagnoses of a unit err by alike is not shown by them: the filters follow the
-        severities as they are shown, and what they truly are is drawn before looking ahead.
-
-        Parameters
-        ----------
-        units : Population
-            As the diagnoses show them.
-        deviation : float
-            Of the logarithm of the factor.
-        rng : Generator
-            Of chance.
-        """
-        severity = self.severity(units.damage)
-        shape = (len(severity), len(self.laws))
-        true = severity * np.exp(-deviation * rng.standard_normal(shape))
-        damage = np.column_stack([law.damage(true[:, k]) for k, law in enumerate(self.laws)])
-        # Damage that shows no severity, such as ageing before the first contact, stays as it is.
-        return replace(units, damage=np.where(damage > 0.0, damage, units.damage))
-
     def to(
         self,
         units: Population,
@@ -220,13 +222,21 @@ class Process:
         """Return the units with parts made new; what replaces them has a growth of its own."""
         new = self.start(len(units.weight), rng)
         made = np.array([law.key in keys for law in self.laws])
-        return replace(
-            units,
-            damage=np.where(made, new.damage, units.damage),
-            growth=np.where(made, new.growth, units.growth),
-            form=np.where(made, new.form, units.form),
-            active=np.where(made, new.active, units.active),
-        )
+        renewed = {
+            name: np.where(made, getattr(new, name), getattr(units, name))
+            for name in ("damage", "growth", "form", "active")
+        }
+        own = np.where(made[:, None], new.own, units.own)
+        return replace(units, own=own, **renewed)
+
+
+def _spreads(laws: Sequence[Law]) -> Floats:
+    """Return the deviations of the coefficients that differ from unit to unit, shape (k, c)."""
+    out = np.zeros((len(laws), max((len(law.spreading) for law in laws), default=0)))
+    for k, law in enumerate(laws):
+        for c, name in enumerate(law.spreading):
+            out[k, c] = law.coefficients[name].spread
+    return out
 
 
 def _gamma(mean: Floats, laws: Sequence[Law], rng: np.random.Generator) -> Floats:

@@ -7,12 +7,14 @@ filters and predictors add noise of their own.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from elevon.errors import InputError
+from elevon.prognose.law import Law
 from elevon.prognose.process import Population, Process
 
 __all__ = ["from_samples", "progpy_model", "to_samples"]
@@ -22,8 +24,9 @@ def progpy_model(process: Process, *, load: float = 1.0, step: float = 1.0) -> A
     """Return a ``progpy.PrognosticsModel``.
 
     States are ``damage KIND@PLACE``, ``growth KIND@PLACE`` (logarithm of the factor on the law's
-    rate) and ``form KIND@PLACE``; outputs the severities; events the requirements, whose event
-    states are their reserve (1: untouched, 0: failed).
+    rate), ``form KIND@PLACE`` and, for coefficients that differ from unit to unit,
+    ``COEFFICIENT KIND@PLACE`` (logarithm of the factor on it); outputs the severities; events the
+    requirements, whose event states are their reserve (1: untouched, 0: failed).
 
     Parameters
     ----------
@@ -45,10 +48,11 @@ def progpy_model(process: Process, *, load: float = 1.0, step: float = 1.0) -> A
         raise InputError(
             "ProgPy is not installed: pip install 'elevon[progpy]' (its licence is NASA's own)"
         ) from error
-    keys = [law.key for law in process.laws]
-    names = [f"{part} {key}" for part in ("damage", "growth", "form") for key in keys]
+    laws = process.laws
+    keys = [law.key for law in laws]
+    names = [name for law in laws for name in _names(law)]
+    begin = dict.fromkeys(names, 0.0) | {_names(law)[0]: law.start for law in laws}
     requirements = [item.name for item in process.response.requirements]
-    starts = [law.start for law in process.laws]
 
     class Actuator(PrognosticsModel):  # type: ignore[misc,unused-ignore]
         inputs: list[str] = []  # noqa: RUF012 - ProgPy's own form
@@ -58,28 +62,27 @@ def progpy_model(process: Process, *, load: float = 1.0, step: float = 1.0) -> A
         is_vectorized = False
 
         def initialize(self, _u: Any = None, _z: Any = None) -> Any:
-            zeros = [0.0] * len(keys)
-            return self.StateContainer(dict(zip(names, [*starts, *zeros, *zeros], strict=True)))
+            return self.StateContainer(begin)
 
         def next_state(self, x: Any, _u: Any, dt: float) -> Any:
-            units = _units(x, keys)
+            units = _units(x, laws)
             count = max(1, round(dt / step))
             for _ in range(count):
                 units = process.advance(units, dt / count, None, np.full(1, load))
-            return self.StateContainer(_states(units, 0, keys))
+            return self.StateContainer(_states(units, 0, laws))
 
         def output(self, x: Any) -> Any:
-            severity = process.severity(_units(x, keys).damage)[0]
+            severity = process.severity(_units(x, laws).damage)[0]
             return self.OutputContainer(dict(zip(keys, map(float, severity), strict=True)))
 
         def event_state(self, x: Any) -> dict[str, float]:
-            reserve = process.response.reserve(process.severity(_units(x, keys).damage))[:, 0]
+            reserve = process.response.reserve(process.severity(_units(x, laws).damage))[:, 0]
             return {
                 n: float(np.clip(r, 0.0, 1.0)) for n, r in zip(requirements, reserve, strict=True)
             }
 
         def threshold_met(self, x: Any) -> dict[str, bool]:
-            reserve = process.response.reserve(process.severity(_units(x, keys).damage))[:, 0]
+            reserve = process.response.reserve(process.severity(_units(x, laws).damage))[:, 0]
             return {n: bool(r < 0.0) for n, r in zip(requirements, reserve, strict=True)}
 
     return Actuator(process_noise=0.0, measurement_noise=0.0)
@@ -92,8 +95,7 @@ def to_samples(units: Population, process: Process) -> Any:
     """
     from progpy.uncertain_data import UnweightedSamples
 
-    keys = [law.key for law in process.laws]
-    return UnweightedSamples([_states(units, n, keys) for n in range(len(units.weight))])
+    return UnweightedSamples([_states(units, n, process.laws) for n in range(len(units.weight))])
 
 
 def from_samples(samples: Any, process: Process, *, usage: float = 0.0) -> Population:
@@ -104,52 +106,50 @@ def from_samples(samples: Any, process: Process, *, usage: float = 0.0) -> Popul
     InputError
         A state is missing.
     """
-    keys = [law.key for law in process.laws]
-    rows = []
-    for sample in samples:
-        missing = [n for key in keys for n in _names(key) if n not in sample]
-        if missing:
-            raise InputError(f"a sample has no state {missing[0]!r}")
-        rows.append([[float(sample[name]) for name in _names(key)] for key in keys])
-    table = np.array(rows)
-    growth = table[:, :, 1]
-    active = growth > _DORMANT
-    return Population(
-        damage=table[:, :, 0],
-        growth=np.where(active, growth, 0.0),
-        form=table[:, :, 2],
-        weight=np.full(len(table), 1.0 / len(table)),
-        active=active,
-        misfit=np.zeros_like(growth),
-        usage=usage,
-    )
+    samples = list(samples)
+    wanted = [name for law in process.laws for name in _names(law)]
+    missing = next((n for sample in samples for n in wanted if n not in sample), None)
+    if missing is not None:
+        raise InputError(f"a sample has no state {missing!r}")
+    units = _population(samples, process.laws, usage)
+    active = units.growth > _DORMANT
+    return replace(units, growth=np.where(active, units.growth, 0.0), active=active)
 
 
 _DORMANT = -600.0
 
 
-def _names(key: str) -> tuple[str, str, str]:
-    return f"damage {key}", f"growth {key}", f"form {key}"
+def _names(law: Law) -> tuple[str, ...]:
+    """Return the names of a law's states."""
+    return tuple(f"{part} {law.key}" for part in ("damage", "growth", "form", *law.spreading))
 
 
-def _units(x: Mapping[str, Any], keys: list[str]) -> Population:
+def _units(x: Mapping[str, Any], laws: Sequence[Law]) -> Population:
     """Return one unit of a state."""
-    rows = np.array([[float(np.asarray(x[name]).item()) for name in _names(key)] for key in keys])
-    growth = rows[None, :, 1]
-    return Population(
-        damage=np.maximum(rows[None, :, 0], 0.0),
-        growth=growth,
-        form=rows[None, :, 2],
-        weight=np.ones(1),
-        active=np.ones_like(growth, dtype=np.bool_),
-        misfit=np.zeros_like(growth),
-    )
+    units = _population([x], laws)
+    return replace(units, damage=np.maximum(units.damage, 0.0))
 
 
-def _states(units: Population, n: int, keys: list[str]) -> dict[str, float]:
+def _population(
+    rows: Sequence[Mapping[str, Any]], laws: Sequence[Law], usage: float = 0.0
+) -> Population:
+    """Return units of states; a growth of -700 as it is."""
+    most = max(len(_names(law)) for law in laws)
+    table = np.zeros((len(rows), len(laws), most))
+    for n, row in enumerate(rows):
+        for k, law in enumerate(laws):
+            values = [float(np.asarray(row[name]).item()) for name in _names(law)]
+            table[n, k, : len(values)] = values
+    damage, growth, form = np.moveaxis(table[:, :, :3], 2, 0)
+    units = Population.of(damage, growth, form=form, usage=usage)
+    return replace(units, own=table[:, :, 3:])
+
+
+def _states(units: Population, n: int, laws: Sequence[Law]) -> dict[str, float]:
     out: dict[str, float] = {}
-    for k, key in enumerate(keys):
+    for k, law in enumerate(laws):
         growth = units.growth[n, k] if units.active[n, k] else -700.0
-        values = (units.damage[n, k], growth, units.form[n, k])
-        out.update(zip(_names(key), map(float, values), strict=True))
+        own = units.own[n, k, : len(law.spreading)]
+        values = (units.damage[n, k], growth, units.form[n, k], *own)
+        out.update(zip(_names(law), map(float, values), strict=True))
     return out

@@ -72,15 +72,7 @@ class UnscentedFilter:
         return self._population(rows[:, :size], rows[:, size:])
 
     def _population(self, damage: Floats, growth: Floats) -> Population:
-        return Population(
-            np.maximum(damage, 0.0),
-            growth,
-            np.zeros_like(growth),
-            np.full(len(growth), 1.0 / len(growth)),
-            np.ones(growth.shape, dtype=np.bool_),
-            np.zeros_like(growth),
-            self.usage,
-        )
+        return Population.of(np.maximum(damage, 0.0), growth, usage=self.usage)
 
     def _grow(self, usage: float) -> None:
         if usage <= self.usage:

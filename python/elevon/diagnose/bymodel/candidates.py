@@ -33,8 +33,6 @@ class Candidate:
     sure : tuple of str
         Evidence whose shift is known; what moves beside it depends on an angle that no log tells,
         so it only makes that evidence uncertain. Empty: all of it.
-    switched : bool
-        Whether it is there or not: it acts in full from one half on.
     """
 
     kind: str
@@ -47,7 +45,6 @@ class Candidate:
     same: tuple[str, ...] = ()
     still: tuple[str, ...] = ()
     sure: tuple[str, ...] = ()
-    switched: bool = False
 
     @property
     def key(self) -> str:

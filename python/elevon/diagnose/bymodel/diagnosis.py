@@ -99,7 +99,7 @@ def answer_of(
     rate: float,
     findings: Sequence[str],
     *,
-    most: int | None = None,
+    pairs: bool = True,
 ) -> Diagnosis:
     """Return the answer of logs that stand against their healthy unit.
 
@@ -113,9 +113,8 @@ def answer_of(
         Of false alarms.
     findings : sequence of str
         What was seen before.
-    most : int, optional
-        Pairs of faults that are weighed, the most promising of a log that is called faulty;
-        default: all.
+    pairs : bool
+        Whether two faults at once are weighed.
     """
     begin = clock.perf_counter()
     rest, root, detector = detector_of(cases, candidates)
@@ -123,8 +122,8 @@ def answer_of(
     blind, least = limits(cases, candidates, root)
     # What the logs cannot show would keep its prior, whatever they say: it is told apart.
     seen = [c for c in candidates if c.key in least] or candidates
+    result = _weighed(cases, seen, pairs=pairs)
     faulty = ratio > detector.threshold(rate)
-    result = _weighed(cases, seen, pairs=faulty or most is None, most=most)
     best = next(h for h in result.hypotheses if bool(h.keys) or not faulty)
     known = {c.key: c for c in candidates}
     named = [(known[key], value) for key, value in zip(best.keys, best.best, strict=True)]
@@ -147,9 +146,7 @@ def answer_of(
     )
 
 
-def _weighed(
-    cases: Sequence[Case], candidates: Sequence[Candidate], *, pairs: bool, most: int | None
-) -> Posterior:
+def _weighed(cases: Sequence[Case], candidates: Sequence[Candidate], *, pairs: bool) -> Posterior:
     rest, covariance = joined(cases)
     return posterior(
         rest,
@@ -160,5 +157,4 @@ def _weighed(
         errors=np.concatenate([case.errors for case in cases]),
         doubt=lambda k, s: doubt_of(cases, k, s),
         pairs=pairs,
-        most=most,
     )

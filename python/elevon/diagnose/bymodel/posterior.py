@@ -19,7 +19,6 @@ from elevon.diagnose.bymodel.candidates import Candidate
 from elevon.diagnose.bymodel.weigh import (
     Frame,
     Hypothesis,
-    beside,
     healthy_alone,
     one_fault,
     two_faults,
@@ -31,7 +30,6 @@ Floats = npt.NDArray[np.float64]
 Shift = Callable[[str, Floats], Floats]
 PRIOR_FAULTY = 0.5  # ASSUMED: a log is diagnosed since somebody doubts
 SECOND = 0.1  # ASSUMED: a faulty unit has a second fault
-_FIRST = 6  # faults that a second one is sought beside, where not all pairs are weighed
 
 
 @dataclass(frozen=True)
@@ -63,7 +61,6 @@ def posterior(
     errors: Floats | None = None,
     doubt: Callable[[str, float], Floats] | None = None,
     pairs: bool = True,
-    most: int | None = None,
 ) -> Posterior:
     """Weigh the hypotheses.
 
@@ -85,9 +82,6 @@ def posterior(
         Key and severity to a deviation that the fault gives the evidence, shape (k,).
     pairs : bool
         Whether two faults at once are weighed.
-    most : int, optional
-        Pairs that are weighed: those that a coarse search beside the likeliest single faults finds
-        best; the others count as impossible. Default: all.
     """
     own = np.zeros(len(rest)) if errors is None else errors
     frame = Frame(rest, covariance, degrees, shift, own, doubt)
@@ -97,8 +91,6 @@ def posterior(
         out.append(one_fault(frame, c, PRIOR_FAULTY * (1.0 - SECOND) * c.rate / total))
     both = list(combinations(candidates, 2)) if pairs else []
     norm = sum(a.rate * b.rate for a, b in both) or 1.0
-    if most is not None and len(both) > most:
-        both = _promising(frame, candidates, out[1:], most)
     for a, b in both:
         out.append(two_faults(frame, (a, b), PRIOR_FAULTY * SECOND * a.rate * b.rate / norm))
     scores = np.array([h.evidence + np.log(h.prior) for h in out])
@@ -106,23 +98,6 @@ def posterior(
     probability /= probability.sum()
     order = np.argsort(-probability)
     return Posterior(tuple(out[k] for k in order), tuple(float(probability[k]) for k in order))
-
-
-def _promising(
-    frame: Frame, candidates: Sequence[Candidate], singles: Sequence[Hypothesis], most: int
-) -> list[tuple[Candidate, Candidate]]:
-    """Pairs that may explain the evidence best: a second fault beside each of the likeliest."""
-    known = {c.key: c for c in candidates}
-    order = {c.key: k for k, c in enumerate(candidates)}
-    ranked = sorted(singles, key=lambda h: -(h.evidence + float(np.log(h.prior))))
-    scores: dict[tuple[str, str], float] = {}
-    for h in ranked[:_FIRST]:
-        first = known[h.keys[0]]
-        for key, score in beside(frame, first, h.best[0], candidates).items():
-            pair = (key, first.key) if order[key] < order[first.key] else (first.key, key)
-            scores[pair] = max(score, scores.get(pair, -np.inf))
-    best = sorted(scores, key=lambda pair: -scores[pair])[:most]
-    return [(known[a], known[b]) for a, b in best]
 
 
 def marginals(result: Posterior, key: str) -> tuple[Floats, Floats]:

@@ -26,7 +26,7 @@ from elevon.prognose import (
 )
 from elevon.prognose.future import MODEL_ERROR, look_ahead
 from elevon.prognose.metrics import Track
-from elevon.prognose.particle import BIAS, resampled
+from elevon.prognose.particle import resampled
 from elevon.prognose.predict import LEVEL
 from elevon.prognose.process import Population
 from elevon.progress import Progress
@@ -172,7 +172,6 @@ def _remaining(
     process: Process, units: Population, mission: Mission, rng: np.random.Generator
 ) -> list[float]:
     """Return low, median, high of the remaining life, as `elevon predict` draws it."""
-    units = process.scaled(units, BIAS, rng)
     future = look_ahead(process, units, mission.usage, rng, model_error=MODEL_ERROR)
     return _quantiles(future.remaining)
 
