@@ -15,7 +15,16 @@ from elevon.prognose.metrics import Track
 from elevon.reproduce.prognosis import campaign
 from elevon.reproduce.prognosis.campaign import campaign_mission, reproduce_prognosis
 from elevon.reproduce.prognosis.result import PrognosisResult, UnitResult
-from elevon.reproduce.prognosis.truth import FAULTS, UnitTruth, inspections_of, other_law
+from elevon.reproduce.prognosis.truth import (
+    BASELINE_DAYS,
+    FAULTS,
+    INSPECTION_DAYS,
+    INSPECTIONS,
+    UnitTruth,
+    _of_the_baselines,
+    inspections_of,
+    other_law,
+)
 from elevon.reproduce.side_by_side import side_by_side
 
 
@@ -38,9 +47,37 @@ def test_inspections_err_as_said_and_name_what_they_do_not_see():
     assert np.diff(uses).min() >= 60.0
     assert np.diff(uses).max() <= 140.0
     shown = np.array([item.seen["short@motor.phase_a"].severity for item in seen])
-    assert shown.mean() == pytest.approx(0.2, abs=0.001)
-    assert shown.std() == pytest.approx(np.hypot(0.02 * 0.2, 0.003), rel=0.1)
+    drawn = INSPECTIONS["insulation"]
+    offset = shown.mean() - 0.2 - float(drawn.mean(np.array(0.2)))
+    assert abs(offset) < 3.0 * float(drawn.common(np.array(0.2)))
+    assert shown.std() == pytest.approx(float(drawn.own(np.array(0.2))), rel=0.1)
+    stated = [item.seen["short@motor.phase_a"].high for item in seen]
+    np.testing.assert_allclose(stated, drawn.stated(shown), rtol=1e-6)
     assert all(item.seen["play@transmission"].severity is None for item in seen)
+
+
+def test_friction_is_said_against_the_healthy_days_and_not_beyond_what_diagnosis_looks_at():
+    """(1 + said) scatters as (1 + severity) does; an edge leaves open what is above it."""
+    drawn, rng = INSPECTIONS["lubricant_loss"], np.random.default_rng(0)
+    said = np.array([drawn.said(1.0, (0.0, 0.0, 0.03), rng) for _ in range(2000)])
+    day = np.log1p(said - float(drawn.mean(np.array(1.0)))) - np.log(2.0)
+    assert day.mean() == pytest.approx(-0.03, abs=0.002)
+    whole = np.hypot(drawn.of_the_day / np.sqrt(INSPECTION_DAYS), 0.5 * drawn.absolute)
+    assert day.std() == pytest.approx(whole, rel=0.08)
+    base, usage = Actuator.load("torino-rotary"), np.linspace(0.0, 1e4, 50)
+    truth = UnitTruth(1, "lubricant_loss", Life(usage, np.full((50, 1), 2.6), 1e4, 0), base)
+    own = inspections_of(truth, campaign_mission().laws(), 100.0, seed=0)
+    seen = [item.seen["friction@transmission"] for item in own]
+    assert max(item.severity for item in seen) == 2.0
+    assert np.median([item.high for item in seen]) > 2.0
+
+
+def test_the_calibrated_set_has_the_friction_of_the_healthy_days():
+    """What is said against those days is looked at in a set of those days: their part cancels."""
+    deviations = np.array([_of_the_baselines(k, 0) for k in range(400)])
+    day = INSPECTIONS["lubricant_loss"].of_the_day / np.sqrt(BASELINE_DAYS)
+    assert deviations.std() == pytest.approx(day, rel=0.1)
+    assert _of_the_baselines(3, 0) == deviations[3]
 
 
 def test_the_truth_has_other_laws_than_the_filter():

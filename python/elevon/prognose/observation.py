@@ -15,12 +15,13 @@ from elevon.errors import InputError, quoted
 if TYPE_CHECKING:
     from elevon.prognose.law import Law
 
-__all__ = ["COMMON", "Inspection", "Seen", "inspection"]
+__all__ = ["COMMON", "SIGMAS", "Inspection", "Seen", "inspection"]
 
 Floats = npt.NDArray[np.float64]
-_SIGMAS = 1.6449  # of a 90 % interval's half width
+SIGMAS = 1.6449  # of a 90 % interval's half width
 _DETECTED = 3.0  # deviations at which a severity counts as seen
 _AT_EDGE = 0.98
+_LEAST = 0.005  # of the severity: no diagnosis is believed to be better; ASSUMED
 _OUTLIER = 0.02  # share of diagnoses that say nothing true; ASSUMED
 _BELIEF = 2.0  # diagnoses that the stated deviations count for against the scatter seen; ASSUMED
 _LARGEST = 3.0  # deviations beyond which a diagnosis is taken as stray, not as scatter
@@ -233,9 +234,9 @@ def _read(cause: Mapping[str, Any], limit: float | None, place: str) -> Seen:
         raise InputError(f"{place}: severity {severity:g} is not within {low:g} to {high:g}")
     if high >= _AT_EDGE * _edge(str(cause["kind"])):  # it may be more than is looked at
         high = max(high, severity) + 4.0 * abs(severity)
-    floor = 0.02 * max(abs(severity), limit or 0.0) or 1e-9
+    floor = _LEAST * max(abs(severity), limit or 0.0) or 1e-9
     return Seen(
         severity,
-        max((severity - low) / _SIGMAS, floor),
-        max((high - severity) / _SIGMAS, floor),
+        max((severity - low) / SIGMAS, floor),
+        max((high - severity) / SIGMAS, floor),
     )

@@ -1,7 +1,11 @@
-"""`elevon reproduce diagnosis-limits` and `monitor-delay`: how small a fault is seen, how soon."""
+"""`elevon reproduce diagnosis-limits`, `monitor-delay` and `inspection-error`.
+
+How small a fault is seen, how soon, and how far the severity errs.
+"""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -15,6 +19,11 @@ if TYPE_CHECKING:
 __all__ = ["CASES"]
 
 _UNITS = Annotated[int, typer.Option("--units", min=1, help="Benches, 39 streams each.")]
+_INSPECTED = Annotated[int, typer.Option("--units", min=2, help="Benches, 40 inspections each.")]
+_KEPT = Annotated[
+    Path | None,
+    typer.Option("--runs", metavar="DIR", help="Keeps what is finished, and goes on from there."),
+]
 _RUNS = Annotated[int, typer.Option("--runs", min=1, help="Units of the bench, 95 logs each.")]
 
 
@@ -30,6 +39,26 @@ def _watch(options: Options, progress: Advance) -> Any:
     from elevon.reproduce.monitor_delay import reproduce_monitor_delay
 
     return reproduce_monitor_delay(seed=options["seed"], units=options["units"], progress=progress)
+
+
+def _inspect(options: Options, progress: Advance) -> Any:
+    from elevon.reproduce.inspection_error.result import reproduce_inspection_error
+
+    return reproduce_inspection_error(
+        seed=options["seed"], units=options["units"], folder=options["runs"], progress=progress
+    )
+
+
+def _show_inspect(values: Values, _result: Any) -> None:
+    columns = ("fault", "severity", "inspections", "seen", "interval", "error_median", "others")
+    print_columns(values["detection"], columns, "inspections that see a severity")
+    deviations = ("fault", "relative", "absolute", "common_relative", "common_absolute",
+                  "stated_relative", "stated_absolute", "stated_over_scatter",
+                  "coverage")  # fmt: skip
+    print_columns(values["rows"], deviations, "deviations, and what intervals state")
+    for row in values["rows"]:
+        text = ", ".join(f"{error:+.3g} at {severity:.3g}" for severity, error in row["offset"])
+        say(f"{row['fault']}: mean error {text} {row['unit']}")
 
 
 def _show_watch(values: Values, _result: Any) -> None:
@@ -75,5 +104,13 @@ CASES = (
         _watch,
         _show_watch,
         options={"units": (_UNITS, 3)},
+    ),
+    Case(
+        "inspection-error",
+        "Inspect units by three logs each: how far the severities of play, friction, short err.",
+        "making and diagnosing inspections",
+        _inspect,
+        _show_inspect,
+        options={"units": (_INSPECTED, 6), "runs": (_KEPT, None)},
     ),
 )

@@ -15,7 +15,7 @@ import numpy as np
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["BASE", "Unit", "draw_unit", "of_the_day"]
+__all__ = ["BASE", "DAILY", "Unit", "draw_unit", "of_the_day"]
 
 BASE = "torino-rotary"
 
@@ -53,7 +53,7 @@ _BETWEEN = {
     "pwm.proportional_gain": 0.15,
 }
 #: Path to the deviation from day to day: share of the unit's value.
-_DAILY = {
+DAILY = {
     "motor.emf_constant": 0.007,
     "friction.dynamic": 0.04,
     "friction.static": 0.04,
@@ -120,7 +120,7 @@ def of_the_day(unit: Unit, seed: int) -> Actuator:
     rng = np.random.default_rng([seed, 102])
     value = unit.actuator.parameters.value
     values: dict[str, float | str] = {}
-    steps = {path: _factor(rng, spread) for path, spread in _DAILY.items()}
+    steps = {path: _factor(rng, spread) for path, spread in DAILY.items()}
     steps["friction.static"] = steps["load.friction"] = steps["friction.dynamic"]
     for path, step in steps.items():
         values[path] = value(path) * step
