@@ -163,8 +163,12 @@ def test_the_command_line(screw, tmp_path, capsys):
     path = tmp_path / "log.csv"
     log(screw, day=5).save(path)
     code = main(["diagnose", str(path), "--actuator", "nasa-ballscrew", "--fault",
-                 "play@transmission", "--json"])  # fmt: skip
+                 "play@transmission", "--json",
+                 "--report", str(tmp_path / "page.html")])  # fmt: skip
     assert code == 0
+    page = (tmp_path / "page.html").read_text()
+    assert "Signals against the healthy model" in page
+    assert "play@transmission" in page.partition("What these logs can tell")[2]
     assert '"status": "healthy"' in capsys.readouterr().out
     asked = ["--actuator", "nasa-ballscrew", "--method", "surrogate"]
     assert main(["diagnose", str(path), *asked]) == 2

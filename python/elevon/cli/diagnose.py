@@ -86,10 +86,11 @@ def diagnose(
     if model.wiring != "rotary":
         if method != "model":
             raise InputError(f"--method {method}: serves rotary actuators; {model.name} is none")
-        result = _by_roles(
-            model, logs, baseline or [], column_map, faults=fault, false_alarm=false_alarm
-        )
-        return _shown(result, method, model.name, report, json=json, force=force)
+        result, traces = _by_roles(
+            model, logs, baseline or [], column_map, faults=fault, false_alarm=false_alarm,
+            drawn=report is not None,
+        )  # fmt: skip
+        return _shown(result, method, model.name, report, traces=traces, json=json, force=force)
     data = read_with(logs, loadcell, command, column_map)
     healthy = read_test_logs(without_companions(baseline or []), column_map=column_map)
     result = run(data, model, baselines=healthy, faults=fault, false_alarm=false_alarm)
@@ -123,17 +124,21 @@ def _by_roles(
     *,
     faults: list[str] | None,
     false_alarm: float,
-) -> Diagnosis:
-    """Diagnose an actuator whose logs are read by roles."""
+    drawn: bool,
+) -> tuple[Diagnosis, list[Traces]]:
+    """Diagnose an actuator whose logs are read by roles; with their signals, if drawn."""
     from elevon.cli.closed_loop import read_recording
     from elevon.diagnose.byroles import diagnose_by_roles
+    from elevon.diagnose.byroles.traces import traces_by_roles
 
     def read(paths: list[Path]) -> list[tuple[str, Recording]]:
         return [(path.name, read_recording(path, column_map)) for path in without_companions(paths)]
 
-    return diagnose_by_roles(
-        read(logs), model, baselines=read(baseline), faults=faults, false_alarm=false_alarm
+    data = read(logs)
+    result = diagnose_by_roles(
+        data, model, baselines=read(baseline), faults=faults, false_alarm=false_alarm
     )
+    return result, traces_by_roles(data, model, result) if drawn else []
 
 
 def _shown(

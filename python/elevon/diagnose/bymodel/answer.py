@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -182,6 +183,8 @@ class Diagnosis:
         Sets of faults that are still possible, most probable first.
     alternatives : tuple of Alternative
         A healthy unit and the other single faults, and what speaks against each.
+    units : mapping of str to str
+        Unit of each candidate's severity, by ``KIND@PLACE``.
     """
 
     logs: tuple[str, ...]
@@ -199,6 +202,7 @@ class Diagnosis:
     seconds: float = field(compare=False)
     hypotheses: tuple[Explanation, ...] = ()
     alternatives: tuple[Alternative, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""

@@ -143,6 +143,7 @@ def answer_of(
         seconds=clock.perf_counter() - begin,
         hypotheses=explanations(result, candidates),
         alternatives=alternatives(result, cases, candidates, best.keys),
+        units={c.key: c.unit for c in candidates},
     )
 
 

@@ -61,7 +61,9 @@ def diagnosis_page(
     if result.alternatives:
         _alternatives(report, result)
     limits = report.section("What these logs can tell")
-    seen = [(key, severity_text(value, _unit(key))) for key, value in result.detectable.items()]
+    seen = [
+        (key, severity_text(value, result.units[key])) for key, value in result.detectable.items()
+    ]
     blind = [(f"{i['kind']}@{i['place']}", i["reason"]) for i in result.unobservable]
     limits.table(
         Table(
@@ -75,12 +77,6 @@ def diagnosis_page(
     for text in result.findings:
         limits.text(text)
     return report
-
-
-def _unit(key: str) -> str:
-    from elevon.diagnose.bymodel.candidates import CANDIDATES
-
-    return next(c.unit for c in CANDIDATES if c.key == key)
 
 
 def _by_network(result: Diagnosis) -> bool:
@@ -117,11 +113,9 @@ def _signals(report: Report, traces: Sequence[Traces]) -> None:
         return
     section = report.section("Signals against the healthy model")
     for item in traces:
-        named = ", and with what is named" if item.panels[0].named is not None else ""
-        text = "The log, the calibrated healthy model in the same test"
-        section.figure(
-            traces_figure(item), f"{item.name}. {text}{named}; means of short stretches."
-        )
+        named = " and the model with what is named" if item.panels[0].named is not None else ""
+        text = f"{item.name} over the healthy model in the same test{named}"
+        section.figure(traces_figure(item), f"{text}; means of short stretches.")
 
 
 def _evidence(report: Report, result: Diagnosis) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
+
+from elevon.units import shown_unit, to_display
 
 if TYPE_CHECKING:
     from elevon.diagnose.bymodel.answer import Cause, Diagnosis
@@ -26,17 +27,20 @@ _NAMES = {
     "tooth_wear@gear": "Worn teeth have added a play of",
     "sag@supply": "The supply has lost",
     "bearing@bearing.outer": "A bearing has a defect of",
+    "bearing_wear@motor.bearing": "The motor's bearing rubs with",
+    "brake_dragging@brake": "The brake drags with",
+    "friction_growth@screw": "The screw's friction has grown by",
+    "efficiency_loss@screw": "The screw has lost efficiency:",
+    "lubrication_loss@screw": "The screw has lost lubricant:",
+    "adapter_gap@adapter": "The adapter's gap has grown by",
 }
 UNEXPLAINED = "does not explain"  # of the finding that the named faults leave a rest
 
 
 def severity_text(value: float, unit: str) -> str:
-    """Return a severity as a person says it: angles in degrees, shares in percent."""
-    if unit == "rad":
-        return f"{math.degrees(value):.3g} deg"
-    if unit == "1":
-        return f"{100.0 * value:.3g} %"
-    return f"{value:.4g} {unit}"
+    """Return a severity as a person says it: angles in degrees, lengths in mm, shares in %."""
+    shown = "%" if unit == "1" else shown_unit(unit)
+    return f"{float(to_display(value, shown)):.3g} {shown}"
 
 
 def sentence(result: Diagnosis) -> str:
@@ -64,11 +68,20 @@ def sentence(result: Diagnosis) -> str:
     return f"{' and '.join(parts)}; {rest} (probability {result.p_best:.3g})."
 
 
+def _said(key: str) -> str:
+    """How a cause begins a sentence; of one without words of its own, by kind and place."""
+    kind, _, place = key.partition("@")
+    part = place.replace(".", " ").replace("_", " ")
+    plain = kind.replace("_", " ")
+    at = "" if part in plain else f" at the {part}"
+    return _NAMES.get(key, f"There is {plain}{at}:")
+
+
 def _clause(key: str, cause: Cause) -> str:
     low, high = (severity_text(v, cause.unit) for v in cause.interval)
     unit = low.partition(" ")[2]
     text = (
-        f"{_NAMES.get(key, key)} {severity_text(cause.severity, cause.unit)} "
+        f"{_said(key)} {severity_text(cause.severity, cause.unit)} "
         f"({low.removesuffix(f' {unit}')} to {high})"
     )
     if not cause.equivalents:

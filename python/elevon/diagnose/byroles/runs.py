@@ -21,7 +21,7 @@ from elevon.diagnose.byroles.spread import daily, factors_of
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["RoleReplay", "Unit", "numbers_of_log", "replay_by_roles", "shown_by"]
+__all__ = ["RoleReplay", "Unit", "channels_by", "numbers_of_log", "replay_by_roles", "shown_by"]
 
 Floats = npt.NDArray[np.float64]
 _DRAWS = 28
@@ -237,7 +237,15 @@ def numbers_of_log(item: RoleLog, actuator: Actuator, channels: Mapping[str, Flo
 
 
 def shown_by(item: RoleLog, actuator: Actuator, units: Sequence[Unit]) -> Iterator[Numbers]:
-    """Run units through a log's test; numbers of each by the log's roles.
+    """Run units through a log's test; numbers of each by the log's roles."""
+    for channels in channels_by(item, actuator, units):
+        yield numbers_of_log(item, actuator, channels)
+
+
+def channels_by(
+    item: RoleLog, actuator: Actuator, units: Sequence[Unit]
+) -> Iterator[dict[str, Floats]]:
+    """Run units through a log's test; what each shows by the log's roles, on its instants.
 
     One run is prepared; the others exchange parameters and faults in what goes to the core.
     """
@@ -261,8 +269,7 @@ def shown_by(item: RoleLog, actuator: Actuator, units: Sequence[Unit]) -> Iterat
         for unit, result in zip(units[first : first + _CHUNK], shown, strict=True):
             rows = result["clocks"][base.plan[0].name]
             late = unit.late if actions else unit.late + unit.phase
-            channels = _channels(item, rows, base.plan[0].signals, signals, late / item.rate)
-            yield numbers_of_log(item, actuator, channels)
+            yield _channels(item, rows, base.plan[0].signals, signals, late / item.rate)
 
 
 def _of_unit(

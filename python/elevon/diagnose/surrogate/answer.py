@@ -93,6 +93,7 @@ def diagnose_by_surrogate(
         findings=tuple(findings),
         seconds=clock.perf_counter() - begin,
         hypotheses=_explanations(said, candidates),
+        units={c.key: c.unit for c in candidates},
     )
 
 

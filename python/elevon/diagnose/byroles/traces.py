@@ -1,0 +1,60 @@
+"""A log's signals by role beside those of the model in the same test."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.diagnose.byroles.log import RoleLog, role_log
+from elevon.diagnose.byroles.runs import Unit, channels_by
+from elevon.diagnose.pictures import Panel, Traces, named_faults
+from elevon.units import to_display
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.diagnose.bymodel.answer import Diagnosis
+    from elevon.recording import Recording
+
+__all__ = ["traces_by_roles"]
+
+Floats = npt.NDArray[np.float64]
+#: Roles that are drawn, the first three of a log; lengths in mm.
+_DRAWN = (
+    "output_position", "torque_current", "motor_speed", "supply_current", "torque_voltage", "state",
+)  # fmt: skip
+_MOST = 3
+
+
+def traces_by_roles(
+    logs: Sequence[tuple[str, Recording]], actuator: Actuator, result: Diagnosis
+) -> list[Traces]:
+    """Return each log's signals beside the healthy model's and those with what is named.
+
+    Parameters
+    ----------
+    logs : sequence of (str, Recording)
+        Those that were diagnosed.
+    actuator : Actuator
+        The healthy unit.
+    result : Diagnosis
+        The answer.
+    """
+    texts = tuple(f"{key}={value!r}" for key, value in named_faults(result).items())
+    units = [Unit({})] + ([Unit({}, texts)] if texts else [])
+    items = [role_log(recording, name, actuator) for name, recording in logs]
+    return [_traces(item, actuator, units) for item in items]
+
+
+def _traces(item: RoleLog, actuator: Actuator, units: Sequence[Unit]) -> Traces:
+    shown: list[Mapping[str, Floats]] = [item.channels, *channels_by(item, actuator, units)]
+    roles = [role for role in _DRAWN if all(role in channels for channels in shown)]
+    panels = []
+    for role in roles[:_MOST]:
+        unit = "mm" if item.units[role] == "m" else item.units[role]
+        lines = [np.asarray(to_display(channels[role], unit)) for channels in shown]
+        name = role.replace("_", " ").capitalize()
+        panels.append(Panel(name, unit, lines[0], lines[1], lines[2] if len(lines) > 2 else None))
+    return Traces(item.name, item.time, panels)
