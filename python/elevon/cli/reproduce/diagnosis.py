@@ -20,7 +20,7 @@ __all__ = ["CASES"]
 
 _UNITS = Annotated[int, typer.Option("--units", min=1, help="Benches, 39 streams each.")]
 _INSPECTED = Annotated[int, typer.Option("--units", min=2, help="Benches, 40 inspections each.")]
-_KEPT = Annotated[
+_FOLDER = Annotated[
     Path | None,
     typer.Option("--runs", metavar="DIR", help="Keeps what is finished, and goes on from there."),
 ]
@@ -111,6 +111,6 @@ CASES = (
         "making and diagnosing inspections",
         _inspect,
         _show_inspect,
-        options={"units": (_INSPECTED, 6), "runs": (_KEPT, None)},
+        options={"units": (_INSPECTED, 6), "runs": (_FOLDER, None)},
     ),
 )

@@ -74,9 +74,9 @@ def fitted(groups: Sequence[Group], counts: Floats | None = None) -> Scatter:
     def surprise(x: Floats) -> float:
         return float(weights @ _surprise(np.exp(x) * scale, groups))
 
-    starts = (np.log([0.3, 0.3, 0.3, 0.3]), np.log([0.5, 0.05, 0.3, 0.01]))
+    starts = [np.log([0.3, 0.3, 0.3, 0.3]), np.log([0.5, 0.05, 0.3, 0.01])]
     if counts is not None:
-        starts = starts[:1]
+        starts.pop()
     results = [
         minimize(surprise, start, bounds=bounds, options={"maxiter": 60}) for start in starts
     ]
