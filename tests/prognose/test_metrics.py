@@ -74,3 +74,16 @@ def test_tracks_that_are_none():
         track(0.0, end=0.0)
     with pytest.raises(InputError, match="no prediction"):
         relative_accuracy(track(0.0, usage=[60, 70]), 0.5)
+
+
+def test_the_picture_shows_each_metric_at_its_value():
+    from elevon.prognose.metric_figures import metrics_figure
+
+    tracks = [track(0.0), track(5.0), track(30.0, width=1.0)]
+    wedge, band, rates = metrics_figure(tracks, shares=(0.5, 0.9)).axes
+    assert [line.get_ydata()[0] for line in wedge.lines[1:]] == pytest.approx([1.0, 1.05, 1.3])
+    dots = [line for line in band.lines if line.get_marker() == "o"]
+    assert [dot.get_xdata()[0] for dot in dots] == pytest.approx([0.0, 0.0])  # the third has none
+    middle, held = rates.lines
+    np.testing.assert_allclose(middle.get_ydata(), [0.9, 0.5])
+    np.testing.assert_allclose(held.get_ydata(), [2 / 3, 2 / 3])

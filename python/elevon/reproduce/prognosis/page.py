@@ -2,20 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-import numpy as np
-
-from elevon.prognose.metrics import Track
+from elevon.prognose.metric_figures import metrics_figure
 from elevon.report import Report, Table
-from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.prognosis.result import SHARES, PrognosisResult
 from elevon.reproduce.provenance import provenance
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["alpha_lambda_figure", "prognosis_report"]
+__all__ = ["prognosis_report"]
 
 
 def prognosis_report(result: PrognosisResult, *, seed: int, date: str | None = None) -> Report:
@@ -45,9 +37,11 @@ def prognosis_report(result: PrognosisResult, *, seed: int, date: str | None = N
     for law in dict.fromkeys(u.law for u in result.units):
         tracks = [u.track for u in result.units if u.law == law]
         section.figure(
-            alpha_lambda_figure(tracks),
-            f"{law}: predicted remaining life of each unit, in lives, over the share of life; the "
-            "wedge is 20 % about the truth.",
+            metrics_figure(tracks, shares=SHARES),
+            f"{law}. Left: predicted remaining life of each unit, the wedge is 20 % about the "
+            "truth. Middle: its error; a dot where the last stretch within 20 % of the life begins "
+            "(strict horizon). Right: relative accuracy, median and 80 % of the units, and how "
+            "many 90 % intervals hold the truth.",
         )
     report.section("Checks").checks(result.checks)
     report.provenance(provenance("elevon reproduce prognosis", Seed=seed))
@@ -56,24 +50,3 @@ def prognosis_report(result: PrognosisResult, *, seed: int, date: str | None = N
 
 def _key(share: float) -> str:
     return f"ra_{share:.0%}".replace("%", "")
-
-
-def alpha_lambda_figure(tracks: list[Track], alpha: float = 0.2) -> Figure:
-    """Draw predicted over true remaining life, all in lives."""
-    with new_figure(width=8.0, height=3.4) as (figure, axis):
-        truth = np.linspace(1.0, 0.0, 50)
-        axis.fill_between(
-            1.0 - truth, (1.0 - alpha) * truth, (1.0 + alpha) * truth, color=COLOURS["green"],
-            alpha=0.2, lw=0,
-        )  # fmt: skip
-        axis.plot(1.0 - truth, truth, color=COLOURS["green"])
-        for track in tracks:
-            life = track.end - track.start
-            axis.plot(
-                (track.usage - track.start) / life, track.median / life, color=COLOURS["orange"],
-                lw=0.8, alpha=0.7,
-            )  # fmt: skip
-        axis.set(
-            xlim=(0.0, 1.0), ylim=(0.0, 1.6), xlabel="share of life", ylabel="remaining [lives]"
-        )
-    return figure
