@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.calibrate.brake_level import Brake, brake_of
+from elevon.calibrate.thin import thinned
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
@@ -140,7 +141,7 @@ def read_logs(
 
 
 def bench_log(imported: ImportedLog) -> BenchLog:
-    """Take what calibration needs from an imported log; errors as `read_logs`."""
+    """Take what calibration needs from an imported log, thinned; errors as `read_logs`."""
     recording, report = imported.recording, imported.report
     name = Path(report.source).name
     for needed in _NEEDED:
@@ -166,7 +167,7 @@ def bench_log(imported: ImportedLog) -> BenchLog:
         raise InputError(f"{name}: {int(good.sum())} samples are complete; {_LEAST_SAMPLES} needed")
     ref, speed, current = (_filled(time, column) for column in columns)
     target = _optional(recording, time, "current_ref")
-    return BenchLog(
+    log = BenchLog(
         name=name,
         start=start,
         time=time,
@@ -182,6 +183,7 @@ def bench_log(imported: ImportedLog) -> BenchLog:
         good=good,
         warnings=tuple(f"{f.place}: {f.text}" for f in report.findings if f.level == "warning"),
     )
+    return thinned(log)
 
 
 def _filled(time: Floats, values: Floats) -> Floats:

@@ -190,7 +190,7 @@ def _method(method: str, file: Path | None) -> Callable[..., Diagnosis]:
 
 
 def _print(result: Diagnosis) -> None:
-    from elevon.diagnose.bymodel.words import sentence
+    from elevon.diagnose.bymodel.words import by_reason, sentence
 
     say(sentence(result))
     rows = [
@@ -203,7 +203,7 @@ def _print(result: Diagnosis) -> None:
         for c in result.faults
     ]
     print_table(("cause", "probability", "severity", "low", "high", "not separable from"), rows)
-    for item in result.unobservable:
-        say(f"not observable: {item['kind']}@{item['place']}: {item['reason']}")
+    for names, reason in by_reason(result.unobservable):
+        say(f"not observable: {names}: {reason}")
     for text in result.findings:
         say(text)

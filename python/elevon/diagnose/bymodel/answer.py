@@ -185,6 +185,9 @@ class Diagnosis:
         A healthy unit and the other single faults, and what speaks against each.
     units : mapping of str to str
         Unit of each candidate's severity, by ``KIND@PLACE``.
+    p_other : float
+        Probability of a fault that is not weighed; part of `p_fault`. Where it is the most
+        probable, a faulty unit has an empty `best`.
     """
 
     logs: tuple[str, ...]
@@ -203,12 +206,14 @@ class Diagnosis:
     hypotheses: tuple[Explanation, ...] = ()
     alternatives: tuple[Alternative, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
+    p_other: float = 0.0
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
         return {
             "status": self.status,
             "p_fault": self.p_fault,
+            "p_other": self.p_other,
             "false_alarm": self.false_alarm,
             "chance": self.chance,
             "faults": [cause.to_dict() for cause in self.faults],

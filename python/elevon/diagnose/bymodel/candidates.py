@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from elevon.diagnose.bymodel.declined import declined
 from elevon.errors import InputError, unknown
 
-__all__ = ["CANDIDATES", "DECLINED", "Candidate", "chosen"]
+__all__ = ["CANDIDATES", "Candidate", "chosen"]
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,8 @@ class Candidate:
     sure : tuple of str
         Evidence whose shift is known; what moves beside it depends on an angle that no log tells,
         so it only makes that evidence uncertain. Empty: all of it.
+    akin : tuple of (str, str)
+        Faults that are not weighed themselves, since in closed form they move the same evidence.
     """
 
     kind: str
@@ -45,6 +48,7 @@ class Candidate:
     same: tuple[str, ...] = ()
     still: tuple[str, ...] = ()
     sure: tuple[str, ...] = ()
+    akin: tuple[tuple[str, str], ...] = ()
 
     @property
     def key(self) -> str:
@@ -73,6 +77,13 @@ _VOLTAGES = ("voltage_per_speed", "voltage_order_1", "voltage_order_2", "voltage
 #
 # A current sensor's gain leaves the motor as it is, so its EMF stays balanced; the low model puts
 # the wrong current into the motor's constants and moves the voltage as a short would.
+#
+# A weak pole pair multiplies the coefficient of phase j by a window of
+# theta_m - phi - 2 pi (j-1)/3, whose first harmonic is a dynamic eccentricity: the same sideband.
+#
+# An encoder's gain is seen as the ratio of the two positions, and so is, with the other sign, a
+# resolver's. Whether it reaches the position loop depends on where the drive closes it, which no
+# healthy log tells.
 CANDIDATES: tuple[Candidate, ...] = (
     Candidate("play", "transmission", "rad", 0.0, 0.03, _BEARING, 0.01),
     Candidate("friction", "transmission", "1", 0.0, 2.0, _BEARING / 3, 0.08),
@@ -80,24 +91,18 @@ CANDIDATES: tuple[Candidate, ...] = (
     Candidate("short", _PHASES[0], "1", 0.0, 0.6, _MOTOR / 4, 0.10, _PHASES[1:]),
     Candidate("eccentricity_static", "motor", "1", 0.0, 0.6, _MOTOR / 4, 0.05),
     Candidate("eccentricity_dynamic", "motor", "1", 0.0, 0.6, _MOTOR / 4, 0.10,
-              sure=("current_sideband", "voltage_sideband")),
+              sure=("current_sideband", "voltage_sideband"),
+              akin=(("local_demagnetisation", "motor"),)),
     Candidate("demagnetisation", "motor", "1", 0.0, 0.4, _MOTOR / 4, 0.05),
     Candidate("unbalance", "motor.rotor", "kg m2", 0.0, 4e-4, _BEARING / 10, 0.05),
     Candidate("gain_drift", "control.position", "1", -0.4, 0.6, _SENSOR / 2, 0.003),
     Candidate("gain_drift", "control.speed", "1", -0.5, 1.0, _SENSOR / 2, 0.05),
-    Candidate("gain", "sensor.encoder", "1", -0.04, 0.04, _SENSOR, 0.01),
+    Candidate("gain", "sensor.encoder", "1", -0.04, 0.04, _SENSOR, 0.01, sure=("position_scale",),
+              akin=(("gain", "sensor.resolver"),)),
     Candidate("gain", _CURRENTS[0], "1", -0.3, 0.3, _SENSOR / 3, 0.10, _CURRENTS[1:], _VOLTAGES),
     Candidate("tooth_wear", "gear", "rad", 0.0, 0.006, _BEARING / 10, 0.50),
     Candidate("sag", "supply", "1", 0.0, 0.4, _CONNECTOR, 0.10),
     Candidate("bearing", _RINGS[0], "m", 0.0, 0.005, _BEARING / 3, 0.30, _RINGS[1:]),
-)  # fmt: skip
-
-#: Faults that are not weighed, with the reason.
-DECLINED: tuple[tuple[str, str, str], ...] = (
-    ("open_phase", _PHASES[0], "with it the unit hardly moves, and such a log is refused; where it "
-     "still moves the low model does not show what the motor does, and a short may be named"),
-    ("bearing", "bearing.cage", "on the whole it adds dry friction and is named friction; how that "
-     "changes once a turn of the cage is not looked for"),
 )  # fmt: skip
 
 
@@ -115,11 +120,11 @@ def chosen(texts: Sequence[str] | None) -> tuple[Candidate, ...]:
         return CANDIDATES
     out: list[Candidate] = []
     names = [f"{c.kind}@{p}" for c in CANDIDATES for p in (c.place, *c.same)]
+    reasons = {f"{item['kind']}@{item['place']}": item["reason"] for item in declined()}
     for text in texts:
         key = text.strip()
-        for kind, place, reason in DECLINED:
-            if key == f"{kind}@{place}":
-                raise InputError(f"--fault {key}: not weighed by the model: {reason}")
+        if key in reasons:
+            raise InputError(f"--fault {key}: not weighed by the model: {reasons[key]}")
         if key not in names:
             raise unknown("fault", key, names, "--fault")
         item = next(c for c in CANDIDATES if key in {f"{c.kind}@{p}" for p in (c.place, *c.same)})

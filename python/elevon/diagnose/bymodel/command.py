@@ -69,7 +69,9 @@ def noted_command(log: BenchLog, limit: float) -> NotedCommand | None:
     """
     if log.note is None or log.user is None or log.note.waveform not in ("sine", "chirp"):
         return None
-    inside = log.good & (np.abs(log.speed_ref) < 0.999 * limit) & np.isfinite(log.user)
+    # A sample beside one at the limit may be the mean of both.
+    cut = np.pad(np.abs(log.speed_ref) >= 0.999 * limit, 1)
+    inside = log.good & ~(cut[:-2] | cut[1:-1] | cut[2:]) & np.isfinite(log.user)
     known = log.note.parameters
     if inside.sum() < _LEAST:
         return None
@@ -99,7 +101,8 @@ def _chirp(first: float, last: float, sweep: float) -> Phase:
 
 
 def _columns(log: BenchLog, turn: Floats, at: npt.NDArray[np.intp]) -> list[Floats]:
-    return [np.sin(turn), np.cos(turn), np.ones(len(turn)), -log.speed_ref[at]]
+    ref = log.speed_ref[at]
+    return [np.sin(turn), np.cos(turn), np.ones(len(turn)), -ref, np.sign(ref)]
 
 
 def _scanned(log: BenchLog, inside: Bools, phase: Phase) -> float:
@@ -151,7 +154,7 @@ def _step(
     bend = slope * (beta[0] * columns[1] - beta[1] * columns[0])
     both, covariance = regress([*columns, bend], log.user[at])
     rest = log.user[at] - both @ np.stack([*columns, bend])
-    return beta, covariance, rest, float(both[4])
+    return beta, covariance, rest, float(both[-1])
 
 
 def _explained(

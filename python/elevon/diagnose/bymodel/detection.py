@@ -1,4 +1,8 @@
-"""Healthy or not at a set rate of false alarms: the best fault's likelihood ratio, by draws."""
+"""Healthy or not at a set rate of false alarms: the best fault's likelihood ratio, by draws.
+
+Beside it, for a share of the rate, how far the evidence stands off in any direction: a fault that
+is not among the candidates is none of a healthy unit either.
+"""
 
 from __future__ import annotations
 
@@ -24,19 +28,24 @@ class Detector:
         Whether the shift may have either sign.
     degrees : float
         Of freedom of Student's distribution.
+    anywhere : float
+        Share of the false-alarm rate for deviations in any direction.
     """
 
-    def __init__(self, directions: Floats, both: Sequence[bool], degrees: float) -> None:
+    def __init__(
+        self, directions: Floats, both: Sequence[bool], degrees: float, anywhere: float = 0.0
+    ) -> None:
         size = np.linalg.norm(directions, axis=1)
         seen = size > 1e-9
         self._ways = directions[seen] / size[seen, None]
         self._both = np.array(both)[seen]
-        self._degrees = degrees
+        self._degrees, self._anywhere = degrees, anywhere
         rng = np.random.default_rng(15)
         width = directions.shape[1]
         chi = rng.chisquare(degrees, _DRAWS) / degrees
         healthy = rng.standard_normal((_DRAWS, width)) / np.sqrt(chi)[:, None]
-        self._healthy = np.sort(self.ratio(healthy))
+        self._ratios = np.sort(self.ratio(healthy))
+        self._healthy = np.sort(self.score(healthy)) if anywhere else self._ratios
 
     def ratio(self, rest: Floats) -> Floats:
         """Log likelihood ratio of whitened evidence, shape (m, k) to (m,)."""
@@ -51,11 +60,28 @@ class Detector:
             power * (np.log1p(square / self._degrees) - np.log1p(gain / self._degrees))
         )
 
+    def score(self, rest: Floats) -> Floats:
+        """What is judged of whitened evidence, shape (m, k) to (m,): the more seldom of the two.
+
+        The ratio, where nothing is set aside for other directions; else less the log of a chance.
+        The squared length over k follows Fisher's distribution.
+        """
+        from scipy.stats import f as fisher
+
+        ratio = self.ratio(rest)
+        if not self._anywhere:
+            return ratio
+        above = len(self._ratios) - np.searchsorted(self._ratios, ratio)
+        along = np.maximum(above, 1) / len(self._ratios) / (1.0 - self._anywhere)
+        square = np.mean(rest**2, axis=1)
+        off = fisher.sf(square, rest.shape[1], self._degrees) / self._anywhere
+        return np.asarray(-np.log(np.minimum(along, np.maximum(off, 1e-300))), dtype=np.float64)
+
     def threshold(self, rate: float) -> float:
-        """Ratio that a healthy unit exceeds at this rate."""
+        """Score that a healthy unit exceeds at this rate."""
         return float(np.quantile(self._healthy, 1.0 - rate))
 
-    def chance(self, ratio: float) -> float:
-        """How often a healthy unit has this ratio or a larger one; at least one draw."""
-        above = len(self._healthy) - int(np.searchsorted(self._healthy, ratio))
+    def chance(self, score: float) -> float:
+        """How often a healthy unit has this score or a larger one; at least one draw."""
+        above = len(self._healthy) - int(np.searchsorted(self._healthy, score))
         return max(above, 1) / len(self._healthy)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.diagnose.bymodel.answer import Diagnosis
-from elevon.diagnose.bymodel.candidates import DECLINED, Candidate, chosen
+from elevon.diagnose.bymodel.candidates import Candidate, chosen
 from elevon.diagnose.bymodel.case import (
     Case,
     case_of,
@@ -19,7 +19,9 @@ from elevon.diagnose.bymodel.case import (
     joined,
     shift_of,
 )
+from elevon.diagnose.bymodel.declined import declined
 from elevon.diagnose.bymodel.explain import (
+    NOTHING_WEIGHED,
     alternatives,
     causes,
     explanations,
@@ -29,12 +31,15 @@ from elevon.diagnose.bymodel.explain import (
 )
 from elevon.diagnose.bymodel.log import TestLog, prepared
 from elevon.diagnose.bymodel.posterior import Posterior, posterior
+from elevon.diagnose.bymodel.weigh import Hypothesis
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["answer_of", "check_asked", "diagnose"]
+__all__ = ["ANYWHERE", "answer_of", "check_asked", "diagnose"]
+
+ANYWHERE = 0.2  # of the false alarms: what no candidate does. ASSUMED
 
 
 def diagnose(
@@ -74,10 +79,10 @@ def diagnose(
         case_of(prepared(item, actuator), actuator, candidates, healthy_logs, findings)
         for item in logs
     ]
-    result = answer_of(cases, candidates, false_alarm, findings)
+    result = answer_of(cases, candidates, false_alarm, findings, other=True)
     blind = result.unobservable
     if not faults:
-        blind += tuple({"kind": k, "place": p, "reason": reason} for k, p, reason in DECLINED)
+        blind += declined()
     return replace(result, unobservable=blind, seconds=clock.perf_counter() - begin)
 
 
@@ -100,6 +105,7 @@ def answer_of(
     findings: Sequence[str],
     *,
     pairs: bool = True,
+    other: bool = False,
 ) -> Diagnosis:
     """Return the answer of logs that stand against their healthy unit.
 
@@ -115,16 +121,18 @@ def answer_of(
         What was seen before.
     pairs : bool
         Whether two faults at once are weighed.
+    other : bool
+        Whether something that is not weighed may be there.
     """
     begin = clock.perf_counter()
-    rest, root, detector = detector_of(cases, candidates)
-    ratio = float(detector.ratio((root @ rest)[None, :])[0])
+    rest, root, detector = detector_of(cases, candidates, ANYWHERE if other else 0.0)
+    score = float(detector.score((root @ rest)[None, :])[0])
     blind, least = limits(cases, candidates, root)
     # What the logs cannot show would keep its prior, whatever they say: it is told apart.
     seen = [c for c in candidates if c.key in least] or candidates
-    result = _weighed(cases, seen, pairs=pairs)
-    faulty = ratio > detector.threshold(rate)
-    best = next(h for h in result.hypotheses if bool(h.keys) or not faulty)
+    result = _weighed(cases, seen, pairs=pairs, other=other)
+    faulty = score > detector.threshold(rate)
+    best = _best(result, faulty=faulty)
     known = {c.key: c for c in candidates}
     named = [(known[key], value) for key, value in zip(best.keys, best.best, strict=True)]
     return Diagnosis(
@@ -132,22 +140,53 @@ def answer_of(
         status="faulty" if faulty else "healthy",
         p_fault=result.faulty,
         false_alarm=rate,
-        chance=detector.chance(ratio),
+        chance=detector.chance(score),
         faults=causes(result, cases, seen, root, best.keys),
         best=best.keys,
-        p_best=result.probabilities[result.hypotheses.index(best)],
+        p_best=_probability(result, best, faulty=faulty),
         unobservable=blind,
         detectable=least,
         moved=moved(cases, best.keys, best.best),
-        findings=(*findings, *unexplained(cases, named)),
+        findings=(*findings, *_left(result, cases, named, faulty=faulty)),
         seconds=clock.perf_counter() - begin,
         hypotheses=explanations(result, candidates),
         alternatives=alternatives(result, cases, candidates, best.keys),
         units={c.key: c.unit for c in candidates},
+        p_other=result.other,
     )
 
 
-def _weighed(cases: Sequence[Case], candidates: Sequence[Candidate], *, pairs: bool) -> Posterior:
+def _best(result: Posterior, *, faulty: bool) -> Hypothesis:
+    """Return the most probable set of faults; the empty one of a faulty unit: something else."""
+    likely = next(h for h in result.hypotheses if bool(h.keys) or not faulty)
+    known = result.probabilities[result.hypotheses.index(likely)]
+    if not faulty or known >= result.other:
+        return likely
+    return next(h for h in result.hypotheses if not h.keys)
+
+
+def _probability(result: Posterior, best: Hypothesis, *, faulty: bool) -> float:
+    if faulty and not best.keys:
+        return result.other
+    return result.probabilities[result.hypotheses.index(best)]
+
+
+def _left(
+    result: Posterior,
+    cases: Sequence[Case],
+    named: Sequence[tuple[Candidate, float]],
+    *,
+    faulty: bool,
+) -> tuple[str, ...]:
+    """Return what is to be said of what the named faults leave."""
+    if faulty and not named:
+        return (f"{NOTHING_WEIGHED} (probability {result.other:.2g})",)
+    return unexplained(cases, named)
+
+
+def _weighed(
+    cases: Sequence[Case], candidates: Sequence[Candidate], *, pairs: bool, other: bool
+) -> Posterior:
     rest, covariance = joined(cases)
     return posterior(
         rest,
@@ -158,4 +197,5 @@ def _weighed(cases: Sequence[Case], candidates: Sequence[Candidate], *, pairs: b
         errors=np.concatenate([case.errors for case in cases]),
         doubt=lambda k, s: doubt_of(cases, k, s),
         pairs=pairs,
+        other=other,
     )

@@ -13,13 +13,25 @@ from elevon.diagnose.bymodel.case import Case, doubt_of, joined, shift_of
 from elevon.diagnose.bymodel.evidence import UNITS
 from elevon.diagnose.bymodel.posterior import Posterior, marginals, quantiles
 
-__all__ = ["alternatives", "causes", "explanations", "limits", "moved", "unexplained"]
+__all__ = [
+    "NOTHING_WEIGHED",
+    "alternatives",
+    "causes",
+    "explanations",
+    "limits",
+    "moved",
+    "unexplained",
+]
 
 Floats = npt.NDArray[np.float64]
 LISTED = 0.02  # probability below which a cause is not listed
 POSSIBLE = 1e-3  # probability below which a set of faults is not listed
 UNLIKELY = 1e-3  # chance of what the named faults leave below which that is said
 ALIKE = 1.0  # deviations between two faults' shifts below which no log separates them
+
+
+#: The finding of a faulty unit with a fault that is not among the candidates.
+NOTHING_WEIGHED = "no fault that is weighed explains these logs, nor is this the healthy unit"
 
 
 def unexplained(
@@ -68,8 +80,8 @@ def causes(
         alike = [o for o in _alike(cases, c, middle, candidates, root) if o.key not in best]
         covered |= {o.key for o in alike}
         probability = min(probability + sum(result.of(o.key) for o in alike), 1.0)
-        names = [(c.kind, place) for place in c.same]
-        names += [(o.kind, p) for o in alike for p in (o.place, *o.same)]
+        names = [(c.kind, place) for place in c.same] + list(c.akin)
+        names += [n for o in alike for n in (*((o.kind, p) for p in (o.place, *o.same)), *o.akin)]
         out.append(Cause(c.kind, c.place, c.unit, probability, middle, (low, high), tuple(names)))
     return tuple(sorted(out, key=lambda cause: -cause.probability))
 
@@ -167,7 +179,8 @@ def limits(
             f"up to {c.high:g} {c.unit if c.unit != '1' else ''}".rstrip()
             + f" it moves nothing here by {SEEN:g} deviations of a healthy unit"
         )
-        blind.append({"kind": c.kind, "place": c.place, "reason": reason})
+        names = ((c.kind, c.place), *c.akin)
+        blind += [{"kind": kind, "place": place, "reason": reason} for kind, place in names]
     return tuple(blind), limits
 
 

@@ -14,6 +14,7 @@ from elevon.diagnose.bymodel.replay import Replay
 __all__ = ["DEGREES", "FLOOR", "MISMATCH", "POOLED", "Elsewhere", "Healthy", "healthy"]
 
 Floats = npt.NDArray[np.float64]
+_FAR = 2.0  # deviations
 DEGREES = 10.0  # ASSUMED: worth of the stated spread, in runs
 
 #: How far a calibrated low model may stand off a healthy unit: share of the value, and SI. ASSUMED,
@@ -36,6 +37,11 @@ MISMATCH: Mapping[str, tuple[float, float]] = {
     "following_gain": (0.004, 0.0),
     "current_sideband": (0.0, 0.006),
     "voltage_sideband": (0.0, 0.006),
+}
+#: With a brake of unknown torque: many times the unit's own friction.
+_HELD: Mapping[str, tuple[float, float]] = {
+    "dry_current": (10.0, 0.0),
+    "viscous_current": (10.0, 0.0),
 }
 #: Least deviation from run to run, beside what the draws of the model show: another start, counts,
 #: clocks, what the model has not. ASSUMED.
@@ -110,18 +116,23 @@ def healthy(
     names: Sequence[str],
     baselines: Sequence[Evidence],
     elsewhere: Sequence[Elsewhere] = (),
+    *,
+    held: bool = False,
 ) -> Healthy:
     """Join the model's spread with baselines.
 
     The offset of a unit from the model is Gaussian with `MISMATCH`; the mean of the baselines of
     the same test narrows it, those of other tests narrow what is `POOLED`. The spread's scale is
-    that stated, worth `DEGREES` runs, and the baselines' scatter.
+    that stated, worth `DEGREES` runs, and the baselines' scatter. Where baselines stand further
+    off the model than was assumed, the assumption yields. In a test that is `held` by a brake whose
+    torque is not known, the model says nothing of friction.
     """
     at = [model.healthy.names.index(name) for name in names]
     draws = model.draws[:, at]
     mean = draws.mean(axis=0)
     own = np.cov(draws.T).reshape(len(at), len(at)) + np.diag(_sizes(FLOOR, names, mean) ** 2)
-    off = np.diag(_sizes(MISMATCH, names, mean) ** 2)
+    table = {**MISMATCH, **_HELD} if held else MISMATCH
+    off = np.diag(_sizes(table, names, mean) ** 2)
     count = len(baselines)
     scale = np.ones(len(at))
     left, moved = off, np.zeros(len(at))
@@ -132,9 +143,10 @@ def healthy(
         scatter = np.sum((rest - centre) ** 2, axis=0) / (np.diag(own) + noise)
         scale = (DEGREES + scatter) / (DEGREES + count - 1)
         own *= np.sqrt(np.outer(scale, scale))
+        off = _yielding(off, own + np.diag(noise), centre, count)
         gain = off @ np.linalg.inv(off + (own + np.diag(noise)) / count)
         left, moved = off - gain @ off, gain @ centre
-    for k, said, std in _pooled(names, mean, elsewhere):
+    for k, said, std in _pooled(names, mean, () if held else elsewhere):
         gain = left[:, k] / (left[k, k] + own[k, k] + std**2)
         moved = moved + gain * (said - moved[k])
         left = left - np.outer(gain, left[k])
@@ -147,6 +159,13 @@ def healthy(
         np.sqrt(scale),
         0.5 * (left + left.T),
     )
+
+
+def _yielding(off: Floats, spread: Floats, centre: Floats, count: int) -> Floats:
+    """Return the prior of the offset, as wide as the baselines are off where it is too narrow."""
+    expected = np.diag(off) + np.diag(spread) / count
+    far = centre**2 > _FAR**2 * expected
+    return np.asarray(off + np.diag(np.where(far, centre**2, 0.0)))
 
 
 def _pooled(

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from elevon.calibrate.kinematics import command_fit
 from elevon.calibrate.log import BenchLog, bench_log
+from elevon.calibrate.thin import group_means, groups_of
 from elevon.diagnose.bymodel.command import noted_command
 from elevon.diagnose.bymodel.evidence import regress
 from elevon.diagnose.bymodel.lost_motion import dragged
@@ -68,6 +69,11 @@ class TestLog:
         """Whether a brake of known torque acted."""
         return self.log.brake.measured
 
+    @property
+    def held(self) -> bool:
+        """Whether a brake acted whose torque is not known."""
+        return self.log.brake.known in ("force", "on")
+
 
 def read_test_logs(
     paths: Sequence[str | Path],
@@ -92,7 +98,9 @@ def read_test_logs(
             log = replace(log, name=f"{Path(path).resolve().parent.name}/{log.name}")
         voltage = None
         if "voltage_q_ref" in imported.recording:
-            values = np.array(imported.recording["voltage_q_ref"].values, dtype=np.float64)
+            channel = imported.recording["voltage_q_ref"]
+            count = groups_of(np.asarray(channel.time, dtype=np.float64))
+            values = group_means(np.array(channel.values, dtype=np.float64), count)
             if len(values) == len(log.time) and np.isfinite(values).sum() > len(values) // 2:
                 voltage = values
         out.append(TestLog(log, voltage))

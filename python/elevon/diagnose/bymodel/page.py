@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from elevon.diagnose.bymodel.words import sentence, severity_text
+from elevon.diagnose.bymodel.words import by_reason, sentence, severity_text
 from elevon.diagnose.pictures import evidence_figure, traces_figure
 from elevon.report import Report, Table
 
@@ -64,7 +64,7 @@ def diagnosis_page(
     seen = [
         (key, severity_text(value, result.units[key])) for key, value in result.detectable.items()
     ]
-    blind = [(f"{i['kind']}@{i['place']}", i["reason"]) for i in result.unobservable]
+    blind = by_reason(result.unobservable)
     limits.table(
         Table(
             ("fault", "least severity seen"),

@@ -21,6 +21,7 @@ from elevon.diagnose.bymodel.weigh import (
     Hypothesis,
     healthy_alone,
     one_fault,
+    outside,
     two_faults,
 )
 
@@ -29,15 +30,25 @@ __all__ = ["Posterior", "marginals", "posterior", "quantiles"]
 Floats = npt.NDArray[np.float64]
 Shift = Callable[[str, Floats], Floats]
 PRIOR_FAULTY = 0.5  # ASSUMED: a log is diagnosed since somebody doubts
+OTHER = 0.02  # ASSUMED: a faulty unit has a fault that is not weighed
 SECOND = 0.1  # ASSUMED: a faulty unit has a second fault
 
 
 @dataclass(frozen=True)
 class Posterior:
-    """All hypotheses, most probable first, with their probabilities."""
+    """All hypotheses, most probable first, with their probabilities.
+
+    Attributes
+    ----------
+    hypotheses, probabilities : tuple
+        What is weighed.
+    other : float
+        Probability of none of them: something moves the evidence that they do not explain.
+    """
 
     hypotheses: tuple[Hypothesis, ...]
     probabilities: tuple[float, ...]
+    other: float = 0.0
 
     def of(self, key: str) -> float:
         """Return the marginal probability of a fault."""
@@ -48,7 +59,7 @@ class Posterior:
     def faulty(self) -> float:
         """Probability of any fault."""
         pairs = zip(self.hypotheses, self.probabilities, strict=True)
-        return float(sum(p for h, p in pairs if h.keys))
+        return float(sum(p for h, p in pairs if h.keys)) + self.other
 
 
 def posterior(
@@ -61,6 +72,7 @@ def posterior(
     errors: Floats | None = None,
     doubt: Callable[[str, float], Floats] | None = None,
     pairs: bool = True,
+    other: bool = False,
 ) -> Posterior:
     """Weigh the hypotheses.
 
@@ -82,6 +94,8 @@ def posterior(
         Key and severity to a deviation that the fault gives the evidence, shape (k,).
     pairs : bool
         Whether two faults at once are weighed.
+    other : bool
+        Whether something else may be there that moves the evidence anyhow.
     """
     own = np.zeros(len(rest)) if errors is None else errors
     frame = Frame(rest, covariance, degrees, shift, own, doubt)
@@ -94,10 +108,15 @@ def posterior(
     for a, b in both:
         out.append(two_faults(frame, (a, b), PRIOR_FAULTY * SECOND * a.rate * b.rate / norm))
     scores = np.array([h.evidence + np.log(h.prior) for h in out])
+    if other:
+        scores = np.append(scores, outside(frame) + np.log(PRIOR_FAULTY * OTHER))
     probability = np.exp(scores - scores.max())
     probability /= probability.sum()
-    order = np.argsort(-probability)
-    return Posterior(tuple(out[k] for k in order), tuple(float(probability[k]) for k in order))
+    beside = float(probability[len(out)]) if other else 0.0
+    order = np.argsort(-probability[: len(out)])
+    return Posterior(
+        tuple(out[k] for k in order), tuple(float(probability[k]) for k in order), beside
+    )
 
 
 def marginals(result: Posterior, key: str) -> tuple[Floats, Floats]:

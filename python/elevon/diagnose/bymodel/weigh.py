@@ -20,6 +20,7 @@ __all__ = [
     "Hypothesis",
     "healthy_alone",
     "one_fault",
+    "outside",
     "prior_density",
     "two_faults",
 ]
@@ -31,6 +32,7 @@ _COARSE = 401
 _FINE = 121
 _PAIR = 41
 _REACH = 6.0  # deviations about the best point that a fine grid covers
+_WIDE = (3.0, 10.0, 30.0)  # deviations by which something else moves the evidence. ASSUMED
 _TURNS = 4  # of the search along one severity, then the other
 
 
@@ -147,6 +149,19 @@ class Frame:
 def healthy_alone(frame: Frame, prior: float) -> Hypothesis:
     """Return the hypothesis of no fault."""
     return Hypothesis((), float(frame.log(frame.y[None, :])[0]), prior)
+
+
+def outside(frame: Frame) -> float:
+    """Log of the marginal likelihood of something else: any number off by so many deviations."""
+    power = 0.5 * (frame.degrees + len(frame.y))
+    square = float(frame.y @ frame.y)
+    logs = [
+        -0.5 * frame.log_det
+        - len(frame.y) * np.log(wide)
+        - power * np.log1p(square / wide**2 / frame.degrees)
+        for wide in _WIDE
+    ]
+    return float(np.logaddexp.reduce(logs) - np.log(len(_WIDE)))
 
 
 def one_fault(frame: Frame, c: Candidate, prior: float) -> Hypothesis:

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 from elevon.units import shown_unit, to_display
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from elevon.diagnose.bymodel.answer import Cause, Diagnosis
 
-__all__ = ["UNEXPLAINED", "sentence", "severity_text"]
+__all__ = ["UNEXPLAINED", "by_reason", "sentence", "severity_text"]
 
 _NAMES = {
     "play@transmission": "Play has grown by",
@@ -43,6 +45,14 @@ def severity_text(value: float, unit: str) -> str:
     return f"{float(to_display(value, shown)):.3g} {shown}"
 
 
+def by_reason(items: Sequence[Mapping[str, str]]) -> list[tuple[str, str]]:
+    """Return what is not observable, names of one reason together: ``KIND@PLACE, ...``, reason."""
+    names: dict[str, list[str]] = {}
+    for item in items:
+        names.setdefault(item["reason"], []).append(f"{item['kind']}@{item['place']}")
+    return [(", ".join(own), reason) for reason, own in names.items()]
+
+
 def sentence(result: Diagnosis) -> str:
     """Return the answer in one sentence or two."""
     left = any(UNEXPLAINED in text for text in result.findings)
@@ -56,6 +66,13 @@ def sentence(result: Diagnosis) -> str:
             f"Nothing here is beyond a healthy unit: it deviates as much in "
             f"{100 * result.chance:.3g} % of logs (called faulty below "
             f"{100 * result.false_alarm:g} %); a fault has a probability of {result.p_fault:.2g}."
+        )
+    if not result.best:
+        worst = max(result.moved, key=lambda m: abs(m.score))
+        return (
+            f"Something is wrong that none of the weighed faults explains (probability "
+            f"{result.p_best:.3g}); furthest off the healthy unit is {_spoken(worst.name)}, by "
+            f"{abs(worst.score):.2g} deviations."
         )
     causes = {f"{c.kind}@{c.place}": c for c in result.faults}
     parts = [_clause(key, causes[key]) for key in result.best if key in causes]
@@ -75,6 +92,12 @@ def _said(key: str) -> str:
     plain = kind.replace("_", " ")
     at = "" if part in plain else f" at the {part}"
     return _NAMES.get(key, f"There is {plain}{at}:")
+
+
+def _spoken(name: str) -> str:
+    from elevon.diagnose.bymodel.evidence import UNITS
+
+    return f"{name} ({UNITS[name][1]})" if name in UNITS else name
 
 
 def _clause(key: str, cause: Cause) -> str:

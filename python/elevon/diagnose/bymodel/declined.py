@@ -1,0 +1,77 @@
+"""Faults of the rotary catalogue that are not weighed, and what becomes of a log that has one."""
+
+from __future__ import annotations
+
+__all__ = ["declined"]
+
+_PHASES = tuple(f"motor.phase_{p}" for p in "abc")
+_CURRENTS = tuple(f"sensor.current_{p}" for p in "abc")
+_SWITCHES = tuple(f"inverter.{p}_{side}" for p in "abc" for side in ("high", "low"))
+
+_LOOP = (
+    "the low model has no loop of its own for it: its current brakes like viscous friction and "
+    "unbalances the phases, so it is named lubrication@transmission with short@motor.phase_a (or "
+    "gain@sensor.current_a), or not explained"
+)
+_OPEN = (
+    "with it the unit hardly moves, and such a log is refused; where it still moves, what the "
+    "motor does is not in the low model: not explained, or a short@motor.phase_a is named"
+)
+_DRY = "on the whole it adds dry friction and is named friction@transmission"
+_ANGLE = (
+    "it shifts or distorts the angle that the drive commutates by: less torque for the current "
+    "(named demagnetisation@motor where it is much), else nothing that these tests show"
+)
+_COUNTS = (
+    "counts that are lost in one place shift the position in steps, which no number of the "
+    "evidence follows: refused as another gear ratio where many are lost, else not seen"
+)
+_GONE = "without that signal there is no motion, or none both ways: such a log is refused"
+
+#: Kind and places to the reason; what it may be named is said in it by ``KIND@PLACE``.
+_DECLINED: tuple[tuple[str, tuple[str, ...], str], ...] = (
+    ("open_phase", _PHASES, _OPEN),
+    ("open_switch", _SWITCHES, _OPEN),
+    ("shorted_switch", _SWITCHES, "the drive trips, and a log without motion is refused"),
+    ("connector_open", ("supply",), "the link empties as soon as the motor draws from it: the unit "
+     "hardly moves, and such a log is refused or not explained"),
+    ("resistor_short", _PHASES, _LOOP),
+    ("phase_short", tuple(f"motor.phases_{p}" for p in ("ab", "bc", "ca")), _LOOP),
+    ("ground_short", _PHASES, _LOOP),
+    ("offset", _CURRENTS, "it moves the current once a turn of the electrical angle, by as much "
+     "in any motion, which the low model has not: not explained where it is much"),
+    ("stuck", _CURRENTS, "the low model has no single sensor: not explained, or named "
+     "gain@sensor.current_a"),
+    ("dead", _CURRENTS, "a gain of nothing: beyond what is weighed of gain@sensor.current_a, which "
+     "is named, or not explained"),
+    ("bearing", ("bearing.cage",), f"{_DRY}; how that changes once a turn of the cage is not "
+     "looked for"),
+    ("stator_rub", ("motor",), f"{_DRY}; how that changes once a turn of the shaft is not looked "
+     "for"),
+    ("jam", ("transmission",), f"{_DRY}, or not explained where it is more than a motor still "
+     "moves with"),
+    ("chipped_tooth", ("gear",), "a step once a turn of a wheel, which no number of the evidence "
+     "follows: not seen, or named tooth_wear@gear or play@transmission"),
+    ("offset", ("sensor.encoder",), "no test looks at absolute positions"),
+    ("offset", ("sensor.resolver",), _ANGLE),
+    ("mismatch", ("sensor.resolver",), _ANGLE),
+    ("winding_short", ("sensor.resolver.sine", "sensor.resolver.cosine",
+                       "sensor.resolver.excitation"), _ANGLE),
+    ("winding_open", ("sensor.resolver.sine", "sensor.resolver.cosine",
+                      "sensor.resolver.excitation"), _GONE),
+    ("dropout", ("sensor.resolver",), "the motor's position and speed disagree: reading the log "
+     "refuses it, or no number of the evidence follows"),
+    ("stuck", ("sensor.resolver", "sensor.encoder"), _GONE),
+    ("dead", ("sensor.encoder",), _GONE),
+    ("missing_counts", ("sensor.encoder",), _COUNTS),
+    ("dark_sectors", ("sensor.encoder",), _COUNTS),
+)  # fmt: skip
+
+
+def declined() -> tuple[dict[str, str], ...]:
+    """Return kind, place and reason of each fault that is not weighed."""
+    return tuple(
+        {"kind": kind, "place": place, "reason": reason}
+        for kind, places, reason in _DECLINED
+        for place in places
+    )

@@ -1,0 +1,153 @@
+"""What is not weighed: it is told from what is, and each fault of the catalogue has its place."""
+
+import numpy as np
+import pytest
+
+from elevon.diagnose.bymodel import diagnose
+from elevon.diagnose.bymodel.candidates import CANDIDATES
+from elevon.diagnose.bymodel.case import Case
+from elevon.diagnose.bymodel.declined import declined
+from elevon.diagnose.bymodel.detection import Detector
+from elevon.diagnose.bymodel.diagnosis import answer_of
+from elevon.diagnose.bymodel.evidence import Evidence
+from elevon.diagnose.bymodel.healthy import healthy
+from elevon.diagnose.bymodel.replay import Replay
+from elevon.diagnose.bymodel.words import sentence
+from elevon.errors import InputError
+from elevon.faults import catalogue
+from elevon.reproduce.diagnosis_limits.campaign import calibrated
+from elevon.reproduce.diagnosis_limits.logs import Trial, bench_logs
+from elevon.reproduce.diagnosis_limits.unit import draw_unit
+
+NAMES = ("lost_motion", "dry_current", "viscous_current", "voltage_order_1", "speed_gain")
+PLAY = next(c for c in CANDIDATES if c.kind == "play")
+
+
+def _case(shown, baselines=()):
+    """A unit whose evidence is 1 with a deviation of 2 %; play moves the lost motion only."""
+    rng = np.random.default_rng(0)
+    draws = 1.0 + 0.02 * rng.standard_normal((40, len(NAMES)))
+    grid = np.linspace(0.0, PLAY.high, 6)
+    moved = np.zeros((6, len(NAMES)))
+    moved[:, 0] = grid / 0.01
+    std = np.full(len(NAMES), 1e-3)
+    model = Replay(Evidence(NAMES, np.ones(5), std), {PLAY.key: grid}, {PLAY.key: moved}, draws)
+    logs = [Evidence(NAMES, np.array(values), std) for values in baselines]
+    return Case("log", Evidence(NAMES, np.array(shown), std), healthy(model, NAMES, logs), model)
+
+
+def test_the_catalogue_is_weighed_akin_or_declined_each_fault_once():
+    weighed = [(c.kind, p) for c in CANDIDATES for p in (c.place, *c.same)]
+    weighed += [name for c in CANDIDATES for name in c.akin]
+    weighed += [(item["kind"], item["place"]) for item in declined()]
+    known = [(r.kind, place) for r in catalogue("rotary") for place in r.places]
+    assert sorted(weighed) == sorted(known)
+
+
+def test_something_else_is_told_from_what_is_weighed():
+    base = [[1.0] * 5]
+    other = answer_of([_case([1, 2, 0, 1.3, 2], base)], [PLAY], 0.05, [], other=True)
+    assert (other.status, other.best) == ("faulty", ())
+    assert other.p_other > 0.9
+    assert other.p_fault > 0.9
+    assert "none of the weighed faults" in sentence(other)
+    assert any("no fault that is weighed" in text for text in other.findings)
+    play = answer_of([_case([1.5, 1, 1, 1, 1], base)], [PLAY], 0.05, [], other=True)
+    assert play.best == (PLAY.key,)
+    assert play.p_other < 0.01
+    well = answer_of([_case([1.01, 1, 0.98, 1, 1], base)], [PLAY], 0.05, [], other=True)
+    assert well.status == "healthy"
+    assert well.p_other < 0.01
+
+
+def test_the_rate_holds_with_a_share_for_other_directions():
+    """Of 20 000 fresh healthy units 5 % within four deviations; off the candidates' way, all."""
+    detector = Detector(np.eye(6)[:2], [True, False], 12.0, 0.2)
+    rng = np.random.default_rng(3)
+    fresh = rng.standard_normal((20_000, 6)) / np.sqrt(rng.chisquare(12, 20_000) / 12)[:, None]
+    share = float(np.mean(detector.score(fresh) > detector.threshold(0.05)))
+    assert share == pytest.approx(0.05, abs=4 * np.sqrt(0.05 * 0.95 / 20_000))
+    off = np.array([[0.0, 0.0, 0.0, 7.0, 7.0, 0.0]])
+    assert detector.ratio(off)[0] == 0.0
+    assert detector.score(off)[0] > detector.threshold(0.05)
+
+
+def test_the_assumed_distance_from_the_model_yields_to_a_baseline():
+    near, far = ([1.0, 1.05, 1, 1, 1], [2.0, 1.05, 1, 1, 1])
+    assert _case(far, [far]).unit.mean[0] == pytest.approx(2.0, abs=0.02)
+    # Within what is assumed the baseline counts by its precision, with and without the far number.
+    assert _case(far, [far]).unit.mean[1] == pytest.approx(
+        _case(near, [near]).unit.mean[1], abs=0.01
+    )
+
+
+#: A clear severity of each fault that the high model has, by its kind and place.
+CLEAR = {
+    "short@motor.phase_a": 0.3, "eccentricity_static@motor": 0.2, "eccentricity_dynamic@motor": 0.2,
+    "resistor_short@motor.phase_a": 0.2, "phase_short@motor.phases_ab": 0.01,
+    "ground_short@motor.phase_a": 0.005, "unbalance@motor.rotor": 3e-4,
+    "open_phase@motor.phase_a": 1.0, "open_switch@inverter.a_high": 1.0,
+    "shorted_switch@inverter.a_low": 1.0, "connector_open@supply": 1.0,
+    "demagnetisation@motor": 0.15,
+    "local_demagnetisation@motor": 0.4, "sag@supply": 0.3, "gain@sensor.current_a": 0.15,
+    "offset@sensor.current_a": 0.3, "friction@transmission": 0.5, "lubrication@transmission": 2.0,
+    "play@transmission": 0.004, "bearing@bearing.outer": 0.002, "stator_rub@motor": 0.5,
+    "bearing@bearing.cage": 0.1, "tooth_wear@gear": 0.004, "chipped_tooth@gear": 0.004,
+    "jam@transmission": 0.3, "gain_drift@control.position": 0.03, "gain_drift@control.speed": 0.4,
+    "dropout@sensor.resolver": 0.2, "mismatch@sensor.resolver": 0.05,
+    "offset@sensor.resolver": 0.05, "offset@sensor.encoder": 0.02, "gain@sensor.resolver": 0.01,
+    "gain@sensor.encoder": 0.01, "missing_counts@sensor.encoder": 0.1,
+    "dark_sectors@sensor.encoder": 0.1, "winding_short@sensor.resolver.sine": 0.1,
+    "winding_short@sensor.resolver.excitation": 0.3, "winding_open@sensor.resolver.sine": 1.0,
+    "stuck@sensor.resolver": 1.0, "stuck@sensor.encoder": 1.0, "stuck@sensor.current_a": 1.0,
+    "dead@sensor.encoder": 1.0, "dead@sensor.current_a": 1.0,
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def bench():
+    unit = draw_unit(7100, 0)
+    return unit, *calibrated(unit, 7100, None)
+
+
+@pytest.mark.long
+@pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
+@pytest.mark.parametrize("test", ["noload", "loaded"])
+def test_no_fault_of_the_catalogue_is_called_another(bench, test, tmp_path):
+    """Each is named, equivalent, or declined with a reason that says what it may be named."""
+    unit, actuator, baselines = bench
+    reasons = {f"{i['kind']}@{i['place']}": i["reason"] for i in declined()}
+    wrong = []
+    for number, (key, severity) in enumerate(CLEAR.items()):
+        trial = Trial(f"f{number}", test, (f"{key}={severity}",), 500 + number)
+        try:
+            log = bench_logs(unit, [trial], tmp_path)[0]
+            answer = diagnose([log], actuator, baselines=baselines)
+        except InputError:
+            continue  # refused: no motion, or positions that contradict each other
+        wrong += [f"{test}: {key}: {text}" for text in _wrong(answer, key, severity, reasons)]
+    assert wrong == []
+
+
+def _wrong(answer, key, severity, reasons):
+    """Say what is wrong with an answer about one fault."""
+    blind = {f"{i['kind']}@{i['place']}" for i in answer.unobservable}
+    below = severity < answer.detectable.get(key, 0.0)
+    named = set()
+    for cause in answer.faults:
+        own = {f"{cause.kind}@{cause.place}", *(f"{k}@{p}" for k, p in cause.equivalents)}
+        named |= own
+        said = any(name in reasons.get(key, "") for name in own)
+        if cause.probability > 0.9 and key not in own and not said and not _beside(answer, key):
+            yield f"called {cause.kind}@{cause.place} with {cause.probability:.2f}"
+    if key not in named | blind | set(reasons) and not below:
+        yield f"nowhere: {answer.status}, {answer.best}"
+
+
+def _beside(answer, key):
+    """Whether the fault is named, too: a second one beside it is another question."""
+    return any(
+        key in {f"{c.kind}@{c.place}", *(f"{k}@{p}" for k, p in c.equivalents)}
+        for c in answer.faults
+        if c.probability > 0.5
+    )
