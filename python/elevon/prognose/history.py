@@ -33,7 +33,7 @@ __all__ = ["Entry", "History", "diagnosed", "read_history", "write_stamp"]
 _KEYS = frozenset({"usage", "unit", "date", "serial", "reset", "logs", "healthy"})
 _OF_DIAGNOSIS = frozenset(
     {
-        "status", "p_fault", "false_alarm", "chance", "faults", "best", "unobservable",
+        "status", "p_fault", "p_other", "false_alarm", "chance", "faults", "best", "unobservable",
         "detectable", "evidence", "findings", "hypotheses", "alternatives", "seconds", "method",
     }
 )  # fmt: skip
