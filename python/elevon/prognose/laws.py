@@ -149,7 +149,8 @@ LAWS: dict[str, Law] = {
                 spread=0.3,
             ),
         },
-        grain=3e-3, start=0.0, start_spread=0.3, dormant=_DORMANT,
+        # What feeds growth is in the law, its own heat with a spread: ASSUMED to leave little out.
+        form_spread=0.1, grain=3e-3, start=0.0, start_spread=0.3, dormant=_DORMANT,
         severity=_shorted, damage=_short_damage,
     ),
     "demagnetisation": Law(

@@ -39,7 +39,7 @@ __all__ = ["campaign_mission", "reproduce_prognosis"]
 
 Floats = npt.NDArray[np.float64]
 _BASE = "torino-rotary"
-_INTERVAL = 0.04  # of the life that the model expects, between inspections
+_INTERVAL = 0.02  # of the life that the model expects, between inspections: some hundred flights
 _SAMPLES = 1000
 
 
