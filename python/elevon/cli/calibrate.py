@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from elevon.cli.by_parts import calibrate_by_parts, way_by_parts
+from elevon.cli.by_parts import Way, calibrate_by_parts, way_by_parts
 from elevon.cli.calibrate_drops import is_drop_table, run_drops
 from elevon.cli.closed_loop import calibrate_closed_loop, check_loop_options, read_loop_logs
 from elevon.cli.common import (
@@ -49,6 +50,16 @@ CommandOption = Annotated[
     ),
 ]
 MapOption = Annotated[Path | None, typer.Option("--map", help="Column map (TOML).")]
+FreeOption = Annotated[
+    list[str] | None,
+    typer.Option(help="Parameter path to estimate, repeatable; or auto (the default)."),
+]
+PerLogOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--per-log", metavar="PATH", help="Estimated for each log too: play.total; repeatable."
+    ),
+]
 FidelityOption = Annotated[str, typer.Option(help="Of the model runs: low or high.")]
 TransientOption = Annotated[
     float | None, typer.Option(min=0.0, help="Left out at the beginning of each log [s].")
@@ -117,6 +128,21 @@ def direct_logs(
         return None
 
 
+@dataclass(frozen=True)
+class _Asked:
+    """What is to be estimated, and where it goes."""
+
+    free: list[str] | None
+    per_log: list[str]
+    fidelity: str
+    transient: float | None
+    out: Path | None
+    report: Path | None
+    as_json: bool
+    force: bool
+    date: str | None
+
+
 @app.command()
 def calibrate(
     logs: LogsArgument,
@@ -126,16 +152,8 @@ def calibrate(
     loadcell: LoadcellOption = None,
     command: CommandOption = None,
     column_map: MapOption = None,
-    free: Annotated[
-        list[str] | None,
-        typer.Option(help="Parameter path to estimate, repeatable; or auto (the default)."),
-    ] = None,
-    per_log: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--per-log", metavar="PATH", help="Estimated for each log too: play.total; repeatable."
-        ),
-    ] = None,
+    free: FreeOption = None,
+    per_log: PerLogOption = None,
     fidelity: FidelityOption = "low",
     transient: TransientOption = None,
     settings: SetOption = None,
@@ -146,51 +164,67 @@ def calibrate(
     date: DateOption = None,
 ) -> int:
     """Estimate what the logs determine, with intervals, and write it as a set."""
-    from elevon.calibrate.calibration import calibrate as run
-    from elevon.calibrate.write import write_calibration
-
     check_outputs([out, report], force=force)
     if out is not None and out.suffix.lower() != ".toml":
         raise InputError(f"--out {out}: a set is a TOML file; end the name in .toml")
     model = read_actuator(actuator, settings)
     if len(logs) == 1 and is_drop_table(logs[0]):
         return _drops(logs[0], model, out, as_json=json, force=force)
+    asked = _Asked(_paths(free), per_log or [], fidelity, transient, out, report, json, force, date)
     way = way_by_parts(logs, model, column_map, fidelity)
     if way is not None:
-        if transient is not None or (fidelity != "low" and not way.runs):
-            say("--transient, and --fidelity without model runs: not used for these logs")
-        return calibrate_by_parts(
-            way, model, free=_paths(free), out=out, report=report, as_json=json, force=force,
-            date=date,
-        )  # fmt: skip
+        return _by_parts(way, model, asked)
     data = direct_logs(model, logs, loadcell, command, column_map)
     if data is None:
-        check_loop_options(fidelity, per_log)
-        few = read_loop_logs(logs, column_map)
-        return calibrate_closed_loop(
-            few, model, out, free=_paths(free), transient=transient, report=report, as_json=json,
-            force=force, date=date,
-        )  # fmt: skip
+        return _in_closed_loop(logs, model, column_map, asked)
+    return _directly(data, model, asked)
+
+
+def _by_parts(way: Way, model: Actuator, asked: _Asked) -> int:
+    """Logs by roles: each number from its own balance."""
+    if asked.transient is not None or (asked.fidelity != "low" and not way.runs):
+        say("--transient, and --fidelity without model runs: not used for these logs")
+    return calibrate_by_parts(
+        way, model, free=asked.free, out=asked.out, report=asked.report, as_json=asked.as_json,
+        force=asked.force, date=asked.date,
+    )  # fmt: skip
+
+
+def _in_closed_loop(
+    logs: list[Path], model: Actuator, column_map: Path | None, asked: _Asked
+) -> int:
+    """Logs with few channels."""
+    check_loop_options(asked.fidelity, asked.per_log)
+    return calibrate_closed_loop(
+        read_loop_logs(logs, column_map), model, asked.out, free=asked.free,
+        transient=asked.transient, report=asked.report, as_json=asked.as_json, force=asked.force,
+        date=asked.date,
+    )  # fmt: skip
+
+
+def _directly(data: list[BenchLog], model: Actuator, asked: _Asked) -> int:
+    """Logs whose signals allow direct estimates."""
+    from elevon.calibrate.calibration import calibrate as run
+    from elevon.calibrate.write import write_calibration
+
     with progress_bar("calibrating") as advance:
         result = run(
-            data,
-            model,
-            free=_paths(free),
-            per_log=per_log or (),
-            fidelity=fidelity,
-            transient=transient,
-            progress=lambda f: advance(0.9 * f),
-        )
-        before, after = _agreement(data, result, transient)
+            data, model, free=asked.free, per_log=asked.per_log, fidelity=asked.fidelity,
+            transient=asked.transient, progress=lambda f: advance(0.9 * f),
+        )  # fmt: skip
+        before, after = _agreement(data, result, asked.transient)
         advance(0.95)
-        promise = after if out is None or after is None else _promise(data, model, free, after)
+        promise = after
+        if asked.out is not None and after is not None:
+            promise = _promise(data, model, asked.free, after)
         advance(1.0)
-    if out is not None:
-        say(f"set: {write_calibration(out, result, validation=promise, force=force)}")
-    if report is not None:
-        page = _page(result, before, after, date)
-        say(f"report: {page.save(report, force=force)}")
-    _print(result, before, after, out, as_json=json)
+    if asked.out is not None:
+        path = write_calibration(asked.out, result, validation=promise, force=asked.force)
+        say(f"set: {path}")
+    if asked.report is not None:
+        page = _page(result, before, after, asked.date)
+        say(f"report: {page.save(asked.report, force=asked.force)}")
+    _print(result, before, after, asked.out, as_json=asked.as_json)
     return 0
 
 
@@ -249,7 +283,7 @@ def _promise(
     """What the thresholds come from: logs held out, or where there is one log, that log."""
     from elevon.calibrate.promise import held_out_agreement, outliers
 
-    held = held_out_agreement(data, model, _paths(free), after)
+    held = held_out_agreement(data, model, free, after)
     if held is None:
         say("thresholds: from the fit itself, since no log could be held out")
         return after

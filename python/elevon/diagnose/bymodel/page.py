@@ -37,25 +37,7 @@ def diagnosis_page(
         Of the logs; the first four are drawn.
     """
     report = Report(f"Diagnosis of {actuator}", sentence(result), date=date)
-    rows = [
-        (
-            f"{c.kind}@{c.place}",
-            c.probability,
-            severity_text(c.severity, c.unit),
-            f"{severity_text(c.interval[0], c.unit)} to {severity_text(c.interval[1], c.unit)}",
-            ", ".join(f"{kind}@{place}" for kind, place in c.equivalents),
-        )
-        for c in result.faults
-    ]
-    causes = report.section("Causes")
-    causes.table(
-        Table(
-            ("cause", "probability", "severity", "90 % interval", "not separable from"),
-            rows,
-            f"Logs: {', '.join(result.logs)}. A cause that is not listed has less than 2 %.",
-            digits=3,
-        )
-    )
+    _causes(report, result)
     _signals(report, traces[:_DRAWN])
     _evidence(report, result)
     if result.alternatives:
@@ -77,6 +59,28 @@ def diagnosis_page(
     for text in result.findings:
         limits.text(text)
     return report
+
+
+def _causes(report: Report, result: Diagnosis) -> None:
+    rows = [
+        (
+            f"{c.kind}@{c.place}",
+            c.probability,
+            severity_text(c.severity, c.unit),
+            f"{severity_text(c.interval[0], c.unit)} to {severity_text(c.interval[1], c.unit)}",
+            ", ".join(f"{kind}@{place}" for kind, place in c.equivalents),
+        )
+        for c in result.faults
+    ]
+    causes = report.section("Causes")
+    causes.table(
+        Table(
+            ("cause", "probability", "severity", "90 % interval", "not separable from"),
+            rows,
+            f"Logs: {', '.join(result.logs)}. A cause that is not listed has less than 2 %.",
+            digits=3,
+        )
+    )
 
 
 def _by_network(result: Diagnosis) -> bool:
