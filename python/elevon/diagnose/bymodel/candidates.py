@@ -36,6 +36,8 @@ class Candidate:
         so it only makes that evidence uncertain. Empty: all of it.
     akin : tuple of (str, str)
         Faults that are not weighed themselves, since in closed form they move the same evidence.
+    switched : bool
+        Whether it is there or not: it acts in full from one half on.
     """
 
     kind: str
@@ -49,6 +51,7 @@ class Candidate:
     still: tuple[str, ...] = ()
     sure: tuple[str, ...] = ()
     akin: tuple[tuple[str, str], ...] = ()
+    switched: bool = False
 
     @property
     def key(self) -> str:

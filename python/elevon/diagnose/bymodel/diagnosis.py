@@ -104,7 +104,7 @@ def answer_of(
     rate: float,
     findings: Sequence[str],
     *,
-    pairs: bool = True,
+    most: int | None = None,
     other: bool = False,
 ) -> Diagnosis:
     """Return the answer of logs that stand against their healthy unit.
@@ -119,8 +119,9 @@ def answer_of(
         Of false alarms.
     findings : sequence of str
         What was seen before.
-    pairs : bool
-        Whether two faults at once are weighed.
+    most : int, optional
+        Pairs of faults that are weighed, the most promising of a log that is called faulty;
+        default: all.
     other : bool
         Whether something that is not weighed may be there.
     """
@@ -130,8 +131,8 @@ def answer_of(
     blind, least = limits(cases, candidates, root)
     # What the logs cannot show would keep its prior, whatever they say: it is told apart.
     seen = [c for c in candidates if c.key in least] or candidates
-    result = _weighed(cases, seen, pairs=pairs, other=other)
     faulty = score > detector.threshold(rate)
+    result = _weighed(cases, seen, pairs=faulty or most is None, most=most, other=other)
     best = _best(result, faulty=faulty)
     known = {c.key: c for c in candidates}
     named = [(known[key], value) for key, value in zip(best.keys, best.best, strict=True)]
@@ -185,7 +186,12 @@ def _left(
 
 
 def _weighed(
-    cases: Sequence[Case], candidates: Sequence[Candidate], *, pairs: bool, other: bool
+    cases: Sequence[Case],
+    candidates: Sequence[Candidate],
+    *,
+    pairs: bool,
+    most: int | None,
+    other: bool,
 ) -> Posterior:
     rest, covariance = joined(cases)
     return posterior(
@@ -198,4 +204,5 @@ def _weighed(
         doubt=lambda k, s: doubt_of(cases, k, s),
         pairs=pairs,
         other=other,
+        most=most,
     )

@@ -19,6 +19,7 @@ from elevon.diagnose.bymodel.candidates import Candidate
 from elevon.diagnose.bymodel.weigh import (
     Frame,
     Hypothesis,
+    beside,
     healthy_alone,
     one_fault,
     outside,
@@ -32,6 +33,7 @@ Shift = Callable[[str, Floats], Floats]
 PRIOR_FAULTY = 0.5  # ASSUMED: a log is diagnosed since somebody doubts
 OTHER = 0.02  # ASSUMED: a faulty unit has a fault that is not weighed
 SECOND = 0.1  # ASSUMED: a faulty unit has a second fault
+_FIRST = 6  # faults that a second one is sought beside, where not all pairs are weighed
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,7 @@ def posterior(
     doubt: Callable[[str, float], Floats] | None = None,
     pairs: bool = True,
     other: bool = False,
+    most: int | None = None,
 ) -> Posterior:
     """Weigh the hypotheses.
 
@@ -96,6 +99,9 @@ def posterior(
         Whether two faults at once are weighed.
     other : bool
         Whether something else may be there that moves the evidence anyhow.
+    most : int, optional
+        Pairs that are weighed: those that a coarse search beside the likeliest single faults finds
+        best; the others count as impossible. Default: all.
     """
     own = np.zeros(len(rest)) if errors is None else errors
     frame = Frame(rest, covariance, degrees, shift, own, doubt)
@@ -105,6 +111,8 @@ def posterior(
         out.append(one_fault(frame, c, PRIOR_FAULTY * (1.0 - SECOND) * c.rate / total))
     both = list(combinations(candidates, 2)) if pairs else []
     norm = sum(a.rate * b.rate for a, b in both) or 1.0
+    if most is not None and len(both) > most:
+        both = _promising(frame, candidates, out[1:], most)
     for a, b in both:
         out.append(two_faults(frame, (a, b), PRIOR_FAULTY * SECOND * a.rate * b.rate / norm))
     scores = np.array([h.evidence + np.log(h.prior) for h in out])
@@ -112,11 +120,28 @@ def posterior(
         scores = np.append(scores, outside(frame) + np.log(PRIOR_FAULTY * OTHER))
     probability = np.exp(scores - scores.max())
     probability /= probability.sum()
-    beside = float(probability[len(out)]) if other else 0.0
+    elsewhere = float(probability[len(out)]) if other else 0.0
     order = np.argsort(-probability[: len(out)])
     return Posterior(
-        tuple(out[k] for k in order), tuple(float(probability[k]) for k in order), beside
+        tuple(out[k] for k in order), tuple(float(probability[k]) for k in order), elsewhere
     )
+
+
+def _promising(
+    frame: Frame, candidates: Sequence[Candidate], singles: Sequence[Hypothesis], most: int
+) -> list[tuple[Candidate, Candidate]]:
+    """Pairs that may explain the evidence best: a second fault beside each of the likeliest."""
+    known = {c.key: c for c in candidates}
+    order = {c.key: k for k, c in enumerate(candidates)}
+    ranked = sorted(singles, key=lambda h: -(h.evidence + float(np.log(h.prior))))
+    scores: dict[tuple[str, str], float] = {}
+    for h in ranked[:_FIRST]:
+        first = known[h.keys[0]]
+        for key, score in beside(frame, first, h.best[0], candidates).items():
+            pair = (key, first.key) if order[key] < order[first.key] else (first.key, key)
+            scores[pair] = max(score, scores.get(pair, -np.inf))
+    best = sorted(scores, key=lambda pair: -scores[pair])[:most]
+    return [(known[a], known[b]) for a, b in best]
 
 
 def marginals(result: Posterior, key: str) -> tuple[Floats, Floats]:

@@ -18,6 +18,7 @@ from elevon.diagnose.bymodel.candidates import Candidate
 __all__ = [
     "Frame",
     "Hypothesis",
+    "beside",
     "healthy_alone",
     "one_fault",
     "outside",
@@ -207,6 +208,23 @@ def two_faults(frame: Frame, pair: tuple[Candidate, Candidate], prior: float) ->
     )
 
 
+def beside(
+    frame: Frame, first: Candidate, at: float, candidates: Sequence[Candidate]
+) -> dict[str, float]:
+    """Return the best log density of each other fault beside a first one, by key; coarse."""
+    own = frame.loosened([(first, at)])
+    moved = own.shift(first.key, np.array([at]))
+    out = {}
+    for c in candidates:
+        if c.key == first.key:
+            continue
+        grid, raw = frame.lines[c.key]
+        row = raw[_dense(grid)] @ own.root.T
+        still = np.broadcast_to(first.error * moved, row.shape)
+        out[c.key] = float(own.log(own.y - moved - row, c.error * row, still).max())
+    return out
+
+
 def prior_density(c: Candidate, severity: Floats) -> Floats:
     """Density of a severity before the log: it grows, so each passes the small ones first.
 
@@ -220,6 +238,8 @@ def prior_density(c: Candidate, severity: Floats) -> Floats:
 
 
 def _around(best: float, scale: float, c: Candidate, count: int) -> Floats:
+    if c.switched:  # its likelihood is a step, which no width describes
+        return np.linspace(c.low, c.high, count)
     low, high = max(c.low, best - _REACH * scale), min(c.high, best + _REACH * scale)
     return np.linspace(low, high, count)
 

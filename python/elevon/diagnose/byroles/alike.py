@@ -37,7 +37,11 @@ def with_alike(
     for cause in result.faults:
         if (cause.kind, cause.place) in covered:
             continue
-        others = _close(cause, cases, candidates, covariance, errors)
+        others = [
+            other
+            for other in _close(cause, cases, candidates, covariance, errors)
+            if other.key not in result.best  # a second fault beside it is no name for it
+        ]
         known = {(cause.kind, cause.place), *cause.equivalents}
         more = [
             (other.kind, place)
@@ -48,8 +52,16 @@ def with_alike(
         joint = [c for c in result.faults if (c.kind, c.place) in more]
         covered |= {(c.kind, c.place) for c in joint}
         total = min(1.0, cause.probability + sum(c.probability for c in joint))
-        out.append(replace(cause, probability=total, equivalents=(*cause.equivalents, *more)))
+        names = (*cause.equivalents, *more)
+        out.append(_there(replace(cause, probability=total, equivalents=names), candidates))
     return replace(result, faults=tuple(out))
+
+
+def _there(cause: Cause, candidates: Sequence[Candidate]) -> Cause:
+    """What is there or not has a severity of one."""
+    if any(c.switched for c in candidates if (c.kind, c.place) == (cause.kind, cause.place)):
+        return replace(cause, severity=1.0, interval=(1.0, 1.0))
+    return cause
 
 
 def _close(

@@ -43,11 +43,13 @@ def candidates_of(actuator: Actuator, texts: Sequence[str] | None = None) -> tup
     from elevon.faults import catalogue
 
     out = []
-    whole = counted_of(actuator) | switched_of(actuator)
+    switched = switched_of(actuator)
+    whole = counted_of(actuator) | switched
     for record in catalogue(actuator.wiring):
         if "low" in record.fidelities:
             made = [_candidate(record, group) for group in _groups(record.places)]
-            out += [replace(c, high=1.0) if c.kind in whole else c for c in made]
+            made = [replace(c, high=1.0) if c.kind in whole else c for c in made]
+            out += [replace(c, switched=c.kind in switched) for c in made]
     if not texts:
         return tuple(out)
     known = {f"{c.kind}@{place}": c for c in out for place in (c.place, *c.same)}

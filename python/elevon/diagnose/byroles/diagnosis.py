@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 __all__ = ["RoleCase", "diagnose_by_roles"]
 
 Floats = npt.NDArray[np.float64]
+PAIRS = 16  # of faults at once that are weighed
 OWN_ERROR = 0.15  # of what a fault does to one number: the low model shows sizes, not waveforms
 
 
@@ -62,7 +63,7 @@ def diagnose_by_roles(
     faults: Sequence[str] | None = None,
     false_alarm: float = 0.05,
 ) -> Diagnosis:
-    """Say what is wrong with the unit that wrote the logs; single faults only.
+    """Say what is wrong with the unit that wrote the logs: which fault or pair of faults.
 
     Parameters
     ----------
@@ -92,7 +93,7 @@ def diagnose_by_roles(
         _case(role_log(recording, name, actuator), actuator, candidates, healthy, findings)
         for name, recording in logs
     ]
-    result = answer_of(cases, candidates, false_alarm, findings, pairs=False)
+    result = answer_of(cases, candidates, false_alarm, findings, most=PAIRS)
     result = with_alike(result, cases, candidates)
     blind = (*result.unobservable, *(declined_of(actuator) if not faults else ()))
     return replace(result, unobservable=blind, seconds=clock.perf_counter() - begin)

@@ -32,6 +32,8 @@ _POINTS = 4  # severities of each candidate, one way
 _ACTS = 0.5  # severity from which on a fault that is there or not acts
 _LATE = 0.1  # deviation, in samples, of where a log is seen to begin. ASSUMED: straight onsets
 _CHUNK = 64  # runs held at once
+_OVER = 4  # samples of the model to one of the log, which are averaged: loggers filter, too
+_SET_POINT = "_ref"  # end of roles that a drive knows as numbers: nothing filters them
 _REMEMBERED = 16  # tests
 _MOST = 1e4  # least deviations that a fault moves a number by: beyond it nothing more is learnt
 
@@ -61,7 +63,7 @@ class RoleReplay(Replay):
     def shift(self, key: str, severity: Floats) -> Floats:
         """Return what severities of shape (m,) do to the evidence, shape (m, k)."""
         at, table = self.severities[key], self.shifts[key]
-        if key.partition("@")[0] in self.switched:
+        if key.partition("@")[0] in self.switched:  # as `Candidate.switched`
             severity = (severity >= _ACTS).astype(np.float64)
         low = np.clip(np.searchsorted(at, severity, side="right") - 1, 0, len(at) - 2)
         part = np.clip((severity - at[low]) / (at[low + 1] - at[low]), 0.0, 1.0)[:, None]
@@ -249,13 +251,14 @@ def channels_by(
 
     One run is prepared; the others exchange parameters and faults in what goes to the core.
     """
-    from elevon.simulate import Run
+    from elevon.simulate import Run, solver_step
     from elevon.simulate.batch import simulate_prepared
     from elevon.simulate.prepare import prepare
 
     ready = _as_on_stand(actuator, item.test)
     signals = _signals(item, actuator)
-    record = f"{','.join(signals.values())}@{item.rate:.12g} Hz"
+    over = _over(item.rate, solver_step(ready, "low"))
+    record = f"{','.join(signals.values())}@{over * item.rate:.12g} Hz"
     base = prepare(Run(ready, _scenario(item, actuator)), "low", record, doubts=False)
     base = replace(base, core=_with_arrays(base.core, item, actuator))
     places = {path: k for k, path in enumerate(ready.parameters)}
@@ -305,6 +308,7 @@ def _channels(
     clock = np.asarray(rows["time"])
     columns = dict(zip(names, np.asarray(rows["values"]).T, strict=False))
     at = item.time + BEFORE + late
+    over = round(1.0 / (item.rate * (clock[1] - clock[0]))) if len(clock) > 1 else 1
     out = {}
     for role, name in signals.items():
         values = np.nan_to_num(columns[name])
@@ -313,7 +317,25 @@ def _channels(
         elif item.units[role] == "1":
             out[role] = values[(np.searchsorted(clock, at + 1e-9, side="right") - 1).clip(0)]
         else:
-            out[role] = np.interp(at, clock, values)
+            filtered = values if role.endswith(_SET_POINT) else _averaged(values, over)
+            out[role] = np.interp(at, clock, filtered)
+    return out
+
+
+def _over(rate: float, step: float) -> int:
+    """Samples of the model to one of a log, an even number as far as its steps allow it."""
+    steps = round(1.0 / (rate * step))
+    return next((n for n in (_OVER, 2) if steps % n == 0), 1)
+
+
+def _averaged(values: Floats, over: int) -> Floats:
+    """Means over a log's period about each sample of the model."""
+    if over == 1 or len(values) < 2 * over:
+        return values
+    half = over // 2
+    total = np.concatenate(([0.0], np.cumsum(0.5 * (values[1:] + values[:-1]))))
+    out = values.copy()
+    out[half:-half] = (total[over:] - total[:-over]) / over
     return out
 
 
