@@ -8,10 +8,12 @@ from elevon.cli import main
 from elevon.diagnose.byroles import diagnose_by_roles
 from elevon.diagnose.byroles.asked import same_test
 from elevon.diagnose.byroles.candidates import candidates_of, declined_of
-from elevon.diagnose.byroles.log import role_log
+from elevon.diagnose.byroles.load import load_alike, read_load
+from elevon.diagnose.byroles.log import _onset, role_log
 from elevon.diagnose.byroles.numbers import numbers_of
 from elevon.diagnose.byroles.runs import spread_of
 from elevon.diagnose.byroles.spread import drawn, factors_of
+from elevon.diagnose.standard import Day, day_logs, diagnosed, standard_tests
 from elevon.errors import InputError, UnknownNameError
 
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
@@ -55,6 +57,51 @@ def test_play_of_a_screw_is_named_and_a_healthy_day_is_healthy(screw):
     assert worn.unobservable == ()  # both are seen, others were not asked for
 
 
+def test_two_faults_of_a_screw_are_named_together(screw):
+    few = ["play@transmission", "gain_drift@control.position", "short@motor.phase_a"]
+    base = [("base", log(screw, day=1))]
+    play = {"kind": "play", "place": "transmission", "severity": "0.4 mm"}
+    gain = {"kind": "gain_drift", "place": "control.position", "severity": -0.5}
+    said = diagnose_by_roles(
+        [("w", log(screw, play, gain, day=3))], screw, baselines=base, faults=few
+    )
+    assert set(said.best) == {"play@transmission", "gain_drift@control.position"}
+    low, high = next(c.interval for c in said.faults if c.kind == "play")
+    assert low < 4e-4 < high
+    assert all(c.probability > 0.9 for c in said.faults)
+
+
+PAIRS = [
+    ("nasa-ballscrew", "sine-opposing", [
+        ("short@motor.phase_a=0.25", "gain_drift@control.position=-0.4"),
+        ("play@transmission=0.0004", "gain@sensor.current_a=0.2"),
+        ("demagnetisation@motor=0.2", "lubrication_loss@screw=0.9"),
+        ("gain@sensor.encoder=0.01", "eccentricity_static@motor=0.2"),
+    ]),
+    ("pisa-landing-gear", "retraction-nominal", [
+        ("demagnetisation@motor=0.3", "offset@sensor.hall_a=0.15"),
+        ("efficiency_loss@screw=0.3", "bearing_wear@motor.bearing=0.3"),
+        ("sag@supply=0.2", "short@motor.phase_a=0.3"),
+        ("demagnetisation@motor=0.25", "proximity_on@sensor.proximity_0=1"),
+    ]),
+]  # fmt: skip
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "title", "pairs"), PAIRS, ids=[name for name, *_ in PAIRS])
+def test_pairs_of_faults_are_named_with_the_whole_catalogue(name, title, pairs):
+    actuator = Actuator.load(name)
+    test = next(t for t in standard_tests(actuator) if t.name == title)
+    days = [Day((), 71), *(Day(pair, 72 + k) for k, pair in enumerate(pairs))]
+    base, *logs = day_logs(actuator, test, days)
+    for pair, item in zip(pairs, logs, strict=True):
+        said = diagnosed(actuator, item, [base])
+        names = [{(c.kind, c.place), *c.equivalents} for c in said.faults]
+        for text in pair:
+            wanted = tuple(text.split("=")[0].split("@"))
+            assert any(wanted in own for own in names), (pair, said.best)
+
+
 def test_a_gear_is_diagnosed_whenever_its_action_came(gear):
     few = ["sag@supply", "proximity_off@sensor.proximity_25", "release_cable_failed@release"]
     base = [("base", log(gear, day=1))]
@@ -95,6 +142,35 @@ def test_a_log_is_read_from_its_first_command(screw, gear):
     extend = role_log(log(gear), "g", gear)
     assert extend.test.command[0][-1] == pytest.approx(0.0, abs=1e-9)
     assert extend.time[0] == pytest.approx(-0.1)
+
+
+def test_a_ramp_is_seen_to_begin_between_two_samples(screw):
+    """Whatever of its first samples is too near its start to count."""
+    time = np.arange(2000) / 500.0
+    for start in (0.3001, 0.3009, 0.3017):
+        ramp = 0.05 * np.clip(time - start, 0.0, 1.0)
+        assert _onset(time, ramp, sequence=False, name="x") == pytest.approx(start, abs=1e-9)
+
+
+def test_a_load_is_read_over_the_stroke_and_its_noise_is_none(gear):
+    rng = np.random.default_rng(3)
+    time = np.arange(4000) / 500.0
+    position = 0.264 * time / time[-1]
+    knots = np.array([-2000.0, -1900, -1700, -1600, -1500, -1400, -1300, -1100, -800])
+    load = np.interp(position, np.linspace(0.0, 0.264, 9), knots) + rng.normal(0.0, 5.0, len(time))
+    rest, over = read_load(gear, time, {"load": load, "output_position": position})
+    assert over is not None
+    np.testing.assert_allclose(over.forces, knots, atol=3.0)
+    assert np.abs(rest[1]).max() < 20.0
+    settings = over.settings(gear)
+    own = gear.parameters.value("load.force_3") * gear.parameters.value("load.factor")
+    assert settings["load.force_3"] == pytest.approx(own - over.forces[3])
+    half = {"load": load[:2000], "output_position": position[:2000]}  # a gear that stops midway
+    assert load_alike((rest, over), read_load(gear, time[:2000], half), time[::20])
+    heavy = {"load": 1.3 * load, "output_position": position}
+    assert not load_alike((rest, over), read_load(gear, time, heavy), time[::20])
+    noise = rng.normal(0.0, 5.0, len(time))
+    assert read_load(gear, time, {"load": noise, "output_position": position}) == (None, None)
 
 
 def test_numbers_of_a_closed_form():

@@ -5,7 +5,8 @@ import pytest
 from elevon import Actuator
 from elevon.diagnose.bymodel.answer import Cause, Diagnosis
 from elevon.diagnose.standard import standard_tests
-from elevon.errors import InputError, UnknownNameError
+from elevon.errors import InputError, Interrupted, UnknownNameError
+from elevon.reproduce import fault_limits
 from elevon.reproduce.fault_limits import (
     FaultLimits,
     Limit,
@@ -14,6 +15,7 @@ from elevon.reproduce.fault_limits import (
     names_it,
     reproduce_fault_limits,
 )
+from elevon.reproduce.fault_limits_table import limits_table
 
 
 def limit(**given):
@@ -56,3 +58,49 @@ def test_bad_plans_are_refused():
         reproduce_fault_limits(Plan(days=0))
     with pytest.raises(UnknownNameError):
         reproduce_fault_limits(Plan(fidelity="middle"))
+
+
+def test_what_is_finished_is_not_run_again(tmp_path, monkeypatch):
+    asked = []
+
+    def once(actuator, test, plan, progress):
+        asked.append(test.name)
+        if len(asked) == 2:
+            raise Interrupted("stopped")
+        return [limit(actuator=actuator.name, test=test.name)], 1
+
+    monkeypatch.setattr(fault_limits, "_test_limits", once)
+    given = {"actuators": ["torino-rotary"], "folder": tmp_path}
+    with pytest.raises(Interrupted):
+        reproduce_fault_limits(Plan(days=3), **given)
+    result = reproduce_fault_limits(Plan(days=3), **given)
+    assert asked == ["backlash", "chirp", "chirp", "loaded-1"]
+    assert result.healthy == {"torino-rotary": (3, 9)}
+    assert [row.test for row in result.limits] == ["backlash", "chirp", "loaded-1"]
+    assert result.limits[0] == limit(actuator="torino-rotary", test="backlash")
+    reproduce_fault_limits(Plan(days=4), **given)  # other work
+    assert len(asked) == 7
+
+
+def test_a_stop_is_heard_between_logs(monkeypatch):
+    actuator = Actuator.load("torino-rotary")
+    test = standard_tests(actuator)[0]
+    monkeypatch.setattr(fault_limits, "day_logs", lambda a, t, days, *rest: [None] * len(days))
+    monkeypatch.setattr(fault_limits, "diagnosed", lambda *given: None)
+    with pytest.raises(Interrupted, match="finished tests"):
+        fault_limits._test_limits(actuator, test, Plan(days=3), lambda fraction: fraction < 0.5)
+
+
+def test_the_table_has_each_fault_in_each_test():
+    rows = (
+        limit(named=True, alarm=True, injected=2e-3),
+        limit(test="u", limit=None, reason="moves nothing"),
+        limit(kind="sag", place="supply", unit="1", limit=None, reason="moves nothing"),
+        limit(kind="sag", place="supply", unit="1", test="u", limit=0.25),
+    )
+    text = limits_table(FaultLimits(rows, {"a": (1, 20)}, "low", 3), "elevon x")
+    assert "| `play@transmission` [m] | 0.001 | - |" in text
+    assert "| `sag@supply` | - | 0.25 |" in text
+    assert "1 of 20 (0 to 25 %) healthy logs called faulty" in text
+    assert "* `play@transmission` (u), `sag@supply` (t): moves nothing" in text
+    assert "    elevon x --table FILE" in text

@@ -16,11 +16,14 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.diagnose.modelfree.scores import share_interval
 from elevon.diagnose.standard import Day, StandardTest, day_logs, diagnosed, standard_tests
-from elevon.errors import DivergedError, InputError, unknown
+from elevon.errors import DivergedError, InputError, Interrupted, unknown
 from elevon.progress import part
 from elevon.report import Check, all_passed
+from elevon.worklog import finished
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from elevon.diagnose.bymodel.answer import Diagnosis
     from elevon.progress import Progress
 
@@ -81,7 +84,7 @@ class Plan:
         Of the days.
     """
 
-    days: int = 8
+    days: int = 10
     injected: int = 12
     fidelity: str = "low"
     seed: int = 0
@@ -156,6 +159,7 @@ def reproduce_fault_limits(
     plan: Plan | None = None,
     *,
     actuators: Sequence[str] = (),
+    folder: Path | None = None,
     progress: Progress | None = None,
 ) -> FaultLimits:
     """Find the limits and check them.
@@ -166,6 +170,8 @@ def reproduce_fault_limits(
         Days, faults, fidelity, seed.
     actuators : sequence of str
         Names or files of sets; default: a shipped one of each wiring.
+    folder : path, optional
+        Where finished tests are noted, so that an interrupted run goes on; default: nowhere.
     progress : callable, optional
         As everywhere.
 
@@ -173,6 +179,8 @@ def reproduce_fault_limits(
     ------
     InputError
         Fewer than one day, an unknown fidelity.
+    Interrupted
+        `progress` returned False.
     """
     plan = plan or Plan()
     if plan.days < 1:
@@ -183,13 +191,24 @@ def reproduce_fault_limits(
     work = [(a, t) for a in map(Actuator.load, names) for t in standard_tests(a)]
     limits: list[Limit] = []
     healthy = {a.name: (0, 0) for a, _ in work}
-    for k, (actuator, test) in enumerate(work):
-        share = part(progress, k / len(work), (k + 1) / len(work))
-        rows, alarms = _test_limits(actuator, test, plan, share)
-        limits += rows
-        before = healthy[actuator.name]
-        healthy[actuator.name] = (before[0] + alarms, before[1] + plan.days)
+    with finished(folder, f"fault-limits {plan}") as done:
+        for k, (actuator, test) in enumerate(work):
+            share = part(progress, k / len(work), (k + 1) / len(work))
+            name = f"{actuator.hash} {test.name}"
+            if done is not None and name in done.items:
+                rows, alarms = _noted(done.items[name].data)
+            else:
+                rows, alarms = _test_limits(actuator, test, plan, share)
+                if done is not None:
+                    done.note(name, [], rows=[row.to_dict() for row in rows], alarms=alarms)
+            limits += rows
+            before = healthy[actuator.name]
+            healthy[actuator.name] = (before[0] + alarms, before[1] + plan.days)
     return FaultLimits(tuple(limits), healthy, plan.fidelity, plan.seed)
+
+
+def _noted(data: dict[str, Any]) -> tuple[list[Limit], int]:
+    return [Limit(**row) for row in data["rows"]], data["alarms"]
 
 
 def _test_limits(
@@ -199,23 +218,27 @@ def _test_limits(
     first = 1000 * plan.seed
     whole = [Day((), first + k) for k in range(plan.days + 1)]
     base, *logs = day_logs(actuator, test, whole, plan.fidelity, part(progress, 0.0, 0.3))
-    answers = [diagnosed(actuator, log, [base]) for log in logs]
+    answers = []
+    for k, log in enumerate(logs):
+        answers.append(diagnosed(actuator, log, [base]))
+        _advance(progress, 0.3 + 0.3 * (k + 1) / len(logs))
     rows = _rows(actuator, test, answers[0])
     tried = _spread([k for k, row in enumerate(rows) if row.limit is not None], plan.injected)
-    severities = [_over(actuator, rows[k]) for k in tried]
-    broken = [
-        Day((f"{rows[k].kind}@{rows[k].place}={severity!r}",), first + 500 + k)
-        for k, severity in zip(tried, severities, strict=True)
-    ]
-    for k, severity, day in zip(tried, severities, broken, strict=True):
+    for done, k in enumerate(tried):
+        severity = _over(actuator, rows[k])
+        day = Day((f"{rows[k].kind}@{rows[k].place}={severity!r}",), first + 500 + k)
         try:
             log = day_logs(actuator, test, [day], plan.fidelity)[0]
         except (InputError, DivergedError):  # not a severity of this fidelity: left unchecked
             continue
         rows[k] = _judged(rows[k], severity, diagnosed(actuator, log, [base]))
-    if progress is not None:
-        progress(1.0)
+        _advance(progress, 0.6 + 0.4 * (done + 1) / len(tried))
     return rows, sum(answer.status == "faulty" for answer in answers)
+
+
+def _advance(progress: Progress | None, fraction: float) -> None:
+    if progress is not None and progress(fraction) is False:
+        raise Interrupted("fault-limits was stopped; finished tests are noted in its folder")
 
 
 def _rows(actuator: Actuator, test: StandardTest, answer: Diagnosis) -> list[Limit]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -23,6 +24,9 @@ _INJECTED = Annotated[
     int, typer.Option("--injected", min=0, help="Faults of each test that a log checks.")
 ]
 _FIDELITY = Annotated[str, typer.Option("--fidelity", help="Of the logs: high or low.")]
+_TABLE = Annotated[
+    Path | None, typer.Option("--table", help="Markdown file for the limits of all tests.")
+]
 _COLUMNS = ("actuator", "test", "kind", "place", "limit", "unit", "injected", "alarm", "named")
 
 
@@ -30,7 +34,36 @@ def _work(options: Options, progress: Advance) -> Any:
     from elevon.reproduce.fault_limits import Plan, reproduce_fault_limits
 
     plan = Plan(options["days"], options["injected"], options["fidelity"], options["seed"])
-    return reproduce_fault_limits(plan, actuators=options["actuator"] or (), progress=progress)
+    return reproduce_fault_limits(
+        plan, actuators=options["actuator"] or (), folder=options["out"], progress=progress
+    )
+
+
+def _prepare(options: Options) -> None:
+    """Refuse a table that cannot be written before the work, not after it."""
+    from elevon.files import check_output
+
+    if options["table"] is not None:
+        check_output(options["table"], force=options["force"])
+
+
+def _finish(result: Any, options: Options) -> None:
+    from elevon.cli.output import say
+    from elevon.files import write_text
+    from elevon.reproduce.fault_limits_table import limits_table
+
+    if options["table"] is not None:
+        text = limits_table(result, _command(options))
+        write_text(options["table"], text, force=options["force"])
+        say(f"table: {options['table']}")
+
+
+def _command(options: Options) -> str:
+    """What makes the same table again."""
+    names = [f"--actuator {name}" for name in options["actuator"] or ()]
+    rest = f"--days {options['days']} --injected {options['injected']}"
+    words = [*names, rest, f"--fidelity {options['fidelity']} --seed {options['seed']}"]
+    return f"elevon reproduce fault-limits {' '.join(words)}"
 
 
 def _page(result: Any, options: Options) -> Report:
@@ -46,8 +79,7 @@ def _page(result: Any, options: Options) -> Report:
     rows = [[getattr(row, name) for name in (*_COLUMNS, "reason")] for row in result.limits]
     text = [["-" if cell is None else str(cell) for cell in row] for row in rows]
     report.section("Limits").table(Table((*_COLUMNS, "reason"), text))
-    seed = options["seed"]
-    report.provenance(provenance(f"elevon reproduce fault-limits --seed {seed}", Seed=seed))
+    report.provenance(provenance(_command(options), Seed=options["seed"]))
     return report
 
 
@@ -65,9 +97,12 @@ CASES = (
         _page,
         {
             "actuator": (_ACTUATORS, None),
-            "days": (_DAYS, 8),
+            "days": (_DAYS, 10),
             "injected": (_INJECTED, 12),
             "fidelity": (_FIDELITY, "low"),
+            "table": (_TABLE, None),
         },
+        prepare=_prepare,
+        finish=_finish,
     ),
 )
