@@ -45,6 +45,8 @@ class RoleTest:
         Signal to where it starts.
     settings : mapping of str to object
         Parameters that the stand set.
+    note : str
+        Stand and step that the log names, if any.
     """
 
     seconds: float
@@ -54,6 +56,7 @@ class RoleTest:
     own_load: bool
     initial: Mapping[str, float | str]
     settings: Mapping[str, Any]
+    note: str = ""
 
     def within(self, seconds: float) -> RoleTest:
         """Return the test up to some seconds after its onset."""
@@ -89,6 +92,7 @@ def test_of(
         own,
         {**_initial(actuator, shown), **_stated(actuator.wiring, said.get("initial", {}))},
         settings,
+        f"{said['name']}: {recording.meta['log']}" if said and "log" in recording.meta else "",
     )
 
 
@@ -139,7 +143,11 @@ def _stated(wiring: str, given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def same_test(a: RoleTest, b: RoleTest) -> bool:
-    """Whether two logs were asked for the same and loaded alike."""
+    """Whether two logs were asked for the same and loaded alike.
+
+    Of two logs that name their step the load needs be no nearer: it may follow from a motion that
+    a fault has changed.
+    """
     seconds = min(a.seconds, b.seconds)
     if max(a.seconds, b.seconds) > 1.3 * seconds:
         return False
@@ -148,6 +156,8 @@ def same_test(a: RoleTest, b: RoleTest) -> bool:
     apart = _held_or_lines(a, grid) - _held_or_lines(b, grid)
     if float(np.sqrt(np.mean(apart**2))) > _ALIKE * size:
         return False
+    if a.note and a.note == b.note and a.settings == b.settings:
+        return True
     return load_alike((a.load, a.stroke), (b.load, b.stroke), grid)
 
 

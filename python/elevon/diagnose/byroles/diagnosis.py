@@ -20,7 +20,8 @@ from elevon.diagnose.byroles.candidates import candidates_of, declined_of
 from elevon.diagnose.byroles.healthy import healthy_of
 from elevon.diagnose.byroles.log import RoleLog, role_log
 from elevon.diagnose.byroles.noise import noise_of
-from elevon.diagnose.byroles.runs import RoleReplay, numbers_of_log, replay_by_roles
+from elevon.diagnose.byroles.runs import RoleReplay, replay_by_roles
+from elevon.diagnose.byroles.shown import numbers_of_log
 from elevon.errors import InputError
 
 if TYPE_CHECKING:

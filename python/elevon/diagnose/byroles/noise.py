@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.diagnose.byroles.log import RoleLog
-from elevon.diagnose.byroles.runs import numbers_of_log
 from elevon.diagnose.byroles.series import noise_deviation
+from elevon.diagnose.byroles.shown import numbers_of_log
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator

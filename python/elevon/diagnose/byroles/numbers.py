@@ -123,10 +123,22 @@ class _Slow:
     forward: npt.NDArray[np.bool_]
     backward: npt.NDArray[np.bool_]
 
+    size: float = 1.0
+
     @property
     def both(self) -> bool:
         """Whether the motion goes both ways."""
         return bool(min(self.forward.mean(), self.backward.mean()) > _BOTH)
+
+    def mean(self, values: Floats, way: float) -> float:
+        """Return the mean where the motion goes one way.
+
+        Weights grow with the speed about the threshold, so that no single sample decides.
+        """
+        assert self.speed is not None
+        return float(
+            np.average(values, weights=np.clip(way * self.speed / self.size - 0.5, 0.0, 1.0))
+        )
 
 
 def numbers_of(
@@ -186,7 +198,7 @@ def _slowed(
         none = np.zeros(len(clock), dtype=np.bool_)
         return _Slow(clock, shown, mean(command), None, none, none)
     size = _MOVING * float(np.quantile(np.abs(speed), 0.95))
-    return _Slow(clock, shown, mean(command), speed, speed > size, speed < -size)
+    return _Slow(clock, shown, mean(command), speed, speed > size, speed < -size, size)
 
 
 def _levels(out: Numbers, role: str, slow: _Slow, unit: str) -> None:
@@ -195,8 +207,8 @@ def _levels(out: Numbers, role: str, slow: _Slow, unit: str) -> None:
     size = float(np.sqrt(np.mean(values**2)))
     out.add(f"{role}: rms", size, "level", size, unit)
     if slow.both:
-        out.add(f"{role}: mean forwards", values[slow.forward].mean(), "level", size, unit)
-        out.add(f"{role}: mean backwards", values[slow.backward].mean(), "level", size, unit)
+        out.add(f"{role}: mean forwards", slow.mean(values, 1.0), "level", size, unit)
+        out.add(f"{role}: mean backwards", slow.mean(values, -1.0), "level", size, unit)
     else:
         for k, part in enumerate(np.array_split(values, _PARTS)):
             out.add(f"{role}: mean of part {k + 1}", part.mean(), "level", size, unit)

@@ -1,27 +1,29 @@
-"""Runs of the low model through a log's test, shown by the same roles."""
+"""Runs of the low model through a log's test: healthy, with each fault, on other days."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.diagnose.bymodel.answer import SEEN
 from elevon.diagnose.bymodel.candidates import Candidate
 from elevon.diagnose.bymodel.evidence import Evidence
 from elevon.diagnose.bymodel.replay import Replay
 from elevon.diagnose.byroles.asked import RoleTest, action_numbers, same_test
 from elevon.diagnose.byroles.candidates import counted_of, switched_of
-from elevon.diagnose.byroles.log import BEFORE, RoleLog
-from elevon.diagnose.byroles.numbers import Numbers, floors, numbers_of
+from elevon.diagnose.byroles.log import RoleLog
+from elevon.diagnose.byroles.numbers import Numbers, floors
+from elevon.diagnose.byroles.shown import Unit, as_on_stand, shown_by
 from elevon.diagnose.byroles.spread import daily, factors_of
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["RoleReplay", "Unit", "channels_by", "numbers_of_log", "replay_by_roles", "shown_by"]
+__all__ = ["RoleReplay", "replay_by_roles"]
 
 Floats = npt.NDArray[np.float64]
 _DRAWS = 28
@@ -30,10 +32,8 @@ _DRAWS = 28
 _WIDE = 2.0
 _POINTS = 4  # severities of each candidate, one way
 _ACTS = 0.5  # severity from which on a fault that is there or not acts
+_BENT = 0.3  # of a straight line's shift: below it the shift sets in between two severities
 _LATE = 0.1  # deviation, in samples, of where a log is seen to begin. ASSUMED: straight onsets
-_CHUNK = 64  # runs held at once
-_OVER = 4  # samples of the model to one of the log, which are averaged: loggers filter, too
-_SET_POINT = "_ref"  # end of roles that a drive knows as numbers: nothing filters them
 _REMEMBERED = 16  # tests
 _MOST = 1e4  # least deviations that a fault moves a number by: beyond it nothing more is learnt
 
@@ -68,32 +68,6 @@ class RoleReplay(Replay):
         low = np.clip(np.searchsorted(at, severity, side="right") - 1, 0, len(at) - 2)
         part = np.clip((severity - at[low]) / (at[low + 1] - at[low]), 0.0, 1.0)[:, None]
         return np.asarray(table[low] * (1.0 - part) + table[low + 1] * part, dtype=np.float64)
-
-
-@dataclass(frozen=True)
-class Unit:
-    """A unit of the replay.
-
-    Attributes
-    ----------
-    values : mapping of str to float
-        What differs from the set.
-    faults : tuple of str
-        As in ``--fault``.
-    late : float
-        Samples that it is seen to begin too late.
-    phase : float
-        Samples by which the recorder's instants precede those of the log: kinks and steps of
-        the command fall between samples.
-    number : int
-        Of its random numbers; healthy days differ in them, faults do not.
-    """
-
-    values: Mapping[str, float]
-    faults: tuple[str, ...] = ()
-    late: float = 0.0
-    phase: float = 0.0
-    number: int = 0
 
 
 @dataclass(frozen=True)
@@ -133,7 +107,7 @@ def replay_by_roles(
         )
         if alike and past.test.settings == item.test.settings and same_test(past.test, item.test):
             return past.made
-    made = _replayed(item, actuator, candidates)
+    made = _refined(_replayed(item, actuator, candidates), item, actuator, candidates)
     _RECENT.append(replace(own, made=made))
     del _RECENT[:-_REMEMBERED]
     return made
@@ -144,7 +118,7 @@ def _replayed(item: RoleLog, actuator: Actuator, candidates: Sequence[Candidate]
     units = [Unit({})]
     for c in candidates:
         units += [Unit({}, (c.text(float(s)),)) for s in severities[c.key] if s != 0.0]
-    ready = _as_on_stand(actuator, item.test)
+    ready = as_on_stand(actuator, item.test)
     steps = _steps_of_days(len(factors_of(ready)))
     units += _days(ready, steps)
     shown = list(shown_by(item, actuator, units))
@@ -196,6 +170,51 @@ def _days(ready: Actuator, steps: Floats) -> list[Unit]:
     ]
 
 
+def _refined(
+    model: RoleReplay, item: RoleLog, actuator: Actuator, candidates: Sequence[Candidate]
+) -> RoleReplay:
+    """Run one more severity of each fault that is seen where straight lines say little."""
+    names, values = model.healthy.names, model.healthy.values
+    least = floors(model.shown, names, values)
+    # With one baseline, as which most logs are judged.
+    root = np.linalg.inv(np.linalg.cholesky(2.0 * (model.spread + np.diag(least**2))))
+    more = [(c, s) for c in candidates for s in _between(model, c, root)]
+    units = [Unit({}, (c.text(s),)) for c, s in more]
+    severities, shifts = dict(model.severities), dict(model.shifts)
+    for (c, severity), numbers in zip(more, shown_by(item, actuator, units), strict=True):
+        row = np.array([numbers.values.get(name, np.nan) for name in names])
+        row = np.clip(np.nan_to_num(row - values), -_MOST * least, _MOST * least)
+        at = int(np.searchsorted(severities[c.key], severity))
+        severities[c.key] = np.insert(severities[c.key], at, severity)
+        shifts[c.key] = np.insert(shifts[c.key], at, row, axis=0)
+    return RoleReplay(
+        model.shown,
+        severities,
+        shifts,
+        draws=model.draws,
+        spread=model.spread,
+        switched=model.switched,
+    )
+
+
+def _between(model: RoleReplay, c: Candidate, root: Floats) -> list[float]:
+    """A severity between those that were run: where it is first seen, or where it sets in."""
+    if len(model.severities[c.key]) == 2:  # there or not, or counted
+        return []
+    grid = np.linspace(0.0, c.high, 2001)
+    seen = np.flatnonzero(np.linalg.norm(model.shift(c.key, grid) @ root.T, axis=1) > SEEN)
+    if not seen.size:
+        return []
+    limit = float(grid[seen[0]])
+    at = model.severities[c.key]
+    k = int(np.searchsorted(at, limit))
+    low, high = float(at[k - 1]), float(at[k])
+    if low == 0.0:
+        return [2.0 * limit] if 4.0 * limit < high else []
+    sizes = np.linalg.norm(model.shift(c.key, np.array([low, high])) @ root.T, axis=1)
+    return [0.5 * (low + high)] if sizes[0] < _BENT * sizes[1] * low / high else []
+
+
 def spread_of(draws: Floats, steps: Floats) -> Floats:
     """Covariance of healthy days, shape (k, k), from draws, shape (d, k), and their factors.
 
@@ -219,183 +238,6 @@ def _severities(c: Candidate, actuator: Actuator) -> Floats:
     return np.concatenate((low, c.high * steps))
 
 
-def _as_on_stand(actuator: Actuator, test: RoleTest) -> Actuator:
-    ready = actuator.with_values(dict(test.settings), source="stand of the log")
-    if test.stroke is None:
-        return ready
-    return ready.with_values(test.stroke.settings(ready), source="load of the log")
-
-
 def _evidence(shown: Numbers) -> Evidence:
     values = np.array(list(shown.values.values()))
     return Evidence(tuple(shown.values), values, np.zeros(len(values)))
-
-
-def numbers_of_log(item: RoleLog, actuator: Actuator, channels: Mapping[str, Floats]) -> Numbers:
-    """Return the numbers of a log, or of a model run on its instants."""
-    known = actuator.parameters
-    pairs = known.value("motor.pole_pairs") if "motor.pole_pairs" in known else None
-    return numbers_of(channels, item.command, item.time, item.units, pairs)
-
-
-def shown_by(item: RoleLog, actuator: Actuator, units: Sequence[Unit]) -> Iterator[Numbers]:
-    """Run units through a log's test; numbers of each by the log's roles."""
-    for channels in channels_by(item, actuator, units):
-        yield numbers_of_log(item, actuator, channels)
-
-
-def channels_by(
-    item: RoleLog, actuator: Actuator, units: Sequence[Unit]
-) -> Iterator[dict[str, Floats]]:
-    """Run units through a log's test; what each shows by the log's roles, on its instants.
-
-    One run is prepared; the others exchange parameters and faults in what goes to the core.
-    """
-    from elevon.simulate import Run, solver_step
-    from elevon.simulate.batch import simulate_prepared
-    from elevon.simulate.prepare import prepare
-
-    ready = _as_on_stand(actuator, item.test)
-    signals = _signals(item, actuator)
-    over = _over(item.rate, solver_step(ready, "low"))
-    record = f"{','.join(signals.values())}@{over * item.rate:.12g} Hz"
-    base = prepare(Run(ready, _scenario(item, actuator)), "low", record, doubts=False)
-    base = replace(base, core=_with_arrays(base.core, item, actuator))
-    places = {path: k for k, path in enumerate(ready.parameters)}
-    actions = action_numbers(actuator.wiring)
-    for first in range(0, len(units), _CHUNK):
-        runs = [
-            replace(base, core=_of_unit(base.core, unit, places, item, actuator.wiring))
-            for unit in units[first : first + _CHUNK]
-        ]
-        shown = simulate_prepared(runs, fidelity="low")
-        for unit, result in zip(units[first : first + _CHUNK], shown, strict=True):
-            rows = result["clocks"][base.plan[0].name]
-            late = unit.late if actions else unit.late + unit.phase
-            yield _channels(item, rows, base.plan[0].signals, signals, late / item.rate)
-
-
-def _of_unit(
-    core: Mapping[str, Any], unit: Unit, places: Mapping[str, int], item: RoleLog, wiring: str
-) -> dict[str, Any]:
-    from elevon.faults import Fault
-
-    vector = np.array(core["parameters"])
-    for path, value in unit.values.items():
-        vector[places[path]] = value
-    faults = [
-        Fault.parse(text).resolved(wiring, "low", f"fault[{k}]")
-        for k, text in enumerate(unit.faults)
-    ]
-    out = {**core, "parameters": vector, "faults": faults, "run": unit.number}
-    if unit.phase != 0.0:
-        later = unit.phase / item.rate
-        out["inputs"] = {
-            port: [{**t, "times": np.asarray(t["times"]) + later} for t in terms]
-            for port, terms in core["inputs"].items()
-        }
-    return out
-
-
-def _channels(
-    item: RoleLog,
-    rows: Mapping[str, Any],
-    names: Sequence[str],
-    signals: Mapping[str, str],
-    late: float,
-) -> dict[str, Floats]:
-    """A run's rows by role, on the log's instants; a run that ended early shows its end on."""
-    clock = np.asarray(rows["time"])
-    columns = dict(zip(names, np.asarray(rows["values"]).T, strict=False))
-    at = item.time + BEFORE + late
-    over = round(1.0 / (item.rate * (clock[1] - clock[0]))) if len(clock) > 1 else 1
-    out = {}
-    for role, name in signals.items():
-        values = np.nan_to_num(columns[name])
-        if len(clock) == 0:
-            out[role] = np.zeros(len(at))
-        elif item.units[role] == "1":
-            out[role] = values[(np.searchsorted(clock, at + 1e-9, side="right") - 1).clip(0)]
-        else:
-            filtered = values if role.endswith(_SET_POINT) else _averaged(values, over)
-            out[role] = np.interp(at, clock, filtered)
-    return out
-
-
-def _over(rate: float, step: float) -> int:
-    """Samples of the model to one of a log, an even number as far as its steps allow it."""
-    steps = round(1.0 / (rate * step))
-    return next((n for n in (_OVER, 2) if steps % n == 0), 1)
-
-
-def _averaged(values: Floats, over: int) -> Floats:
-    """Means over a log's period about each sample of the model."""
-    if over == 1 or len(values) < 2 * over:
-        return values
-    half = over // 2
-    total = np.concatenate(([0.0], np.cumsum(0.5 * (values[1:] + values[:-1]))))
-    out = values.copy()
-    out[half:-half] = (total[over:] - total[:-over]) / over
-    return out
-
-
-def _signals(item: RoleLog, actuator: Actuator) -> dict[str, str]:
-    """Role to the low model's signal, what a sensor shows before what is true."""
-    from elevon import _core
-
-    played: dict[str, str] = {}
-    for signal in _core.signals(actuator.wiring, "low"):
-        if signal["role"] is not None:
-            played[signal["role"]] = signal["name"]
-    return {role: played[role] for role in item.channels if role in played}
-
-
-_EMPTY: Mapping[str, Any] = {"kind": "table", "times": [0.0, 1.0], "values": [0.0, 0.0]}
-
-
-def _scenario(item: RoleLog, actuator: Actuator) -> Any:
-    """The test with empty tables: their arrays are put in when everything is checked."""
-    from elevon import _core
-    from elevon.scenario import Scenario
-
-    wiring = next(w for w in _core.wirings() if w["name"] == actuator.wiring)
-    actions = action_numbers(actuator.wiring)
-    command: dict[str, Any] = {"mode": wiring["modes"][0], "terms": [_EMPTY]}
-    if actions:
-        command = {"mode": wiring["modes"][0], "steps": _steps(item.test, actions)}
-    document: dict[str, Any] = {
-        "duration": item.test.seconds + BEFORE + 2.0 / item.rate,
-        "command": command,
-    }
-    if item.test.load is not None:
-        document["load"] = {"user": {"terms": [_EMPTY]}}
-    if item.test.initial:
-        document["initial"] = dict(item.test.initial)
-    return Scenario.from_dict(document)
-
-
-def _steps(test: RoleTest, actions: Sequence[str]) -> list[dict[str, Any]]:
-    times, numbers = test.command
-    return [
-        {"time": max(float(t) + BEFORE, 0.0), "action": actions[int(n) % len(actions)]}
-        for t, n in zip(times, numbers, strict=True)
-        if t < test.seconds
-    ]
-
-
-def _with_arrays(core: Mapping[str, Any], item: RoleLog, actuator: Actuator) -> dict[str, Any]:
-    inputs = dict(core["inputs"])
-    if not action_numbers(actuator.wiring):
-        inputs["command"] = [_table(inputs["command"][0], item.test.command)]
-    if item.test.load is not None:
-        inputs["user"] = [_table(inputs["user"][0], item.test.load)]
-    return {**core, "inputs": inputs}
-
-
-def _table(term: Mapping[str, Any], points: tuple[Floats, Floats]) -> dict[str, Any]:
-    times, values = points
-    return {
-        **term,
-        "times": np.ascontiguousarray(times + BEFORE),
-        "values": np.ascontiguousarray(values),
-    }

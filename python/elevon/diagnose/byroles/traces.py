@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.diagnose.byroles.log import RoleLog, role_log
-from elevon.diagnose.byroles.runs import Unit, channels_by
+from elevon.diagnose.byroles.shown import Unit, channels_by
 from elevon.diagnose.pictures import Panel, Traces, named_faults
 from elevon.units import to_display
 
