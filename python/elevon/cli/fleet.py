@@ -65,7 +65,7 @@ def fleet(
         tables = respond(model, flown, progress=advance)
     units: dict[str, Prognosis] = {}
     for name, item in zip(names, read, strict=True):
-        seen = diagnosed(item, model).inspections(tables.laws)
+        seen = diagnosed(item, model).inspections(tables.laws, tables.units_by_name)
         units[name] = predict(seen, model, flown, response=tables, seed=seed, serial=name)
     plan = plan_fleet(units, costs)
     if report is not None:

@@ -68,7 +68,7 @@ def predict(
     if any(entry.diagnosis is None for entry in entries.entries):
         with progress_bar("diagnoses") as advance:
             entries = diagnosed(entries, model, progress=advance)
-    seen = entries.inspections(tables.laws)
+    seen = entries.inspections(tables.laws, tables.units_by_name)
     result = run(
         seen, model, flown, response=tables, particles=particles, seed=seed, serial=entries.serial
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from elevon.prognose.measured import governing
 from elevon.prognose.mission import Usage
 from elevon.prognose.process import Population, Process
 from elevon.prognose.requirement import SEVERITY
@@ -76,10 +77,10 @@ def look_ahead(
     rng : Generator
         Of chance.
     model_error : float
-        See `MODEL_ERROR`; drawn once a unit and requirement.
+        See `MODEL_ERROR`; one of each unit and requirement.
     """
     count = len(units.weight)
-    off = _model_errors(process, count, model_error, rng)
+    off = _model_errors(process, units, model_error, rng)
     load = usage.load * np.exp(usage.load_spread * rng.standard_normal(count))
     end, first = np.full(count, np.inf), np.full(count, -1, dtype=np.intp)
     damage = units.damage.copy()
@@ -109,14 +110,22 @@ def look_ahead(
 
 
 def _model_errors(
-    process: Process, count: int, deviation: float, rng: np.random.Generator
+    process: Process, units: Population, deviation: float, rng: np.random.Generator
 ) -> Floats:
-    """Draw what each unit's requirements are off by, shape (m, n), in thresholds."""
-    measured = [r.measure != SEVERITY for r in process.response.requirements]
+    """Return what each unit's requirements are off by, shape (m, n), in thresholds.
+
+    Drawn, or what the units carry where requirements have been measured.
+    """
+    count, requirements = len(units.weight), process.response.requirements
+    measured = [r.measure != SEVERITY for r in requirements]
     if deviation == 0.0:
         return np.zeros((len(measured), count))
-    scale = deviation * np.array(measured, dtype=np.float64)[:, None]
-    return np.asarray(scale * rng.standard_normal((len(measured), count)))
+    off = rng.standard_normal((len(measured), count))
+    if units.off.shape[2]:
+        for item in (r for r in requirements if r.measure != SEVERITY):
+            r, k = governing(process.response, item.name)
+            off[r] = units.off[:, k, r]
+    return np.asarray(deviation * np.array(measured, dtype=np.float64)[:, None] * off)
 
 
 def _out_of_sight(more: float, ends: Floats) -> bool:

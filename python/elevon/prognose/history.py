@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from elevon.errors import FormatError, InputError, Interrupted, unknown
 from elevon.prognose.laws import LAWS
+from elevon.prognose.measured import read_measured
 from elevon.prognose.mission import UNITS_OF_USE
 from elevon.prognose.observation import Inspection, inspection
 from elevon.prognose.predict import check_order
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Entry", "History", "diagnosed", "read_history", "write_stamp"]
 
-_KEYS = frozenset({"usage", "unit", "date", "serial", "reset", "logs", "healthy"})
+_KEYS = frozenset({"usage", "unit", "date", "serial", "reset", "logs", "healthy", "measured"})
 _OF_DIAGNOSIS = frozenset(
     {
         "status", "p_fault", "p_other", "false_alarm", "chance", "faults", "best", "unobservable",
@@ -59,6 +60,8 @@ class Entry:
         Those logs.
     healthy : bool
         Whether they serve as baseline.
+    measured : object
+        Requirements' own values as the file gives them.
     """
 
     path: Path
@@ -69,6 +72,7 @@ class Entry:
     diagnosis: Mapping[str, Any] | None
     logs: tuple[Path, ...]
     healthy: bool
+    measured: Any = None
 
 
 @dataclass(frozen=True)
@@ -79,13 +83,23 @@ class History:
     unit: str
     serial: str
 
-    def inspections(self, laws: Sequence[Law]) -> list[Inspection]:
+    def inspections(
+        self, laws: Sequence[Law], requirements: Mapping[str, str] | None = None
+    ) -> list[Inspection]:
         """Return what the filters take.
+
+        Parameters
+        ----------
+        laws : sequence of Law
+            Whose faults matter.
+        requirements : mapping of str to str, optional
+            Those that may have been measured, and the SI unit of each.
 
         Raises
         ------
         InputError
-            An entry has no diagnosis yet, or one that is none; a part made new that no fault has.
+            An entry has no diagnosis yet, or one that is none; a part made new that no fault has; a
+            measured requirement that is none.
         """
         out = []
         for entry in self.entries:
@@ -100,6 +114,9 @@ class History:
                     name=entry.path.name,
                     date=entry.date,
                     reset=entry.reset,
+                    measured=None
+                    if entry.measured is None
+                    else read_measured(entry.measured, requirements or {}, str(entry.path)),
                 )
             )
         return out
@@ -199,6 +216,7 @@ def _entry(path: Path) -> tuple[Entry, str] | None:
         diagnosis,
         logs,
         bool(data.get("healthy", False)),
+        data.get("measured"),
     )
     return entry, str(unit)
 

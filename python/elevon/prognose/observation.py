@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import erfc, sqrt
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from elevon.errors import InputError, quoted
 
 if TYPE_CHECKING:
     from elevon.prognose.law import Law
+    from elevon.prognose.measured import Measured
 
 __all__ = ["COMMON", "SIGMAS", "Inspection", "Seen", "inspection"]
 
@@ -118,6 +119,8 @@ class Inspection:
         Of its file.
     date : str
         ISO date, or empty.
+    measured : mapping of str to Measured
+        Requirements' own values, by name; they update the particle filter alone.
     """
 
     usage: float
@@ -125,6 +128,7 @@ class Inspection:
     reset: tuple[str, ...] = ()
     name: str = ""
     date: str = ""
+    measured: Mapping[str, Measured] = field(default_factory=dict)
 
 
 def inspection(
@@ -135,6 +139,7 @@ def inspection(
     name: str = "",
     date: str = "",
     reset: Sequence[str] = (),
+    measured: Mapping[str, Measured] | None = None,
 ) -> Inspection:
     """Build an inspection from a diagnosis.
 
@@ -144,7 +149,7 @@ def inspection(
         The JSON object of ``elevon diagnose``: its ``faults`` and ``detectable`` are used.
     laws : sequence of Law
         Whose faults matter.
-    usage, name, date, reset
+    usage, name, date, reset, measured
         As in `Inspection`.
 
     Raises
@@ -163,7 +168,7 @@ def inspection(
         else:
             continue
         seen[law.key] = replace(read, common=_common(law.kind, read.severity or 0.0))
-    return Inspection(usage, seen, tuple(reset), name, date)
+    return Inspection(usage, seen, tuple(reset), name, date, measured or {})
 
 
 def _common(kind: str, severity: float) -> float:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.prognose.future import MODEL_ERROR
+from elevon.prognose.measured import Measured, governing
 from elevon.prognose.observation import Inspection, Seen
 from elevon.prognose.process import Population, Process
 
@@ -61,10 +65,12 @@ class ParticleFilter:
             if seen is None:
                 continue
             self._compare(units, k, seen)
-            units = self._weighed(units, k, seen)
+            units = self._weighed(units, k, partial(self._likelihood, k, seen))
             if seen.severity is not None:
                 units = _with_misfit(units, k, seen.scatter(self._shown(units, k, seen)))
                 self._counts[k] += 1
+        for name, value in item.measured.items():
+            units = self._measured(units, name, value)
         if item.reset:
             units = self.process.reset(units, item.reset, self.rng)
         self.units = units
@@ -75,7 +81,36 @@ class ParticleFilter:
         severity = self.process.laws[k].severity(units.damage[:, k])
         return severity + seen.common * units.common[:, k]
 
-    def _weighed(self, units: Population, k: int, seen: Seen) -> Population:
+    def _likelihood(self, k: int, seen: Seen, units: Population) -> Floats:
+        """Return the logarithm of a diagnosis' likelihood, shape (n,)."""
+        shown = self._shown(units, k, seen)
+        return seen.log_likelihood(shown, units.misfit[:, k], self._counts[k])
+
+    def _measured(self, units: Population, name: str, value: Measured) -> Population:
+        """Weigh by a requirement's own value: the model's at the units' severities, and off it.
+
+        What the model is off by is a share of its value, and at the threshold that of the future.
+        The numbers of the law that moves it most are weighed, and what the model is off by stands
+        beside them; of the other laws' faults their units' spread is in the value.
+        """
+        response = self.process.response
+        r, k = governing(response, name)
+        units = units.with_off(len(response.requirements), self.rng)
+        limit = response.thresholds[r]
+        reserve = float(response.requirements[r].reserve(np.array(value.value), limit))
+        seen = Seen(reserve, value.deviation / limit, value.deviation / limit)
+        sign = 1.0 if response.requirements[r].at_least else -1.0
+
+        def likelihood(units: Population) -> Floats:
+            left = response.reserve(self.process.severity(units.damage))[r]
+            off = MODEL_ERROR * units.off[:, k, r] * (1.0 + sign * left)
+            return seen.log_likelihood(left + off)
+
+        return self._weighed(units, k, likelihood)
+
+    def _weighed(
+        self, units: Population, k: int, likelihood: Callable[[Population], Floats]
+    ) -> Population:
         """Weigh and draw one law's numbers, in shares of the likelihood that leave enough of them.
 
         A diagnosis that few particles foresaw so narrows the cloud in steps, rather than to those
@@ -83,9 +118,7 @@ class ParticleFilter:
         """
         left = 1.0
         while left > 0.0:
-            score = seen.log_likelihood(
-                self._shown(units, k, seen), units.misfit[:, k], self._counts[k]
-            )
+            score = likelihood(units)
             share = _share(score, left)
             left -= share
             units = _drawn(units, k, _weights(share * score), self.rng)
@@ -159,18 +192,24 @@ def _drawn(units: Population, k: int, weight: Floats, rng: np.random.Generator) 
     wide = _KERNEL * max(1.0 - _effective(weight), 0.0)  # equal weights round to just below zero
     new = _kernel(_rows(units, updated, k), part, _rows(out, moved, k), wide, rng)
     damage, growth, form = out.damage.copy(), out.growth.copy(), out.form.copy()
-    common, own = out.common.copy(), out.own.copy()
+    common, own, off = out.common.copy(), out.own.copy(), out.off.copy()
     damage[moved, k], growth[moved, k] = np.exp(new[:, 0]), new[:, 1]
     form[moved, k] = np.abs(new[:, 2])  # one-sided as its prior
-    common[moved, k], own[moved, k] = new[:, 3], new[:, 4:]
-    return replace(out, damage=damage, growth=growth, form=form, common=common, own=own)
+    last = 4 + own.shape[2]
+    common[moved, k], own[moved, k], off[moved, k] = new[:, 3], new[:, 4:last], new[:, last:]
+    return replace(out, damage=damage, growth=growth, form=form, common=common, own=own, off=off)
 
 
 def _rows(units: Population, keep: npt.NDArray[np.bool_], k: int) -> Floats:
-    """Logarithm of the damage and all fixed numbers of one law, shape (n, 4 + c)."""
+    """Logarithm of the damage and all fixed numbers of one law, shape (n, 4 + c + m)."""
     fixed = (units.growth, units.form, units.common)
     return np.column_stack(
-        (np.log(units.damage[keep, k]), *(v[keep, k] for v in fixed), units.own[keep, k])
+        (
+            np.log(units.damage[keep, k]),
+            *(v[keep, k] for v in fixed),
+            units.own[keep, k],
+            units.off[keep, k],
+        )
     )
 
 

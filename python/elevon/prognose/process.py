@@ -26,7 +26,7 @@ ONSET = 0.05
 """Rate at which a dormant fault begins to grow, for each e-fold of use. ASSUMED."""
 
 
-_OF_LAWS = ("damage", "growth", "form", "active", "misfit", "common", "own")  # unit and law first
+_OF_LAWS = ("damage", "growth", "form", "active", "misfit", "common", "own", "off")  # unit, law
 
 
 @dataclass(frozen=True)
@@ -52,6 +52,9 @@ class Population:
     own : ndarray, shape (n, k, c)
         Logarithms of the unit's factors on the coefficients that differ from unit to unit, in the
         order of `Law.spreading`; the rest of c is unused.
+    off : ndarray, shape (n, k, m)
+        What the model says of m requirements is off by, in deviations of that, beside the law that
+        moves each most; m = 0 until one of them has been measured.
     usage : float
         Use so far, in the mission's unit.
     """
@@ -64,6 +67,7 @@ class Population:
     misfit: Floats
     common: Floats
     own: Floats
+    off: Floats
     usage: float = 0.0
 
     @classmethod
@@ -81,6 +85,7 @@ class Population:
             misfit=zeros,
             common=zeros,
             own=np.zeros((*growth.shape, 0)),
+            off=np.zeros((*growth.shape, 0)),
             usage=usage,
         )
 
@@ -94,6 +99,12 @@ class Population:
         columns = np.arange(self.damage.shape[1])
         rows = np.where(columns == k, index[:, None], np.arange(len(index))[:, None])
         return replace(self, **{name: getattr(self, name)[rows, columns] for name in _OF_LAWS})
+
+    def with_off(self, requirements: int, rng: np.random.Generator) -> Population:
+        """Return the units with what the model is off by, drawn where they carry none yet."""
+        if self.off.shape[2]:
+            return self
+        return replace(self, off=rng.standard_normal((*self.damage.shape, requirements)))
 
 
 class Process:
@@ -136,6 +147,7 @@ class Process:
             misfit=np.zeros((count, size)),
             common=rng.standard_normal((count, size)),
             own=self._spreads * rng.standard_normal((count, *self._spreads.shape)),
+            off=np.zeros((count, size, 0)),
         )
 
     def severity(self, damage: Floats) -> Floats:

@@ -65,6 +65,12 @@ class Response:
         object.__setattr__(self, "_tables", (exposures, np.column_stack(reserves)))
 
     @property
+    def units_by_name(self) -> dict[str, str]:
+        """Requirements' names to the SI units of what they measure."""
+        names = (item.name for item in self.requirements)
+        return dict(zip(names, self.units, strict=True))
+
+    @property
     def loaded(self) -> bool:
         """Whether the last axis is the load's factor."""
         return len(self.grid.axes) > len(self.laws)
