@@ -105,6 +105,18 @@ def test_growth_is_a_gamma_process_whatever_the_steps():
         assert damage.min() >= 0.0
 
 
+def test_ends_do_not_depend_on_whether_their_course_is_kept():
+    unit = process(law(1e-3, spread=0.5, grain=0.01), limits=(1.0,))
+    units = unit.start(50, np.random.default_rng(0))
+    kept, ends = (
+        look_ahead(unit, units, Usage(), np.random.default_rng(1), course=course)
+        for course in (True, False)
+    )
+    np.testing.assert_array_equal(kept.end, ends.end)
+    assert len(kept.course) > 10
+    np.testing.assert_array_equal(ends.course, kept.course[:1])
+
+
 def test_the_first_of_two_requirements_is_named_with_its_share():
     unit = process(law(1e-3, "play"), law(1e-3, "friction"), limits=(1.0, 1.5))
     rng = np.random.default_rng(3)

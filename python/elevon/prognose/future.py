@@ -63,6 +63,7 @@ def look_ahead(
     rng: np.random.Generator,
     *,
     model_error: float = 0.0,
+    course: bool = True,
 ) -> Future:
     """Let units of equal weight be used until they fail.
 
@@ -78,6 +79,9 @@ def look_ahead(
         Of chance.
     model_error : float
         See `MODEL_ERROR`; one of each unit and requirement.
+    course : bool
+        Whether the severities' course is kept, which takes a sixth of the time; else it is where
+        they stand now.
     """
     count = len(units.weight)
     off = _model_errors(process, units, model_error, rng)
@@ -90,23 +94,25 @@ def look_ahead(
     end[dead], first[dead] = units.usage, reserve[:, dead].argmin(axis=0)
     alive, reserve = alive[~dead], reserve[:, ~dead]
     now = units.picked(np.flatnonzero(~dead))
-    at, course = [units.usage], [_quantiles(process, damage)]
+    at, kept = [units.usage], [_quantiles(process, damage)]
     for _ in range(_MOST_STEPS):
         if not len(alive) or _out_of_sight(now.usage - units.usage, end - units.usage):
             break
-        step = _step(process, now, load[alive])
-        later = process.advance(now, step, rng, load[alive])
+        rate = process.rate(now, now.damage, load[alive])
+        step = _step(process, rate)
+        later = process.advance(now, step, rng, load[alive], rate)
         after = process.response.reserve(process.severity(later.damage)) + off[:, alive]
         failed = after.min(axis=0) < 0.0
         if failed.any():
             share, which = crossing(reserve[:, failed], after[:, failed])
             end[alive[failed]], first[alive[failed]] = now.usage + share * step, which
         damage[alive] = later.damage
-        at.append(later.usage)
-        course.append(_quantiles(process, damage))
+        if course:
+            at.append(later.usage)
+            kept.append(_quantiles(process, damage))
         alive, reserve = alive[~failed], after[:, ~failed]
         now = later.picked(np.flatnonzero(~failed))
-    return Future(units.usage, end, first, np.array(at), np.array(course))
+    return Future(units.usage, end, first, np.array(at), np.array(kept))
 
 
 def _model_errors(
@@ -135,11 +141,11 @@ def _out_of_sight(more: float, ends: Floats) -> bool:
     return bool(long_ago) or more > _FARTHEST
 
 
-def _step(process: Process, units: Population, load: Floats) -> float:
+def _step(process: Process, rate: Floats) -> float:
     """Repetitions in which the fastest units go a hundredth of the way to the greatest severity."""
-    rate = np.quantile(process.rate(units, units.damage, load), 0.9, axis=0)
+    fast = np.quantile(rate, 0.9, axis=0)
     with np.errstate(divide="ignore"):
-        return float(min(np.min(_STEP * process.range / rate), 0.1 * _FARTHEST))
+        return float(min(np.min(_STEP * process.range / fast), 0.1 * _FARTHEST))
 
 
 def crossing(before: Floats, after: Floats) -> tuple[Floats, npt.NDArray[np.intp]]:

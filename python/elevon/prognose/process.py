@@ -188,13 +188,15 @@ class Process:
         steps: float,
         rng: np.random.Generator | None,
         load: Floats | None = None,
+        rate: Floats | None = None,
     ) -> Population:
         """Let all units be used `steps` repetitions more, in one step of the midpoint rule.
 
-        Without a random generator growth is the mean one.
+        Without a random generator growth is the mean one; `rate` is that of the units as they
+        stand, where it is known already.
         """
         ones = np.ones(len(units.weight)) if load is None else load
-        first = steps * self.rate(units, units.damage, ones)
+        first = steps * (self.rate(units, units.damage, ones) if rate is None else rate)
         mean = steps * self.rate(units, units.damage + 0.5 * first, ones)
         grown = mean if rng is None else _gamma(mean, self.laws, rng)
         growth, active = units.growth, units.active

@@ -172,7 +172,7 @@ def _remaining(
     process: Process, units: Population, mission: Mission, rng: np.random.Generator
 ) -> list[float]:
     """Return low, median, high of the remaining life, as `elevon predict` draws it."""
-    future = look_ahead(process, units, mission.usage, rng, model_error=MODEL_ERROR)
+    future = look_ahead(process, units, mission.usage, rng, model_error=MODEL_ERROR, course=False)
     return _quantiles(future.remaining)
 
 
