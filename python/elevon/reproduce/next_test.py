@@ -8,15 +8,18 @@ of the tests is worth, not what the model's errors cost (`diagnosis-limits` does
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import permutations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from elevon.diagnose.bymodel.candidates import CANDIDATES
 from elevon.diagnose.nexttest import Belief, Possible, profiles
-from elevon.diagnose.nexttest.information import expected_information, planned, updated
+from elevon.diagnose.nexttest.information import expected_information, likelihoods, planned
 from elevon.errors import Interrupted
 from elevon.report import Check, all_passed
 
@@ -42,11 +45,14 @@ PAIRS: Mapping[str, tuple[Condition, Condition]] = {
     "friction or healthy": (("friction@transmission", 0.10), None),
     "position gain or healthy": (("gain_drift@control.position", 0.003), None),
 }
-STRATEGIES = ("information", "fixed", "random", "standard")
-"""By information; all in the order of the list; any of them; the three standard ones in turn."""
-JUDGED = ("fixed", "random")
+STRATEGIES = ("information", "orders", "fixed", "random", "standard")
+"""By information; the mean of every order of the tests that is fixed beforehand, repeated; the
+order of the list; any of them; the three standard ones in turn."""
+JUDGED = ("orders", "fixed", "random", "standard")
 CERTAIN, MOST = 0.95, 10
 _KNOWN_TO = 0.2  # deviation of a severity, of itself: what earlier tests left open (ASSUMED)
+_ODDS = math.log(CERTAIN / (1.0 - CERTAIN))
+_AHEAD = 2  # logs of each test that are made together
 
 
 @dataclass(frozen=True)
@@ -57,24 +63,43 @@ class Episode:
     ----------
     pair, strategy : str
         Which; how tests were chosen.
-    tests : int
-        Run; `MOST` where it was still not certain.
-    certain, right : bool
-        Whether one condition reached `CERTAIN`; whether the likelier one was the true one.
+    tests : float
+        Run; `MOST` where it was still not certain. Over all orders: their mean.
+    certain, right : float
+        Share in which one condition reached `CERTAIN`, and in which the likelier one was the true
+        one.
     """
 
     pair: str
     strategy: str
-    tests: int
-    certain: bool
-    right: bool
+    tests: float
+    certain: float
+    right: float
 
 
 @dataclass(frozen=True)
 class NextTestResult:
-    """All episodes; those of one number are of one unit by all strategies."""
+    """All episodes; those of one number are of one unit by all strategies.
+
+    Attributes
+    ----------
+    episodes : tuple of Episode
+        The logs of a unit are the same for all strategies: the second run of a test is one log,
+        whoever asks for it.
+    orders : ndarray, shape (units, orders)
+        Tests that each unit took by each fixed order.
+    """
 
     episodes: tuple[Episode, ...]
+    orders: npt.NDArray[np.float64]
+
+    @property
+    def best_order(self) -> tuple[float, tuple[str, ...]]:
+        """Mean tests of the fixed order that proves best here, found afterwards, and the order."""
+        means = self.orders.mean(axis=0)
+        names = [profile.name for profile in profiles()]
+        at = int(np.argmin(means))
+        return float(means[at]), tuple(names[k] for k in _every_order(len(names))[at])
 
     def rows(self) -> list[dict[str, Any]]:
         """Return a row for each pair and strategy, and one over all pairs."""
@@ -94,8 +119,8 @@ class NextTestResult:
             "units": len(rows),
             "tests": mean,
             "tests_interval": [low, high],
-            "certain": sum(e.certain for e in rows),
-            "right": sum(e.right for e in rows),
+            "certain": float(sum(e.certain for e in rows)),
+            "right": float(sum(e.right for e in rows)),
         }
 
     def saved(self, other: str) -> tuple[float, float, float]:
@@ -111,7 +136,7 @@ class NextTestResult:
                   "tests", at_least=True)
             for name in JUDGED
         ]  # fmt: skip
-        certain = [e for e in self.episodes if e.strategy == "information" and e.certain]
+        certain = [e for e in self.episodes if e.strategy == "information" and e.certain == 1.0]
         share = sum(e.right for e in certain) / max(len(certain), 1)
         slack = 2.0 * math.sqrt(CERTAIN * (1.0 - CERTAIN) / max(len(certain), 1))
         text = "certain answers that are right (95 % less two deviations)"
@@ -124,6 +149,7 @@ class NextTestResult:
             "status": "pass" if all_passed(checks) else "fail",
             "checks": [check.to_dict() for check in checks],
             "saved": {name: list(self.saved(name)) for name in STRATEGIES[1:]},
+            "best_fixed_order": {"tests": self.best_order[0], "order": list(self.best_order[1])},
             "rows": self.rows(),
         }
 
@@ -140,7 +166,7 @@ def _interval(values: Sequence[float]) -> tuple[float, float, float]:
 def reproduce_next_test(
     *,
     seed: int = 0,
-    units: int = 8,
+    units: int = 24,
     pairs: Sequence[str] = tuple(PAIRS),
     progress: Progress | None = None,
 ) -> NextTestResult:
@@ -161,15 +187,23 @@ def reproduce_next_test(
 
     actuator = Actuator.load("torino-rotary").with_values({"drive.kind": "pwm"})
     bench = _Bench(actuator, pairs)
-    out = []
+    episodes, orders = [], []
     for number, pair in enumerate(pairs):
         for k in range(units):
             done = (number + k / units) / len(pairs)
             if progress is not None and progress(done) is False:
                 raise Interrupted("interrupted between two units")
-            for strategy in STRATEGIES:
-                out.append(bench.episode(pair, strategy, [seed, list(PAIRS).index(pair), k]))
-    return NextTestResult(tuple(out))
+            unit = _Unit(bench, pair, [seed, list(PAIRS).index(pair), k])
+            own = unit.by_orders()
+            orders.append(own[0])
+            episodes += [unit.mean_of_orders(*own) if s == "orders" else unit.episode(s)
+                         for s in STRATEGIES]  # fmt: skip
+    return NextTestResult(tuple(episodes), np.array(orders))
+
+
+@lru_cache(maxsize=2)
+def _every_order(count: int) -> npt.NDArray[np.intp]:
+    return np.array(list(permutations(range(count))), dtype=np.intp)
 
 
 class _Bench:
@@ -178,52 +212,25 @@ class _Bench:
     def __init__(self, actuator: Actuator, pairs: Sequence[str]) -> None:
         keys = {c[0] for pair in pairs for c in PAIRS[pair] if c is not None}
         candidates = [c for c in CANDIDATES if c.key in keys]
-        self._actuator = actuator
-        self._profiles = profiles()
-        self._cases = [planned(p, actuator, candidates) for p in self._profiles]
+        self.actuator = actuator
+        self.profiles = profiles()
+        self.cases = [planned(p, actuator, candidates) for p in self.profiles]
         self._first: dict[str, int] = {}
 
-    def episode(self, pair: str, strategy: str, seed: Sequence[int]) -> Episode:
-        rng = np.random.default_rng([*seed, 1])
-        truth = seed[-1] % 2
-        condition = PAIRS[pair][truth]
-        factor = max(1.0 + _KNOWN_TO * float(rng.standard_normal()), 0.3)
-        belief = Belief.of([_possible(c) for c in PAIRS[pair]])
-        pick = self._picker(pair, strategy, rng)
-        for number in range(MOST):
-            at = pick(number, belief)
-            values = self._log(at, condition, factor, [*seed, 2, number])
-            belief = updated(self._cases[at], belief, values)
-            weights = [p.weight for p in belief.possible]
-            if max(weights) >= CERTAIN:
-                break
-        right = int(np.argmax(weights)) == truth
-        return Episode(pair, strategy, number + 1, max(weights) >= CERTAIN, right)
+    def most_informative(self, pair: str, belief: Belief, *, first: bool) -> int:
+        """Return the test to run next; the first of a pair is the same for all its units."""
+        if first and pair in self._first:
+            return self._first[pair]
+        at = int(np.argmax([expected_information(case, belief) for case in self.cases]))
+        if first:
+            self._first[pair] = at
+        return at
 
-    def _picker(
-        self, pair: str, strategy: str, rng: np.random.Generator
-    ) -> Callable[[int, Belief], int]:
-        count = len(self._cases)
-        if strategy == "fixed":
-            return lambda number, _belief: number % count
-        if strategy == "standard":
-            own = [k for k, profile in enumerate(self._profiles) if profile.standard]
-            return lambda number, _belief: own[number % len(own)]
-        if strategy == "random":
-            return lambda _number, _belief: int(rng.integers(count))
-
-        def informed(number: int, belief: Belief) -> int:
-            if number == 0 and pair in self._first:
-                return self._first[pair]
-            information = [expected_information(case, belief) for case in self._cases]
-            if number == 0:
-                self._first[pair] = int(np.argmax(information))
-            return int(np.argmax(information))
-
-        return informed
-
-    def _log(self, at: int, condition: Condition, factor: float, seed: Sequence[int]) -> Any:
-        """Run one test on another day; what the log shows, in the order of the case's names."""
+    def logs(
+        self, wanted: Sequence[tuple[int, int]], condition: Condition, factor: float,
+        seed: Sequence[int],
+    ) -> list[Any]:  # fmt: skip
+        """Run tests, each on another day; what the logs show, in the order of the cases' names."""
         from elevon.bench.rig import setups
         from elevon.bench.traces import recorded
         from elevon.diagnose.bymodel.log import prepared
@@ -233,16 +240,92 @@ class _Bench:
         from elevon.scenario.compile import signal_records
         from elevon.simulate import Run, simulate_batch
 
-        rng = np.random.default_rng(seed)
-        day = day_of(self._actuator, rng)
         faults = [] if condition is None else [f"{condition[0]}={factor * condition[1]!r}"]
-        own = int(rng.integers(2**31))
-        setup = setups(self._profiles[at].procedure, day.actuator, faults=faults, seed=own)[0]
-        record = recorded(list(signal_records(self._actuator.wiring, "low")))
-        run = Run(setup.actuator, setup.scenario, setup.conditions.seed)
-        shown = simulate_batch([run], fidelity="low", record=record)[0]
-        item = prepared(traced(setup, shown, cell=day.cell), self._actuator)
-        return logged_evidence(item, self._actuator).only(self._cases[at].unit.names).values
+        days, ready = [], []
+        for at, repeat in wanted:
+            rng = np.random.default_rng([*seed, 2, at, repeat])
+            days.append(day_of(self.actuator, rng))
+            own, procedure = int(rng.integers(2**31)), self.profiles[at].procedure
+            ready.append(setups(procedure, days[-1].actuator, faults=faults, seed=own)[0])
+        record = recorded(list(signal_records(self.actuator.wiring, "low")))
+        runs = [Run(s.actuator, s.scenario, s.conditions.seed) for s in ready]
+        out = []
+        shown = simulate_batch(runs, fidelity="low", record=record)
+        for (at, _), day, setup, run in zip(wanted, days, ready, shown, strict=True):
+            item = prepared(traced(setup, run, cell=day.cell), self.actuator)
+            names = self.cases[at].unit.names
+            out.append(logged_evidence(item, self.actuator).only(names).values)
+        return out
+
+
+class _Unit:
+    """A unit of one of two conditions; each run of each test is one log for all strategies."""
+
+    def __init__(self, bench: _Bench, pair: str, seed: Sequence[int]) -> None:
+        self._rng = np.random.default_rng([*seed, 1])
+        self._bench, self._pair, self._seed = bench, pair, seed
+        self._truth = seed[-1] % 2
+        self._factor = max(1.0 + _KNOWN_TO * float(self._rng.standard_normal()), 0.3)
+        self._prior = Belief.of([_possible(c) for c in PAIRS[pair]])
+        self._odds: dict[tuple[int, int], float] = {}
+
+    def odds(self, at: int, repeat: int) -> float:
+        """Return log odds that a run of a test gives for the second condition."""
+        if (at, repeat) not in self._odds:
+            block = repeat // _AHEAD * _AHEAD
+            some = [(at, block)] if block else [(k, 0) for k in range(len(self._bench.cases))]
+            wanted = [(k, first + j) for k, first in some for j in range(_AHEAD)]
+            condition = PAIRS[self._pair][self._truth]
+            logs = self._bench.logs(wanted, condition, self._factor, self._seed)
+            for key, values in zip(wanted, logs, strict=True):
+                log = likelihoods(self._bench.cases[key[0]], self._prior, values)
+                self._odds[key] = float(log[1] - log[0])
+        return self._odds[at, repeat]
+
+    def episode(self, strategy: str) -> Episode:
+        """Run tests by a strategy until it is certain."""
+        done: list[int] = []
+        odds = 0.0
+        while len(done) < MOST and abs(odds) < _ODDS:
+            at = self._next(strategy, len(done), odds)
+            odds += self.odds(at, done.count(at))
+            done.append(at)
+        right = (odds > 0.0) == bool(self._truth)
+        return Episode(self._pair, strategy, len(done), float(abs(odds) >= _ODDS), float(right))
+
+    def _next(self, strategy: str, number: int, odds: float) -> int:
+        """Return the test that a strategy runs next."""
+        if strategy == "information":
+            return self._informed(number, odds)
+        every = range(len(self._bench.profiles))
+        if strategy == "random":
+            return int(self._rng.integers(len(every)))
+        some = [k for k in every if strategy == "fixed" or self._bench.profiles[k].standard]
+        return some[number % len(some)]
+
+    def _informed(self, number: int, odds: float) -> int:
+        share = 1.0 / (1.0 + math.exp(-odds))
+        weights = (1.0 - share, share)
+        sets = zip(self._prior.possible, weights, strict=True)
+        belief = Belief.of([replace(p, weight=w) for p, w in sets])
+        return self._bench.most_informative(self._pair, belief, first=number == 0)
+
+    def by_orders(self) -> tuple[Any, Any, Any]:
+        """Return tests, whether certain and whether right, of each fixed order, shape (orders,)."""
+        count = len(self._bench.cases)
+        rounds = -(-MOST // count)
+        table = np.array([[self.odds(k, r) for k in range(count)] for r in range(rounds)])
+        orders = _every_order(count)
+        odds = np.cumsum(np.hstack([row[orders] for row in table])[:, :MOST], axis=1)
+        sure = np.abs(odds) >= _ODDS
+        last = np.where(sure.any(axis=1), sure.argmax(axis=1), MOST - 1)
+        at_end = odds[np.arange(len(orders)), last]
+        return last + 1.0, sure.any(axis=1), (at_end > 0.0) == bool(self._truth)
+
+    def mean_of_orders(self, tests: Any, certain: Any, right: Any) -> Episode:
+        """Return the mean over the fixed orders as an episode."""
+        means = [float(np.mean(values)) for values in (tests, certain, right)]
+        return Episode(self._pair, "orders", *means)
 
 
 def _possible(condition: Condition) -> Possible:

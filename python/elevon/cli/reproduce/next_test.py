@@ -24,7 +24,10 @@ def _show(values: Values, _result: Any) -> None:
     columns = ("pair", "strategy", "units", "tests", "tests_interval", "certain", "right")
     print_columns(values["rows"], columns, "tests until one condition has 95 %")
     for name, (mean, low, high) in values["saved"].items():
-        say(f"saved against {name} order: {mean:.2f} tests ({low:.2f} to {high:.2f})")
+        against = "the mean of all fixed orders" if name == "orders" else f"{name} order"
+        say(f"saved against {against}: {mean:.2f} tests ({low:.2f} to {high:.2f})")
+    best = values["best_fixed_order"]
+    say(f"the fixed order that proves best here: {best['tests']:.2f} tests: {best['order']}")
 
 
 CASES = (
@@ -34,6 +37,6 @@ CASES = (
         "testing units",
         _work,
         _show,
-        options={"units": (_UNITS, 8)},
+        options={"units": (_UNITS, 24)},
     ),
 )

@@ -94,7 +94,8 @@ def reference(
     if count < _LEAST:
         raise InputError(
             f"the baselines have {count} windows of {width:g} s in which the unit moves both "
-            f"ways; {_LEAST} are needed, better thirty"
+            f"ways; {_LEAST} are needed, better thirty; a motion that does not repeat within a "
+            "baseline is not watched: elevon diagnose takes its log as a whole"
         )
     shown = [own for own in shown if own]
     reach = max(_MODELLED, 2.0 * width) + RUN_IN

@@ -52,7 +52,8 @@ def period(item: TestLog, window: float | None) -> float:
     if note is None or note.waveform != "sine" or not frequency > 0.0:
         raise InputError(
             f"{item.name}: its note names no sine, so the window must be given: one period of the "
-            "motion, or a whole number of them"
+            "motion, or a whole number of them; a motion that does not repeat (a chirp, a brake on "
+            "a ramp) is not watched: elevon diagnose takes such a log as a whole"
         )
     return 1.0 / frequency
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.diagnose.nexttest.profiles import Profile
 
-__all__ = ["expected_information", "planned", "updated"]
+__all__ = ["expected_information", "likelihoods", "planned", "updated"]
 
 Floats = npt.NDArray[np.float64]
 _DRAWS = 200  # outcomes of a test
@@ -120,9 +120,14 @@ def expected_information(case: Case, belief: Belief, seed: int = 0) -> float:
     return float(np.mean(own_log - mixed) / np.log(2.0))
 
 
+def likelihoods(case: Case, belief: Belief, values: Floats) -> Floats:
+    """Return the log likelihood of each set, from values by `case.unit.names`."""
+    return np.asarray(_likelihoods(case, belief, (values - case.unit.mean)[None, :])[0])
+
+
 def updated(case: Case, belief: Belief, values: Floats) -> Belief:
     """Return what is believed after a test that showed these values, by `case.unit.names`."""
-    log = _likelihoods(case, belief, (values - case.unit.mean)[None, :])[0]
+    log = likelihoods(case, belief, values)
     weights = np.array([p.weight for p in belief.possible]) * np.exp(log - log.max())
     return Belief.of(
         [replace(p, weight=float(w)) for p, w in zip(belief.possible, weights, strict=True)]
