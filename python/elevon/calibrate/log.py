@@ -150,9 +150,7 @@ def bench_log(imported: ImportedLog) -> BenchLog:
                 f"{name}: no channel plays {needed}; calibration needs a speed set point, the "
                 f"motor's speed and a torque current; roles: {', '.join(recording.roles) or 'none'}"
             )
-    current_role = next(
-        (r for r in ("torque_current", "current_ref") if r in recording.roles), None
-    )
+    current_role = next((r for r in _CURRENTS if r in recording.roles), None)
     if current_role is None:
         raise InputError(f"{name}: no torque current; friction cannot be determined")
     clock = recording.role("speed_ref").clock
