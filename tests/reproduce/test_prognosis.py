@@ -10,6 +10,8 @@ import pytest
 from elevon import Actuator
 from elevon.cli import main
 from elevon.errors import InputError, Interrupted
+from elevon.prognose import Response
+from elevon.prognose.grid import Grid
 from elevon.prognose.life import Life
 from elevon.prognose.metrics import Track
 from elevon.reproduce.prognosis import campaign
@@ -24,6 +26,7 @@ from elevon.reproduce.prognosis.truth import (
     _of_the_baselines,
     inspections_of,
     other_law,
+    with_values,
 )
 from elevon.reproduce.side_by_side import side_by_side
 
@@ -72,6 +75,27 @@ def test_friction_is_said_against_the_healthy_days_and_not_beyond_what_diagnosis
     assert np.median([item.high for item in seen]) > 2.0
 
 
+def test_measured_requirements_are_the_truths_with_the_scatter_of_a_day():
+    base, usage = Actuator.load("torino-rotary"), np.linspace(0.0, 1e5, 50)
+    asked = campaign_mission().requirement[:2]
+    law = campaign_mission().laws()[0]
+    grid = Grid((np.array([0.0, law.highest]),))
+    values = np.array([[0.02, 0.5], [0.06, 0.7]])
+    response = Response(
+        (law,), asked, (0.02, 0.88), ("rad", "A"), grid, {"hours": np.ones(2)}, values, 2, "high"
+    )
+    life = Life(usage, np.full((50, 1), 0.25 * law.highest), 1e5, 0)
+    truth = UnitTruth(0, "gear_wear", life, base, response)
+    seen = inspections_of(truth, campaign_mission().laws(), 100.0, seed=0)
+    told = with_values(truth, seen, 0)
+    assert [item.seen for item in told] == [item.seen for item in seen]
+    for name, value, spread in (("tracking error", 0.03, 0.002), ("current", 0.55, 0.024)):
+        shown = np.array([item.measured[name].value for item in told])
+        assert shown.mean() == pytest.approx(value, rel=3.0 * spread / np.sqrt(len(shown)))
+        assert shown.std() == pytest.approx(spread * value, rel=0.1)
+        assert told[0].measured[name].deviation == pytest.approx(spread * value)
+
+
 def test_the_calibrated_set_has_the_friction_of_the_healthy_days():
     """What is said against those days is looked at in a set of those days: their part cancels."""
     deviations = np.array([_of_the_baselines(k, 0) for k in range(400)])
@@ -115,7 +139,8 @@ def test_an_interrupted_campaign_goes_on_from_its_finished_histories(tmp_path, m
     """Each history is done once, and what is noted gives the same figures to the last bit."""
     asked = []
 
-    def history(number, seed, _expected):
+    def history(number, seed, _expected, *, measured):
+        assert not measured
         asked.append(number)
         if number == 4:
             return {"left_out": "history 4: no inspection"}

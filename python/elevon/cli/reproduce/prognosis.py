@@ -18,6 +18,9 @@ _HISTORIES = Annotated[int, typer.Option("--histories", min=3, help="Lives, over
 _PROCESSES = Annotated[
     int | None, typer.Option("--processes", min=1, help="Side by side; default: all processors.")
 ]
+_MEASURED = Annotated[
+    bool, typer.Option("--measured", help="Inspections measure the requirements, too.")
+]
 
 
 def _work(options: Options, progress: Advance) -> Any:
@@ -28,6 +31,7 @@ def _work(options: Options, progress: Advance) -> Any:
         seed=options["seed"],
         processes=options["processes"],
         folder=options["out"],
+        measured=options["measured"],
         progress=progress,
     )
 
@@ -56,6 +60,10 @@ CASES = (
         _work,
         _show,
         _page,
-        {"histories": (_HISTORIES, 60), "processes": (_PROCESSES, None)},
+        {
+            "histories": (_HISTORIES, 60),
+            "processes": (_PROCESSES, None),
+            "measured": (_MEASURED, False),
+        },
     ),
 )

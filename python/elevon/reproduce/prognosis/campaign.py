@@ -31,7 +31,13 @@ from elevon.prognose.predict import LEVEL
 from elevon.prognose.process import Population
 from elevon.progress import Progress
 from elevon.reproduce.prognosis.result import SHARES, PrognosisResult, UnitResult
-from elevon.reproduce.prognosis.truth import FAULTS, UnitTruth, inspections_of, true_unit
+from elevon.reproduce.prognosis.truth import (
+    FAULTS,
+    UnitTruth,
+    inspections_of,
+    true_unit,
+    with_values,
+)
 from elevon.reproduce.side_by_side import side_by_side
 from elevon.worklog import finished
 
@@ -54,6 +60,7 @@ def reproduce_prognosis(
     seed: int = 0,
     processes: int | None = None,
     folder: Path | None = None,
+    measured: bool = False,
     progress: Progress | None = None,
 ) -> PrognosisResult:
     """Let units live and predict their ends.
@@ -68,6 +75,8 @@ def reproduce_prognosis(
         That work side by side, a history each; default: one for each processor.
     folder : path, optional
         Where finished histories are noted; the same work goes on from there. Default: nowhere.
+    measured : bool
+        Whether inspections carry what the unit showed of its requirements, too.
     progress : callable, optional
         Told the done fraction; returns False to stop.
 
@@ -82,11 +91,12 @@ def reproduce_prognosis(
         raise InputError(f"{histories} histories: at least {len(FAULTS)}, one a law, are needed")
     begin = clock.perf_counter()
     numbers = range(histories)
-    with finished(folder, f"prognosis seed {seed}") as done:
+    work = f"prognosis seed {seed}{' measured' if measured else ''}"
+    with finished(folder, work) as done:
         known = {n: done.items[str(n)].data for n in numbers if done and str(n) in done.items}
         missing = [n for n in numbers if n not in known]
         expected = _expected() if missing else {}
-        calls = {str(n): partial(_history, n, seed, expected) for n in missing}
+        calls = {str(n): partial(_history, n, seed, expected, measured=measured) for n in missing}
         for name, data in side_by_side(calls, processes=processes, progress=progress):
             known[int(name)] = data
             if done is not None:
@@ -97,10 +107,13 @@ def reproduce_prognosis(
         seed,
         clock.perf_counter() - begin,
         tuple(row["left_out"] for row in rows if "left_out" in row),
+        measured,
     )
 
 
-def _history(number: int, seed: int, expected: Mapping[str, float]) -> dict[str, Any]:
+def _history(
+    number: int, seed: int, expected: Mapping[str, float], *, measured: bool
+) -> dict[str, Any]:
     """Return one life with its predictions as it is noted; or why it cannot be judged."""
     base, mission = Actuator.load(_BASE), campaign_mission()
     law = FAULTS[number % len(FAULTS)]
@@ -108,6 +121,8 @@ def _history(number: int, seed: int, expected: Mapping[str, float]) -> dict[str,
     seen = inspections_of(truth, mission.laws(), _INTERVAL * expected[law], seed)
     if not seen or seen[0].usage > SHARES[0] * truth.life.end:
         return {"left_out": f"history {number}: no inspection before half of its life"}
+    if measured:
+        seen = with_values(truth, seen, seed)
     return {"unit": predicted(truth, mission, seen, seed).noted()}
 
 

@@ -102,12 +102,15 @@ class PrognosisResult:
         Time it took.
     left_out : tuple of str
         Lives that could not be judged, with the reason.
+    measured : bool
+        Whether inspections carried what the unit showed of its requirements.
     """
 
     units: tuple[UnitResult, ...]
     seed: int
     seconds: float = field(compare=False)
     left_out: tuple[str, ...] = ()
+    measured: bool = False
 
     def accuracy(self, law: str | None = None, track: str = "track") -> float:
         """Return the mean relative accuracy over units and `SHARES`; of another track by name."""
@@ -153,6 +156,7 @@ class PrognosisResult:
             "status": "pass" if all_passed(self.checks) else "fail",
             "checks": [check.to_dict() for check in self.checks],
             "seed": self.seed,
+            "measured": self.measured,
             "summary": self.summary(),
             "prognostic_horizon": {
                 "alpha": 0.2,

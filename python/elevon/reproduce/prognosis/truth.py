@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ import numpy.typing as npt
 from elevon.diagnose.bymodel.candidates import CANDIDATES
 from elevon.prognose.law import Law
 from elevon.prognose.life import Life, run_to_failure
+from elevon.prognose.measured import Measured
 from elevon.prognose.observation import SIGMAS, Inspection, Seen, inspection
 from elevon.prognose.process import Process
 from elevon.prognose.respond import respond
@@ -20,15 +21,18 @@ from elevon.reproduce.diagnosis_limits.unit import DAILY
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.prognose.mission import Mission
+    from elevon.prognose.response import Response
 
 __all__ = [
     "FAULTS",
     "INSPECTIONS",
+    "VALUES",
     "InspectionError",
     "UnitTruth",
     "inspections_of",
     "other_law",
     "true_unit",
+    "with_values",
 ]
 
 Floats = npt.NDArray[np.float64]
@@ -179,12 +183,15 @@ class UnitTruth:
         Severity of that law's fault.
     calibrated : Actuator
         The healthy unit as its calibration says.
+    response : Response, optional
+        What its fault does to the requirements.
     """
 
     number: int
     law: str
     life: Life
     calibrated: Actuator
+    response: Response | None = None
 
 
 def true_unit(base: Actuator, mission: Mission, law: str, number: int, seed: int) -> UnitTruth:
@@ -225,7 +232,8 @@ def true_unit(base: Actuator, mission: Mission, law: str, number: int, seed: int
         ),
         rng,
     )
-    return UnitTruth(number, law, life, base.with_values(calibrated, source="calibration"))
+    known = base.with_values(calibrated, source="calibration")
+    return UnitTruth(number, law, life, known, response)
 
 
 def other_law(law: Law, rng: np.random.Generator) -> Law:
@@ -277,6 +285,27 @@ def inspections_of(
             for law in laws
         }
         out.append(Inspection(usage, seen, name=f"{usage:.0f}"))
+
+
+#: Deviation of what a unit shows of a requirement from day to day, over its value: on the bench of
+#: `inspection-error`, four units, six days, this mission, the largest of three conditions.
+VALUES: Mapping[str, float] = {"tracking_error": 0.002, "current": 0.024}
+
+
+def with_values(truth: UnitTruth, inspections: Sequence[Inspection], seed: int) -> list[Inspection]:
+    """Return the inspections with what the unit showed of its requirements in a mission."""
+    assert truth.response is not None
+    rng, out = np.random.default_rng([24, seed, truth.number]), []
+    for item in inspections:
+        severity = np.atleast_1d(truth.life.at(item.usage))[None, :]
+        values = truth.response.measured(severity)[:, 0]
+        measured = {}
+        for asked, value in zip(truth.response.requirements, values, strict=True):
+            day = VALUES.get(asked.measure, 0.0) * float(value)
+            if day > 0.0:
+                measured[asked.name] = Measured(float(value + day * rng.standard_normal()), day)
+        out.append(replace(item, measured=measured))
+    return out
 
 
 def _seen(
