@@ -17,10 +17,18 @@ from elevon.diagnose.surrogate import (
     diagnose_by_surrogate,
     shipped,
 )
-from elevon.diagnose.surrogate.campaign import Table
+from elevon.diagnose.surrogate.campaign import ASKED, Table, _Plan, _unit_runs
 from elevon.diagnose.surrogate.features import NAMES, changes, log_features
-from elevon.diagnose.surrogate.fit import Plan, fitted, judged
-from elevon.diagnose.surrogate.network import Batch, either, honest, loss_and_gradient, train
+from elevon.diagnose.surrogate.fit import Plan, fitted
+from elevon.diagnose.surrogate.judge import judged, judged_at
+from elevon.diagnose.surrogate.network import (
+    Batch,
+    Ensemble,
+    either,
+    honest,
+    loss_and_gradient,
+    train,
+)
 from elevon.diagnose.surrogate.population import (
     FAULTS,
     _stable,
@@ -240,6 +248,24 @@ def test_what_was_not_trained_is_said(unit, logs):
         diagnose_by_surrogate([without], unit)
 
 
+def test_a_unit_unlike_the_trained_ones_is_said():
+    """Its logs agree with its own baseline: what is unlike is the unit, or that nothing braked."""
+    rough = Actuator.load("torino-rotary").with_values(
+        {"friction.dynamic": 1.2, "friction.static": 1.6}
+    )
+    log, base = bench_logs(rough, [(1, []), (2, [])])
+    said = diagnose_by_surrogate([log], rough, baselines=[base]).findings
+    assert any("unit whose healthy dry_current" in text for text in said)
+    plain = Actuator.load("torino-rotary")
+    cases = bench_logs(plain, [(1, []), (2, [])], procedure="loaded")
+    bare = [
+        replace(item, log=replace(item.log, brake=replace(item.log.brake, known="on")))
+        for item in cases
+    ]
+    with pytest.raises(InputError, match="not trained on such a test"):
+        diagnose_by_surrogate(bare[:1], plain, baselines=bare[1:])
+
+
 def test_a_log_without_voltage_is_still_read(unit, logs):
     without = replace(logs["play"], voltage=None)
     result = diagnose_by_surrogate([without], unit, baselines=[logs["base"]])
@@ -250,7 +276,7 @@ def test_the_file_that_ships(tmp_path):
     ours = shipped()
     assert set(ours.tests) == {"backlash", "loaded"}
     path = ours.save(tmp_path / "again.npz")
-    assert path.stat().st_size < 700_000
+    assert path.stat().st_size < 500_000
     again = Surrogate.load(path)
     for name, test in ours.tests.items():
         for view, head in test.heads.items():
@@ -264,11 +290,11 @@ def test_the_file_that_ships(tmp_path):
             Surrogate.load(tmp_path / "bad.npz")
 
 
-def _table(units, rng):
-    """Units of known law: each fault moves a feature of its own; days scatter."""
+def _table(units, rng, unlike=0.1):
+    """Units of known law: each fault moves a feature of its own; units and days scatter."""
     severity, values, unit, baseline = [], [], [], []
     for u in range(units):
-        centre = 1.0 + 0.1 * rng.standard_normal(len(NAMES))
+        centre = 1.0 + unlike * rng.standard_normal(len(NAMES))
         for k in range(10):
             faults = {} if k < 3 else drawn_faults(rng, learned())
             row = np.array([faults.get(key, 0.0) for key in FAULTS])
@@ -291,6 +317,54 @@ def test_calibration_holds_on_units_never_seen():
     assert scores["covered"] / scores["severities"] > 0.82
     assert scores["false_alarms"] / scores["healthy"] < 0.12
     assert scores["brier"] < 0.7 * scores["brier_by_rate"]
+
+
+def test_units_are_judged_at_the_severities_asked():
+    rng = np.random.default_rng(5)
+    tables, plan = {"loaded": _table(40, rng, 0.0)}, Plan(folds=2, members=1, rounds=400)
+    drawn = _table(20, rng, 0.0)
+    surrogate = fitted(tables, {}, plan, {})
+    severity = np.zeros((100, len(FAULTS)))
+    for row, (key, size) in enumerate(list(ASKED["loaded"].items()) * 20):
+        severity[row, FAULTS.index(key)] = size
+    unit = np.arange(100) // 5
+    values = 1.0 + 0.02 * rng.standard_normal((100, len(NAMES)))
+    values[:, : len(FAULTS)] += sizes(severity)
+    asked = Table(unit, np.zeros(100, dtype=bool), severity, values, np.ones((100, 2)))
+    said = judged_at(surrogate, {"loaded": drawn}, {"loaded": asked})
+    assert list(said) == [f"loaded.{key}" for key in ASKED["loaded"]]
+    *large, small = said.values()  # the gain's size is 0.18, the others' 0.28 and more
+    for fault in said.values():
+        assert fault["runs"] == 20
+        assert fault["isolated"] <= min(fault["alarms"], fault["first"])
+        assert fault["covered"] >= 15
+    for fault in large:
+        assert fault["first"] >= 18
+        assert fault["median_error"] < small["median_error"]
+
+
+def test_a_chance_is_a_rank_among_runs_that_the_networks_have_not_seen():
+    """Two parts, the second with logits 10 higher for anything: each has its own healthy runs."""
+    weights = [np.ones((2, 1, 4)), np.array([[[0.0, 0.0, 0.0, 0.0]], [[10.0, 0.0, 0.0, 0.0]]])]
+    low, high = np.arange(-4.0, 0.0), np.arange(-4.5, 0.0)
+    head = replace(
+        shipped().tests["backlash"].heads["relative"], ensemble=Ensemble(weights),
+        scaling=np.tile([1.0, 1.0, 0.0], (2, 1)), healthy=np.concatenate((low, high + 10.0)),
+        fold=np.repeat([0.0, 1.0], [len(low), len(high)]),
+    )  # fmt: skip
+    x = np.array([[-9.0], [-2.2], [3.0]])
+    expected = [(np.sum(np.concatenate((low, high)) >= v) + 1.0) / 10.0 for v in x[:, 0]]
+    np.testing.assert_allclose(head.chances(head.ensemble.says(x)), expected)
+
+
+def test_days_asked_are_days_of_the_same_units(unit):
+    drawn = next(_unit_runs(_Plan(unit, "loaded", 0, "low", False), 3))
+    asked = list(_unit_runs(_Plan(unit, "loaded", 0, "low", True), 3))
+    assert [p.faults for p in asked] == [{k: v} for k, v in ASKED["loaded"].items()]
+    path = "gear.inertia"  # of the unit, the same on every day
+    inertia = {p.setup.actuator.parameters.value(path) for p in (drawn, *asked)}
+    assert len(inertia) == 1
+    assert not any(p.baseline for p in asked)
 
 
 def test_references_are_other_days_of_the_same_unit():
@@ -349,6 +423,8 @@ def test_training_by_one_command(elevon_cli, tmp_path):  # noqa: F811
              "--test-units", "2", "--runs", tmp_path / "runs", "--json")  # fmt: skip
     first = elevon_cli(*asked)
     assert first.code == 0
+    whole = out.read_bytes()
     again = elevon_cli(*asked, "--force")
     assert json.loads(again.out) == json.loads(first.out)
+    assert out.read_bytes() == whole
     assert set(Surrogate.load(out).tests) == {"backlash", "loaded"}

@@ -20,12 +20,12 @@ def diagnose_train(
         str, typer.Option(metavar="ACTUATOR", help="Units are drawn about it.")
     ] = "torino-rotary",
     out: Annotated[Path, typer.Option(metavar="FILE", help="Surrogate to write (.npz).")],
-    units: Annotated[int, typer.Option(min=8, help="Units on the high model.")] = 96,
-    low_units: Annotated[int, typer.Option(min=0, help="More units, on the low model.")] = 240,
+    units: Annotated[int, typer.Option(min=8, help="Units on the high model.")] = 240,
+    low_units: Annotated[int, typer.Option(min=0, help="More units, on the low model.")] = 480,
     test_units: Annotated[
         int, typer.Option(min=0, help="Units of another seed that only judge it.")
     ] = 32,
-    rounds: Annotated[int, typer.Option(min=10, help="Training steps of a network.")] = 1500,
+    rounds: Annotated[int, typer.Option(min=10, help="Training steps of a network.")] = 5000,
     runs: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Keeps the runs, and goes on from there.")
     ] = None,
@@ -77,3 +77,21 @@ def _print(report: Any) -> None:
          "all named", "within 90 %"),
         rows,
     )  # fmt: skip
+    at = [
+        (
+            name,
+            f"{s['severity']:.3g}",
+            f"{s['alarms']}/{s['runs']}",
+            f"{s['first']}/{s['runs']}",
+            f"{s['isolated']}/{s['runs']}",
+            f"{100.0 * s['median_error']:.1f} %",
+            f"{s['covered']}/{s['runs']}",
+        )
+        for name, s in report.get("asked", {}).items()
+    ]
+    if at:
+        print_table(
+            ("test and fault, alone, one baseline", "severity, SI", "alarms", "named first",
+             "and no other", "median error", "within 90 %"),
+            at,
+        )  # fmt: skip

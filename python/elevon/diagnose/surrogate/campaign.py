@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -35,13 +35,25 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.recording import Recording
 
-__all__ = ["HEALTHY_DAYS", "TESTS", "Table", "gathered"]
+__all__ = ["ASKED", "HEALTHY_DAYS", "TESTS", "Table", "gathered"]
 
 Floats = npt.NDArray[np.float64]
 #: Procedures of the bench that are learned; the first trace of each, with the unit's own play.
 TESTS = ("backlash", "loaded")
 HEALTHY_DAYS = 3
 FAULTY_DAYS = 7
+#: Severities at which a fault on its own is to be told, by test; SI. What units are judged at.
+ASKED: Mapping[str, Mapping[str, float]] = {
+    test: {
+        "play@transmission": math.radians(0.13),
+        "friction@transmission": 0.25,
+        "short@motor.phase_a": 0.10 if test == "loaded" else 0.20,
+        "eccentricity_static@motor": 0.05 if test == "loaded" else 0.10,
+        "gain_drift@control.position": 0.02,
+    }
+    for test in TESTS
+}
+_DAY_ASKED = 100  # number of the first day with a fault of `ASKED`
 _UNITS = 16  # of a block: what is run, and written, at a time
 _VERSION = 2
 
@@ -84,6 +96,7 @@ def gathered(
     units: int,
     seed: int,
     fidelity: str = "high",
+    asked: bool = False,
     folder: Path | None = None,
     progress: Progress | None = None,
 ) -> Table:
@@ -101,6 +114,8 @@ def gathered(
         Of everything that is drawn.
     fidelity : str
         ``high`` or ``low``.
+    asked : bool
+        One day for each fault of `ASKED` instead.
     folder : path, optional
         Finished blocks are kept there, and used when they are there already.
     progress : callable, optional
@@ -117,18 +132,28 @@ def gathered(
         raise InputError(f"{actuator.name}: the surrogate learns rotary actuators so far")
     if test not in TESTS:
         raise InputError(f"test {test!r}: one of {', '.join(TESTS)}")
+    plan = _Plan(actuator, test, seed, fidelity, asked)
     parts = []
     blocks = list(_blocks(units))
     for number, block in enumerate(blocks):
-        path = None if folder is None else folder / _file(actuator, test, seed, block, fidelity)
+        path = None if folder is None else folder / _file(plan, block)
         share = _share(progress, number, len(blocks))
         if path is not None and path.exists():
             parts.append(_read(path))
             continue
-        parts.append(_block(actuator, test, seed, block, fidelity=fidelity, progress=share))
+        parts.append(_block(plan, block, share))
         if path is not None:
             _write(path, parts[-1])
     return Table.joined(parts)
+
+
+@dataclass(frozen=True)
+class _Plan:
+    actuator: Actuator
+    test: str
+    seed: int
+    fidelity: str
+    asked: bool
 
 
 def _blocks(units: int) -> Iterator[range]:
@@ -142,10 +167,12 @@ def _share(progress: Progress | None, number: int, total: int) -> Progress | Non
     return part(progress, number / total, (number + 1) / total)
 
 
-def _file(actuator: Actuator, test: str, seed: int, block: range, fidelity: str) -> str:
-    name = f"{actuator.hash[:12]}-v{_VERSION}-s{seed}"
-    kind = "" if fidelity == "high" else f"-{fidelity}"
-    return f"{test}{kind}-{name}-{block.start:05d}-{block.stop:05d}.npz"
+def _file(plan: _Plan, block: range) -> str:
+    name = f"{plan.actuator.hash[:12]}-v{_VERSION}-s{plan.seed}"
+    kind = "" if plan.fidelity == "high" else f"-{plan.fidelity}"
+    if plan.asked:
+        kind += "-asked"
+    return f"{plan.test}{kind}-{name}-{block.start:05d}-{block.stop:05d}.npz"
 
 
 def _read(path: Path) -> Table:
@@ -163,26 +190,18 @@ def _write(path: Path, table: Table) -> None:
     write_bytes(path, stream.getvalue())
 
 
-def _block(
-    actuator: Actuator,
-    test: str,
-    seed: int,
-    block: range,
-    *,
-    fidelity: str,
-    progress: Progress | None,
-) -> Table:
+def _block(plan: _Plan, block: range, progress: Progress | None) -> Table:
     """Simulate some units; runs that trip or diverge give no row."""
     from elevon.scenario.compile import signal_records
     from elevon.simulate import Run, simulate_batch
 
-    planned = [row for number in block for row in _unit_runs(actuator, test, seed, number)]
+    planned = [row for number in block for row in _unit_runs(plan, number)]
     runs = [Run(p.setup.actuator, p.setup.scenario, p.setup.conditions.seed) for p in planned]
-    record = recorded(list(signal_records(actuator.wiring, fidelity)))
+    record = recorded(list(signal_records(plan.actuator.wiring, plan.fidelity)))
     with warnings.catch_warnings():
         # Units are drawn for both fidelities: what does not act in one of them is no news.
         warnings.simplefilter("ignore", ElevonWarning)
-        shown = simulate_batch(runs, fidelity=fidelity, record=record, progress=progress)
+        shown = simulate_batch(runs, fidelity=plan.fidelity, record=record, progress=progress)
     rows = []
     for p, recording in zip(planned, shown, strict=True):
         if recording.status == "ok" and (row := _row(p, recording)) is not None:
@@ -208,20 +227,31 @@ class _Planned:
     setup: Setup
 
 
-def _unit_runs(actuator: Actuator, test: str, seed: int, number: int) -> Iterator[_Planned]:
+def _unit_runs(plan: _Plan, number: int) -> Iterator[_Planned]:
     """One unit, drawn alike for every test, and its days, which are not."""
+    seed, test = plan.seed, plan.test
     own = np.random.default_rng([seed, number])
     build = build_of(np.random.default_rng([seed, len(TESTS), number // ALIKE]))
-    unit = unit_of(actuator, build, own)
+    unit = unit_of(plan.actuator, build, own)
     noise = {name: most * float(own.random()) for name, most in NOISE.items()}
     procedure, candidates = first_trace(load_procedure(test)), learned()
-    for k in range(HEALTHY_DAYS + FAULTY_DAYS):
+    for k, asked in _days(plan):
         rng = np.random.default_rng([seed, number, TESTS.index(test), k])
         day = day_of(unit, rng)
-        faults = {} if k < HEALTHY_DAYS else drawn_faults(rng, candidates)
+        faults = drawn_faults(rng, candidates) if asked is None else asked
         texts = [_text(key, severity, rng) for key, severity in faults.items()]
         setup = setups(procedure, day.actuator, faults=texts, seed=int(rng.integers(2**31)))[0]
         yield _Planned(number, k < HEALTHY_DAYS, day, faults, noise, setup)
+
+
+def _days(plan: _Plan) -> Iterator[tuple[int, dict[str, float] | None]]:
+    """Numbers of a unit's days with the faults there; None: they are drawn."""
+    if plan.asked:
+        for k, (key, severity) in enumerate(ASKED[plan.test].items()):
+            yield _DAY_ASKED + k, {key: severity}
+        return
+    for k in range(HEALTHY_DAYS + FAULTY_DAYS):
+        yield k, {} if k < HEALTHY_DAYS else None
 
 
 def _text(key: str, severity: float, rng: np.random.Generator) -> str:

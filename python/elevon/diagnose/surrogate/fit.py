@@ -12,18 +12,26 @@ import numpy.typing as npt
 from elevon.diagnose.surrogate.campaign import Table
 from elevon.diagnose.surrogate.features import NAMES, SCALES, changes
 from elevon.diagnose.surrogate.model import Head, Surrogate, TestModel
-from elevon.diagnose.surrogate.network import Batch, Ensemble, Opinion, either, honest, train
-from elevon.diagnose.surrogate.population import FAULTS
+from elevon.diagnose.surrogate.network import (
+    Batch,
+    Ensemble,
+    Opinion,
+    either,
+    honest,
+    stored,
+    train,
+)
+from elevon.diagnose.surrogate.population import ALIKE, FAULTS
 from elevon.diagnose.surrogate.sampling import Rows, sizes
 from elevon.diagnose.surrogate.view import VIEWS, View
 from elevon.progress import Progress, part
 
-__all__ = ["Plan", "fitted", "judged"]
+__all__ = ["Plan", "fitted", "scores"]
 
 Floats = npt.NDArray[np.float64]
 FALSE_ALARM = 0.05
 HIGH = 0.25  # of a batch at least are runs of the high model
-_KNOWN = 1500  # training runs kept to tell what is unlike them
+_KNOWN = 1000  # training runs kept to tell what is unlike them
 _FAR = 0.995  # of held-out runs lie nearer to a training run
 _ROOM = 0.1  # of the trained range beyond its ends
 _LEAST = 0.2  # of the healthy median: what a share is taken of at least
@@ -36,7 +44,8 @@ class Plan:
     Attributes
     ----------
     folds : int
-        Parts of the units; each part is held out of the networks that are calibrated on it.
+        Parts of the units, those that are built alike together; each part is held out of the
+        networks that are calibrated on it.
     members, rounds, batch : int
         Networks of a fold, steps of each, runs of a step.
     seed : int
@@ -45,7 +54,7 @@ class Plan:
 
     folds: int = 4
     members: int = 2
-    rounds: int = 1500
+    rounds: int = 5000
     batch: int = 256
     seed: int = 0
 
@@ -92,25 +101,54 @@ def _head(
     rng = np.random.default_rng([plan.seed, 99])
     view = _view(high, relative, rng)
     usable = high.usable()
-    fold = high.table.unit[usable] % plan.folds
+    fold = _folds(high.table.unit, plan.folds)[usable]
     ensembles, parts = [], []
     for k in range(plan.folds):
         train_rows = usable[fold != k]
         ensembles.append(
-            train(
-                _sampler(high, train_rows, low, view, plan.batch),
-                3 * len(FAULTS) + 1,
-                members=plan.members,
-                rounds=plan.rounds,
-                seed=plan.seed + 1000 * k,
-                progress=part(progress, k / plan.folds, (k + 1) / plan.folds),
+            stored(
+                train(
+                    _sampler(high, train_rows, low, view, plan.batch),
+                    3 * len(FAULTS) + 1,
+                    members=plan.members,
+                    rounds=plan.rounds,
+                    seed=plan.seed + 1000 * k,
+                    progress=part(progress, k / plan.folds, (k + 1) / plan.folds),
+                )
             )
         )
         held = usable[fold == k]
         parts.append((held, ensembles[-1].says(high.inputs(view, held, rng))))
     rows = np.concatenate([held for held, _ in parts])
-    opinion = _stacked([said for _, said in parts])
-    return _calibrated(high, low, view, _union(ensembles), rows=rows, opinion=opinion, rng=rng)
+    held = _Held(
+        rows, np.concatenate([np.full(len(own), k) for k, (own, _) in enumerate(parts)]),
+        _stacked([said for _, said in parts]),
+    )  # fmt: skip
+    return _calibrated(high, low, view, _union(ensembles), held=held, rng=rng)
+
+
+def _folds(unit: npt.NDArray[np.int64], folds: int) -> npt.NDArray[np.int64]:
+    """Parts of the units, shape as theirs: those built alike are of one part if they suffice."""
+    alike = ALIKE if int(unit.max()) >= ALIKE * (folds - 1) else 1
+    return unit // alike % folds
+
+
+@dataclass(frozen=True)
+class _Held:
+    """Runs, shape (n,), the part each is of, and what networks say that have not seen it."""
+
+    rows: npt.NDArray[np.int64]
+    fold: npt.NDArray[np.int64]
+    opinion: Opinion
+
+    def chances(self, union: Floats, healthy: npt.NDArray[np.bool_]) -> Floats:
+        """Return the share of healthy runs of the same part that look at least as faulty."""
+        out = np.empty(len(union))
+        for k in set(self.fold.tolist()):
+            part = self.fold == k
+            own = np.sort(union[part & healthy])
+            out[part] = 1.0 - np.searchsorted(own, union[part]) / max(len(own), 1)
+        return out
 
 
 def _sampler(
@@ -137,8 +175,10 @@ def _union(ensembles: Sequence[Ensemble]) -> Ensemble:
 
 
 def _stacked(opinions: Sequence[Opinion]) -> Opinion:
-    names = ("presence", "faulty", "size", "deviation")
-    return Opinion(*(np.concatenate([getattr(o, n) for o in opinions]) for n in names))
+    axes = {"presence": 0, "faulty": 0, "size": 0, "deviation": 0, "each": 1}
+    return Opinion(
+        *(np.concatenate([getattr(o, n) for o in opinions], axis=a) for n, a in axes.items())
+    )
 
 
 def _view(high: Rows, relative: bool, rng: np.random.Generator) -> View:
@@ -151,11 +191,9 @@ def _view(high: Rows, relative: bool, rng: np.random.Generator) -> View:
     view = View(relative, centre, floor, *(np.ones(len(NAMES)) for _ in range(4)))
     rows = high.usable()
     own = rows[table.baseline[rows]]
-    against = high.references(own, rng)[0] if relative else None
-    spread = view.change(table.values[own], against).std(axis=0)
+    spread = _changes(high, view, own, rng).std(axis=0)
     spread = np.where(spread > 0.0, spread, 1.0)
-    against = high.references(rows, rng)[0] if relative else None
-    wide = view.change(table.values[rows], against).std(axis=0)
+    wide = _changes(high, view, rows, rng).std(axis=0)
     return View(
         relative, centre, floor, spread, np.where(wide > 0.0, wide, 1.0),
         over.mean(axis=0), np.where(over.std(axis=0) > 0.0, over.std(axis=0), 1.0),
@@ -168,10 +206,10 @@ def _calibrated(
     view: View,
     ensemble: Ensemble,
     *,
-    rows: npt.NDArray[np.int64],
-    opinion: Opinion,
+    held: _Held,
     rng: np.random.Generator,
 ) -> tuple[Head, dict[str, Any]]:
+    rows, opinion = held.rows, held.opinion
     severity = high.table.severity[rows]
     there = severity != 0.0
     faulty = there.any(axis=1)
@@ -180,24 +218,24 @@ def _calibrated(
     scaling = np.array([*own, _calibration(union, faulty)])
     score = np.abs(sizes(severity) - opinion.size) / opinion.deviation
     conformal = np.array([_quantile(score[there[:, k], k]) for k in range(there.shape[1])])
-    healthy = np.sort(union[~faulty])
     change = _changes(high, view, rows, rng)
     known = _known(high, low, view, rng)
     head = Head(
-        view, ensemble, scaling, conformal, healthy, known,
-        *_ends(np.vstack((change, np.sinh(known)))), np.full(len(FAULTS), np.nan), np.inf,
+        view, ensemble, scaling, conformal, union[~faulty], held.fold[~faulty].astype(float), known,
+        *_ends(np.vstack((change, np.sinh(known)))), *_unit_ends(high, low, view),
+        np.full(len(FAULTS), np.nan), np.inf,
     )  # fmt: skip
     named = _named(opinion, scaling, severity)
     reach = float(np.quantile(_to_neighbour(head, change), _FAR))
     head = Head(**{**vars(head), "named": named, "reach": reach})
-    return head, scores(head, opinion, severity)
+    return head, scores(head, opinion, severity, held.chances(union, ~faulty))
 
 
 def _changes(
     rows_of: Rows, view: View, rows: npt.NDArray[np.int64], rng: np.random.Generator
 ) -> Floats:
     healthy = rows_of.references(rows, rng)[0] if view.relative else None
-    return view.change(rows_of.table.values[rows], healthy)
+    return view.change(rows_of.values(rows, rng), healthy)
 
 
 def _known(high: Rows, low: Rows | None, view: View, rng: np.random.Generator) -> Floats:
@@ -216,6 +254,14 @@ def _to_neighbour(head: Head, change: Floats) -> Floats:
     square = (own**2).sum(axis=1)[:, None] + (head.known**2).sum(axis=1)[None, :]
     square = np.maximum(square - 2.0 * own @ head.known.T, 0.0)
     return np.asarray(np.sqrt(np.partition(square, 1, axis=1))[:, 1])
+
+
+def _unit_ends(high: Rows, low: Rows | None, view: View) -> tuple[Floats, Floats]:
+    """Return between what ends the trained units lie, by single healthy days of theirs."""
+    if not view.relative:  # units are held against the middle: what is unlike them has changed
+        return np.zeros(len(NAMES)), np.zeros(len(NAMES))
+    healthy = [s.table.values[s.table.baseline] for s in (high, low) if s is not None]
+    return _ends(view.context(np.vstack(healthy)))
 
 
 def _ends(change: Floats) -> tuple[Floats, Floats]:
@@ -264,14 +310,16 @@ def _named(opinion: Opinion, scaling: Floats, severity: Floats) -> Floats:
     return out
 
 
-def scores(head: Head, opinion: Opinion, severity: Floats) -> dict[str, Any]:
-    """Return what an opinion of held-out runs is worth."""
+def scores(head: Head, opinion: Opinion, severity: Floats, chance: Floats) -> dict[str, Any]:
+    """Return what an opinion of held-out runs is worth.
+
+    `chance`, shape (n,), is how often a healthy unit looks as faulty.
+    """
     there = severity != 0.0
     faulty = there.any(axis=1)
     logit = honest(head.scaling[:-1], opinion.presence)
     probability = 1.0 / (1.0 + np.exp(-logit))
-    above = len(head.healthy) - np.searchsorted(head.healthy, either(logit))
-    alarm = (above + 1.0) / (len(head.healthy) + 1.0) <= FALSE_ALARM
+    alarm = chance <= FALSE_ALARM
     inside = np.abs(sizes(severity) - opinion.size) <= head.conformal * opinion.deviation
     single = there.sum(axis=1) == 1
     best = probability.argmax(axis=1) == there.argmax(axis=1)
@@ -306,15 +354,3 @@ def _reliability(probability: Floats, there: npt.NDArray[np.bool_]) -> list[dict
         for k in range(len(edges) - 1)
         if (at == k).any()
     ]
-
-
-def judged(surrogate: Surrogate, tables: Mapping[str, Table]) -> dict[str, Any]:
-    """Return the scores of a surrogate on runs of units it never saw."""
-    out = {}
-    for name, table in tables.items():
-        rows_of = Rows.of(table)
-        rows = rows_of.usable()
-        for view, head in surrogate.tests[name].heads.items():
-            inputs = rows_of.inputs(head.view, rows, np.random.default_rng(0))
-            out[f"{name}.{view}"] = scores(head, head.ensemble.says(inputs), table.severity[rows])
-    return out

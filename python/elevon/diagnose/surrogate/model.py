@@ -17,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.diagnose.surrogate.features import NAMES, LogFeatures
-from elevon.diagnose.surrogate.network import Ensemble, either, honest, packed, unpacked
+from elevon.diagnose.surrogate.network import Ensemble, Opinion, either, honest
+from elevon.diagnose.surrogate.pack import packed, unpacked
 from elevon.diagnose.surrogate.population import FAULTS
 from elevon.diagnose.surrogate.view import VIEWS, View
 from elevon.errors import FormatError
@@ -25,10 +26,13 @@ from elevon.errors import FormatError
 __all__ = ["Head", "Said", "Surrogate", "TestModel", "shipped"]
 
 Floats = npt.NDArray[np.float64]
-_FORMAT, _VERSION = "elevon-surrogate", 1
+_FORMAT, _VERSION = "elevon-surrogate", 2
 _MOST_BYTES = 50_000_000
 _TEST = 0.2  # relative difference of travel and speed up to which a log is of a test
-_STORED = ("scaling", "conformal", "healthy", "known", "low", "high", "named")
+_STORED = (
+    "scaling", "conformal", "healthy", "fold", "known", "low", "high", "unit_low", "unit_high",
+    "named",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -75,11 +79,15 @@ class Head:
     conformal : ndarray, shape (f,)
         Deviations that hold 90 % of held-out sizes.
     healthy : ndarray, shape (h,)
-        Sorted logits of any fault (`either`) of held-out healthy runs.
+        Logits of any fault (`either`) of healthy runs, by the members that have not seen them.
+    fold : ndarray, shape (h,)
+        Number of those members' part of the ensemble; the parts are of equal size.
     known : ndarray, shape (p, k)
         Changes of training runs, as arsinh.
     low, high : ndarray, shape (k,)
         Ends of what was trained.
+    unit_low, unit_high : ndarray, shape (k,)
+        Ends between which the trained units lie (`View.context`).
     named : ndarray, shape (f,)
         Least severity from which on 95 % of held-out single faults were named; NaN: none.
     reach : float
@@ -91,9 +99,12 @@ class Head:
     scaling: Floats
     conformal: Floats
     healthy: Floats
+    fold: Floats
     known: Floats
     low: Floats
     high: Floats
+    unit_low: Floats
+    unit_high: Floats
     named: Floats
     reach: float
 
@@ -105,24 +116,46 @@ class Head:
         opinion = self.ensemble.says(inputs)
         change = self.view.change(row, healthy)[0]
         presence = honest(self.scaling[:-1], opinion.presence)[0]
-        score = float(either(presence))
-        above = len(self.healthy) - int(np.searchsorted(self.healthy, score))
         return Said(
             presence,
-            float(honest(self.scaling[-1:], np.array([score]))[0]),
-            (above + 1.0) / (len(self.healthy) + 1.0),
+            float(honest(self.scaling[-1:], either(presence)[None])[0]),
+            float(self.chances(opinion)[0]),
             opinion.size[0],
             self.conformal * opinion.deviation[0],
             change,
-            self._outside(change),
+            self.outside(change, None if healthy is None else self.view.context(healthy)[0]),
         )
 
-    def _outside(self, change: Floats) -> tuple[str, ...]:
+    def chances(self, opinion: Opinion) -> Floats:
+        """Return how often a healthy unit looks as faulty, shape (n,).
+
+        Each part of the ensemble is held against the healthy runs that it has not seen, and the
+        ranks are counted together (cross-conformal prediction; Vovk, 2015).
+        """
+        parts = int(self.fold.max()) + 1
+        each = opinion.each.reshape(parts, -1, *opinion.presence.shape).mean(axis=1)
+        score = either(honest(self.scaling[:-1], each))
+        above = sum(
+            len(own) - np.searchsorted(np.sort(own), score[k])
+            for k, own in ((k, self.healthy[self.fold == k]) for k in range(parts))
+        )
+        return np.asarray((above + 1.0) / (len(self.healthy) + 1.0))
+
+    def outside(self, change: Floats, context: Floats | None) -> tuple[str, ...]:
+        """Say what lies outside the training set: of changes, and of the unit, shape (k,) each."""
         out = [
             f"{name} {x:+.3g} healthy deviations (trained {a:+.3g} to {b:+.3g})"
             for name, x, a, b in zip(NAMES, change, self.low, self.high, strict=True)
             if not a <= x <= b
         ]
+        if context is not None:
+            rows = zip(NAMES, context, self.unit_low, self.unit_high, strict=True)
+            out += [
+                f"a unit whose healthy {name} lies {x:+.3g} deviations from the middle of the "
+                f"trained units (trained {a:+.3g} to {b:+.3g})"
+                for name, x, a, b in rows
+                if not a <= x <= b
+            ]
         distance = float(self.distances(change[None, :])[0])
         if distance > self.reach:
             out.append(
@@ -184,25 +217,21 @@ class Surrogate:
         """
         from elevon.files import write_bytes
 
-        arrays: dict[str, Any] = {}
+        arrays: dict[str, npt.NDArray[Any]] = {}
         tests: dict[str, Any] = {}
         for name, test in self.tests.items():
             tests[name] = {"braked": test.braked, "travel": test.travel, "speed": test.speed}
             for view, head in test.heads.items():
                 key = f"{name}.{view}"
                 tests[name][view] = head.reach
-                arrays |= {
-                    f"{key}.{n}": a.astype(np.float32) for n, a in head.view.arrays().items()
-                }
-                arrays |= {f"{key}.{n}": getattr(head, n).astype(np.float32) for n in _STORED}
-                arrays[f"{key}.known"] = head.known.astype(np.float16)
-                arrays |= packed(head.ensemble, key)
+                arrays |= {f"{key}.{n}": a for n, a in _arrays(head).items()}
+        values, index = packed(arrays)
         about = {
             "format": _FORMAT, "version": _VERSION, "names": list(NAMES), "faults": list(FAULTS),
-            "tests": tests, "report": dict(self.report),
+            "tests": tests, "arrays": index, "report": dict(self.report),
         }  # fmt: skip
         stream = io.BytesIO()
-        np.savez_compressed(stream, about=np.array(json.dumps(about)), **arrays)
+        np.savez(stream, about=np.frombuffer(json.dumps(about).encode(), dtype=np.uint8), **values)
         return write_bytes(path, stream.getvalue(), force=force)
 
     @classmethod
@@ -225,17 +254,18 @@ class Surrogate:
 
 
 def _assembled(data: Mapping[str, Any]) -> Surrogate:
-    about = json.loads(str(data["about"]))
+    about = json.loads(bytes(data["about"]))
     if about.get("format") != _FORMAT or about.get("version") != _VERSION:
         raise ValueError(f"format {about.get('format')!r}, version {about.get('version')!r}")
     if tuple(about["names"]) != NAMES or tuple(about["faults"]) != FAULTS:
         raise ValueError("features or faults of another version; train it anew")
-    if not all(np.isfinite(a).all() for n, a in data.items() if n != "about" and "named" not in n):
-        raise ValueError("an array is not finite")
+    arrays = unpacked(data, about["arrays"])
     tests = {}
     for name, item in about["tests"].items():
         heads = {
-            view: _head(data, f"{name}.{view}", float(item[view])) for view in VIEWS if view in item
+            view: _head(arrays, f"{name}.{view}", float(item[view]))
+            for view in VIEWS
+            if view in item
         }
         tests[name] = TestModel(
             bool(item["braked"]), float(item["travel"]), float(item["speed"]), heads
@@ -243,11 +273,23 @@ def _assembled(data: Mapping[str, Any]) -> Surrogate:
     return Surrogate(tests, about["report"])
 
 
-def _head(data: Mapping[str, Any], key: str, reach: float) -> Head:
+def _arrays(head: Head) -> dict[str, npt.NDArray[Any]]:
+    """Return what a file holds of a head; a severity that is never named is stored as -1."""
+    out = {n: a.astype(np.float32) for n, a in head.view.arrays().items()}
+    out |= {n: getattr(head, n).astype(np.float32) for n in _STORED}
+    out["named"] = np.nan_to_num(head.named, nan=-1.0).astype(np.float32)
+    out["known"] = head.known.astype(np.float16)
+    out["fold"] = head.fold.astype(np.float16)
+    return out | {f"layer{k}": w.astype(np.float16) for k, w in enumerate(head.ensemble.weights)}
+
+
+def _head(data: Mapping[str, Floats], key: str, reach: float) -> Head:
     own = {n.removeprefix(f"{key}."): a for n, a in data.items() if n.startswith(f"{key}.")}
     view = View.build(key.endswith("relative"), own)
-    arrays = {n: np.asarray(own[n], dtype=np.float64) for n in _STORED}
-    return Head(view=view, ensemble=unpacked(data, key), reach=reach, **arrays)
+    arrays = {n: own[n] for n in _STORED}
+    arrays["named"] = np.where(own["named"] < 0.0, np.nan, own["named"])
+    layers = [own[f"layer{k}"] for k in range(sum(n.startswith("layer") for n in own))]
+    return Head(view=view, ensemble=Ensemble(layers), reach=reach, **arrays)
 
 
 @lru_cache(maxsize=1)

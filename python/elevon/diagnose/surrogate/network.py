@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,17 +21,17 @@ __all__ = [
     "Opinion",
     "honest",
     "loss_and_gradient",
-    "packed",
+    "stored",
     "train",
-    "unpacked",
 ]
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[Any]  # of double precision, but of single in training
 Weights = list[Floats]  # w1, b1, w2, b2, ...
-HIDDEN = (48, 48)
+HIDDEN = (44, 44)
 _LEAST_LOG, _MOST_LOG = -5.0, 1.5  # of a deviation
 _PART = 64  # rows of a product
-DECAY = 3e-2  # of the weights, over the step's rate
+_SINGLE = np.float32
+DECAY = 0.2  # of the weights, over the step's rate: less of it, and the units are learned by heart
 
 
 @dataclass(frozen=True)
@@ -61,12 +62,15 @@ class Opinion:
         Logit of any fault.
     size, deviation : ndarray, shape (n, f)
         Of each fault, were it there.
+    each : ndarray, shape (e, n, f)
+        Of every member: logit of each fault.
     """
 
     presence: Floats
     faulty: Floats
     size: Floats
     deviation: Floats
+    each: Floats
 
 
 @dataclass(frozen=True)
@@ -96,6 +100,7 @@ class Ensemble:
             out[..., -1].mean(axis=0),
             size.mean(axis=0),
             np.sqrt(own),
+            out[..., :count],
         )
 
 
@@ -115,7 +120,7 @@ def loss_and_gradient(weights: Weights, batch: Batch) -> tuple[float, Weights]:
     sizes of those that are there.
     """
     layers = _forward(weights, _parts(batch.inputs))
-    out, there = np.concatenate(layers[-1]), (batch.size != 0.0).astype(np.float64)
+    out, there = np.concatenate(layers[-1]), (batch.size != 0.0).astype(batch.inputs.dtype)
     n, f = there.shape
     size, raw = out[:, f : 2 * f], out[:, 2 * f : 3 * f]
     log = np.clip(raw, _LEAST_LOG, _MOST_LOG)
@@ -194,7 +199,7 @@ def train(
     seed: int,
     progress: Callable[[float], object] | None = None,
 ) -> Ensemble:
-    """Train the members by Adam with a rate that falls to nothing.
+    """Train the members by Adam with a rate that falls to nothing, in single precision.
 
     Parameters
     ----------
@@ -217,7 +222,8 @@ def train(
             raise Interrupted("training was interrupted")
         rng = np.random.default_rng([seed, k])
         all_weights.append(_member(batches, outputs, rounds, rng))
-    return Ensemble([np.stack(layer) for layer in zip(*all_weights, strict=True)])
+    layers = zip(*all_weights, strict=True)
+    return Ensemble([np.stack(layer).astype(np.float64) for layer in layers])
 
 
 def _member(
@@ -229,11 +235,14 @@ def _member(
     widths = (batches(rng).inputs.shape[1], *HIDDEN, outputs)
     weights: Weights = []
     for a, b in itertools.pairwise(widths):
-        weights += [rng.standard_normal((a, b)) / math.sqrt(a), np.zeros((1, b))]
+        start = rng.standard_normal((a, b)) / math.sqrt(a)
+        weights += [start.astype(_SINGLE), np.zeros((1, b), dtype=_SINGLE)]
     mean = [np.zeros_like(w) for w in weights]
     square = [np.zeros_like(w) for w in weights]
     for step in range(1, rounds + 1):
-        _, gradient = loss_and_gradient(weights, batches(rng))
+        drawn = batches(rng)
+        drawn = Batch(drawn.inputs.astype(_SINGLE), drawn.size.astype(_SINGLE))
+        _, gradient = loss_and_gradient(weights, drawn)
         rate = 4e-3 * 0.5 * (1.0 + math.cos(math.pi * step / rounds))
         for k, g in enumerate(gradient):
             mean[k] += 0.1 * (g - mean[k])
@@ -244,12 +253,6 @@ def _member(
     return weights
 
 
-def packed(ensemble: Ensemble, name: str) -> dict[str, npt.NDArray[np.float16]]:
-    """Return the arrays of an ensemble for a file."""
-    return {f"{name}.layer{k}": w.astype(np.float16) for k, w in enumerate(ensemble.weights)}
-
-
-def unpacked(data: Mapping[str, npt.NDArray[np.float16]], name: str) -> Ensemble:
-    """Return an ensemble from a file's arrays."""
-    count = sum(key.startswith(f"{name}.layer") for key in data)
-    return Ensemble([data[f"{name}.layer{k}"].astype(np.float64) for k in range(count)])
+def stored(ensemble: Ensemble) -> Ensemble:
+    """Return an ensemble of the half precision that a file keeps."""
+    return Ensemble([w.astype(np.float16).astype(np.float64) for w in ensemble.weights])

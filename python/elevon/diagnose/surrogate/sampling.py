@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -41,55 +41,63 @@ def severities(size: Floats) -> Floats:
     return np.asarray(np.sign(inside) * inside**2 * np.where(inside < 0.0, low, high))
 
 
-def _scattered(table: Table) -> Table:
-    """Add the least run-to-run deviation that diagnosis by the model allows for, drawn once."""
-    rng = np.random.default_rng([len(table.unit), int(table.unit.sum())])
+def _deviation(values: Floats) -> Floats:
+    """Return the least run-to-run deviation that diagnosis by the model allows for (`FLOOR`)."""
     share, least = (np.array([FLOOR[name][k] for name in NAMES]) for k in (0, 1))
-    deviation = np.hypot(share * np.abs(table.values), least)
-    values = table.values + deviation * rng.standard_normal(table.values.shape)
-    return replace(table, values=values)
+    return np.asarray(np.hypot(share * np.abs(values), least))
 
 
 @dataclass(frozen=True)
 class Rows:
     """A table with, for every row, the other healthy days of its unit.
 
+    What runs of a simulation lack from day to day (`FLOOR`) is drawn anew whenever they are asked
+    for.
+
     Attributes
     ----------
     table : Table
         Rows.
+    deviation : ndarray, shape (n, k)
+        Of what is drawn.
     others : ndarray of int, shape (n, d)
         Rows of the baselines; -1 where there is none.
     """
 
     table: Table
+    deviation: Floats
     others: npt.NDArray[np.int64]
 
     @classmethod
     def of(cls, table: Table) -> Rows:
-        """Find the baselines of rows, and add what runs of a simulation lack (`FLOOR`)."""
-        table = _scattered(table)
+        """Find the baselines of rows."""
         base = {int(u): np.flatnonzero(table.baseline & (table.unit == u)) for u in set(table.unit)}
         width = max((len(v) for v in base.values()), default=1)
         others = np.full((len(table.unit), width), -1, dtype=np.int64)
         for row, unit in enumerate(table.unit.tolist()):
             near = base[unit][base[unit] != row]
             others[row, : len(near)] = near
-        return cls(table, others)
+        return cls(table, _deviation(table.values), others)
 
     def usable(self) -> npt.NDArray[np.int64]:
         """Rows with a baseline."""
         return np.flatnonzero(self.others[:, 0] >= 0)
 
+    def values(self, rows: npt.NDArray[np.int64], rng: np.random.Generator) -> Floats:
+        """Return the features of rows, shape (..., k), of a day of their own each."""
+        step = self.deviation[rows] * rng.standard_normal((*rows.shape, len(NAMES)))
+        return np.asarray(self.table.values[rows] + step)
+
     def references(
-        self, rows: npt.NDArray[np.int64], rng: np.random.Generator
+        self, rows: npt.NDArray[np.int64], rng: np.random.Generator, most: int | None = None
     ) -> tuple[Floats, Floats]:
-        """Return the mean of one or more baselines of each row, and how many they are."""
+        """Return the mean of one or more baselines of each row (`most` at most), and how many."""
         there = self.others[rows] >= 0
         keys = np.where(there, rng.random(there.shape), 2.0)
-        count = 1 + np.floor(rng.random(len(rows)) * there.sum(axis=1)).astype(np.int64)
+        those = np.minimum(there.sum(axis=1), most or there.shape[1])
+        count = 1 + np.floor(rng.random(len(rows)) * those).astype(np.int64)
         chosen = (keys.argsort(axis=1).argsort(axis=1) < count[:, None]).astype(np.float64)
-        values = self.table.values[self.others[rows]]
+        values = self.values(self.others[rows], rng)
         return (chosen[:, :, None] * values).sum(axis=1) / count[:, None], count.astype(np.float64)
 
     def inputs(
@@ -99,14 +107,15 @@ class Rows:
         rng: np.random.Generator,
         *,
         hide: bool = False,
+        most: int | None = None,
     ) -> Floats:
-        """Return the networks' inputs of rows."""
-        values = self.table.values[rows]
+        """Return the networks' inputs of rows; `most` baselines each at most."""
+        values = self.values(rows, rng)
         if hide:
             values = hidden(values, rng)
         if not view.relative:
             return view.inputs(values, None, np.ones(len(rows)))
-        healthy, count = self.references(rows, rng)
+        healthy, count = self.references(rows, rng, most)
         return view.inputs(values, healthy, count)
 
     def batch(self, view: View, rows: npt.NDArray[np.int64], rng: np.random.Generator) -> Batch:

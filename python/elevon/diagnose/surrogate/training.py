@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from elevon.diagnose.surrogate.campaign import TESTS, Table, gathered
-from elevon.diagnose.surrogate.fit import Plan, fitted, judged
+from elevon.diagnose.surrogate.fit import Plan, fitted
+from elevon.diagnose.surrogate.judge import judged, judged_at
 from elevon.diagnose.surrogate.model import Surrogate
 from elevon.errors import InputError
 from elevon.progress import Progress, part
@@ -16,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["trained"]
 
-_LOW, _TEST = 100, 1  # added to the seed: units of the low model, and those that judge
+_LOW, _TEST = 100, 7  # added to the seed: units of the low model, and those that judge
 _RUNS = 0.7  # of the work
 
 
@@ -58,26 +61,49 @@ def trained(
     plan = Plan(rounds=rounds, seed=seed)
     if units < 2 * plan.folds:
         raise InputError(f"--units {units}: at least {2 * plan.folds}")
-    jobs = [
-        ("high", units, seed),
-        ("low", low_units, seed + _LOW),
-        ("test", test_units, seed + _TEST),
-    ]
-    jobs = [job for job in jobs if job[1]]
-    tables: dict[str, dict[str, Table]] = {name: {} for name, _, _ in jobs}
-    steps = len(jobs) * len(TESTS)
-    for number, (name, count, own) in enumerate(jobs):
-        for at, test in enumerate(TESTS, number * len(TESTS)):
-            share = part(progress, _RUNS * at / steps, _RUNS * (at + 1) / steps)
-            tables[name][test] = gathered(
-                actuator, test, units=count, seed=own, folder=folder, progress=share,
-                fidelity="low" if name == "low" else "high",
-            )  # fmt: skip
+    jobs = {
+        "high": _Job(units, seed),
+        "low": _Job(low_units, seed + _LOW, fidelity="low"),
+        "test": _Job(test_units, seed + _TEST),
+        "asked": _Job(test_units, seed + _TEST, asked=True),
+    }
+    jobs = {name: job for name, job in jobs.items() if job.units}
+    tables: dict[str, dict[str, Table]] = {}
+    for number, (name, job) in enumerate(jobs.items()):
+        share = part(progress, _RUNS * number / len(jobs), _RUNS * (number + 1) / len(jobs))
+        tables[name] = _tables(actuator, job, folder, share)
     report = {
-        "actuator": actuator.name, "units": units, "low_units": low_units,
-        "test_units": test_units, "rounds": rounds, "seed": seed,
+        "command": f"elevon diagnose-train --actuator {actuator.name} --units {units} --low-units "
+        f"{low_units} --test-units {test_units} --rounds {rounds} --seed {seed}",
+        "made": f"{datetime.now(UTC):%Y-%m-%d}", "actuator": actuator.name,
+        "seeds": {name: job.seed for name, job in jobs.items()},
+        "units": units, "low_units": low_units, "test_units": test_units, "rounds": rounds,
     }  # fmt: skip
     result = fitted(tables["high"], tables.get("low", {}), plan, report, part(progress, _RUNS, 1.0))
     if not test_units:
         return result
-    return Surrogate(result.tests, {**result.report, "test": judged(result, tables["test"])})
+    more = {
+        "test": judged(result, tables["test"]),
+        "asked": judged_at(result, tables["test"], tables["asked"]),
+    }
+    return Surrogate(result.tests, {**result.report, **more})
+
+
+@dataclass(frozen=True)
+class _Job:
+    units: int
+    seed: int
+    fidelity: str = "high"
+    asked: bool = False
+
+
+def _tables(
+    actuator: Actuator, job: _Job, folder: Path | None, progress: Progress | None
+) -> dict[str, Table]:
+    return {
+        test: gathered(
+            actuator, test, units=job.units, seed=job.seed, fidelity=job.fidelity, asked=job.asked,
+            folder=folder, progress=part(progress, k / len(TESTS), (k + 1) / len(TESTS)),
+        )
+        for k, test in enumerate(TESTS)
+    }  # fmt: skip

@@ -62,6 +62,11 @@ class View:
         reference = self.centre if healthy is None else healthy
         return np.nan_to_num(changes(values, reference, self.floor) / self.spread)
 
+    def context(self, healthy: Floats) -> Floats:
+        """Return how far units lie from the middle of those trained, in their scatter, (n, k)."""
+        context = changes(healthy, self.centre, self.floor)
+        return np.nan_to_num((context - self.middle) / self.range)
+
     def inputs(self, values: Floats, healthy: Floats | None, count: Floats) -> Floats:
         """Return what the networks are given, shape (n, m).
 
@@ -71,8 +76,7 @@ class View:
         missing = [np.isnan(values[:, at]).any(axis=1) for at in (_VOLTAGE, _FOLLOWING)]
         parts = [np.arcsinh(change), change * self.spread / self.wide, np.stack(missing, axis=1)]
         if self.relative and healthy is not None:
-            context = changes(healthy, self.centre, self.floor)
-            parts.append(np.nan_to_num((context - self.middle) / self.range).clip(-3.0, 3.0))
+            parts.append(self.context(healthy).clip(-3.0, 3.0))
             parts.append(1.0 / count[:, None])
         return np.hstack(parts)
 
