@@ -33,7 +33,7 @@ from elevon.simulate import Run, simulate_batch
 FAULT = "short@motor.phase_b=0.2"
 BASELINES = 3
 TESTS = ("backlash", "loaded")
-PROCESSES = 7
+PROCESSES = 5
 FRESH = """
 import pickle, sys, time
 from elevon.diagnose.surrogate import diagnose_by_surrogate

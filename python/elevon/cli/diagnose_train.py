@@ -24,7 +24,7 @@ def diagnose_train(
     low_units: Annotated[int, typer.Option(min=0, help="More units, on the low model.")] = 480,
     test_units: Annotated[
         int, typer.Option(min=0, help="Units of another seed that only judge it.")
-    ] = 32,
+    ] = 48,
     rounds: Annotated[int, typer.Option(min=10, help="Training steps of a network.")] = 5000,
     runs: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Keeps the runs, and goes on from there.")
