@@ -165,6 +165,19 @@ def test_what_cannot_be_watched_is_refused(unit, monitor, streams):
         Monitor(unit, [streams["base"]], window=12.0)
 
 
+def test_windows_begin_a_second_after_the_motion_has(streams):
+    from dataclasses import replace
+
+    from elevon.diagnose.monitor.windows import run_in, top_speed
+
+    item = streams["healthy"]
+    top = top_speed(item)
+    rests = replace(item, log=replace(item.log, speed=np.where(item.log.time < 2.0, 0.0, top)))
+    assert run_in(rests, top) == pytest.approx(3.0, abs=item.log.period)
+    still = replace(item, log=replace(item.log, speed=0.0 * item.log.speed))
+    assert run_in(still, top) is None
+
+
 def test_another_motion_is_left_out(monitor, streams):
     from dataclasses import replace
 
@@ -190,7 +203,8 @@ def test_the_command(elevon_cli, tmp_path):  # noqa: F811
     assert document["window"] == pytest.approx(5.0)
     assert document["alarm"]["time"] > 11.0
     assert document["alarm"]["causes"][0]["kind"] == "play"
-    assert len(document["steps"]) == 4
+    assert len(document["steps"]) == 3  # the first second of motion is none
+    assert document["steps"][0]["start"] >= 1.0
     said = elevon_cli("monitor", logs[0], *options)
     assert "No alarm in" in said.err + said.out
     refused = elevon_cli("monitor", logs[1], *options, "--false-alarm-time", "0 s", "--json")

@@ -23,6 +23,8 @@ from elevon.diagnose.monitor.windows import (
     motion,
     of_samples,
     period,
+    run_in,
+    top_speed,
     window_evidence,
 )
 from elevon.errors import InputError
@@ -163,6 +165,7 @@ class Monitor:
         self._reference = reference(self.actuator, self.baselines, self._candidates, self.width)
         self.thresholds = self._simulated()
         self._motion = motion(self.baselines[0])
+        self._top = top_speed(self.baselines[0])
         self._warn()
         self._begin()
 
@@ -178,6 +181,7 @@ class Monitor:
         self._filter = ChangeFilter(spread, directions, streams=1, last=_LAST)
         self._used: list[Step] = []
         self._held: dict[str, list[Floats]] = {}
+        self._moves = False  # whether what the day begins with is past
 
     @property
     def reference(self) -> Reference:
@@ -187,12 +191,14 @@ class Monitor:
     def new_day(self) -> None:
         """Say that the unit was stopped: its temperatures and friction are another day's."""
         self._held.clear()
+        self._moves = False
         self._filter.new_day()
 
     def feed_log(self, item: TestLog) -> list[Step]:
         """Take a whole log, as a day of its own; return a step for each whole window."""
         self.new_day()
-        return [self.feed_window(part, start) for start, part in cut(item, self.width)]
+        parts = cut(item, self.width, start=run_in(item, self._top) or 0.0)
+        return [self.feed_window(part, start) for start, part in parts]
 
     def feed(self, samples: Mapping[str, Floats]) -> list[Step]:
         """Take samples as they come, in any number; return the steps that became complete.
@@ -217,9 +223,16 @@ class Monitor:
         held = {name: np.concatenate(parts) for name, parts in self._held.items()}
         out, time = [], held["time"]
         while len(time) and time[-1] >= time[0] + self.width:
-            inside = time < time[0] + self.width
+            inside = time < time[0] + self.width - 0.5 * (time[1] - time[0])
             part = {name: values[inside] for name, values in held.items()}
             item = of_samples(part, self.baselines[0].log.note, "stream")
+            if not self._moves:
+                lead = run_in(item, self._top)
+                self._moves = lead is not None
+                later = time >= time[0] + (self.width if lead is None else lead)
+                held = {name: values[later] for name, values in held.items()}
+                time = held["time"]
+                continue
             out.append(self.feed_window(item, float(time[0])))
             held = {name: values[~inside] for name, values in held.items()}
             time = held["time"]

@@ -16,7 +16,7 @@ from elevon.diagnose.bymodel.healthy import DEGREES, healthy
 from elevon.diagnose.bymodel.log import RUN_IN, TestLog, prepared
 from elevon.diagnose.bymodel.replay import replay
 from elevon.diagnose.monitor.filter import Spread
-from elevon.diagnose.monitor.windows import cut, stretch, window_evidence
+from elevon.diagnose.monitor.windows import cut, run_in, stretch, top_speed, window_evidence
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
@@ -86,10 +86,8 @@ def reference(
     InputError
         Fewer than three windows in which the unit moves.
     """
-    shown = [
-        [e for _, w in cut(b, width, start=RUN_IN) if (e := window_evidence(w, actuator))]
-        for b in baselines
-    ]
+    parts = [cut(b, width, start=run_in(b, top_speed(b)) or 0.0) for b in baselines]
+    shown = [[e for _, w in part if (e := window_evidence(w, actuator))] for part in parts]
     count = sum(map(len, shown))
     if count < _LEAST:
         raise InputError(

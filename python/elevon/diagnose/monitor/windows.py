@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from elevon.diagnose.bymodel.command import noted_command
 from elevon.diagnose.bymodel.evidence import Evidence
-from elevon.diagnose.bymodel.log import TestLog
+from elevon.diagnose.bymodel.log import RUN_IN, TestLog
 from elevon.diagnose.bymodel.replay import logged_evidence
 from elevon.errors import InputError
 
@@ -19,7 +19,10 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.logs.command.note import CommandNote
 
-__all__ = ["CHANNELS", "cut", "motion", "of_samples", "period", "stretch", "window_evidence"]
+__all__ = [
+    "CHANNELS", "cut", "motion", "of_samples", "period", "run_in", "stretch", "top_speed",
+    "window_evidence",
+]  # fmt: skip
 
 Floats = npt.NDArray[np.float64]
 _LEAST = 400  # samples of a window that may be used
@@ -56,6 +59,36 @@ def period(item: TestLog, window: float | None) -> float:
             "a ramp) is not watched: elevon diagnose takes such a log as a whole"
         )
     return 1.0 / frequency
+
+
+def top_speed(item: TestLog) -> float:
+    """Return the highest motor speed of a log [rad/s]."""
+    return float(np.nanmax(np.where(item.log.good, np.abs(item.log.speed), 0.0), initial=0.0))
+
+
+def run_in(item: TestLog, top: float) -> float | None:
+    """Return how much of a day's beginning is no window [s]: rest, and the start of the motion.
+
+    A drive that sets off shows inertia and ripple that no window of the motion itself shows.
+
+    Parameters
+    ----------
+    item : TestLog
+        What the day begins with.
+    top : float
+        Highest speed of the motion [rad/s].
+
+    Returns
+    -------
+    float or None
+        None where it rests throughout.
+    """
+    log = item.log
+    fast = log.good & (np.abs(log.speed) > _MOVING * top)
+    if not fast.any():
+        return None
+    # Half a sample before one, so that rounding decides nothing.
+    return float(log.time[np.argmax(fast)] - log.time[0]) + RUN_IN - 0.5 * log.period
 
 
 def cut(item: TestLog, width: float, *, start: float = 0.0) -> Iterator[tuple[float, TestLog]]:
