@@ -8,7 +8,7 @@ import pytest
 
 from elevon import Actuator
 from elevon.diagnose.bymodel.candidates import CANDIDATES
-from elevon.diagnose.bymodel.evidence import UNITS, Signals, evidence
+from elevon.diagnose.bymodel.evidence import UNITS, Signals, evidence, median
 from elevon.diagnose.bymodel.lost_motion import dragged
 from elevon.diagnose.nexttest.belief import Answered
 from elevon.diagnose.surrogate import (
@@ -146,6 +146,12 @@ def test_a_gap_is_passed_once_the_driver_has_gone_its_width():
     np.testing.assert_array_equal(out[:10], expected[:10])
     assert not out[11:15].any()
     assert out[16:].all()
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 8, 801])
+def test_the_median_is_numpys(count):
+    values = np.random.default_rng(count).standard_normal(count)
+    assert median(values) == np.median(values)
 
 
 def test_a_change_is_a_share_where_it_scales():

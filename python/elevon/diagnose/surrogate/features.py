@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from elevon.diagnose.bymodel.evidence import Signals, evidence
+from elevon.diagnose.bymodel.evidence import Signals, evidence, median
 from elevon.diagnose.bymodel.log import RUN_IN, TestLog
 from elevon.errors import InputError
 
@@ -169,7 +169,7 @@ def _gain(centre: Floats, user: Floats, set_point: Floats, rate: float) -> float
     rows[4] = centre * (first[1] * rows[2] - first[2] * rows[1])  # by the rate
     gram[4] = gram[:, 4] = rows @ rows[4]
     rest = np.abs(user - _solved(gram, 5) @ rows[:5])
-    far = rows[:, rest >= _FAR * float(np.median(rest)) + 1e-12]
+    far = rows[:, rest >= _FAR * median(rest) + 1e-12]
     return float(_solved(gram - far @ far.T, 5)[0]) / scale
 
 

@@ -9,7 +9,6 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -295,4 +294,4 @@ def _head(data: Mapping[str, Floats], key: str, reach: float) -> Head:
 @lru_cache(maxsize=1)
 def shipped() -> Surrogate:
     """Return the surrogate that comes with the package."""
-    return Surrogate.load(Path(str(files("elevon.diagnose.surrogate") / "rotary.npz")))
+    return Surrogate.load(Path(__file__).with_name("rotary.npz"))
