@@ -1,6 +1,7 @@
 """Both filters against the exact one, and what inspections may be."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -138,6 +139,19 @@ def test_a_coefficient_that_differs_from_unit_to_unit_is_learned():
     assert own.std() == pytest.approx(spread, rel=0.35)
     renewed = flt.update(Inspection(1000.0, {}, reset=(KEY,))).own[:, 0, 0]
     assert renewed.std() == pytest.approx(0.4, rel=0.1)
+
+
+def test_a_fault_that_units_begin_with_is_given_up_where_no_inspection_sees_it():
+    unit = process(law(1e-3, start=0.5, start_spread=0.02, dormant=0.3), limits=(2.0,))
+    flt = ParticleFilter(unit, count=4000, seed=1)
+    there = flt.units.damage[:, 0] > 0.0
+    assert there.mean() == pytest.approx(0.7, abs=0.03)
+    for usage in (10.0, 20.0, 30.0):
+        flt.update(Inspection(usage, {KEY: Seen(None, 0.1, 0.1)}))
+    assert np.median(flt.units.damage) == 0.0
+    assert (flt.units.damage > 0.3).mean() < 0.03
+    begun = unit.advance(replace(flt.units, usage=1e-6), 1e9, np.random.default_rng(0))
+    assert begun.damage[begun.active & ~flt.units.active].min() >= 0.5
 
 
 def test_growth_hastens_beyond_the_law_and_never_slows():

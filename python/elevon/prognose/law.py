@@ -90,8 +90,8 @@ class Law:
     start_spread : float
         Deviation of the damage at the start (never below zero damage).
     dormant : float
-        Share of new units in which the fault does not grow; it may begin to (`ONSET` of
-        `elevon.prognose.process`).
+        Share of new units in which the fault is not there and does not grow; it may begin to, at
+        `start` (`ONSET` of `elevon.prognose.process`).
     severity, damage : callable
         Damage to severity and back, shape (n,) to (n,), both rising.
     highest : float

@@ -89,6 +89,10 @@ class Population:
             usage=usage,
         )
 
+    def without_dormant(self) -> Population:
+        """Return the units without the faults that do not grow in them: those are not there."""
+        return replace(self, damage=np.where(self.active, self.damage, 0.0))
+
     def picked(self, index: npt.NDArray[np.intp]) -> Population:
         """Return those of an index, all with the same weight."""
         even = np.full(len(index), 1.0 / max(len(index), 1))
@@ -148,7 +152,7 @@ class Process:
             common=rng.standard_normal((count, size)),
             own=self._spreads * rng.standard_normal((count, *self._spreads.shape)),
             off=np.zeros((count, size, 0)),
-        )
+        ).without_dormant()
 
     def severity(self, damage: Floats) -> Floats:
         """Return the severities of damages, shape (n, k) both."""
@@ -199,7 +203,7 @@ class Process:
         first = steps * (self.rate(units, units.damage, ones) if rate is None else rate)
         mean = steps * self.rate(units, units.damage + 0.5 * first, ones)
         grown = mean if rng is None else _gamma(mean, self.laws, rng)
-        growth, active = units.growth, units.active
+        damage, growth, active = units.damage + grown, units.growth, units.active
         if rng is not None and units.usage > 0.0:
             e_folds = float(np.log1p(steps / units.usage))
             if self.drift > 0.0:
@@ -207,9 +211,11 @@ class Process:
                 growth = growth + wander * rng.standard_normal(growth.shape)
             if not active.all():
                 active = active | (rng.random(active.shape) < 1.0 - np.exp(-ONSET * e_folds))
+                begun = active & ~units.active & (damage <= 0.0)
+                damage = np.where(begun, [law.start for law in self.laws], damage)
         return replace(
             units,
-            damage=np.minimum(units.damage + grown, self._most),
+            damage=np.minimum(damage, self._most),
             growth=growth,
             active=active,
             usage=units.usage + steps,

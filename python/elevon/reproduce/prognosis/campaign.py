@@ -134,11 +134,9 @@ def _expected() -> dict[str, float]:
             item for item in mission.requirement if item.fault is None or item.fault == law.key
         )
         alone = mission.model_copy(update={"requirement": asked})
-        process = Process(respond(base, alone, laws=[law]))
+        process = Process(respond(base, alone, laws=[replace(law, dormant=0.0)]))
         rng = np.random.default_rng(0)
-        units = process.start(500, rng)
-        growing = replace(units, active=np.ones_like(units.active))
-        future = look_ahead(process, growing, mission.usage, rng)
+        future = look_ahead(process, process.start(500, rng), mission.usage, rng)
         out[law.name] = float(np.median(future.end))
     return out
 
@@ -233,6 +231,7 @@ def _unaided(
     units = process.start(_SAMPLES, rng)
     others = [k for k, law in enumerate(process.laws) if law.name != truth.law]
     units.active[:, others] = False
+    units = units.without_dormant()
     life = _quantiles(look_ahead(process, units, mission.usage, rng).end)
     rows = [[max(value - item.usage, 0.0) for value in life] for item in seen]
     return _track(seen, rows, truth.life.end)

@@ -221,7 +221,8 @@ def true_unit(base: Actuator, mission: Mission, law: str, number: int, seed: int
             )
         }
     )
-    response = respond(base.with_values(unit, source="truth"), asked, laws=[true], fidelity="high")
+    acting = [replace(true, dormant=0.0)]
+    response = respond(base.with_values(unit, source="truth"), asked, laws=acting, fidelity="high")
     process = Process(response, drift=0.0)
     start = process.start(10, rng).picked(np.array([0]))
     factor = _FACTOR[0] + _FACTOR[1] * rng.standard_normal((1, 1))
