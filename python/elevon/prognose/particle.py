@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from elevon.prognose.future import MODEL_ERROR
+from elevon.prognose.future import LASTING, MODEL_ERROR
 from elevon.prognose.measured import Measured, governing
 from elevon.prognose.observation import Inspection, Seen
 from elevon.prognose.process import Population, Process
@@ -89,7 +89,8 @@ class ParticleFilter:
     def _measured(self, units: Population, name: str, value: Measured) -> Population:
         """Weigh by a requirement's own value: the model's at the units' severities, and off it.
 
-        What the model is off by is a share of its value, and at the threshold that of the future.
+        What the model is off by is a share of its value; `LASTING` of its square stays as faults
+        grow, the rest is the value's own scatter.
         The numbers of the law that moves it most are weighed, and what the model is off by stands
         beside them; of the other laws' faults their units' spread is in the value.
         """
@@ -98,13 +99,14 @@ class ParticleFilter:
         units = units.with_off(len(response.requirements), self.rng)
         limit = response.thresholds[r]
         reserve = float(response.requirements[r].reserve(np.array(value.value), limit))
-        seen = Seen(reserve, value.deviation / limit, value.deviation / limit)
         sign = 1.0 if response.requirements[r].at_least else -1.0
+        size = MODEL_ERROR * (1.0 + sign * reserve)
+        deviation = float(np.hypot(value.deviation / limit, np.sqrt(1.0 - LASTING) * size))
+        seen = Seen(reserve, deviation, deviation)
 
         def likelihood(units: Population) -> Floats:
             left = response.reserve(self.process.severity(units.damage))[r]
-            off = MODEL_ERROR * units.off[:, k, r] * (1.0 + sign * left)
-            return seen.log_likelihood(left + off)
+            return seen.log_likelihood(left + np.sqrt(LASTING) * size * units.off[:, k, r])
 
         return self._weighed(units, k, likelihood)
 
