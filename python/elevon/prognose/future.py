@@ -98,7 +98,7 @@ def look_ahead(
     end[dead], first[dead] = units.usage, reserve[:, dead].argmin(axis=0)
     alive, reserve = alive[~dead], reserve[:, ~dead]
     now = units.picked(np.flatnonzero(~dead))
-    at, kept = [units.usage], [_quantiles(process, damage)]
+    at, courses = [units.usage], [_quantiles(process, damage)]
     for _ in range(_MOST_STEPS):
         if not len(alive) or _out_of_sight(now.usage - units.usage, end - units.usage):
             break
@@ -113,10 +113,10 @@ def look_ahead(
         damage[alive] = later.damage
         if course:
             at.append(later.usage)
-            kept.append(_quantiles(process, damage))
+            courses.append(_quantiles(process, damage))
         alive, reserve = alive[~failed], after[:, ~failed]
         now = later.picked(np.flatnonzero(~failed))
-    return Future(units.usage, end, first, np.array(at), np.array(kept))
+    return Future(units.usage, end, first, np.array(at), np.array(courses))
 
 
 def _model_errors(
