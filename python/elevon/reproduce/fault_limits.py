@@ -25,7 +25,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from elevon.diagnose.bymodel.answer import Diagnosis
+    from elevon.diagnose.bymodel.log import TestLog
     from elevon.progress import Progress
+    from elevon.recording import Recording
 
 __all__ = ["FaultLimits", "Limit", "Plan", "default_actuators", "reproduce_fault_limits"]
 
@@ -224,16 +226,37 @@ def _test_limits(
         _advance(progress, 0.3 + 0.3 * (k + 1) / len(logs))
     rows = _rows(actuator, test, answers[0])
     tried = _spread([k for k, row in enumerate(rows) if row.limit is not None], plan.injected)
-    for done, k in enumerate(tried):
-        severity = _over(actuator, rows[k])
-        day = Day((f"{rows[k].kind}@{rows[k].place}={severity!r}",), first + 500 + k)
-        try:
-            log = day_logs(actuator, test, [day], plan.fidelity)[0]
-        except (InputError, DivergedError):  # not a severity of this fidelity: left unchecked
-            continue
-        rows[k] = _judged(rows[k], severity, diagnosed(actuator, log, [base]))
+    severities = [_over(actuator, rows[k]) for k in tried]
+    days = [
+        Day((f"{rows[k].kind}@{rows[k].place}={severity!r}",), first + 500 + k)
+        for k, severity in zip(tried, severities, strict=True)
+    ]
+    broken = _broken_logs(actuator, test, days, plan.fidelity)
+    for done, (k, severity, shown) in enumerate(zip(tried, severities, broken, strict=True)):
+        if shown is not None:
+            rows[k] = _judged(rows[k], severity, diagnosed(actuator, shown, [base]))
         _advance(progress, 0.6 + 0.4 * (done + 1) / len(tried))
     return rows, sum(answer.status == "faulty" for answer in answers)
+
+
+def _broken_logs(
+    actuator: Actuator, test: StandardTest, days: Sequence[Day], fidelity: str
+) -> list[TestLog | Recording | None]:
+    """Logs with faults, together; one by one where that fails, None for what this fidelity refuses.
+
+    A log is the same to the bit either way.
+    """
+    try:
+        return list(day_logs(actuator, test, days, fidelity))
+    except (InputError, DivergedError):
+        pass
+    out: list[TestLog | Recording | None] = []
+    for day in days:
+        try:
+            out += day_logs(actuator, test, [day], fidelity)
+        except (InputError, DivergedError):
+            out.append(None)
+    return out
 
 
 def _advance(progress: Progress | None, fraction: float) -> None:
