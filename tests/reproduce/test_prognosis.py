@@ -15,18 +15,17 @@ from elevon.prognose.grid import Grid
 from elevon.prognose.life import Life
 from elevon.prognose.metrics import Track
 from elevon.reproduce.prognosis import campaign
-from elevon.reproduce.prognosis.campaign import campaign_mission, reproduce_prognosis
+from elevon.reproduce.prognosis.campaign import Plan, campaign_mission, reproduce_prognosis
 from elevon.reproduce.prognosis.result import PrognosisResult, UnitResult
 from elevon.reproduce.prognosis.truth import (
     BASELINE_DAYS,
     FAULTS,
     INSPECTION_DAYS,
     INSPECTIONS,
+    Inspector,
     UnitTruth,
     _of_the_baselines,
-    inspections_of,
     other_law,
-    with_values,
 )
 from elevon.reproduce.side_by_side import side_by_side
 
@@ -40,15 +39,24 @@ def unit(law, error, number=0):
     return UnitResult(number, law, "tracking error", track, far, near, 0.1)
 
 
+def inspected(truth, count=1000, **options):
+    """Inspections at even uses over a life."""
+    inspector = Inspector(truth, campaign_mission().laws(), 0, **options)
+    uses = np.linspace(0.0, truth.life.end, count, endpoint=False)
+    return [inspector.at(float(usage)) for usage in uses]
+
+
+def test_the_next_inspection_is_due_in_a_tenth_of_what_is_surely_left():
+    plan = Plan(interval=100.0, soonest=10.0)
+    assert [plan.wait(least) for least in (1e7, 500.0, 50.0, 0.0)] == [100.0, 50.0, 10.0, 10.0]
+
+
 def test_inspections_err_as_said_and_name_what_they_do_not_see():
-    mission, base = campaign_mission(), Actuator.load("torino-rotary")
+    base = Actuator.load("torino-rotary")
     usage = np.linspace(0.0, 1e5, 50)
     life = Life(usage, np.full((50, 1), 0.2), 1e5, 0)
     truth = UnitTruth(2, "insulation", life, base)
-    seen = inspections_of(truth, mission.laws(), 100.0, seed=0)
-    uses = np.array([item.usage for item in seen])
-    assert np.diff(uses).min() >= 60.0
-    assert np.diff(uses).max() <= 140.0
+    seen = inspected(truth)
     shown = np.array([item.seen["short@motor.phase_a"].severity for item in seen])
     drawn = INSPECTIONS["insulation"]
     offset = shown.mean() - 0.2 - float(drawn.mean(np.array(0.2)))
@@ -69,7 +77,7 @@ def test_friction_is_said_against_the_healthy_days_and_not_beyond_what_diagnosis
     assert day.std() == pytest.approx(whole, rel=0.08)
     base, usage = Actuator.load("torino-rotary"), np.linspace(0.0, 1e4, 50)
     truth = UnitTruth(1, "lubricant_loss", Life(usage, np.full((50, 1), 2.6), 1e4, 0), base)
-    own = inspections_of(truth, campaign_mission().laws(), 100.0, seed=0)
+    own = inspected(truth, 100)
     seen = [item.seen["friction@transmission"] for item in own]
     assert max(item.severity for item in seen) == 2.0
     assert np.median([item.high for item in seen]) > 2.0
@@ -86,8 +94,7 @@ def test_measured_requirements_are_the_truths_with_the_scatter_of_a_day():
     )
     life = Life(usage, np.full((50, 1), 0.25 * law.highest), 1e5, 0)
     truth = UnitTruth(0, "gear_wear", life, base, response)
-    seen = inspections_of(truth, campaign_mission().laws(), 100.0, seed=0)
-    told = with_values(truth, seen, 0)
+    seen, told = inspected(truth), inspected(truth, measured=True)
     assert [item.seen for item in told] == [item.seen for item in seen]
     for name, value, spread in (("tracking error", 0.03, 0.002), ("current", 0.55, 0.024)):
         shown = np.array([item.measured[name].value for item in told])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
@@ -33,10 +33,9 @@ from elevon.progress import Progress
 from elevon.reproduce.prognosis.result import SHARES, PrognosisResult, UnitResult
 from elevon.reproduce.prognosis.truth import (
     FAULTS,
+    Inspector,
     UnitTruth,
-    inspections_of,
     true_unit,
-    with_values,
 )
 from elevon.reproduce.side_by_side import side_by_side
 from elevon.worklog import finished
@@ -46,6 +45,8 @@ __all__ = ["campaign_mission", "reproduce_prognosis"]
 Floats = npt.NDArray[np.float64]
 _BASE = "torino-rotary"
 _INTERVAL = 0.02  # of the life that the model expects, between inspections: some hundred flights
+_OF_THE_REST = 0.1  # of the least life that is left, after which the next inspection is due
+_SOONEST = 0.002  # of the life that the model expects, between inspections: some ten flights
 _SAMPLES = 1000
 
 
@@ -118,12 +119,10 @@ def _history(
     base, mission = Actuator.load(_BASE), campaign_mission()
     law = FAULTS[number % len(FAULTS)]
     truth = true_unit(base, mission, law, number, seed)
-    seen = inspections_of(truth, mission.laws(), _INTERVAL * expected[law], seed)
-    if not seen or seen[0].usage > SHARES[0] * truth.life.end:
+    unit = predicted(truth, mission, Plan.of(expected[law]), seed, measured=measured)
+    if unit is None:
         return {"left_out": f"history {number}: no inspection before half of its life"}
-    if measured:
-        seen = with_values(truth, seen, seed)
-    return {"unit": predicted(truth, mission, seen, seed).noted()}
+    return {"unit": unit.noted()}
 
 
 def _expected() -> dict[str, float]:
@@ -141,12 +140,43 @@ def _expected() -> dict[str, float]:
     return out
 
 
+@dataclass(frozen=True)
+class Plan:
+    """When units are inspected: at even intervals, sooner where the end may be near.
+
+    Attributes
+    ----------
+    interval : float
+        Use between inspections at most.
+    soonest : float
+        At least.
+    """
+
+    interval: float
+    soonest: float
+
+    @classmethod
+    def of(cls, expected: float) -> Plan:
+        """Return the campaign's, for a life that is expected."""
+        return cls(_INTERVAL * expected, _SOONEST * expected)
+
+    def wait(self, least: float) -> float:
+        """Return the use until the next inspection, from the least remaining life predicted."""
+        return min(max(_OF_THE_REST * least, self.soonest), self.interval)
+
+
 def predicted(
-    truth: UnitTruth, mission: Mission, seen: Sequence[Inspection], seed: int
-) -> UnitResult:
-    """Predict a unit's end at each inspection, on tables of its own calibrated model."""
+    truth: UnitTruth, mission: Mission, plan: Plan, seed: int, *, measured: bool = False
+) -> UnitResult | None:
+    """Predict a unit's end at each inspection, on tables of its own calibrated model.
+
+    None where it failed before it was inspected in the first half of its life.
+    """
     response = respond(truth.calibrated, mission, snapshots=True)
-    track, seconds = tracked(response, mission, seen, truth.life.end, seed)
+    inspector = Inspector(truth, mission.laws(), seed, measured=measured)
+    seen, track, seconds = tracked(response, mission, inspector, plan, seed)
+    if not seen or seen[0].usage > SHARES[0] * truth.life.end:
+        return None
     return UnitResult(
         truth.number,
         truth.law,
@@ -166,19 +196,39 @@ def _first(truth: UnitTruth, mission: Mission) -> int:
 
 
 def tracked(
-    response: Response, mission: Mission, seen: Sequence[Inspection], end: float, seed: int
-) -> tuple[Track, float]:
-    """Return the predictions at each inspection, and the longest time one took."""
+    response: Response,
+    mission: Mission,
+    inspector: Inspector,
+    plan: Plan,
+    seed: int,
+) -> tuple[list[Inspection], Track, float]:
+    """Inspect a unit until its end and predict it each time.
+
+    Returns
+    -------
+    seen : list of Inspection
+        What the inspections said.
+    track : Track
+        The predictions; empty where there was no inspection.
+    seconds : float
+        Longest processor time of one.
+    """
     flt = ParticleFilter(Process(response), seed=seed)
-    rows, longest = [], 0.0
-    for item in seen:
+    seen: list[Inspection] = []
+    rows: list[list[float]] = []
+    longest, wait, end = 0.0, plan.interval, inspector.truth.life.end
+    while True:
+        usage = (seen[-1].usage if seen else 0.0) + wait * inspector.rng.uniform(0.6, 1.4)
+        if usage >= end:
+            return seen, _track(seen, rows, end), longest
+        seen.append(inspector.at(usage))
         begin = clock.process_time()
-        flt.update(item)
+        flt.update(seen[-1])
         rng = np.random.default_rng([20, seed])
         units = resampled(flt.units, _SAMPLES, rng)
         rows.append(_remaining(flt.process, units, mission, rng))
         longest = max(longest, clock.process_time() - begin)
-    return _track(seen, rows, end), longest
+        wait = plan.wait(rows[-1][0])
 
 
 def _remaining(
@@ -190,7 +240,7 @@ def _remaining(
 
 
 def _track(seen: Sequence[Inspection], rows: Sequence[Sequence[float]], end: float) -> Track:
-    low, median, high = np.array(rows).T
+    low, median, high = np.array(rows).reshape(-1, 3).T
     return Track(np.array([item.usage for item in seen]), median, low, high, end)
 
 

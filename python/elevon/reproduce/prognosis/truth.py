@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -28,11 +28,10 @@ __all__ = [
     "INSPECTIONS",
     "VALUES",
     "InspectionError",
+    "Inspector",
     "UnitTruth",
-    "inspections_of",
     "other_law",
     "true_unit",
-    "with_values",
 ]
 
 Floats = npt.NDArray[np.float64]
@@ -261,52 +260,62 @@ def _of_the_baselines(number: int, seed: int) -> float:
     return float(deviation * rng.standard_normal())
 
 
-def inspections_of(
-    truth: UnitTruth, laws: tuple[Law, ...], interval: float, seed: int
-) -> list[Inspection]:
-    """Inspect a unit at irregular uses, with the diagnosis' errors.
-
-    Part of the error is the same at all inspections of a unit, and of that part the days of its
-    baselines are also in its calibrated set.
-    """
-    rng = np.random.default_rng([19, seed, truth.number])
-    common = {law.name: rng.standard_normal(2) for law in laws}
-    healthy = _of_the_baselines(truth.number, seed)
-    out: list[Inspection] = []
-    usage = 0.0
-    while True:
-        usage += interval * rng.uniform(0.6, 1.4)
-        if usage >= truth.life.end:
-            return out
-        own = float(truth.life.at(usage)[0])
-        seen = {
-            law.key: _seen(
-                law, own if law.name == truth.law else 0.0, (*common[law.name], healthy), rng
-            )
-            for law in laws
-        }
-        out.append(Inspection(usage, seen, name=f"{usage:.0f}"))
-
-
 #: Deviation of what a unit shows of a requirement from day to day, over its value: on the bench of
 #: `inspection-error`, four units, six days, this mission, the largest of three conditions.
 VALUES: Mapping[str, float] = {"tracking_error": 0.002, "current": 0.024}
 
 
-def with_values(truth: UnitTruth, inspections: Sequence[Inspection], seed: int) -> list[Inspection]:
-    """Return the inspections with what the unit showed of its requirements in a mission."""
-    assert truth.response is not None
-    rng, out = np.random.default_rng([24, seed, truth.number]), []
-    for item in inspections:
-        severity = np.atleast_1d(truth.life.at(item.usage))[None, :]
-        values = truth.response.measured(severity)[:, 0]
+class Inspector:
+    """Inspects a unit at any uses, with the diagnosis' errors.
+
+    Part of the error is the same at all inspections of a unit, and of that part the days of its
+    baselines are also in its calibrated set.
+
+    Parameters
+    ----------
+    truth : UnitTruth
+        The unit.
+    laws : tuple of Law
+        What is looked for.
+    seed : int
+        Of chance.
+    measured : bool
+        Whether inspections carry what the unit showed of its requirements in a mission, too.
+    """
+
+    def __init__(
+        self, truth: UnitTruth, laws: tuple[Law, ...], seed: int, *, measured: bool = False
+    ) -> None:
+        self.truth, self._laws, self._measured = truth, laws, measured
+        self.rng = np.random.default_rng([19, seed, truth.number])
+        self._of_values = np.random.default_rng([24, seed, truth.number])
+        healthy = _of_the_baselines(truth.number, seed)
+        self._common = {law.name: (*self.rng.standard_normal(2).tolist(), healthy) for law in laws}
+
+    def at(self, usage: float) -> Inspection:
+        """Return what an inspection at a use says."""
+        own = float(self.truth.life.at(usage)[0])
+        seen = {
+            law.key: _seen(
+                law, own if law.name == self.truth.law else 0.0, self._common[law.name], self.rng
+            )
+            for law in self._laws
+        }
+        values = self._values(usage) if self._measured else {}
+        return Inspection(usage, seen, name=f"{usage:.0f}", measured=values)
+
+    def _values(self, usage: float) -> dict[str, Measured]:
+        """Return what the unit shows of its requirements on that day."""
+        assert self.truth.response is not None
+        response = self.truth.response
+        values = response.measured(np.atleast_1d(self.truth.life.at(usage))[None, :])[:, 0]
         measured = {}
-        for asked, value in zip(truth.response.requirements, values, strict=True):
+        for asked, value in zip(response.requirements, values, strict=True):
             day = VALUES.get(asked.measure, 0.0) * float(value)
             if day > 0.0:
-                measured[asked.name] = Measured(float(value + day * rng.standard_normal()), day)
-        out.append(replace(item, measured=measured))
-    return out
+                drawn = float(value + day * self._of_values.standard_normal())
+                measured[asked.name] = Measured(drawn, day)
+        return measured
 
 
 def _seen(
