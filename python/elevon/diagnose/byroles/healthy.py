@@ -39,7 +39,11 @@ def healthy_of(model: RoleReplay, names: Sequence[str], same: Sequence[Evidence]
         noise = np.array([e.only(names).std for e in same])
         more = (own + np.diag(np.mean(noise**2, axis=0))) / len(same)
     else:
-        more = np.diag((_mismatch(model, names) * least) ** 2)
+        # The stated stiffness is seldom measured: its give is uncertain by its own size. It moves
+        # all numbers of a log at once, in proportion.
+        more = np.diag((_mismatch(model, names) * least) ** 2) + np.outer(
+            model.give[at], model.give[at]
+        )
     return Healthy(tuple(names), mean, own + more, _FREE, len(same), scale)
 
 

@@ -49,16 +49,19 @@ class RoleReplay(Replay):
         Covariance of the numbers from day to day.
     switched : frozenset of str
         Kinds of faults that are there or not.
+    give : ndarray, shape (k,)
+        What the stated give of the output under the log's load does to the numbers.
     """
 
     def __init__(
         self, shown: Numbers, severities: Mapping[str, Floats], shifts: Mapping[str, Floats],
-        *, draws: Floats, spread: Floats, switched: frozenset[str],
+        *, draws: Floats, spread: Floats, switched: frozenset[str], give: Floats,
     ) -> None:  # fmt: skip
         super().__init__(_evidence(shown), severities, shifts, draws)
         self.shown = shown
         self.spread = spread
         self.switched = switched
+        self.give = give
 
     def shift(self, key: str, severity: Floats) -> Floats:
         """Return what severities of shape (m,) do to the evidence, shape (m, k)."""
@@ -115,7 +118,7 @@ def replay_by_roles(
 
 def _replayed(item: RoleLog, actuator: Actuator, candidates: Sequence[Candidate]) -> RoleReplay:
     severities = {c.key: _severities(c, actuator) for c in candidates}
-    units = [Unit({})]
+    units = [Unit({}), Unit({}, gives=False)]
     for c in candidates:
         units += [Unit({}, (c.text(float(s)),)) for s in severities[c.key] if s != 0.0]
     ready = as_on_stand(actuator, item.test)
@@ -125,7 +128,7 @@ def _replayed(item: RoleLog, actuator: Actuator, candidates: Sequence[Candidate]
     names = tuple(shown[0].values)
     rows = np.array([[s.values.get(n, np.nan) for n in names] for s in shown])
     most = _MOST * floors(shown[0], names, rows[0])
-    shifts, at = {}, 1
+    shifts, at = {}, 2
     for c in candidates:
         zero = severities[c.key] == 0.0
         table = np.zeros((len(zero), len(names)))
@@ -141,6 +144,7 @@ def _replayed(item: RoleLog, actuator: Actuator, candidates: Sequence[Candidate]
         draws=draws,
         spread=spread_of(draws, steps),
         switched=switched_of(actuator),
+        give=np.nan_to_num(rows[0] - rows[1]),
     )
 
 
@@ -194,6 +198,7 @@ def _refined(
         draws=model.draws,
         spread=model.spread,
         switched=model.switched,
+        give=model.give,
     )
 
 

@@ -22,6 +22,7 @@ __all__ = ["Unit", "as_on_stand", "channels_by", "numbers_of_log", "shown_by"]
 Floats = npt.NDArray[np.float64]
 _CHUNK = 64  # runs held at once
 _OVER = 4  # samples of the model to one of the log, which are averaged: loggers filter, too
+_ELASTIC = 1.0  # play.model: a contact that gives
 _SET_POINT = "_ref"  # end of roles that a drive knows as numbers: nothing filters them
 
 
@@ -42,6 +43,8 @@ class Unit:
         the command fall between samples.
     number : int
         Of its random numbers; healthy days differ in them, faults do not.
+    gives : bool
+        Whether its output gives way under the log's load, which the low model does not know.
     """
 
     values: Mapping[str, float]
@@ -49,6 +52,7 @@ class Unit:
     late: float = 0.0
     phase: float = 0.0
     number: int = 0
+    gives: bool = True
 
 
 def as_on_stand(actuator: Actuator, test: RoleTest) -> Actuator:
@@ -91,6 +95,7 @@ def channels_by(
     base = replace(base, core=_with_arrays(base.core, item, actuator))
     places = {path: k for k, path in enumerate(ready.parameters)}
     actions = action_numbers(actuator.wiring)
+    give = give_under(item, ready)
     for first in range(0, len(units), _CHUNK):
         runs = [
             replace(base, core=_of_unit(base.core, unit, places, item, actuator.wiring))
@@ -100,7 +105,23 @@ def channels_by(
         for unit, result in zip(units[first : first + _CHUNK], shown, strict=True):
             rows = result["clocks"][base.plan[0].name]
             late = unit.late if actions else unit.late + unit.phase
-            yield _channels(item, rows, base.plan[0].signals, signals, late / item.rate)
+            shows = _channels(item, rows, base.plan[0].signals, signals, late / item.rate)
+            if give is not None and unit.gives and "output_position" in shows:
+                shows["output_position"] = shows["output_position"] - give
+            yield shows
+
+
+def give_under(item: RoleLog, ready: Actuator) -> Floats | None:
+    """Return how far the output stands back under the log's load, shape (n,): force by stiffness.
+
+    The low model's play is rigid. None without a load, or of a unit whose contact is rigid, too.
+    """
+    known = ready.parameters
+    if item.test.load is None or "play.model" not in known or known.value("play.model") != _ELASTIC:
+        return None
+    return np.asarray(
+        np.interp(item.time, *item.test.load) / known.value("play.stiffness"), dtype=np.float64
+    )
 
 
 def _of_unit(
