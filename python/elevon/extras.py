@@ -8,7 +8,7 @@ __all__ = ["EXTRAS", "missing_package"]
 EXTRAS = {
     "files": ("h5netcdf", "h5py", "pandas", "pyarrow", "xarray"),
     "reports": ("jinja2", "markupsafe", "matplotlib"),
-    "calibrate": ("scipy", "tomlkit"),
+    "calibrate": ("scipy", "threadpoolctl", "tomlkit"),
     "cluster": ("dask", "distributed"),
     "gym": ("gymnasium",),
     "learn": ("sklearn",),

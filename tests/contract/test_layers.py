@@ -11,7 +11,7 @@ PACKAGE = Path(__file__).resolve().parents[2] / "python" / "elevon"
 # thought: what it may know of is everything left of it, and nothing else.
 ROWS = [
     ["errors", "extras", "_core"],
-    ["units", "files", "progress", "memory", "data"],
+    ["units", "files", "progress", "memory", "data", "threads"],
     ["documents", "series", "number_text", "report", "worklog", "containers"],
     ["recording"],
     ["parameters", "loads"],

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elevon import Actuator, Scenario, simulate
+from elevon import Actuator, Recording, Scenario, simulate
 from elevon.cli import main
 from elevon.diagnose.byroles import diagnose_by_roles
 from elevon.diagnose.byroles.asked import same_test
@@ -248,3 +248,58 @@ def test_the_command_line(screw, tmp_path, capsys):
     assert '"status": "healthy"' in capsys.readouterr().out
     asked = ["--actuator", "nasa-ballscrew", "--method", "surrogate"]
     assert main(["diagnose", str(path), *asked]) == 2
+
+
+def loaded_log(actuator, gives, *faults, seconds=3.0, day=1, force=1500.0):
+    """A sine against 1500 N; the output gives way by `gives` times load over stiffness."""
+    unit = drawn(actuator, np.random.default_rng(day))
+    grid = np.arange(0.0, 4.0, 0.01)
+    force = force * np.clip(5.0 * np.cos(2.0 * np.pi * 0.7 * grid), -1.0, 1.0)
+    sine = {"kind": "sine", "amplitude": "12 mm", "frequency": "0.7 Hz"}
+    table = {"kind": "table", "times": grid.tolist(), "values": force.tolist()}
+    scenario = Scenario.from_dict({
+        "duration": seconds,
+        "command": {"mode": "position", "terms": [sine]},
+        "load": {"user": {"terms": [table]}},
+        "fault": list(faults),
+    })  # fmt: skip
+    names = "encoder_position,resolver_position,resolver_speed,speed_ref,current_q_meas"
+    made = simulate(unit, scenario, fidelity="low", record=f"command,{names}@200 Hz")
+    time = made.clock().time
+    load = np.interp(time, grid, force)
+    columns, units, roles = {}, {}, {}
+    for role in made.roles:
+        channel = made.role(role)
+        back = gives * load / actuator.parameters.value("play.stiffness")
+        columns[role] = channel.values - (back if role == "output_position" else 0.0)
+        units[role], roles[role] = channel.unit, role
+    columns["load"], units["load"], roles["load"] = load, "N", "load"
+    return Recording.build(time, columns, units, meta={"roles": roles})
+
+
+def test_a_screw_that_gives_under_its_load_is_healthy_and_its_play_is_seen(screw):
+    few = ["play@transmission", "gain_drift@control.position"]
+    base = [("base", loaded_log(screw, 1.0))]
+    healthy = diagnose_by_roles(
+        [("h", loaded_log(screw, 1.0, day=2))], screw, baselines=base, faults=few
+    )
+    assert (healthy.status, healthy.findings) == ("healthy", ())  # its baseline is not left out
+    play = {"kind": "play", "place": "transmission", "severity": "60 um"}
+    worn = diagnose_by_roles(
+        [("w", loaded_log(screw, 1.0, play, day=3))], screw, baselines=base, faults=few
+    )
+    assert worn.best == ("play@transmission",)
+    assert worn.faults[0].interval[0] < 6e-5 < worn.faults[0].interval[1]
+    stiff = [("s", loaded_log(screw, 0.0))]  # its stiffness is uncertain by its own size
+    assert diagnose_by_roles(stiff, screw, baselines=stiff, faults=few).findings == ()
+    soft = [("s", loaded_log(screw, 8.0))]
+    driven = [("d", loaded_log(screw, -1.0, force=-1500.0))]
+    said = diagnose_by_roles(driven, screw, baselines=driven, faults=few)
+    assert any("drives the output" in finding for finding in said.findings)
+    assert "looks faulty" in diagnose_by_roles(soft, screw, baselines=soft, faults=few).findings[-1]
+
+
+def test_a_baseline_may_go_on_for_longer_than_the_log(screw):
+    short, long = (role_log(loaded_log(screw, 1.0, seconds=s), "s", screw).test for s in (1.5, 3.0))
+    assert same_test(short, long)
+    assert not same_test(long, short)

@@ -26,6 +26,7 @@ from elevon.calibrate.signals import Signals, signal_stage
 from elevon.errors import InputError, Interrupted, unknown
 from elevon.parameters.records import record_of
 from elevon.progress import Progress, part
+from elevon.threads import one_blas_thread
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -117,6 +118,7 @@ class Calibration(Outcome):
         }
 
 
+@one_blas_thread()
 def calibrate(
     logs: Sequence[BenchLog],
     actuator: Actuator,

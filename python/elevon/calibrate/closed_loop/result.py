@@ -29,6 +29,7 @@ from elevon.calibrate.outcome import Outcome, log_facts
 from elevon.errors import InputError, Interrupted
 from elevon.parameters.relations import static_following
 from elevon.progress import Progress
+from elevon.threads import one_blas_thread
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -93,6 +94,7 @@ class LoopCalibration(Outcome):
         }
 
 
+@one_blas_thread()
 def calibrate_loop(
     logs: Sequence[LoopLog],
     actuator: Actuator,

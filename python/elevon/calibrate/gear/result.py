@@ -30,6 +30,7 @@ from elevon.calibrate.level import Level, as_values
 from elevon.errors import InputError
 from elevon.parameters.records import record_of
 from elevon.progress import Progress
+from elevon.threads import one_blas_thread
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -62,6 +63,7 @@ _GIVEN = {
 }
 
 
+@one_blas_thread()
 def calibrate_gear(
     logs: Sequence[GearLog],
     actuator: Actuator,

@@ -21,6 +21,7 @@ from elevon.calibrate.screw.torque import torque_balance
 from elevon.errors import InputError
 from elevon.parameters.records import record_of
 from elevon.progress import Progress
+from elevon.threads import one_blas_thread
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -56,6 +57,7 @@ _SCALED = (
 )  # fmt: skip
 
 
+@one_blas_thread()
 def calibrate_screw(
     logs: Sequence[ScrewLog],
     actuator: Actuator,

@@ -33,6 +33,7 @@ from elevon.diagnose.bymodel.log import TestLog, prepared
 from elevon.diagnose.bymodel.posterior import Posterior, posterior
 from elevon.diagnose.bymodel.weigh import Hypothesis
 from elevon.errors import InputError
+from elevon.threads import one_blas_thread
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -42,6 +43,7 @@ __all__ = ["ANYWHERE", "answer_of", "check_asked", "diagnose"]
 ANYWHERE = 0.2  # of the false alarms: what no candidate does. ASSUMED
 
 
+@one_blas_thread()
 def diagnose(
     logs: Sequence[TestLog],
     actuator: Actuator,

@@ -21,8 +21,9 @@ from elevon.diagnose.byroles.healthy import healthy_of
 from elevon.diagnose.byroles.log import RoleLog, role_log
 from elevon.diagnose.byroles.noise import noise_of
 from elevon.diagnose.byroles.runs import RoleReplay, replay_by_roles
-from elevon.diagnose.byroles.shown import numbers_of_log
+from elevon.diagnose.byroles.shown import driven, numbers_of_log
 from elevon.errors import InputError
+from elevon.threads import one_blas_thread
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -56,6 +57,7 @@ class RoleCase(Case):
         return np.asarray(self.model.shift(key, severity)[:, self._places], dtype=np.float64)
 
 
+@one_blas_thread()
 def diagnose_by_roles(
     logs: Sequence[tuple[str, Recording]],
     actuator: Actuator,
@@ -120,10 +122,17 @@ def _case(
         if name in shown.names and all(name in e.names for _, e in proofs)
     ]
     findings += item.findings
+    if driven(item, actuator):
+        findings.append(
+            f"{item.name}: the load drives the output part of the time and holds it at one end of "
+            "its play, where the low model has it dragged: play may be named as something else, "
+            "and its limit does not hold"
+        )
     if not same:
         findings.append(
-            f"{item.name}: no baseline of this test: how far a healthy unit stands off the model "
-            "is assumed, small faults are not seen"
+            f"{item.name}: no baseline of this test, asked and loaded alike and about as long at "
+            "least: how far a healthy unit stands off the model is assumed, small faults are not "
+            "seen"
         )
     sound = _sound(model, names, proofs, findings)
     return RoleCase(item.name, shown.only(names), healthy_of(model, names, sound), model)

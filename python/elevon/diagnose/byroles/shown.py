@@ -17,12 +17,21 @@ from elevon.diagnose.byroles.series import averaged
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["Unit", "as_on_stand", "channels_by", "numbers_of_log", "shown_by"]
+__all__ = [
+    "Unit",
+    "as_on_stand",
+    "channels_by",
+    "driven",
+    "give_under",
+    "numbers_of_log",
+    "shown_by",
+]
 
 Floats = npt.NDArray[np.float64]
 _CHUNK = 64  # runs held at once
 _OVER = 4  # samples of the model to one of the log, which are averaged: loggers filter, too
 _ELASTIC = 1.0  # play.model: a contact that gives
+_PUSHED = 0.1  # of the greatest load, of the fastest motion, and share of the time
 _SET_POINT = "_ref"  # end of roles that a drive knows as numbers: nothing filters them
 
 
@@ -109,6 +118,17 @@ def channels_by(
             if give is not None and unit.gives and "output_position" in shows:
                 shows["output_position"] = shows["output_position"] - give
             yield shows
+
+
+def driven(item: RoleLog, ready: Actuator) -> bool:
+    """Whether a load drives the output of an elastic play for more than a tenth of the motion."""
+    give = give_under(item, ready)
+    if give is None:
+        return False
+    speed = np.gradient(item.command, item.time)
+    pushed = give * np.sign(speed) < -_PUSHED * np.abs(give).max()
+    moving = np.abs(speed) > _PUSHED * np.abs(speed).max()
+    return bool(np.mean(pushed[moving]) > _PUSHED)
 
 
 def give_under(item: RoleLog, ready: Actuator) -> Floats | None:
