@@ -8,11 +8,12 @@ import pytest
 
 from elevon import Actuator
 from elevon.diagnose.bymodel import diagnose, read_test_logs
-from elevon.diagnose.bymodel.candidates import CANDIDATES
+from elevon.diagnose.bymodel.candidates import CANDIDATES, chosen
+from elevon.diagnose.bymodel.case import case_of, detector_of
 from elevon.diagnose.bymodel.detection import Detector
 from elevon.diagnose.bymodel.log import prepared
 from elevon.diagnose.bymodel.posterior import marginals, posterior, quantiles
-from elevon.diagnose.bymodel.replay import replay
+from elevon.diagnose.bymodel.replay import _RECENT, replay
 from elevon.errors import InputError, UnknownNameError
 from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
 from tests.diagnose.virtual import bench_logs
@@ -114,6 +115,47 @@ def test_what_a_fault_leaves_alone_or_to_chance_is_no_evidence_of_it(unit, logs)
     assert not still[np.isin(names, sensor.still)].any()
     assert still[names == "current_order_2"] > 0.0
     assert not model.doubt(sensor.key, 0.2).any()
+
+
+@pytest.mark.parametrize("baselines", [(), ("base",)])
+def test_an_answer_does_not_depend_on_what_was_asked_before(unit, logs, baselines):
+    def said(name):
+        whole = answer(unit, logs[name], *(logs[b] for b in baselines), faults=FEW).to_dict()
+        return {k: v for k, v in whole.items() if k != "seconds"}
+
+    _RECENT.clear()
+    alone = said("play")
+    _RECENT.clear()
+    other = said("healthy")
+    assert said("play") == alone != other
+
+
+def test_the_runs_of_a_baseline_stand_about_the_logs_own_healthy_run(unit, logs):
+    item, base = (prepared(*read_test_logs([logs[n]]), unit) for n in ("healthy", "base"))
+    few = chosen(FEW)
+    lent, own, theirs = (
+        replay(item, unit, few, [base]),
+        replay(item, unit, few),
+        replay(base, unit, few),
+    )
+    np.testing.assert_array_equal(lent.healthy.values, own.healthy.values)
+    np.testing.assert_array_equal(lent.shifts[FEW[0]], theirs.shifts[FEW[0]])
+    np.testing.assert_allclose(
+        lent.draws - lent.healthy.values, theirs.draws - theirs.healthy.values, rtol=0.0, atol=1e-12
+    )
+    assert (lent.healthy.values != theirs.healthy.values).any()
+
+
+def test_what_moves_next_to_nothing_gives_the_detector_no_direction(unit, logs):
+    item = prepared(*read_test_logs([logs["healthy"]]), unit)
+    every = chosen([*FEW, "sag@supply"])
+    case = case_of(item, unit, every, [], [])
+    root = np.linalg.inv(np.linalg.cholesky(case.covariance))
+    at = case.model.severities["sag@supply"][1:]
+    size = np.linalg.norm(case.shift("sag@supply", at) @ root.T, axis=1)
+    assert 0.0 < size.max() < 2.0
+    scores = [detector_of([case], some)[2].chance(4.0) for some in (every, every[:2])]
+    assert scores[0] == scores[1]
 
 
 def test_a_faulty_baseline_is_named_and_left_out(unit, logs):

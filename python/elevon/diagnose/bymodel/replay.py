@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -111,44 +112,98 @@ def signals_of(item: TestLog) -> Signals:
     )  # fmt: skip
 
 
-def replay(item: TestLog, actuator: Actuator, candidates: Sequence[Candidate]) -> Replay:
+def replay(
+    item: TestLog,
+    actuator: Actuator,
+    candidates: Sequence[Candidate],
+    baselines: Sequence[TestLog] = (),
+) -> Replay:
     """Run the test on the model: healthy, each candidate at several severities, and the spread.
 
-    Logs of one test, by its note, share the runs of the first of them: they differ only by when
-    the command and the brake began, to which no regression looks.
+    The healthy run is always the log's own. Shifts and spread are those of the first baseline that
+    is of the same test by its note, run once for all logs that stand against it; without one they
+    are the log's own. So they depend on what the caller gives, not on what was asked before.
+
+    Parameters
+    ----------
+    item : TestLog
+        Prepared.
+    actuator : Actuator
+        The healthy unit.
+    candidates : sequence of Candidate
+        Faults.
+    baselines : sequence of TestLog
+        Prepared; whose runs may serve.
     """
-    key = _test_key(item, actuator, candidates)
-    if key in _RECENT:
-        return _RECENT[key]
-    made = _replayed(item, actuator, candidates)
-    if key is not None:
-        _RECENT[key] = made
-        while len(_RECENT) > _REMEMBERED:
-            _RECENT.pop(next(iter(_RECENT)))
-    return made
+    alike = next((b for b in baselines if candidates and _same_runs(item, b)), item)
+    made = _remembered(alike, actuator, candidates)
+    return made if alike is item else _about(made, modelled(item, actuator))
 
 
 def modelled(item: TestLog, actuator: Actuator) -> Evidence:
     """Return the evidence of the healthy model in a log's test."""
-    return replay(item, actuator, ()).healthy
+    return _remembered(item, actuator, ()).healthy
 
 
-_REMEMBERED = 32  # tests
-_RECENT: dict[Any, Replay] = {}
+def _about(made: Replay, own: Evidence) -> Replay:
+    """Return the runs of another log of the test about a log's own healthy run."""
+    names = tuple(n for n in made.healthy.names if n in own.names)
+    at = [made.healthy.names.index(n) for n in names]
+    own = own.only(names)
+    return Replay(
+        own,
+        made.severities,
+        {key: table[:, at] for key, table in made.shifts.items()},
+        made.draws[:, at] + own.values - made.healthy.values[at],
+        {key: table[:, at] for key, table in made.doubts.items()},
+    )
 
 
-def _test_key(item: TestLog, actuator: Actuator, candidates: Sequence[Candidate]) -> Any:
-    """What logs of one test have in common; None where the note does not say which test it was."""
+_REMEMBERED = 32  # logs
+_RECENT: dict[Any, Replay] = {}  # by all that the runs depend on; the latest asked for is the last
+
+
+def _remembered(item: TestLog, actuator: Actuator, candidates: Sequence[Candidate]) -> Replay:
+    key = (actuator.hash, tuple(candidates), _digest(item))
+    made = _RECENT.pop(key, None) or _replayed(item, actuator, candidates)
+    _RECENT[key] = made
+    while len(_RECENT) > _REMEMBERED:
+        _RECENT.pop(next(iter(_RECENT)))
+    return made
+
+
+def _digest(item: TestLog) -> bytes:
+    """Of all in a log that its model runs depend on."""
     log = item.log
-    if log.note is None or log.note.waveform is None or item.good is None:
-        return None
-    noted = tuple(sorted((k, float(f"{v:.3g}")) for k, v in log.note.parameters.items()))
-    level = float(np.mean(log.brake.level)) if item.braked else 0.0
-    shape = (round(log.duration), round(1e5 * log.period), round(20.0 * float(item.good.mean())))
-    return (
-        actuator.hash, tuple(candidates), log.note.waveform, noted, item.braked,
-        round(10.0 * level), shape, log.current_signal, item.voltage is None, item.gain is None,
-    )  # fmt: skip
+    assert log.user is not None
+    assert item.replay is not None
+    assert item.good is not None
+    state = (item.braked, log.duration, log.user[0], log.speed[0], item.voltage is None)
+    out = hashlib.sha256(f"{state!r} {log.current_signal}".encode())
+    brake = (log.brake.time, log.brake.level) if item.braked else ()
+    for array in (log.time, item.replay, item.good, *brake):
+        out.update(f"{array.shape}".encode() + np.ascontiguousarray(array).tobytes())
+    return out.digest()
+
+
+def _same_runs(a: TestLog, b: TestLog) -> bool:
+    """Whether faults do the same in two logs: one test by the notes, as much of it measured."""
+    if a.log.note is None or b.log.note is None or a.log.note.waveform is None:
+        return False
+    if a.log.note.waveform != b.log.note.waveform or a.good is None or b.good is None:
+        return False
+    noted = (a.log.note.parameters, b.log.note.parameters)
+    alike = [noted[0].keys() == noted[1].keys(), a.braked == b.braked]
+    alike += [a.log.current_signal == b.log.current_signal]
+    alike += [(a.voltage is None) == (b.voltage is None)]
+    pairs = [(a.log.duration, b.log.duration, 0.02), (a.log.period, b.log.period, 0.01)]
+    pairs += [(float(a.good.mean()), float(b.good.mean()), 0.05)]
+    if all(alike):
+        pairs += [(noted[0][n], noted[1][n], 0.005) for n in noted[0]]
+        if a.braked:
+            levels = (float(np.mean(a.log.brake.level)), float(np.mean(b.log.brake.level)))
+            pairs += [(*levels, 0.1)]
+    return all(alike) and all(abs(x - y) <= e * max(abs(x), abs(y)) for x, y, e in pairs)
 
 
 def _replayed(item: TestLog, actuator: Actuator, candidates: Sequence[Candidate]) -> Replay:
