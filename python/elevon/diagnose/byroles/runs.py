@@ -17,7 +17,7 @@ from elevon.diagnose.byroles.asked import RoleTest, action_numbers, same_test
 from elevon.diagnose.byroles.candidates import counted_of, switched_of
 from elevon.diagnose.byroles.log import RoleLog
 from elevon.diagnose.byroles.numbers import Numbers, floors
-from elevon.diagnose.byroles.shown import Unit, as_on_stand, shown_by
+from elevon.diagnose.byroles.shown import Unit, as_on_stand, give_under, numbers_of_log, shown_by
 from elevon.diagnose.byroles.spread import daily, factors_of
 
 if TYPE_CHECKING:
@@ -110,20 +110,41 @@ def replay_by_roles(
         )
         if alike and past.test.settings == item.test.settings and same_test(past.test, item.test):
             return past.made
-    made = _refined(_replayed(item, actuator, candidates), item, actuator, candidates)
+    gives = _gives(item, actuator)
+    model = _replayed(item, actuator, candidates, gives=gives)
+    made = _refined(model, item, actuator, candidates, gives=gives)
     _RECENT.append(replace(own, made=made))
     del _RECENT[:-_REMEMBERED]
     return made
 
 
-def _replayed(item: RoleLog, actuator: Actuator, candidates: Sequence[Candidate]) -> RoleReplay:
-    severities = {c.key: _severities(c, actuator) for c in candidates}
+def _gives(item: RoleLog, actuator: Actuator) -> bool:
+    """Whether a log is nearer to a model that gives: what faults do to a number depends on it."""
+    if give_under(item, as_on_stand(actuator, item.test)) is None:
+        return True
+    own = numbers_of_log(item, actuator, item.channels).values
     units = [Unit({}), Unit({}, gives=False)]
+    both = list(shown_by(item, actuator, units))
+    names = [name for name in both[0].values if name in own]
+    values = np.array(
+        [[n.get(name, np.nan) for name in names] for n in (own, *(b.values for b in both))]
+    )
+    least = floors(both[0], names, values[0])
+    soft, rigid = (float(np.nansum(((values[0] - v) / least) ** 2)) for v in values[1:])
+    return soft <= rigid
+
+
+def _replayed(
+    item: RoleLog, actuator: Actuator, candidates: Sequence[Candidate], *, gives: bool
+) -> RoleReplay:
+    severities = {c.key: _severities(c, actuator) for c in candidates}
+    units = [Unit({}), Unit({})]
     for c in candidates:
         units += [Unit({}, (c.text(float(s)),)) for s in severities[c.key] if s != 0.0]
     ready = as_on_stand(actuator, item.test)
     steps = _steps_of_days(len(factors_of(ready)))
     units += _days(ready, steps)
+    units = [replace(u, gives=gives if k != 1 else not gives) for k, u in enumerate(units)]
     shown = list(shown_by(item, actuator, units))
     names = tuple(shown[0].values)
     rows = np.array([[s.values.get(n, np.nan) for n in names] for s in shown])
@@ -175,7 +196,12 @@ def _days(ready: Actuator, steps: Floats) -> list[Unit]:
 
 
 def _refined(
-    model: RoleReplay, item: RoleLog, actuator: Actuator, candidates: Sequence[Candidate]
+    model: RoleReplay,
+    item: RoleLog,
+    actuator: Actuator,
+    candidates: Sequence[Candidate],
+    *,
+    gives: bool,
 ) -> RoleReplay:
     """Run one more severity of each fault that is seen where straight lines say little."""
     names, values = model.healthy.names, model.healthy.values
@@ -183,7 +209,7 @@ def _refined(
     # With one baseline, as which most logs are judged.
     root = np.linalg.inv(np.linalg.cholesky(2.0 * (model.spread + np.diag(least**2))))
     more = [(c, s) for c in candidates for s in _between(model, c, root)]
-    units = [Unit({}, (c.text(s),)) for c, s in more]
+    units = [Unit({}, (c.text(s),), gives=gives) for c, s in more]
     severities, shifts = dict(model.severities), dict(model.shifts)
     for (c, severity), numbers in zip(more, shown_by(item, actuator, units), strict=True):
         row = np.array([numbers.values.get(name, np.nan) for name in names])
