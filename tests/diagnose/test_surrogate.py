@@ -17,28 +17,17 @@ from elevon.diagnose.surrogate import (
     diagnose_by_surrogate,
     shipped,
 )
-from elevon.diagnose.surrogate.campaign import ASKED, Table, _Plan, _unit_runs
+from elevon.diagnose.surrogate.campaign import ASKED, _Plan, _unit_runs
 from elevon.diagnose.surrogate.features import NAMES, changes, log_features
-from elevon.diagnose.surrogate.fit import Plan, fitted
-from elevon.diagnose.surrogate.judge import judged, judged_at
-from elevon.diagnose.surrogate.network import (
-    Batch,
-    Ensemble,
-    either,
-    honest,
-    loss_and_gradient,
-    train,
-)
 from elevon.diagnose.surrogate.population import (
     FAULTS,
     _stable,
     build_of,
     day_of,
-    drawn_faults,
     learned,
     unit_of,
 )
-from elevon.diagnose.surrogate.sampling import Rows, severities, sizes
+from elevon.diagnose.surrogate.sampling import severities, sizes
 from elevon.errors import FormatError, InputError
 from elevon.prognose.history import _KEYS, _OF_DIAGNOSIS
 from elevon.simulate.acting import check_values
@@ -61,45 +50,6 @@ def logs(unit):
     return dict(
         zip(("base", "healthy", "play", "short", "far"), bench_logs(unit, cases), strict=True)
     )
-
-
-def _batch(rng, n=40, inputs=5, faults=2):
-    there = rng.random((n, faults)) < 0.5
-    return Batch(rng.standard_normal((n, inputs)), there * rng.uniform(-1.0, 1.0, (n, faults)))
-
-
-def test_the_gradient_is_that_of_the_loss():
-    rng = np.random.default_rng(0)
-    batch = _batch(rng)
-    weights = [0.3 * rng.standard_normal(s) for s in ((5, 6), (1, 6), (6, 7), (1, 7))]
-    _, gradient = loss_and_gradient(weights, batch)
-    for k, layer in enumerate(weights):
-        way = rng.standard_normal(layer.shape)
-        ends = []
-        for step in (1e-5, -1e-5):
-            moved = [w + step * way if j == k else w for j, w in enumerate(weights)]
-            ends.append(loss_and_gradient(moved, batch)[0])
-        slope = (ends[0] - ends[1]) / 2e-5
-        assert slope == pytest.approx(float(np.sum(gradient[k] * way)), rel=1e-6, abs=1e-9)
-
-
-def test_training_learns_a_linear_law_and_its_noise():
-    """Input = size + noise of deviation 0.2: the size's deviation is the posterior's."""
-
-    def draw(rng, n=128):
-        size = np.where(rng.random((n, 1)) < 0.5, rng.standard_normal((n, 1)), 0.0)
-        return Batch(size + 0.2 * rng.standard_normal((n, 1)), size)
-
-    ensemble = train(draw, 4, members=1, rounds=1500, seed=0)
-    fresh = draw(np.random.default_rng(9), 4000)
-    said = ensemble.says(fresh.inputs)
-    there = fresh.size[:, 0] != 0.0
-    score = ((fresh.size - said.size) / said.deviation)[there, 0]
-    assert np.std(score) == pytest.approx(1.0, abs=0.1)
-    assert np.median(said.deviation[there]) == pytest.approx(0.2 / np.sqrt(1.04), rel=0.15)
-    large = np.abs(fresh.inputs[:, 0]) > 1.0
-    assert (said.faulty[large] > 2.0).all()
-    assert said.faulty[np.abs(fresh.inputs[:, 0]) < 0.1].max() < 0.0
 
 
 def test_sizes_and_severities_are_inverse():
@@ -233,17 +183,6 @@ def test_a_faulty_baseline_is_named(unit, logs):
     assert not any("looks faulty" in text for text in sound.findings)
 
 
-def test_calibrated_logits():
-    logit = np.array([[-3.0, 0.0, 2.0]])
-    same = np.tile([1.0, 1.0, 0.0], (3, 1))
-    np.testing.assert_allclose(honest(same, logit), logit)
-    steeper = honest(np.tile([1.0, 2.0, 0.0], (3, 1)), logit)
-    assert steeper[0, 2] > 2.0 * logit[0, 2]
-    present = 1.0 / (1.0 + np.exp(-logit))
-    none = np.prod(1.0 - present)
-    assert either(logit)[0] == pytest.approx(np.log((1.0 - none) / none))
-
-
 def test_what_was_not_trained_is_said(unit, logs):
     result = diagnose_by_surrogate([logs["far"]], unit, baselines=[logs["base"]])
     assert any("outside the training set" in text for text in result.findings)
@@ -296,73 +235,6 @@ def test_the_file_that_ships(tmp_path):
             Surrogate.load(tmp_path / "bad.npz")
 
 
-def _table(units, rng, unlike=0.1):
-    """Units of known law: each fault moves a feature of its own; units and days scatter."""
-    severity, values, unit, baseline = [], [], [], []
-    for u in range(units):
-        centre = 1.0 + unlike * rng.standard_normal(len(NAMES))
-        for k in range(10):
-            faults = {} if k < 3 else drawn_faults(rng, learned())
-            row = np.array([faults.get(key, 0.0) for key in FAULTS])
-            shift = np.zeros(len(NAMES))
-            shift[: len(FAULTS)] = sizes(row)
-            severity.append(row)
-            values.append(centre + shift + 0.02 * rng.standard_normal(len(NAMES)))
-            unit.append(u)
-            baseline.append(k < 3)
-    about = np.ones((len(unit), 2))
-    return Table(*map(np.array, (unit, baseline, severity, values)), about)
-
-
-def test_calibration_holds_on_units_never_seen():
-    rng = np.random.default_rng(3)
-    tables = {"backlash": _table(40, rng)}
-    plan = Plan(folds=2, members=1, rounds=150)
-    result = fitted(tables, {}, plan, {})
-    scores = judged(result, {"backlash": _table(40, rng)})["backlash.relative"]
-    assert scores["covered"] / scores["severities"] > 0.82
-    assert scores["false_alarms"] / scores["healthy"] < 0.12
-    assert scores["brier"] < 0.7 * scores["brier_by_rate"]
-
-
-def test_units_are_judged_at_the_severities_asked():
-    rng = np.random.default_rng(5)
-    tables, plan = {"loaded": _table(40, rng, 0.0)}, Plan(folds=2, members=1, rounds=400)
-    drawn = _table(20, rng, 0.0)
-    surrogate = fitted(tables, {}, plan, {})
-    severity = np.zeros((100, len(FAULTS)))
-    for row, (key, size) in enumerate(list(ASKED["loaded"].items()) * 20):
-        severity[row, FAULTS.index(key)] = size
-    unit = np.arange(100) // 5
-    values = 1.0 + 0.02 * rng.standard_normal((100, len(NAMES)))
-    values[:, : len(FAULTS)] += sizes(severity)
-    asked = Table(unit, np.zeros(100, dtype=bool), severity, values, np.ones((100, 2)))
-    said = judged_at(surrogate, {"loaded": drawn}, {"loaded": asked})
-    assert list(said) == [f"loaded.{key}" for key in ASKED["loaded"]]
-    *large, small = said.values()  # the gain's size is 0.18, the others' 0.28 and more
-    for fault in said.values():
-        assert fault["runs"] == 20
-        assert fault["isolated"] <= min(fault["alarms"], fault["first"])
-        assert fault["covered"] >= 15
-    for fault in large:
-        assert fault["first"] >= 18
-        assert fault["median_error"] < small["median_error"]
-
-
-def test_a_chance_is_a_rank_among_runs_that_the_networks_have_not_seen():
-    """Two parts, the second with logits 10 higher for anything: each has its own healthy runs."""
-    weights = [np.ones((2, 1, 4)), np.array([[[0.0, 0.0, 0.0, 0.0]], [[10.0, 0.0, 0.0, 0.0]]])]
-    low, high = np.arange(-4.0, 0.0), np.arange(-4.5, 0.0)
-    head = replace(
-        shipped().tests["backlash"].heads["relative"], ensemble=Ensemble(weights),
-        scaling=np.tile([1.0, 1.0, 0.0], (2, 1)), healthy=np.concatenate((low, high + 10.0)),
-        fold=np.repeat([0.0, 1.0], [len(low), len(high)]),
-    )  # fmt: skip
-    x = np.array([[-9.0], [-2.2], [3.0]])
-    expected = [(np.sum(np.concatenate((low, high)) >= v) + 1.0) / 10.0 for v in x[:, 0]]
-    np.testing.assert_allclose(head.chances(head.ensemble.says(x)), expected)
-
-
 def test_days_asked_are_days_of_the_same_units(unit):
     drawn = next(_unit_runs(_Plan(unit, "loaded", 0, "low", False), 3))
     asked = list(_unit_runs(_Plan(unit, "loaded", 0, "low", True), 3))
@@ -371,15 +243,6 @@ def test_days_asked_are_days_of_the_same_units(unit):
     inertia = {p.setup.actuator.parameters.value(path) for p in (drawn, *asked)}
     assert len(inertia) == 1
     assert not any(p.baseline for p in asked)
-
-
-def test_references_are_other_days_of_the_same_unit():
-    rows = Rows.of(_table(3, np.random.default_rng(4)))
-    for row, near in enumerate(rows.others):
-        known = near[near >= 0]
-        assert row not in known
-        assert (rows.table.unit[known] == rows.table.unit[row]).all()
-        assert rows.table.baseline[known].all()
 
 
 def test_units_and_days_differ(unit):
