@@ -15,7 +15,7 @@ from elevon.demo.results import Plays, Recovered, validation_from_json, validati
 from elevon.demo.steps import Story, Work
 from elevon.parameters.relations import motor_torque_constant
 from elevon.progress import Progress, part
-from elevon.report.checks import Check, all_passed
+from elevon.report.checks import Check, verdict
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -94,8 +94,7 @@ class Demo(Story):
         """Return the JSON form."""
         checks = self.checks
         return {
-            "status": "pass" if all_passed(checks) else "fail",
-            "checks": [check.to_dict() for check in checks],
+            **verdict(checks),
             "seed": self.seed,
             "rows": self.rows(),
             "steps": [step.to_dict() for step in self.steps],

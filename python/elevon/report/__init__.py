@@ -6,7 +6,7 @@
 >>> path = report.save("report.html")  # doctest: +SKIP
 """
 
-from elevon.report.checks import Check, all_passed
+from elevon.report.checks import Check, all_passed, verdict
 from elevon.report.document import Report, Section, Table
 
-__all__ = ["Check", "Report", "Section", "Table", "all_passed"]
+__all__ = ["Check", "Report", "Section", "Table", "all_passed", "verdict"]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["Check", "all_passed"]
+__all__ = ["Check", "all_passed", "verdict"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,3 +57,11 @@ def all_passed(checks: Iterable[Check]) -> bool:
     """Tell whether there is at least one check and none failed."""
     results = [check.passed for check in checks]
     return bool(results) and all(results)
+
+
+def verdict(checks: Sequence[Check]) -> dict[str, Any]:
+    """Return ``status`` (``pass``, ``fail``) and ``checks``, as every reproduction prints them."""
+    return {
+        "status": "pass" if all_passed(checks) else "fail",
+        "checks": [check.to_dict() for check in checks],
+    }

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from elevon.diagnose.bymodel.replay import _RECENT
 from elevon.diagnose.optimisers import CAUSES, METHODS, Monitor, search
 from elevon.diagnose.optimisers.cost import limits
-from elevon.report import Check, all_passed
+from elevon.report import Check, verdict
 from elevon.reproduce.side_by_side import side_by_side
 from elevon.worklog import finished
 
@@ -147,8 +147,7 @@ class OptimisersResult:
         """Return the JSON form."""
         checks = self.checks()
         return {
-            "status": "pass" if all_passed(checks) else "fail",
-            "checks": [check.to_dict() for check in checks],
+            **verdict(checks),
             "causes": {key: list(ends) for key, ends in limits().items()},
             "rows": self.rows(),
         }

@@ -18,7 +18,7 @@ from elevon.diagnose.modelfree.scores import share_interval
 from elevon.diagnose.standard import Day, StandardTest, day_logs, diagnosed, standard_tests
 from elevon.errors import DivergedError, InputError, Interrupted, unknown
 from elevon.progress import part
-from elevon.report import Check, all_passed
+from elevon.report import Check, verdict
 from elevon.worklog import finished
 
 if TYPE_CHECKING:
@@ -130,8 +130,7 @@ class FaultLimits:
         """Return what `--json` prints."""
         checks = self.checks
         return {
-            "status": "pass" if all_passed(checks) else "fail",
-            "checks": [check.to_dict() for check in checks],
+            **verdict(checks),
             "fidelity": self.fidelity,
             "seed": self.seed,
             "healthy": {

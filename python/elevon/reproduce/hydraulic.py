@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elevon.report.checks import Check, all_passed
+from elevon.report.checks import Check, verdict
 from elevon.reproduce.pisa_gear import Stroke, run_strokes
 
 if TYPE_CHECKING:
@@ -132,9 +132,8 @@ class HydraulicResult:
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object of the command."""
         return {
-            "status": "pass" if all_passed(self.checks) else "fail",
+            **verdict(self.checks),
             "rows": [row.to_dict() for row in self.rows],
-            "checks": [check.to_dict() for check in self.checks],
         }
 
 

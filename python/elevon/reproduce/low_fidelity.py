@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elevon.compare import Comparison, compare, default_scenario, filtered
-from elevon.report import Check, all_passed
+from elevon.report import Check, verdict
 from elevon.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -82,9 +82,8 @@ class LowFidelityResult:
         """Return the JSON object of the command."""
         checks = self.checks
         return {
-            "status": "pass" if all_passed(checks) else "fail",
+            **verdict(checks),
             "actuator": self.actuator,
-            "checks": [check.to_dict() for check in checks],
             "rows": [row.to_dict() for row in self.rows],
         }
 

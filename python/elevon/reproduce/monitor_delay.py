@@ -19,7 +19,7 @@ import numpy as np
 
 from elevon.errors import ElevonWarning, InputError, Interrupted
 from elevon.progress import Progress, part
-from elevon.report import Check, all_passed
+from elevon.report import Check, verdict
 from elevon.reproduce.diagnosis_limits.campaign import calibrated
 from elevon.reproduce.diagnosis_limits.logs import STREAM, Trial, bench_logs
 from elevon.reproduce.diagnosis_limits.plan import FAULTS, Fault
@@ -138,8 +138,7 @@ class MonitorDelay:
         healthy = [s for s in self.streams if not s.kind]
         counts = {OFTEN: sum(s.often for s in healthy), SELDOM: sum(s.early for s in healthy)}
         return {
-            "status": "pass" if all_passed(checks) else "fail",
-            "checks": [check.to_dict() for check in checks],
+            **verdict(checks),
             "seed": self.seed,
             "units": self.units,
             "window": self.window,

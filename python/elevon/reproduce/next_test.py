@@ -21,7 +21,7 @@ from elevon.diagnose.bymodel.candidates import CANDIDATES
 from elevon.diagnose.nexttest import Belief, Possible, profiles
 from elevon.diagnose.nexttest.information import expected_information, likelihoods, planned
 from elevon.errors import Interrupted
-from elevon.report import Check, all_passed
+from elevon.report import Check, verdict
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -146,8 +146,7 @@ class NextTestResult:
         """Return the JSON form."""
         checks = self.checks()
         return {
-            "status": "pass" if all_passed(checks) else "fail",
-            "checks": [check.to_dict() for check in checks],
+            **verdict(checks),
             "saved": {name: list(self.saved(name)) for name in STRATEGIES[1:]},
             "best_fixed_order": {"tests": self.best_order[0], "order": list(self.best_order[1])},
             "rows": self.rows(),

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from elevon.errors import SimulationError
 from elevon.recording.states import code_names
-from elevon.report.checks import Check, all_passed
+from elevon.report.checks import Check, verdict
 from elevon.reproduce.pisa_gear import ACTUATOR
 
 if TYPE_CHECKING:
@@ -138,10 +138,9 @@ class FailuresResult:
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object of the command."""
         return {
-            "status": "pass" if all_passed(self.checks) else "fail",
+            **verdict(self.checks),
             "fidelity": self.fidelity,
             "rows": [row.to_dict() for row in self.rows],
-            "checks": [check.to_dict() for check in self.checks],
             "seed": self.seed,
         }
 

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import SimulationError
-from elevon.report.checks import Check, all_passed
+from elevon.report.checks import Check, verdict
 from elevon.reproduce.pisa_gear import ACTUATOR, Stroke, run_strokes
 
 if TYPE_CHECKING:
@@ -103,9 +103,8 @@ class FrictionResult:
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object of the command."""
         return {
-            "status": "pass" if all_passed(self.checks) else "fail",
+            **verdict(self.checks),
             "rows": [row.to_dict() for row in self.rows],
-            "checks": [check.to_dict() for check in self.checks],
             "seed": self.seed,
         }
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elevon.report.checks import Check, all_passed
+from elevon.report.checks import Check, verdict
 from elevon.reproduce.pisa_gear import CONDITIONS, Condition, Stroke, run_strokes, stroke_time
 
 if TYPE_CHECKING:
@@ -68,11 +68,10 @@ class FunctionalResult:
         """Return the JSON object of the command; the limit condition has no requirement."""
         runs = [run for row in self.rows for run in (row.extension, row.retraction)]
         return {
-            "status": "pass" if all_passed(self.checks) else "fail",
+            **verdict(self.checks),
             "cycle": "one stroke in each direction, from the command to the switch at its end",
             "fidelity": self.fidelity,
             "rows": [row.to_dict() for row in self.rows],
-            "checks": [check.to_dict() for check in self.checks],
             "sim_s": sum(float(run.meta["sim_s"]) for run in runs),
             "seed": runs[0].meta["seed"],
             "version": runs[0].meta["version"],

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elevon.report.checks import Check, all_passed
+from elevon.report.checks import Check, verdict
 from elevon.reproduce.pisa_gear import ACTUATOR, CONDITIONS, Condition
 
 if TYPE_CHECKING:
@@ -68,12 +68,11 @@ class ValidationResult:
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object of the command."""
         return {
-            "status": "pass" if all_passed(self.checks) else "fail",
+            **verdict(self.checks),
             "measured": "virtual rig with a mismatch; no signals were published",
             "published": "the thesis draws measured and simulated curves and prints no error",
             "percent_of_rms": "RMS error over the measured signal's RMS about its mean",
             "rows": self.rows,
-            "checks": [check.to_dict() for check in self.checks],
             "fidelity": self.fidelity,
             "seed": self.seed,
             "parameter_hash": self.parameter_hash,

@@ -17,7 +17,7 @@ from elevon.errors import InputError
 from elevon.faults import FaultRecord, catalogue
 from elevon.progress import Progress
 from elevon.recording import Recording
-from elevon.report import Check, all_passed
+from elevon.report import Check, verdict
 from elevon.scenario import Scenario
 from elevon.simulate import Run, simulate_batch
 
@@ -162,8 +162,7 @@ class SignaturesResult:
         """Return the JSON form."""
         checks = self.checks()
         return {
-            "status": "pass" if all_passed(checks) else "fail",
-            "checks": [check.to_dict() for check in checks],
+            **verdict(checks),
             "rows": [item.to_dict() for item in self.signatures],
         }
 

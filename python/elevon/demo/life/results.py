@@ -12,7 +12,7 @@ from elevon.demo.results import Recovered
 from elevon.demo.steps import Story
 from elevon.prognose.life import Life
 from elevon.prognose.metrics import Track, cumulative_relative_accuracy
-from elevon.report.checks import Check, all_passed
+from elevon.report.checks import Check, verdict
 
 if TYPE_CHECKING:
     from elevon.diagnose.bymodel import Diagnosis
@@ -143,8 +143,7 @@ class LifeDemo(Story):
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
         return {
-            "status": "pass" if all_passed(self.checks) else "fail",
-            "checks": [check.to_dict() for check in self.checks],
+            **verdict(self.checks),
             "seed": self.seed,
             "end": self.life.end,
             "cumulative_relative_accuracy": self.accuracy,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from elevon.errors import SimulationError
-from elevon.report.checks import Check, all_passed
+from elevon.report.checks import Check, verdict
 from elevon.reproduce.backlash.estimate import flat_lengths, lost_motion, play_from_encoder
 from elevon.reproduce.backlash.table import (
     BacklashRow,
@@ -90,11 +90,10 @@ class BacklashResult:
         """Return the JSON object of the command."""
         runs = [self.blank, *self.recordings]
         return {
-            "status": "pass" if all_passed(self.checks) else "fail",
+            **verdict(self.checks),
             "encoder_count_deg": self.encoder_count_deg,
             "flat_length_rank_correlation": _rank_correlation(self.rows),
             "rows": [row.to_dict() for row in self.rows],
-            "checks": [check.to_dict() for check in self.checks],
             "sim_s": sum(float(run.meta["sim_s"]) for run in runs),
             "seed": self.blank.meta["seed"],
             "parameter_hash": self.blank.meta["parameter_hash"],

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from elevon.report.checks import Check, all_passed
+from elevon.report.checks import Check, verdict
 from elevon.reproduce.compliance.fit import (
     Array,
     ComplianceFit,
@@ -76,7 +76,7 @@ class ComplianceResult:
         low, high = self.interval
         stiffness = self.robust.stiffness * NM_PER_RAD
         return {
-            "status": "pass" if all_passed(self.checks) else "fail",
+            **verdict(self.checks),
             "load_on_loss_n_per_deg": self.variants[0].load_on_loss,
             "loss_on_load_n_per_deg": self.variants[0].loss_on_load,
             "robust_n_per_deg": self.robust.stiffness,
@@ -97,7 +97,6 @@ class ComplianceResult:
             "variants": [_variant_dict(variant) for variant in self.variants],
             "slips": [{"row": s.row, "kind": s.kind, "reason": s.reason} for s in self.slips],
             "rows": [_row(a, b) for a, b in zip(self.printed, self.repaired, strict=True)],
-            "checks": [check.to_dict() for check in self.checks],
         }
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from elevon.diagnose.modelfree.scores import share_interval
 from elevon.progress import Progress
-from elevon.report import Check, all_passed
+from elevon.report import Check, verdict
 from elevon.reproduce.diagnosis_limits.campaign import Campaign, run_campaign
 from elevon.reproduce.diagnosis_limits.judge import Row
 from elevon.reproduce.diagnosis_limits.logs import TESTS
@@ -86,8 +86,7 @@ class DiagnosisLimits:
         alarms = sum(row.alarm for row in healthy)
         checks = self.checks
         return {
-            "status": "pass" if all_passed(checks) else "fail",
-            "checks": [check.to_dict() for check in checks],
+            **verdict(checks),
             "seed": self.campaign.seed,
             "units": self.campaign.units,
             "healthy_logs": len(healthy),

@@ -14,7 +14,7 @@ from elevon.diagnose.modelfree.scores import share_interval
 from elevon.prognose.laws import LAWS
 from elevon.prognose.observation import SIGMAS
 from elevon.progress import Progress
-from elevon.report import Check, all_passed
+from elevon.report import Check, verdict
 from elevon.reproduce.inspection_error.campaign import OF_THE_DAY, Inspected, inspect_units
 from elevon.reproduce.inspection_error.fit import Group, Scatter, fitted, fitted_interval, stated
 from elevon.reproduce.inspection_error.plan import DAYS, FAULTS, Growing
@@ -91,8 +91,7 @@ class InspectionErrors:
         """Return what `--json` prints."""
         checks = self.checks
         return {
-            "status": "pass" if all_passed(checks) else "fail",
-            "checks": [check.to_dict() for check in checks],
+            **verdict(checks),
             "seed": self.seed,
             "units": self.units,
             "rows": self.rows(),

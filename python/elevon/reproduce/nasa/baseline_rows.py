@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from elevon.report.checks import Check, all_passed
+from elevon.report.checks import Check, verdict
 from elevon.reproduce.nasa.design import FactorEffect
 from elevon.reproduce.nasa.histories import History
 from elevon.reproduce.nasa.profiles import LoadKind, Profile
@@ -119,13 +119,12 @@ class BaselineResult:
             for e in fitted
         ]  # fmt: skip
         return {
-            "status": "pass" if all_passed(self.checks) else "fail",
+            **verdict(self.checks),
             "load_kind": self.load_kind,
             "rows": [row.to_dict() for row in self.rows],
             "effects": effects,
             "corners": self.corners,
             "runs": self.sheet,
-            "checks": [check.to_dict() for check in self.checks],
             "seed": self.seed,
             "replicates": self.replicates,
             **self.meta,

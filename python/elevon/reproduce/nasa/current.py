@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.report.checks import Check, all_passed
+from elevon.report.checks import Check, verdict
 from elevon.units import to_si
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ class CurrentResult:
         """Return the JSON object of the command."""
         names = ("average", "maximum", "minimum")
         return {
-            "status": "pass" if all_passed(self.checks) else "fail",
+            **verdict(self.checks),
             "measured": "virtual stand with a mismatch; no signals were published",
             "percent_rms": "RMS error over the measured current's RMS about its mean",
             "summary": {
@@ -120,7 +120,6 @@ class CurrentResult:
                 for state in PUBLISHED
             },
             "rows": [row.to_dict() for row in self.rows],
-            "checks": [check.to_dict() for check in self.checks],
             "seed": self.seed,
             "parameter_hash": self.parameter_hash,
         }

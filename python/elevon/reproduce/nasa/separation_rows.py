@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from elevon.report.checks import Check, all_passed
+from elevon.report.checks import Check, verdict
 from elevon.reproduce.nasa.effect import Effect
 from elevon.reproduce.nasa.impact import Impact, Trace
 
@@ -129,12 +129,11 @@ class SeparationResult:
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object of the command."""
         return {
-            "status": "pass" if all_passed(self.checks) else "fail",
+            **verdict(self.checks),
             "rows": [row.to_dict() for row in self.rows],
             "impacts": [impact.to_dict() for impact in self.impacts],
             "null_rate": self.null_rate,
             "null_tables": self.null_tables,
-            "checks": [check.to_dict() for check in self.checks],
             "seed": self.seed,
             "healthy": self.healthy,
             "reassemblies": self.reassemblies,

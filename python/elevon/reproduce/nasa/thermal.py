@@ -11,7 +11,7 @@ import numpy.typing as npt
 from elevon.errors import SimulationError
 from elevon.parameters.relations import copper_loss
 from elevon.progress import part
-from elevon.report.checks import Check, all_passed
+from elevon.report.checks import Check, verdict
 from elevon.reproduce.nasa.dema import DemaFit, fit_dema
 from elevon.reproduce.nasa.profiles import Profile, profile_scenario
 
@@ -70,11 +70,10 @@ class ThermalResult:
             )
         ]  # fmt: skip
         return {
-            "status": "pass" if all_passed(self.checks) else "fail",
+            **verdict(self.checks),
             "rows": rows,
             "fit": [row.to_dict() for row in self.fit.rows] if self.fit else [],
             "fit_parameter_hash": self.fit.parameter_hash if self.fit else None,
-            "checks": [check.to_dict() for check in self.checks],
             "note": "parameters ASSUMED within insulation classes; no published temperature to "
             "compare with",
             **self.meta,

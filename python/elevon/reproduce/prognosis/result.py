@@ -18,7 +18,7 @@ from elevon.prognose.metrics import (
     relative_accuracy,
     wilson,
 )
-from elevon.report.checks import Check, all_passed
+from elevon.report.checks import Check, verdict
 
 __all__ = ["SHARES", "PrognosisResult", "UnitResult"]
 
@@ -153,8 +153,7 @@ class PrognosisResult:
         """Return the JSON form."""
         horizons = [prognostic_horizon(u.track) for u in self.units]
         return {
-            "status": "pass" if all_passed(self.checks) else "fail",
-            "checks": [check.to_dict() for check in self.checks],
+            **verdict(self.checks),
             "seed": self.seed,
             "measured": self.measured,
             "summary": self.summary(),
