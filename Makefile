@@ -52,7 +52,7 @@ test: setup lint test-rust test-python ## every check but the long ones
 test-rust: ## the closed forms of the components, beside them
 	cargo test $(PHYSICS) --package elevon-core --lib
 
-check: $(STAMPS)/packages test-rust ## from a saved line of physics to its tests; CHECK=tests/physics/test_play.py for less
+check: $(STAMPS)/packages test-rust ## from a saved line of physics to its tests; CHECK=tests/physics/test_backlash.py for less
 	cargo build $(PHYSICS) --package elevon-py --lib
 	@rm -rf $(OVERLAY) && mkdir -p $(OVERLAY)/elevon
 	@ln -s $(CURDIR)/python/elevon/* $(OVERLAY)/elevon/ && rm -f $(OVERLAY)/elevon/_core*.so

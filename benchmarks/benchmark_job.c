@@ -1,7 +1,7 @@
 /* Yardstick, one run: the closed rotary loop of benchmarks/README.md as one hand-written C loop.
  *
  * Explicit Euler at 1e-6 s: position P, speed PI with conditional integration, inverse transform, three relays of
- * +-0.5 A on a star with a floating neutral, torque, stick-slip friction, end stops and the play operator. It has
+ * +-0.5 A on a star with a floating neutral, torque, stick-slip friction, end stops and the backlash operator. It has
  * nothing but this one actuator in it: no options, no units, no checks. What it costs is what the job costs.
  *
  *   cc -O3 -march=native benchmark_job.c -lm                sines from libm
@@ -51,7 +51,7 @@ typedef struct {
 
 __attribute__((noinline)) void run(State *S, long n, double dt, double Tl, double *log, int dec) {
     const double p = 4, R = 2.75, iL = 1 / 30.5e-3, K = 1.1 / 1.5, iJ = 1 / (7.7e-4 + 1.9e-3), Cm = 1e-3;
-    const double V2 = 190, h = 0.5, gi = 124, igi = 1 / 124.0, half_play = 0.1 * M_PI / 180;
+    const double V2 = 190, h = 0.5, gi = 124, igi = 1 / 124.0, half_backlash = 0.1 * M_PI / 180;
     const double Fst = 0.12, Fdy = 0.06, Kpp = 20, Kps = 0.3, Kis = 6, Tmax = 22, A = 7 * M_PI / 180;
     const double om = 2 * M_PI * 0.2, thmax = 30 * M_PI / 180 * 124, iKt = 1 / 1.1;
     const double h3 = 0.86602540378443864676;
@@ -90,7 +90,7 @@ __attribute__((noinline)) void run(State *S, long n, double dt, double Tl, doubl
         int lim = fabs(tn) > thmax;
         th = lim ? copysign(thmax, tn) : tn;
         w = lim ? 0 : wn;
-        double u = th * igi, lo = u - half_play, hi = u + half_play;
+        double u = th * igi, lo = u - half_backlash, hi = u + half_backlash;
         thu = thu > hi ? hi : (thu < lo ? lo : thu);
         if (++d == dec) {
             d = 0;
@@ -120,7 +120,7 @@ int main(int argc, char **argv) {
         took[r] = now() - t0;
     }
     qsort(took, repeats, 8, ascending);
-    printf("steps=%ld ns_per_step=%.4f user_deg=%.9f speed=%.9f transitions=%ld\n", n,
+    printf("steps=%ld ns_per_step=%.4f output_deg=%.9f speed=%.9f transitions=%ld\n", n,
            took[repeats / 2] / n * 1e9, S.thu * 180 / M_PI, S.w, S.sw);
     free(log);
     return 0;

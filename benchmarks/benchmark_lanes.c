@@ -49,7 +49,7 @@ typedef struct {
 
 __attribute__((noinline)) static void run(State *restrict S, long n, double dt, double *restrict log, int dec) {
     const double p = 4, R = 2.75, iL = 1 / 30.5e-3, K = 1.1 / 1.5, iJ = 1 / (7.7e-4 + 1.9e-3), Cm = 1e-3;
-    const double V2 = 190, h = 0.5, gi = 124, igi = 1 / 124.0, half_play = 0.1 * M_PI / 180;
+    const double V2 = 190, h = 0.5, gi = 124, igi = 1 / 124.0, half_backlash = 0.1 * M_PI / 180;
     const double Fst = 0.12, Fdy = 0.06, Kpp = 20, Kps = 0.3, Kis = 6, Tmax = 22;
     const double thmax = 30 * M_PI / 180 * 124, iKt = 1 / 1.1, h3 = 0.86602540378443864676;
     int d = 0;
@@ -88,7 +88,7 @@ __attribute__((noinline)) static void run(State *restrict S, long n, double dt, 
             double stop = __builtin_copysign(thmax, tn);
             th = at > thmax ? stop : tn;
             w = at > thmax ? 0 : wn;
-            double u = th * igi, lo = u - half_play, hi = u + half_play;
+            double u = th * igi, lo = u - half_backlash, hi = u + half_backlash;
             thu = thu < lo ? lo : thu;
             thu = thu > hi ? hi : thu;
             S->ia[j] = ia; S->ib[j] = ib; S->ic[j] = ic; S->w[j] = w; S->th[j] = th; S->thu[j] = thu;
@@ -132,7 +132,7 @@ int main(int argc, char **argv) {
         took[r] = now() - t0;
     }
     qsort(took, repeats, 8, ascending);
-    printf("steps=%ld lanes=%d ns_per_lane_step=%.4f user_deg=%.9f speed=%.9f\n", n, N,
+    printf("steps=%ld lanes=%d ns_per_lane_step=%.4f output_deg=%.9f speed=%.9f\n", n, N,
            took[repeats / 2] / n / N * 1e9, S.thu[0] * 180 / M_PI, S.w[0]);
     free(log);
     return 0;

@@ -65,9 +65,9 @@ def settings(case: dict[str, float | str], ratio: float) -> dict[str, Any]:
     }
     if "load" in case:
         values |= {
-            "play.model": "elastic",
-            "play.stiffness": 1e4,
-            "play.damping": 20.0,
+            "backlash.model": "elastic",
+            "backlash.stiffness": 1e4,
+            "backlash.damping": 20.0,
             "load.inertia": float(case["load"]),
         }
     return values

@@ -30,8 +30,8 @@ COMMON: dict[str, Any] = {
     "friction.dynamic": 0.06,
     "friction.viscous": 1e-3,
     "friction.viscous_slope": 0.0,
-    "play.model": "operator",
-    "play.total": "0.2 deg",
+    "backlash.model": "operator",
+    "backlash.total": "0.2 deg",
     "stop.upper": "30 deg",
     "stop.lower": "-30 deg",
     "inverter.supply_voltage": 380.0,
@@ -53,13 +53,13 @@ COMMON: dict[str, Any] = {
     "control.conditional_integration": "on",
     "control.sample_time": 0.0,
     "control.noise_deviation": 0.0,
-    "control.position_feedback": "user",
+    "control.position_feedback": "output",
     "sensor.current.noise_deviation": 0.0,
     "sensor.current.bits": 0,
 }
 # Every option of the high model at once: faults in winding and air gap, a lossy bridge,
 # load-dependent friction,
-# the second mass behind an elastic play, every branch of the controller, imperfect sensors that
+# the second mass behind an elastic backlash, every branch of the controller, imperfect sensors that
 # close the loop.
 FULL: dict[str, Any] = {
     "motor.turns_a": 0.9,
@@ -72,9 +72,9 @@ FULL: dict[str, Any] = {
     "gear.efficiency": 0.9,
     "gear.efficiency_aiding": 0.891,
     "friction.viscous_slope": -1e-4,
-    "play.model": "elastic",
-    "play.stiffness": 1e4,
-    "play.damping": 5.0,
+    "backlash.model": "elastic",
+    "backlash.stiffness": 1e4,
+    "backlash.damping": 5.0,
     "load.inertia": 0.05,
     "load.stiffness": 0.8,
     "inverter.on_resistance": 0.1,
@@ -96,11 +96,11 @@ FULL: dict[str, Any] = {
     "sensor.resolver.mismatch": 0.01,
 }
 RECORD = [
-    "user_position,motor_position,motor_speed,current_a,current_b,current_c,motor_torque@400 Hz"
+    "output_position,motor_position,motor_speed,current_a,current_b,current_c,motor_torque@400 Hz"
 ]
 FULL_LOAD: dict[str, Any] = {
     "brake": {"terms": [{"kind": "sine", "amplitude": 0.2, "bias": 0.5, "frequency": 0.5}]},
-    "user": {"terms": [{"kind": "triangle", "amplitude": 20.0, "frequency": 0.3}]},
+    "output": {"terms": [{"kind": "triangle", "amplitude": 20.0, "frequency": 0.3}]},
 }
 
 

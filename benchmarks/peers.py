@@ -1,7 +1,7 @@
 """Other simulators on the common job, or on as much of it as they can express, when installed.
 
 Every entry says what part of the job it ran: none of them but scipy's has the relays, the
-stick-slip friction and the play, so their figures flatter them.
+stick-slip friction and the backlash, so their figures flatter them.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def with_scipy() -> dict[str, Any]:
         friction_dynamic=0.06,
         torque_maximum=1e9,
         ratio=124.0,
-        half_play=math.radians(0.1),
+        half_backlash=math.radians(0.1),
         supply=SUPPLY,
         half_band=0.5,
         gain_position=20 * 124.0,
@@ -58,13 +58,13 @@ def with_scipy() -> dict[str, Any]:
     return {
         "s_per_simulated_s": wall / 0.05,
         "ran": "whole job, event-located DOP853, 50 ms",
-        "user_deg": math.degrees(trace.user[-1]),
+        "output_deg": math.degrees(trace.output[-1]),
     }
 
 
 def with_motulator() -> dict[str, Any]:
     """Motor, two-level bridge with a 4 kHz carrier, current and speed loops; no relays, friction,
-    gear or play.
+    gear or backlash.
     """
     from motulator.drive import model
     from motulator.drive.control import sm
@@ -95,7 +95,7 @@ def with_motulator() -> dict[str, Any]:
 
 def with_gym_electric_motor() -> dict[str, Any]:
     """Motor and switched bridge at 1e-6 s with three relays written in Python; no friction, gear
-    or play.
+    or backlash.
     """
     import gym_electric_motor as gem
 

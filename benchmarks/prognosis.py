@@ -13,7 +13,7 @@ from elevon.prognose import Inspection, ParticleFilter, Process, Seen, respond
 from elevon.prognose.predict import prognosis
 from elevon.reproduce.prognosis.campaign import campaign_mission
 
-SEVERITIES = {"play@transmission": 2e-6, "friction@transmission": 1.5e-4}
+SEVERITIES = {"backlash@transmission": 2e-6, "friction@transmission": 1.5e-4}
 
 
 def inspections():

@@ -64,7 +64,7 @@ def batch(full: bool) -> float:
 def low() -> float:
     """Simulated seconds a wall second of one low-fidelity run on one thread."""
     model, scene = elevon.Actuator.load("torino-rotary"), job.scenario(LOW_SECONDS)
-    record = ["user_position,motor_speed,current_q@400 Hz"]
+    record = ["output_position,motor_speed,current_q@400 Hz"]
     wall, _ = timed(lambda: elevon.simulate(model, scene, fidelity="low", record=record))
     return LOW_SECONDS / wall
 
@@ -76,7 +76,7 @@ def low_batch() -> float:
         elevon.Run(model, job.scenario(LOW_BATCH_SECONDS, 5.0 + 0.1 * i), i, str(i))
         for i in range(LANES)
     ]
-    record = ["user_position,motor_speed,current_q@400 Hz"]
+    record = ["output_position,motor_speed,current_q@400 Hz"]
     wall, _ = timed(lambda: elevon.simulate_batch(runs, fidelity="low", record=record, threads=1))
     return LANES * LOW_BATCH_SECONDS / wall
 
@@ -92,12 +92,12 @@ def thousand() -> dict[str, float]:
 
 def agreement(sticks: dict[str, yardsticks.Yardstick]) -> dict[str, float]:
     """Do the timed programs compute the same thing? One simulated second."""
-    ours = elevon.simulate(job.actuator(), job.scenario(1.0), record=["user_position@400 Hz"])
+    ours = elevon.simulate(job.actuator(), job.scenario(1.0), record=["output_position@400 Hz"])
     theirs = sticks["c_count"].run(STEPS)
     return {
-        "user_deg": math.degrees(ours.final["user_position"]),
-        "c_user_deg": theirs["user_deg"],
-        "user_difference_deg": math.degrees(ours.final["user_position"]) - theirs["user_deg"],
+        "output_deg": math.degrees(ours.final["output_position"]),
+        "c_output_deg": theirs["output_deg"],
+        "output_difference_deg": math.degrees(ours.final["output_position"]) - theirs["output_deg"],
         "transitions": ours.final["leg_transitions"],
         "c_transitions": theirs["transitions"],
         "transitions_ratio": ours.final["leg_transitions"] / theirs["transitions"],
@@ -187,7 +187,8 @@ def main() -> int:
         report(result)
     agrees = result["agreement"]
     close = (
-        abs(agrees["user_difference_deg"]) <= 0.01 and abs(agrees["transitions_ratio"] - 1) <= 0.05
+        abs(agrees["output_difference_deg"]) <= 0.01
+        and abs(agrees["transitions_ratio"] - 1) <= 0.05
     )
     return 0 if close else 1
 

@@ -17,7 +17,7 @@ REPEATS = 7
 def _once(actuator, fidelity):
     scenario = {**actuator.default_scenario, "duration": SECONDS[fidelity]}
     began = time.process_time()
-    elevon.simulate(actuator, scenario, fidelity=fidelity, record="user_position@1 kHz")
+    elevon.simulate(actuator, scenario, fidelity=fidelity, record="output_position@1 kHz")
     return time.process_time() - began
 
 

@@ -24,7 +24,7 @@ KINDS = [
     [{"kind": "short", "place": "motor.phase_a", "severity": 0.1}],
     [{"kind": "eccentricity_static", "place": "motor", "severity": 0.1}],
     [{"kind": "friction", "place": "transmission", "severity": 0.25}],
-    [{"kind": "play", "place": "transmission", "severity": "0.13 deg"}],
+    [{"kind": "backlash", "place": "transmission", "severity": "0.13 deg"}],
 ]
 
 

@@ -1,8 +1,8 @@
 #!/bin/sh
-# From the virtual bench to a calibrated set: three tests of a unit whose friction and play nobody
+# From the virtual bench to a calibrated set: three tests of a unit whose friction and backlash nobody
 # has told the model, calibrated together, validated on another log.
 set -e
-run() { elevon bench run "$@" --actuator torino-rotary --set drive.kind=pwm --set play.total=0.6deg \
+run() { elevon bench run "$@" --actuator torino-rotary --set drive.kind=pwm --set backlash.total=0.6deg \
     --set friction.dynamic=0.36N*m --set friction.static=0.45N*m; }
 for test in backlash loaded chirp; do run $test --out logs; done
 run backlash --seed 7 --out another

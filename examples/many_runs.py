@@ -1,4 +1,4 @@
-"""Ten plays at once: the batch is bit-identical to ten single runs."""
+"""Ten backlashes at once: the batch is bit-identical to ten single runs."""
 
 import elevon
 
@@ -10,9 +10,9 @@ scenario = elevon.Scenario.from_dict(
     }
 )
 runs = [
-    elevon.Run(actuator, scenario.with_faults([f"play@transmission={tenths / 10} deg"]))
+    elevon.Run(actuator, scenario.with_faults([f"backlash@transmission={tenths / 10} deg"]))
     for tenths in range(10)
 ]
 for run, recording in zip(runs, elevon.simulate_batch(runs, fidelity="low"), strict=True):
-    lost = recording["motor_position"].values / 124 - recording["user_position"].values
+    lost = recording["motor_position"].values / 124 - recording["output_position"].values
     print(run.scenario.fault[0], f"lost motion {abs(lost).max():.5f} rad")

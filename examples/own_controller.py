@@ -3,13 +3,13 @@
 import elevon
 
 units = [
-    {"duration": 1, "command": {"mode": "torque"}, "load": {"user": {"terms": [load]}}}
+    {"duration": 1, "command": {"mode": "torque"}, "load": {"output": {"terms": [load]}}}
     for load in ({"kind": "constant", "value": f"{n} N m"} for n in (0, 10, 20))
 ]
 session = elevon.Session([elevon.Run("torino-rotary", unit) for unit in units])
 recordings = session.run(
     "1 s",
-    lambda now: 120.0 * (0.1 - now["user_position"]) - 0.2 * now["motor_speed"],
-    record=["user_position"],
+    lambda now: 120.0 * (0.1 - now["output_position"]) - 0.2 * now["motor_speed"],
+    record=["output_position"],
 )
-print(*(f"{r['user_position'].values[-1]:.4f} rad" for r in recordings))
+print(*(f"{r['output_position'].values[-1]:.4f} rad" for r in recordings))

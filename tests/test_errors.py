@@ -3,7 +3,13 @@ import pytest
 from elevon import errors
 from elevon.errors import ElevonError, InputError, did_you_mean, nearest, unknown
 
-PATHS = ["motor.inertia", "motor.winding_resistance", "gear.ratio", "play.total", "user.inertia"]
+PATHS = [
+    "motor.inertia",
+    "motor.winding_resistance",
+    "gear.ratio",
+    "backlash.total",
+    "output.inertia",
+]
 
 
 @pytest.mark.parametrize(
@@ -14,7 +20,7 @@ PATHS = ["motor.inertia", "motor.winding_resistance", "gear.ratio", "play.total"
         ("motor_inertia", "motor.inertia"),
         ("motor-winding-resistance", "motor.winding_resistance"),
         ("ratio", "gear.ratio"),
-        ("play.totl", "play.total"),
+        ("backlash.totl", "backlash.total"),
     ],
 )
 def test_nearest_name_comes_first(wrong, right):
@@ -22,7 +28,7 @@ def test_nearest_name_comes_first(wrong, right):
 
 
 def test_part_of_a_name_finds_every_whole():
-    assert set(nearest("inertia", PATHS)) == {"motor.inertia", "user.inertia"}
+    assert set(nearest("inertia", PATHS)) == {"motor.inertia", "output.inertia"}
 
 
 def test_nothing_near_gives_nothing():

@@ -134,5 +134,5 @@ class Actuator:
 
 
 def list_actuators() -> list[str]:
-    """Return the names that `Actuator.load` knows: shipped sets and those in ``ELEVON_SETS``."""
+    """Return the names that `Actuator.load` knows: shipped, and in ``ELEVON_ACTUATORS``."""
     return list(set_names())

@@ -31,8 +31,8 @@ Array = npt.NDArray[np.float64]
 
 ROLES = {"position": "output_position", "speed": "motor_speed", "q_current": "torque_current"}
 """What is compared, and the role that shows it."""
-SIGNALS = ("user_position", "motor_speed", "current_q")
-"""What plays these roles in a servo, true values before what the sensors show."""
+SIGNALS = ("output_position", "motor_speed", "current_q")
+"""What backlashes these roles in a servo, true values before what the sensors show."""
 RATES = {"high": "10 kHz", "low": "every"}
 """The relays' ripple (1 to 5 kHz) must not alias; the low model is kept at each of its steps."""
 GRID_HZ = 400.0

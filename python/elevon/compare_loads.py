@@ -82,7 +82,7 @@ def load_size(actuator: Actuator, load: str | float | None = None) -> float:
         raise InputError(
             f"{actuator.name}: its set has no [compare] load; give one with --load, such as '500 N'"
         )
-    unit = next(port["unit"] for port in _core.ports(actuator.wiring) if port["name"] == "user")
+    unit = next(port["unit"] for port in _core.ports(actuator.wiring) if port["name"] == "output")
     size = parse_quantity(given, unit, "load")
     if size <= 0.0:
         raise InputError(f"load = {given} must be above 0")
@@ -93,10 +93,10 @@ def _direction(actuator: Actuator, scenario: Scenario, seed: int) -> tuple[Any, 
     """Direction of the motion over time, between -1 and 1."""
     from elevon.simulate import simulate
 
-    run = simulate(actuator, scenario, fidelity="low", record="user_speed@every", seed=seed)
+    run = simulate(actuator, scenario, fidelity="low", record="output_speed@every", seed=seed)
     if run.status != "ok":
         raise SimulationError(f"compare: the motion ended as {run.status}", run.status)
-    speed = run["user_speed"]
+    speed = run["output_speed"]
     times = np.arange(0.0, scenario.seconds, 1.0 / _RATE)
     values = np.interp(times, speed.time, speed.values)
     return times, np.tanh(values / (_AT_REST * max(float(np.abs(values).max()), 1e-12)))
@@ -107,5 +107,5 @@ def _loaded(scenario: Scenario, times: Any, values: Any) -> Scenario:
     data = scenario.to_dict()
     term = {"kind": "table", "times": times.tolist(), "values": values.tolist()}
     load = dict(data.get("load", {}))
-    terms = list(load.get("user", {}).get("terms", []))
-    return scenario.replaced(load={**load, "user": {"terms": [*terms, term]}})
+    terms = list(load.get("output", {}).get("terms", []))
+    return scenario.replaced(load={**load, "output": {"terms": [*terms, term]}})

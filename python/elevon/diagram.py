@@ -70,21 +70,21 @@ _ROTARY = Diagram(
             "motor_torque",
         ),
         Block(
-            "Fast shaft",
+            "Motor shaft",
             ("inertia, Borello friction", "viscous friction, brake", "friction.*"),
             "motor_position",
         ),
         Block(
-            "Transmission, user",
-            ("gear 1:i, play, stops", "spring, inertia", "gear.* play.* load.*"),
-            "user_position",
+            "Transmission, output",
+            ("gear 1:i, backlash, stops", "spring, inertia", "gear.* backlash.* load.*"),
+            "output_position",
         ),
     ),
-    loads=((1, "supply"), (3, "brake, shaft load"), (4, "user load")),
+    loads=((1, "supply"), (3, "brake, shaft load"), (4, "output load")),
     feedback=(
         (2, 1, "current_a, b, c (sensors)"),
         (3, 0, "motor_speed, motor_position (resolver)"),
-        (4, 0, "user_position / encoder"),
+        (4, 0, "output_position / encoder"),
     ),
 )
 
@@ -113,15 +113,15 @@ _BALLSCREW = Diagram(
         ),
         Block(
             "Ram, load side",
-            ("play, joint, load mass", "load cell, end stops", "play.* load.* stop.*"),
-            "user_position",
+            ("backlash, joint, load mass", "load cell, end stops", "backlash.* load.* stop.*"),
+            "output_position",
         ),
     ),
     loads=((1, "supply"), (4, "ram load, N")),
     feedback=(
         (2, 1, "current_a, b, c (sensors)"),
         (3, 0, "motor_speed, motor_position (resolver)"),
-        (4, 0, "user_position / encoder"),
+        (4, 0, "output_position / encoder"),
     ),
 )
 
@@ -151,7 +151,7 @@ _LANDING_GEAR = Diagram(
         Block(
             "Lever, leg, down-lock",
             ("triangle, varying inertia", "load factor, lock", "lever.* leg.* lock.*"),
-            "user_position",
+            "output_position",
         ),
     ),
     loads=((1, "supply"), (4, "load factor, rig speed")),

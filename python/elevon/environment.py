@@ -52,7 +52,7 @@ class ActuatorEnv(gymnasium.Env[Floats, Floats]):
         target: Callable[[float], float],
         *,
         mode: str = "torque",
-        observed: Sequence[str] = ("user_position", "motor_speed"),
+        observed: Sequence[str] = ("output_position", "motor_speed"),
         period: float | str = "5 ms",
         duration: float | str = "1 s",
         reward: Callable[[Floats, Floats], float] | None = None,

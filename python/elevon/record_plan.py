@@ -1,4 +1,4 @@
-"""What is kept of a run: texts such as ``"user_position,motor_speed@400 Hz"`` become clocks."""
+"""What is kept of a run: texts such as ``"output_position,motor_speed@400 Hz"`` become clocks."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     ),
     "essential": (
         "command",
-        "user_position",
+        "output_position",
         "motor_torque",
         "friction_torque",
         "current_q",
@@ -52,8 +52,8 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
         "locked",
         "brake_released",
         "released",
-        "user_position",
-        "user_speed",
+        "output_position",
+        "output_speed",
         "motor_position",
         "motor_speed",
         "speed_ref",
@@ -175,7 +175,7 @@ def _read(text: str, units: Mapping[str, str], step: float) -> tuple[list[str], 
     if not rate.strip() or not (names.strip() or rate.strip() == _EVERY):
         raise InputError(
             f"record: {text!r} is not of the form SIGNALS@RATE, such as "
-            "'user_position,motor_speed@400 Hz' or 'current_a@every'"
+            "'output_position,motor_speed@400 Hz' or 'current_a@every'"
         )
     wanted = names if names.strip() else _ALL
     chosen: list[str] = []

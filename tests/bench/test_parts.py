@@ -65,23 +65,23 @@ def test_micrometer_reproduces_the_printed_columns(shared):
     )
     for _, d, mw, _, calculated, _, measured, _ in table:
         assert micrometer.centre_distance(d) == pytest.approx(mw, abs=0.015)
-        assert micrometer.geometric_play(d) == pytest.approx(calculated, abs=1.5e-4)
-        assert micrometer.measured_play(d) == pytest.approx(measured, abs=1e-12)
+        assert micrometer.geometric_backlash(d) == pytest.approx(calculated, abs=1.5e-4)
+        assert micrometer.measured_backlash(d) == pytest.approx(measured, abs=1e-12)
 
 
 def test_micrometer_inverts():
     for curve in ("geometric", "measured"):
         for reading in np.linspace(9.0, 14.0, 21):
-            play = micrometer.total_play(reading, curve)
-            assert micrometer.micrometer_for(play, curve) == pytest.approx(reading, abs=1e-9)
-    assert micrometer.total_play(14.0) == micrometer.INTRINSIC_PLAY
+            backlash = micrometer.total_backlash(reading, curve)
+            assert micrometer.micrometer_for(backlash, curve) == pytest.approx(reading, abs=1e-9)
+    assert micrometer.total_backlash(14.0) == micrometer.INTRINSIC_BACKLASH
     for bad in (8.9, 14.1, math.nan):
         with pytest.raises(InputError):
             micrometer.centre_distance(bad)
     with pytest.raises(InputError, match="slide sets"):
         micrometer.micrometer_for(0.2)
     with pytest.raises(InputError, match="geometric"):
-        micrometer.total_play(14.0, "guess")
+        micrometer.total_backlash(14.0, "guess")
 
 
 def test_converter_counts_and_clips():

@@ -8,7 +8,7 @@ import pytest
 
 from elevon import Actuator
 from elevon.bench.brake_rig import BrakeRig, CellState, brake_loop
-from elevon.bench.micrometer import INTRINSIC_PLAY
+from elevon.bench.micrometer import INTRINSIC_BACKLASH
 from elevon.bench.procedure import Procedure, load_procedure, procedure_names
 from elevon.bench.rig import setups
 from elevon.bench.run import claim_bench, run_procedure
@@ -50,10 +50,10 @@ def test_every_procedure_of_the_package_can_be_set_up(actuator):
         assert len(found) == len(load_procedure(name).traces)
 
 
-def test_loaded_runs_have_the_published_plays_and_brake(actuator):
+def test_loaded_runs_have_the_published_backlashes_and_brake(actuator):
     found = setups(load_procedure("loaded"), actuator)
-    plays = [setup.actuator.parameters.value("play.total") for setup in found]
-    assert plays == pytest.approx([INTRINSIC_PLAY + net for net in (0.0, 0.0145, 0.02335)])
+    backlashes = [setup.actuator.parameters.value("backlash.total") for setup in found]
+    assert backlashes == pytest.approx([INTRINSIC_BACKLASH + net for net in (0.0, 0.0145, 0.02335)])
     for setup in found:
         assert setup.brake.asked[0] == pytest.approx(0.2)
         assert setup.brake.asked[-1] == pytest.approx(2.0, abs=0.1)
@@ -274,9 +274,9 @@ def test_what_the_bench_cannot_do_is_refused(actuator, step, message):
 
 @pytest.mark.parametrize(("step", "message"), [
     ({"kind": "brakes"}, "brake"),
-    ({"kind": "play"}, "exactly one"),
-    ({"kind": "play", "micrometer": "20 mm"}, "outside"),
-    ({"kind": "play", "micrometer": "12 mm", "net": 0.01}, "exactly one"),
+    ({"kind": "backlash"}, "exactly one"),
+    ({"kind": "backlash", "micrometer": "20 mm"}, "outside"),
+    ({"kind": "backlash", "micrometer": "12 mm", "net": 0.01}, "exactly one"),
     ({"kind": "spring", "radus": "8 mm"}, "radius"),
     ({"kind": "weights", "drops": [{"mass": "1 kg", "at": "2 s", "until": "1 s"}]}, "after"),
     ({"kind": "trace", "name": "../x", "duration": "3 s"}, "plain file name"),

@@ -37,10 +37,10 @@ def test_each_shipped_actuator_has_a_stand_and_procedures_that_can_be_set_up():
 def test_a_procedure_of_another_stand_is_refused_with_those_of_this_one():
     with pytest.raises(InputError, match="ballscrew-profiles"):
         stand_setups(load_procedure("loaded"), Actuator.load("nasa-ballscrew"))
-    with pytest.raises(InputError, match="has no 'play'"):
-        play = {"kind": "play", "total": "0.01 rad"}
+    with pytest.raises(InputError, match="has no 'backlash'"):
+        backlash = {"kind": "backlash", "total": "0.01 rad"}
         trace = {"kind": "trace", "name": "one", "duration": "1 s"}
-        stand_setups(procedure(play, trace), Actuator.load("nasa-ballscrew"))
+        stand_setups(procedure(backlash, trace), Actuator.load("nasa-ballscrew"))
 
 
 def test_a_step_of_force_rises_as_a_loop_of_second_order_does():

@@ -44,7 +44,7 @@ VALUES = {
     "friction.dynamic": 0.22,
     "friction.static": 0.30,
     "friction.viscous": 5e-3,
-    "play.total": "0.6 deg",
+    "backlash.total": "0.6 deg",
 }
 
 
@@ -63,16 +63,16 @@ class Truth:
     def values(self):
         """Return true values by the name of the estimate."""
         value = self.actuator.parameters.value
-        user = value("load.inertia") / value("gear.ratio") ** 2
+        output = value("load.inertia") / value("gear.ratio") ** 2
         known = {
-            "derived.inertia": value("motor.inertia") + value("gear.inertia") + user,
+            "derived.inertia": value("motor.inertia") + value("gear.inertia") + output,
             "derived.torque_constant": 1.5 * value("motor.emf_constant"),
             "derived.integral_gain": value("control.speed_gain") / value("control.integral_time"),
             "sensor.current_offset": self.current,
             "sensor.speed_offset": self.speed,
             "sensor.encoder.offset": self.encoder - self.motor / value("gear.ratio"),
         }
-        paths = ("play.total", "friction.dynamic", "friction.viscous", "motor.emf_constant",
+        paths = ("backlash.total", "friction.dynamic", "friction.viscous", "motor.emf_constant",
                  "motor.inertia", "control.speed_gain", "control.integral_time")  # fmt: skip
         return known | {path: value(path) for path in paths}
 
@@ -87,7 +87,7 @@ def make_truth(values=None, cases=tuple(CASES), seed=0, **sensors):
         if brake:
             document["load"] = {"brake": {"terms": list(brake)}}
         runs.append(Run(actuator, Scenario.from_dict(document), seed=seed, label=name))
-    kept = simulate_batch(runs, record="drive_log,brake_torque,user_position@400 Hz")
+    kept = simulate_batch(runs, record="drive_log,brake_torque,output_position@400 Hz")
     return Truth(actuator, recordings=dict(zip(cases, kept, strict=True)), **sensors)
 
 

@@ -9,11 +9,11 @@ struct bench {
     double control_every;      /* steps between two samples of the speed controller */
     double position_every;     /* steps between two samples of the position controller */
     double log_every;          /* steps between two rows of the log */
-    double ratio;              /* gear, fast over user */
+    double ratio;              /* gear, fast over output */
     double torque_constant;    /* N m per A peak */
-    double inertia;            /* kg m2, fast shaft */
-    double dry;                /* N m, fast shaft, moving */
-    double stick;              /* N m, fast shaft, at rest */
+    double inertia;            /* kg m2, motor shaft */
+    double dry;                /* N m, motor shaft, moving */
+    double stick;              /* N m, motor shaft, at rest */
     double stribeck;           /* rad/s over which rest turns into motion; 0: at once */
     double falling;            /* exponent of the fall from rest to motion */
     double bristle;            /* N m/rad, stiffness of LuGre's bristles; 0: at rest the shaft is held */
@@ -22,23 +22,23 @@ struct bench {
     double viscous;            /* N m s/rad */
     double cogging;            /* N m */
     double cogging_teeth;      /* periods a turn */
-    double play;               /* rad at the user, total */
+    double backlash;               /* rad at the output, total */
     double elastic;            /* 0: kinematic dragging; 1: two masses */
-    double stiffness;          /* N m/rad at the user */
-    double damping;            /* N m s/rad at the user */
-    double user_inertia;       /* kg m2 */
-    double user_dry;           /* N m */
+    double stiffness;          /* N m/rad at the output */
+    double damping;            /* N m s/rad at the output */
+    double output_inertia;       /* kg m2 */
+    double output_dry;           /* N m */
     double speed_gain;         /* N m s/rad */
     double integral_time;      /* s; 0: none */
     double derivative_time;    /* s */
     double derivative_filter;  /* N; 0: unfiltered */
     double believed_constant;  /* N m/A, of the controller */
     double current_limit;      /* A peak */
-    double position_gain;      /* 1/s, user error to fast-shaft speed */
+    double position_gain;      /* 1/s, output error to motor-shaft speed */
     double speed_limit;        /* rad/s */
     double current_lag;        /* s, of the current loop */
     double speed_by_counts;    /* 1: the controller's speed is a difference of motor counts */
-    double encoder_counts;     /* a user turn */
+    double encoder_counts;     /* an output turn */
     double encoder_gain;
     double encoder_offset;     /* rad */
     double encoder_delay;      /* s, of the logged value */
@@ -48,11 +48,11 @@ struct bench {
     double speed_cutoff;       /* Hz, of the logged speed; 0: none */
     double resistance;         /* ohm */
     double inductance;         /* H */
-    double user_start;         /* rad */
-    double motor_start;        /* share of half the play, -1 to 1 */
+    double output_start;         /* rad */
+    double motor_start;        /* share of half the backlash, -1 to 1 */
 };
 
-enum { USER, MOTOR, SPEED_REF, SPEED, CURRENT_REF, CURRENT, VOLTAGE, REACTION, COLUMNS };
+enum { OUTPUT, MOTOR, SPEED_REF, SPEED, CURRENT_REF, CURRENT, VOLTAGE, REACTION, COLUMNS };
 
 static const double TURN = 6.283185307179586;
 
@@ -92,20 +92,20 @@ static double bristled(const struct bench *b, double *w, double *z, double activ
     return friction;
 }
 
-/* command [rad at the user] and brake [N m on the fast shaft]: one value a position sample.
+/* command [rad at the output] and brake [N m on the motor shaft]: one value a position sample.
    rows: COLUMNS values a log row. Returns 1 where the motion runs away. */
 int run(const struct bench *b, const double *command, const double *brake, double *rows)
 {
     const long steps = (long)b->steps, every = (long)b->control_every;
     const long outer = (long)b->position_every, log = (long)b->log_every;
     const long late = lround(b->encoder_delay / b->dt);
-    const double dt = b->dt, half = 0.5 * b->play, sample = dt * every;
+    const double dt = b->dt, half = 0.5 * b->backlash, sample = dt * every;
     const double follow = 1.0 - exp(-dt / b->current_lag);
     const double smooth = 1.0 - exp(-TURN * b->cutoff * dt);
     const double slow = b->speed_cutoff > 0.0 ? 1.0 - exp(-TURN * b->speed_cutoff * dt) : 1.0;
     const double lag = b->derivative_filter > 0.0 ? b->derivative_time / b->derivative_filter : 0.0;
-    double user = b->user_start, user_w = 0.0;
-    double motor = b->ratio * (user + half * b->motor_start), w = 0.0;
+    double output = b->output_start, output_w = 0.0;
+    double motor = b->ratio * (output + half * b->motor_start), w = 0.0;
     double i = 0.0, i_ref = 0.0, i_shown = 0.0, w_shown = 0.0, w_ref = 0.0;
     double sum = 0.0, rate = 0.0, last_error = 0.0, last_motor = counted(motor, b->motor_counts);
     double load = 0.0, z = 0.0;
@@ -113,12 +113,12 @@ int run(const struct bench *b, const double *command, const double *brake, doubl
     if (past == NULL)
         return 1;
     for (long k = 0; k <= late; k++)
-        past[k] = user;
+        past[k] = output;
     for (long n = 0; n < steps; n++) {
         const double b_now = brake[n / outer];
-        past[n % (late + 1)] = user;
+        past[n % (late + 1)] = output;
         if (n % outer == 0) {
-            double seen = b->encoder_gain * user + b->encoder_offset;
+            double seen = b->encoder_gain * output + b->encoder_offset;
             if (b->quantised_loop)
                 seen = counted(seen, b->encoder_counts);
             w_ref = clip(b->position_gain * (command[n / outer] - seen), b->speed_limit);
@@ -160,7 +160,7 @@ int run(const struct bench *b, const double *command, const double *brake, doubl
         if (n % log == 0) {
             double *row = rows + n / log * COLUMNS;
             double seen = b->encoder_gain * past[(n + 1) % (late + 1)] + b->encoder_offset;
-            row[USER] = counted(seen, b->encoder_counts);
+            row[OUTPUT] = counted(seen, b->encoder_counts);
             row[MOTOR] = motor;
             row[SPEED_REF] = w_ref;
             row[SPEED] = w_shown;
@@ -171,21 +171,21 @@ int run(const struct bench *b, const double *command, const double *brake, doubl
             row[REACTION] = friction * share;
         }
         motor += w * dt;
-        const double lead = motor / b->ratio - user;
+        const double lead = motor / b->ratio - output;
         if (b->elastic) {
             load = 0.0;
             if (fabs(lead) > half) {
                 load = b->stiffness * (lead - copysign(half, lead))
-                     + b->damping * (w / b->ratio - user_w);
+                     + b->damping * (w / b->ratio - output_w);
                 if (load * lead < 0.0)
                     load = 0.0;
             }
-            slide(&user_w, load, b->user_dry, b->user_dry, b->user_inertia, dt);
-            user += user_w * dt;
+            slide(&output_w, load, b->output_dry, b->output_dry, b->output_inertia, dt);
+            output += output_w * dt;
         } else if (lead > half) {
-            user = motor / b->ratio - half;
+            output = motor / b->ratio - half;
         } else if (lead < -half) {
-            user = motor / b->ratio + half;
+            output = motor / b->ratio + half;
         }
         if (!(fabs(w) < 1e4)) {
             free(past);

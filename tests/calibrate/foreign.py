@@ -1,7 +1,8 @@
 """A bench that is not in the project: its own plant, drive and sensors, for calibration's tests.
 
 It shares no code and no modelling choice with the package: a sampled speed controller, a current
-loop with a lag, Borello's friction, play by dragging or between two masses, integrated by a small C
+loop with a lag, Borello's friction, backlash as an operator or between two masses, integrated by a
+small C
 program (`foreign.c`) that is compiled on the fly. What its files look like is in `foreign_files`.
 """
 
@@ -23,12 +24,12 @@ COUNT = 2 * math.pi / 80_000
 STEP = 25e-6
 LOG = 2.5e-3
 DURATION = 20.0
-COLUMNS = ("user", "motor", "speed_ref", "speed", "current_ref", "current", "voltage", "reaction")
+COLUMNS = ("output", "motor", "speed_ref", "speed", "current_ref", "current", "voltage", "reaction")
 
 
 @dataclass(frozen=True)
 class Bench:
-    """The actuator and the drive, SI; torques and inertia on the fast shaft, currents as peak."""
+    """The actuator and the drive, SI; torques and inertia on the motor shaft, currents as peak."""
 
     torque_constant: float = 1.35
     inertia: float = 2.7e-3
@@ -42,12 +43,12 @@ class Bench:
     viscous: float = 3e-3
     cogging: float = 0.0
     cogging_teeth: float = 48.0
-    play: float = math.radians(0.5)
+    backlash: float = math.radians(0.5)
     elastic: bool = False
     stiffness: float = 625.0
     damping: float = 0.67
-    user_inertia: float = 2e-3
-    user_dry: float = 0.3
+    output_inertia: float = 2e-3
+    output_dry: float = 0.3
     ratio: float = 124.0
     speed_gain: float = 0.2
     integral_time: float = 0.3
@@ -93,7 +94,7 @@ class Sensors:
 
 @dataclass(frozen=True)
 class Trial:
-    """One log: what is commanded (degrees at the user, Hz), and whether the brake acts."""
+    """One log: what is commanded (degrees at the output, Hz), and whether the brake acts."""
 
     waveform: str
     values: dict
@@ -154,11 +155,11 @@ def run(bench, sensors, trial, seed=0, duration=DURATION, start=None):
     rng = np.random.default_rng([seed, 1])
     start = float(rng.uniform(0.3, 1.5)) if start is None else start
     trigger = float(rng.uniform(0.2, 1.2))
-    user = math.radians(float(rng.uniform(-2.0, 2.0)))
+    output = math.radians(float(rng.uniform(-2.0, 2.0)))
     where = float(rng.uniform(-1.0, 1.0))
     outer = bench.position_sample_time or bench.sample_time
     tick = np.arange(round(duration / outer) + 1) * outer
-    rest = user * sensors.encoder_gain + sensors.encoder_offset
+    rest = output * sensors.encoder_gain + sensors.encoder_offset
     command = np.where(tick < start, rest, trial.command(np.maximum(tick - start, 0.0)))
     brake = np.zeros_like(tick)
     if trial.brake:
@@ -176,7 +177,7 @@ def run(bench, sensors, trial, seed=0, duration=DURATION, start=None):
         "believed_constant": bench.torque_constant,
         "encoder_counts": 80_000.0,
         "motor_counts": 2.0**24,
-        "user_start": user,
+        "output_start": output,
         "motor_start": where,
     }
     program, names = library()
@@ -192,9 +193,9 @@ def run(bench, sensors, trial, seed=0, duration=DURATION, start=None):
 
 def truth(bench, sensors):
     """Return what a calibration is to find, SI; of two masses, what one mass sees of them."""
-    dragged = bench.user_dry / bench.ratio if bench.elastic else 0.0
-    swung = bench.user_inertia / bench.ratio**2 if bench.elastic else 0.0
-    wound = 2 * bench.user_dry / bench.stiffness if bench.elastic else 0.0
+    dragged = bench.output_dry / bench.ratio if bench.elastic else 0.0
+    swung = bench.output_inertia / bench.ratio**2 if bench.elastic else 0.0
+    wound = 2 * bench.output_dry / bench.stiffness if bench.elastic else 0.0
     zero = sensors.encoder_gain * sensors.motor_zero / bench.ratio
     return {
         "motor.emf_constant": bench.torque_constant / 1.5,
@@ -202,7 +203,7 @@ def truth(bench, sensors):
         "friction.dynamic": bench.dry + dragged,
         "friction.static": bench.stick + dragged,
         "friction.viscous": bench.viscous,
-        "play.total": bench.play + wound,
+        "backlash.total": bench.backlash + wound,
         "control.speed_gain": bench.speed_gain,
         "control.integral_time": bench.integral_time,
         "control.derivative_time": bench.derivative_time,
@@ -230,7 +231,7 @@ def draw(seed, bench=None, sensors=None):
         "dry": dry,
         "stick": dry * u(1.0, 1.5),
         "viscous": u(1.5e-3, 8e-3),
-        "play": math.radians(u(0.3, 1.5)),
+        "backlash": math.radians(u(0.3, 1.5)),
         "speed_gain": inertia * stiff,
         "integral_time": u(0.12, 0.6),
         "derivative_time": u(0.15, 0.45) / stiff,
@@ -255,7 +256,7 @@ def draw(seed, bench=None, sensors=None):
 
 
 def draw_creeping(seed, bench=None):
-    """Draw a bench on LuGre's bristles, whose friction grows with its load, with elastic play."""
+    """Draw a bench on LuGre's bristles, friction that grows with load, elastic backlash."""
     rng = np.random.default_rng([seed, 4])
     creeping = {
         "elastic": True,
@@ -264,7 +265,7 @@ def draw_creeping(seed, bench=None):
         "bristle": float(np.exp(rng.uniform(np.log(100.0), np.log(5e3)))),
         "bristle_damping": float(rng.uniform(0.1, 1.0)),
         "load_share": float(rng.uniform(0.0, 0.02)),
-        "user_dry": float(rng.uniform(0.1, 2.0)),
+        "output_dry": float(rng.uniform(0.1, 2.0)),
         "sample_time": float(rng.choice([125e-6, 250e-6])),
     }
     return draw(seed, {**creeping, **(bench or {})})
@@ -272,9 +273,9 @@ def draw_creeping(seed, bench=None):
 
 def unrest(bench, sensors, seed=0):
     """Return how the bench hunts under a command that stands still: RMS speed of the motor, and
-    the user's travel in counts."""
+    the output's travel in counts."""
     still = Trial("sine", {"amplitude": 0.0, "bias": 5.0, "frequency": 1.0})
     done = run(bench, sensors, still, seed, duration=6.0, start=0.2)
     late = done.time > 3.0
-    travel = np.ptp(done.rows["user"][late]) / COUNT
+    travel = np.ptp(done.rows["output"][late]) / COUNT
     return float(np.sqrt(np.mean(done.rows["speed"][late] ** 2))), float(travel)

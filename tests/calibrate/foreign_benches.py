@@ -30,7 +30,7 @@ def _chirp(amplitude, end):
 
 
 CASES = {
-    "plain": Case("125 us, N = 10; encoder on the fast shaft, rms, signed cell of 80 Hz", 0),
+    "plain": Case("125 us, N = 10; encoder on the motor shaft, rms, signed cell of 80 Hz", 0),
     "no-derivative": Case(
         "250 us, no derivative; slow shaft, semicolons, decimal comma, CRLF, peak, positive cell",
         1,
@@ -60,7 +60,9 @@ CASES = {
             note_keys="units",
         ),
     ),
-    "two-mass": Case("elastic play between two masses, friction at the user", 4, {"elastic": True}),
+    "two-mass": Case(
+        "elastic backlash between two masses, friction at the output", 4, {"elastic": True}
+    ),
     "no-arm": Case(
         "a load cell, its arm unknown", 5, {}, {}, Style(noted_arm=False, encoder_shaft="slow")
     ),

@@ -55,7 +55,7 @@ def drive_columns(done, sensors, style, rng):
     shaft = 124.0 if style.encoder_shaft == "fast" else 1.0
     return {
         "time": 1e3 * done.time,
-        "encoder": np.degrees(rows["user"]) * shaft,
+        "encoder": np.degrees(rows["output"]) * shaft,
         "motor": motor,
         "speed_ref": rows["speed_ref"] / RPM,
         "speed": speed / RPM,

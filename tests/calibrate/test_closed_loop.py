@@ -215,7 +215,7 @@ def test_options_without_a_meaning_in_closed_loop_are_refused():
     with pytest.raises(InputError, match="low fidelity"):
         check_loop_options("high", None)
     with pytest.raises(InputError, match="two positions"):
-        check_loop_options("low", ["play.total"])
+        check_loop_options("low", ["backlash.total"])
 
 
 def test_what_the_closed_loop_does_not_free_is_refused(known_drive):

@@ -50,13 +50,13 @@ def test_the_forty_rows(tmp_path, capsys):
     document = json.loads(capsys.readouterr().out)
     assert document["rows"] == 40
     assert {slip["row"] for slip in document["slips"]} >= {1, 3, 10, 14, 28, 29}
-    found = document["parameters"]["play.stiffness"]
+    found = document["parameters"]["backlash.stiffness"]
     # Loss on load over the repaired rows gives 113.4 N/deg without offsets or weights.
     assert 100.0 < document["stiffness_n_per_deg"] < 135.0
     assert found["low"] < found["value"] < found["high"]
     dead = document["parameters"]["derived.dead_zone"]
     assert dead["low"] < dead["value"] < dead["high"]
-    loaded = Actuator.load(out).parameters["play.stiffness"]
+    loaded = Actuator.load(out).parameters["backlash.stiffness"]
     assert loaded.value == pytest.approx(found["value"])
     assert loaded.confidence == "calibrated"
 

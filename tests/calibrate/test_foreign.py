@@ -16,7 +16,8 @@ from tests.calibrate.foreign_files import CAMPAIGN, Style, write_campaign, write
 
 #: What a campaign with a load cell must tell; the rest may be left out, but never be wrong.
 TOLD = {
-    "motor.emf_constant", "derived.inertia", "friction.dynamic", "friction.viscous", "play.total",
+    "motor.emf_constant", "derived.inertia", "friction.dynamic", "friction.viscous",
+    "backlash.total",
     "control.speed_gain", "control.integral_time", "control.position_gain",
     "sensor.speed_offset", "sensor.current_offset", "sensor.encoder.offset", "sensor.encoder.gain",
 }  # fmt: skip
@@ -34,7 +35,7 @@ HELD_BACK = Trial("sine", {"amplitude": 12.0, "bias": 20.0, "frequency": 0.15}, 
 
 def allowed(path, true):
     """Return how far an estimate may be off: 2 %, and one count where counts are read."""
-    if path == "play.total":
+    if path == "backlash.total":
         return COUNT + 0.02 * abs(true)
     if path == "sensor.encoder.offset":
         return COUNT
@@ -93,7 +94,7 @@ def small(tmp_path_factory):
 def test_a_small_bench_from_end_to_end(small, tmp_path, capsys):
     logs, true = small
     out = tmp_path / "found.toml"
-    free = ("friction.dynamic", "friction.viscous", "play.total", "motor.emf_constant",
+    free = ("friction.dynamic", "friction.viscous", "backlash.total", "motor.emf_constant",
             "control.speed_gain", "control.integral_time", "sensor.encoder.offset")  # fmt: skip
     options = ["--free", ",".join(free), "--out", str(out), "--json"]
     assert elevon(["calibrate", *logs, "--actuator", "torino-rotary", *options]) == 0
@@ -292,4 +293,4 @@ def test_the_foreign_benches_stand_still_when_told_to(name):
     bench, sensors, _, _ = CASES[name].build()
     speed, travel = unrest(bench, sensors)
     assert speed < 2.0
-    assert travel < 2.0 + bench.play / COUNT
+    assert travel < 2.0 + bench.backlash / COUNT

@@ -60,7 +60,7 @@ def test_every_way_of_writing_gives_the_same_numbers(name, trials, tmp_path, cap
     assert code == 0, said
     seen = Recording.load(report["recording"])
     np.testing.assert_allclose(
-        seen["encoder_position"].values, braked.rows["user"], atol=1e-3 * COUNT
+        seen["encoder_position"].values, braked.rows["output"], atol=1e-3 * COUNT
     )
     motor = seen["resolver_position"].values - sensors.motor_zero
     np.testing.assert_allclose(motor, braked.rows["motor"], atol=2e-6)

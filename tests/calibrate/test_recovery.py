@@ -23,9 +23,9 @@ def test_every_parameter_is_recovered(result, truth):
         assert item.std < 0.02 * abs(true), path
 
 
-def test_play_is_found_within_a_count_and_2_percent(result, truth):
-    true = truth.values["play.total"]
-    assert abs(result["play.total"].value - true) < COUNT + 0.02 * true
+def test_backlash_is_found_within_a_count_and_2_percent(result, truth):
+    true = truth.values["backlash.total"]
+    assert abs(result["backlash.total"].value - true) < COUNT + 0.02 * true
 
 
 def test_registers_stay_apart(result):
@@ -35,13 +35,15 @@ def test_registers_stay_apart(result):
     assert all(registers[path] == "sensor" for path in OFFSETS)
 
 
-def test_where_each_log_began_in_the_play_is_told_apart_from_the_sensors(result, truth):
+def test_where_each_log_began_in_the_backlash_is_told_apart_from_the_sensors(result, truth):
     for name, recording in truth.recordings.items():
-        motor, user = (float(recording[s].values[0]) for s in ("motor_position", "user_position"))
+        motor, output = (
+            float(recording[s].values[0]) for s in ("motor_position", "output_position")
+        )
         item = result[f"initial.lead[{name}.csv]"]
         assert item.register == "initial"
         assert not item.in_set
-        true = motor / truth.actuator.parameters.value("gear.ratio") - user
+        true = motor / truth.actuator.parameters.value("gear.ratio") - output
         assert item.interval[0] <= true <= item.interval[1]
 
 
@@ -90,9 +92,9 @@ def test_a_single_log_holds_its_end_back(logs, before):
 
 def test_free_keeps_the_others(logs, before):
     result = calibrate(
-        logs, before, free=["friction.dynamic", "play.total"], model_runs=False, hold_out=False
+        logs, before, free=["friction.dynamic", "backlash.total"], model_runs=False, hold_out=False
     )
-    assert {i.path for i in result.estimates if i.in_set} == {"friction.dynamic", "play.total"}
+    assert {i.path for i in result.estimates if i.in_set} == {"friction.dynamic", "backlash.total"}
     assert result.actuator.parameters["motor.inertia"] == before.parameters["motor.inertia"]
 
 
@@ -157,7 +159,7 @@ def _draw(rng):
         "friction.dynamic": dry,
         "friction.static": dry * u(1.0, 1.4),
         "friction.viscous": u(2e-3, 8e-3),
-        "play.total": f"{u(0.3, 1.5)} deg",
+        "backlash.total": f"{u(0.3, 1.5)} deg",
         "motor.emf_constant": k,
         "control.torque_constant": 1.5 * k,
         "pwm.emf_constant": k,
@@ -190,31 +192,31 @@ def test_three_logs_take_less_than_a_minute(logs):
 
 @pytest.mark.long
 def test_a_two_mass_bench_fitted_with_the_low_model(tmp_path, before):
-    """Elastic play and PWM drive against the low model: errors reported, absorbers named.
+    """Elastic backlash and PWM drive against the low model: errors reported, absorbers named.
 
-    Nothing rubs on the user's side of the two-mass model, so the user mass flies through the gap,
-    which no play operator does: within the gap the low model cannot know where it is.
+    Nothing rubs on the output side of the two-mass model, so the output mass flies through the gap,
+    which no backlash operator does: within the gap the low model cannot know where it is.
     """
     from elevon.calibrate import validate
 
     truth = make_truth(
-        {"play.model": "elastic", "solver.method": "semi_implicit", "solver.step": 2.5e-6}
+        {"backlash.model": "elastic", "solver.method": "semi_implicit", "solver.step": 2.5e-6}
     )
     logs = read_logs(write_logs(truth, tmp_path))
     result = calibrate(logs, before, hold_out=False)
     assert any("moves within it on its own" in text for text in result.findings)
     assert "sensor.encoder.gain" not in {item.path for item in result.estimates}
-    for path in ("friction.dynamic", "motor.emf_constant", "control.speed_gain", "play.total"):
+    for path in ("friction.dynamic", "motor.emf_constant", "control.speed_gain", "backlash.total"):
         assert result[path].value == pytest.approx(truth.values[path], rel=0.05), path
-    low, high = result["play.total"].interval
-    assert low < truth.values["play.total"] < high
+    low, high = result["backlash.total"].interval
+    assert low < truth.values["backlash.total"] < high
     checked = validate(logs, result.actuator)
     assert {error.signal for error in checked.errors} == {
         "encoder_position", "motor_speed", "current_q_meas",
     }  # fmt: skip
     for error in checked.errors:
         if error.signal == "encoder_position" and error.log != "chirp.csv":
-            assert error.rms < 0.5 * truth.values["play.total"]
+            assert error.rms < 0.5 * truth.values["backlash.total"]
     assert result.dynamic is not None
     absorbed = {path for path, *_ in result.dynamic.absorbed}
     assert absorbed

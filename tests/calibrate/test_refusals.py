@@ -50,10 +50,10 @@ def test_a_log_at_rest_determines_nothing(tmp_path, before):
         calibrate(read_logs([still(tmp_path)]), before)
 
 
-def test_play_without_a_reversal_is_refused(tmp_path, before):
+def test_backlash_without_a_reversal_is_refused(tmp_path, before):
     logs = read_logs([one_way(tmp_path)])
-    with pytest.raises(InputError, match=r"play.total.*excites"):
-        calibrate(logs, before, free=["play.total"])
+    with pytest.raises(InputError, match=r"backlash.total.*excites"):
+        calibrate(logs, before, free=["backlash.total"])
 
 
 def test_a_parameter_nothing_excites_is_refused(logs, before):
@@ -78,7 +78,7 @@ def test_another_wiring_is_refused(logs):
 
 
 def test_missing_columns_are_named(tmp_path, logs):
-    with pytest.raises(InputError, match="no channel plays motor_speed"):
+    with pytest.raises(InputError, match="no channel backlashes motor_speed"):
         read_logs([still(tmp_path / "a", motor_speed=None)])
     with pytest.raises(InputError, match="no torque current"):
         read_logs([still(tmp_path / "b", current_ref=None, current_q_meas=None)])
@@ -143,7 +143,13 @@ def test_exact_derivatives_agree_with_differences_where_nothing_switches(logs, b
 
 def test_command_line(tmp_path, log_paths, capsys):
     out, page = tmp_path / "set.toml", tmp_path / "page.html"
-    arguments = ["--actuator", "torino-rotary", "--free", "friction.dynamic,play.total", "--json"]
+    arguments = [
+        "--actuator",
+        "torino-rotary",
+        "--free",
+        "friction.dynamic,backlash.total",
+        "--json",
+    ]
     code = run(["calibrate", str(log_paths[0]), *arguments, "--out", str(out),
                 "--report", str(page)])  # fmt: skip
     printed = capsys.readouterr()
@@ -165,7 +171,7 @@ def test_command_line_refusals(tmp_path, log_paths, capsys):
     bad = [
         ["--actuator", "torino-rotry"],
         ["--actuator", "torino-rotary", "--free", "motor.emf_constant"],
-        ["--actuator", "torino-rotary", "--free", "auto,play.total"],
+        ["--actuator", "torino-rotary", "--free", "auto,backlash.total"],
         ["--actuator", "torino-rotary", "--out", str(tmp_path / "set.txt")],
         ["--actuator", "torino-rotary", "--loadcell", log, "--loadcell", log],
     ]

@@ -49,8 +49,8 @@ def test_a_fast_log_full_of_noise_raises_no_friction(tmp_path, monkeypatch, miss
 
 @pytest.mark.long
 def test_twenty_five_creeping_benches(tmp_path):
-    """LuGre, friction that grows with the load, elastic play: medians within 2 %, static friction
-    in its interval on at least 80 %."""
+    """LuGre, friction that grows with the load, elastic backlash: medians within 2 %, static
+    friction in its interval on at least 80 %."""
     errors, hits = {}, []
     for seed in range(300, 325):
         bench, sensors = draw_creeping(seed)

@@ -16,7 +16,7 @@ def _log(rate):
     brake = Brake("torque", np.array([0.0, 2.0]), np.array([0.2, 0.4]))
     return BenchLog(
         name="log", start=5.0, time=time, speed_ref=wave, speed=wave, current=2.0 * wave + 1.0,
-        current_signal="current_q_meas", current_target=wave, motor=124.0 * wave, user=None,
+        current_signal="current_q_meas", current_target=wave, motor=124.0 * wave, output=None,
         brake=brake, note=None, good=np.ones(len(time), dtype=bool), warnings=(),
     )  # fmt: skip
 
@@ -37,7 +37,7 @@ def test_a_fast_log_keeps_its_instants_and_what_is_linear(rate, left):
     np.testing.assert_allclose(log.speed, np.sin(3.0 * at), atol=2e-6)
     np.testing.assert_allclose(log.current, 2.0 * log.speed + 1.0, rtol=1e-12)
     assert log.brake.time[0] == pytest.approx(5.0 - log.start)
-    assert log.user is None
+    assert log.output is None
 
 
 def test_a_group_that_lacks_a_sample_is_not_good():

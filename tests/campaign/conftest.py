@@ -37,7 +37,7 @@ def plan(tmp_path):
     def write(count=12, head="runs_per_file = 4", tail="", terms="", name="plan.toml", bare=False):
         path = tmp_path / name
         vary = VARY.format(count=count) if count else ""
-        head = head if bare else f'record = "user_position,motor_speed@400 Hz"\n{head}'
+        head = head if bare else f'record = "output_position,motor_speed@400 Hz"\n{head}'
         path.write_text(PLAN.format(vary=vary, head=head, tail=tail, terms=terms))
         return path
 

@@ -17,7 +17,9 @@ from elevon.campaign import load_plan, load_run, read_manifest, resolve_plan
 from elevon.cli import main
 from elevon.errors import FormatError, InputError
 
-HEAD = 'actuator = "torino-rotary"\nfidelity = "low"\nrecord = "user_position,motor_speed@400 Hz"\n'
+HEAD = (
+    'actuator = "torino-rotary"\nfidelity = "low"\nrecord = "output_position,motor_speed@400 Hz"\n'
+)
 SCENARIO = """
 [scenario]
 duration = "0.2 s"
@@ -37,7 +39,7 @@ parameter = "motor.winding_temperature"
 from = "20 degC"
 to = "80 degC"
 [[random.draw]]
-fault = "play@transmission"
+fault = "backlash@transmission"
 from = "0.01 deg"
 to = "1 deg"
 spacing = "log"
@@ -79,12 +81,14 @@ def test_runs_are_all_combinations(write):
 
 def test_draws_fill_their_ranges_and_leave_some_faults_out(write):
     runs = planned(write(HEAD, SCENARIO, RANDOM.replace("count = 8", "count = 64")))
-    plays = np.array([runs.values(n)["play@transmission"] for n in range(64)])
-    present = np.degrees(plays[plays > 0.0])
+    backlashes = np.array([runs.values(n)["backlash@transmission"] for n in range(64)])
+    present = np.degrees(backlashes[backlashes > 0.0])
     assert 25 <= len(present) <= 39
     assert 0.01 <= min(present) < 0.03 < 0.5 < max(present) <= 1.0 + 1e-12
     assert np.median(present) == pytest.approx(0.1, rel=0.6)
-    assert [len(runs.run(n).scenario.fault) for n in range(64)] == list((plays > 0.0).astype(int))
+    assert [len(runs.run(n).scenario.fault) for n in range(64)] == list(
+        (backlashes > 0.0).astype(int)
+    )
 
 
 @pytest.mark.parametrize("method", ["latin_hypercube", "sobol", "halton", "uniform"])
@@ -105,7 +109,7 @@ def test_splits_keep_seeds_of_one_draw_together(write):
 def test_cases_change_several_things(write):
     cases = (
         '[[case]]\nname = "healthy"\n[[case]]\nname = "worn"\n'
-        'faults = ["play@transmission=0.1 deg", "friction@transmission=0.2"]\n'
+        'faults = ["backlash@transmission=0.1 deg", "friction@transmission=0.2"]\n'
         'parameters = { "motor.winding_temperature" = "60 degC" }\n'
         'scenario = { duration = "0.1 s" }\n'
     )
@@ -126,7 +130,7 @@ def test_a_batch_is_its_single_runs(write, tmp_path):
             item.actuator,
             item.scenario,
             fidelity="low",
-            record="user_position,motor_speed@400 Hz",
+            record="output_position,motor_speed@400 Hz",
             seed=item.seed,
             number=number,
         )
@@ -155,7 +159,7 @@ def test_the_folder_tells_everything(write, tmp_path, capsys):
         for name, about in block["files"].items():
             data = (out / name).read_bytes()
             assert hashlib.sha256(data).hexdigest() == about["sha256"]
-    assert {"user_position", "short@motor.phase_a"} <= {
+    assert {"output_position", "short@motor.phase_a"} <= {
         column["name"] for column in manifest.clocks[0]["columns"]
     }
     assert (summary["failed"], summary["bytes_per_run"] > 0.0) == (0, True)
@@ -317,7 +321,10 @@ REFUSED = {
         HEAD + SCENARIO + SHORTS + SHORTS.replace("short", "open_phase"),
         "contradict",
     ),
-    "signal": (HEAD.replace("user_position", "user_positon") + SCENARIO, "did you mean 'user_pos"),
+    "signal": (
+        HEAD.replace("output_position", "output_positon") + SCENARIO,
+        "did you mean 'output_pos",
+    ),
     "rate": (HEAD.replace("400 Hz", "300 Hz") + SCENARIO, "nearest"),
     "block": (HEAD + "runs_per_file = 0\n" + SCENARIO, "greater than or equal to 1"),
     "no scenario file": (HEAD + 'scenario = "absent.toml"\n', "cannot be read"),

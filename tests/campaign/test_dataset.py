@@ -13,7 +13,7 @@ from elevon.campaign.export import identifiers, run_numbers
 from elevon.cli import main
 from elevon.errors import InputError
 
-HEAD = 'runs_per_file = 4\nrecord = "user_position,motor_speed@400 Hz"'
+HEAD = 'runs_per_file = 4\nrecord = "output_position,motor_speed@400 Hz"'
 TAIL = """
 [[case]]
 name = "healthy"
@@ -21,7 +21,7 @@ name = "healthy"
 name = "rubbing"
 faults = ["friction@transmission=0.2:ramp(start=0 s,end=5 ms)"]
 [[vary]]
-fault = "play@transmission"
+fault = "backlash@transmission"
 values = ["0 deg", "0.1 deg"]
 [[vary]]
 parameter = "control.mode"
@@ -67,13 +67,15 @@ def alone_of(made, number):
 def test_labels_are_columns_by_the_faults_names(made):
     ds = elevon.load_campaign(made)
     runs = ds.runs.to_pandas()
-    assert runs["play@transmission"].tolist() == pytest.approx([0.0, np.radians(0.1)] * 6)
+    assert runs["backlash@transmission"].tolist() == pytest.approx([0.0, np.radians(0.1)] * 6)
     assert runs["friction@transmission"].tolist() == [0.0] * 6 + [0.2] * 6
-    assert ds.runs.units["play@transmission"] == "rad"
+    assert ds.runs.units["backlash@transmission"] == "rad"
     assert runs.case.tolist() == ["healthy"] * 6 + ["rubbing"] * 6
     assert runs["control.mode"].tolist() == ["position"] * 12
     samples = ds.signals.to_pandas()
-    assert (samples.groupby("run")["play@transmission"].first() == runs["play@transmission"]).all()
+    assert (
+        samples.groupby("run")["backlash@transmission"].first() == runs["backlash@transmission"]
+    ).all()
     growing = samples[samples.run == 7]["friction@transmission"].to_numpy()
     assert (growing == alone_of(made, 7)["fault_1"].values).all()
     assert 0.0 < growing[1] < growing[2] == 0.2
@@ -202,7 +204,7 @@ def test_describe(made, cli):
     assert told["healthy"] == 3
     assert [(fault["name"], fault["runs"]) for fault in told["faults"]] == [
         ("friction@transmission", 6),
-        ("play@transmission", 6),
+        ("backlash@transmission", 6),
     ]
     friction = next(item for item in told["varied"] if item["name"] == "friction.dynamic")
     assert (friction["min"], friction["max"], sum(friction["histogram"])) == (0.2, 0.4, 12)
@@ -213,10 +215,10 @@ def test_describe(made, cli):
 def test_cards_tell_what_is_in_it(made):
     text, page = (made / "README.md").read_text(), (made / "card.html").read_text()
     for content in (text, page):
-        for word in ("play@transmission", "friction.dynamic", "12 ok", "load_campaign"):
+        for word in ("backlash@transmission", "friction.dynamic", "12 ok", "load_campaign"):
             assert word in content
     assert "elevon-chart" in page
-    assert "play@transmission: user_position" in page
+    assert "backlash@transmission: output_position" in page
     assert "http" not in page.replace("http://www.w3.org", "").split("<style>")[0]
 
 
@@ -262,8 +264,8 @@ def test_export_for_matlab(made, cli, tmp_path):
     assert told["runs"] == 3
     table = loadmat(tmp_path / "mat" / "runs.mat", squeeze_me=True, simplify_cells=True)
     assert table["runs"]["run"].tolist() == [0, 6, 7]
-    assert table["names"]["play_at_transmission"] == "play@transmission"
-    assert table["units"]["play_at_transmission"] == "rad"
+    assert table["names"]["backlash_at_transmission"] == "backlash@transmission"
+    assert table["units"]["backlash_at_transmission"] == "rad"
     assert list(table["runs"]["case"]) == ["healthy", "rubbing", "rubbing"]
     run = loadmat(tmp_path / "mat" / "run_000007.mat", simplify_cells=True)
     alone = elevon.load_campaign(made).recording(7)
@@ -275,7 +277,7 @@ def test_export_for_matlab(made, cli, tmp_path):
     assert (healthy["at_400_hz"]["friction_at_transmission"] == 0.0).all()
     again = elevon.Recording.load(tmp_path / "mat" / "run_000007.mat")
     assert {label["channel"] for label in again.labels} == {
-        "friction_at_transmission", "play_at_transmission"
+        "friction_at_transmission", "backlash_at_transmission"
     }  # fmt: skip
     assert cli("dataset", "export", made, "--out", tmp_path / "mat", "--runs", "0")[0] == 2
 
@@ -291,7 +293,7 @@ def test_export_in_other_forms(made, cli, tmp_path, form):
         heads = (tmp_path / form / "runs.csv").read_text().splitlines()[0]
         assert '"sim_s [s]"' in heads
     alone = elevon.load_campaign(made).recording(3)
-    assert loaded["user_position"].values.tobytes() == alone["user_position"].values.tobytes()
+    assert loaded["output_position"].values.tobytes() == alone["output_position"].values.tobytes()
 
 
 def test_names_for_matlab_differ():

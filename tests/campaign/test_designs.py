@@ -125,7 +125,7 @@ parameter = "friction.dynamic"
 from = "0.2 N m"
 to = "0.4 N m"
 [[design.factor]]
-fault = "play@transmission"
+fault = "backlash@transmission"
 from = "0 deg"
 to = "0.5 deg"
 role = "nuisance"
@@ -154,10 +154,10 @@ def test_a_factorial_design_in_a_plan(plan):
     assert sorted(first) == sorted(second) == list(range(9))
     assert list(first) != list(range(9))
     assert list(first) != list(second)
-    assert {c.name: c.role for c in resolved.columns}["play@transmission"] == "nuisance"
+    assert {c.name: c.role for c in resolved.columns}["backlash@transmission"] == "nuisance"
     assert resolved.design["kind"] == "full_factorial"
     assert [len(resolved.run(n).scenario.fault) for n in range(18)] == [
-        int(value > 0.0) for value in values["play@transmission"]
+        int(value > 0.0) for value in values["backlash@transmission"]
     ]
 
 
@@ -200,13 +200,13 @@ def test_sampled_designs_fill_their_ranges(plan, kind):
 
 def test_a_users_table(plan, tmp_path):
     (tmp_path / "points.csv").write_text(
-        "C,play@transmission,A\n5 deg,0.1 deg,0.25 N m\n6 deg,0,0.3 N m\n"
+        "C,backlash@transmission,A\n5 deg,0.1 deg,0.25 N m\n6 deg,0,0.3 N m\n"
     )
     resolved = runs_of(plan, 'kind = "table"\nfile = "points.csv"\nreplicates = 2')
     assert len(resolved) == 4
     assert resolved.values(1) == {
         "friction.dynamic": 0.3,
-        "play@transmission": 0.0,
+        "backlash@transmission": 0.0,
         "command.terms[0].amplitude": pytest.approx(math.radians(6.0)),
     }
     assert any(name.endswith("points.csv") for name in resolved.sources)

@@ -22,7 +22,7 @@ distribution = "uniform"
 from = "20 degC"
 to = "40 degC"
 [[population.growth]]
-fault = "play@transmission"
+fault = "backlash@transmission"
 from = "0.01 deg"
 to = "0.5 deg"
 law = "power"
@@ -55,13 +55,13 @@ def test_each_unit_has_its_own_values_for_life(plan):
 
 def test_faults_grow_over_a_units_life(plan):
     resolved = resolved_of(plan, POPULATION)
-    play = np.degrees(resolved.columns[2].values.reshape(30, 5))
-    assert play[:, 0] == pytest.approx(0.01)
-    assert (np.diff(play, axis=1) >= 0.0).all()
-    assert 0.4 < np.median(play[:, -1]) < 0.6
-    assert np.std(np.log(play[:, -1] - 0.01)) == pytest.approx(0.2, rel=0.4)
+    backlash = np.degrees(resolved.columns[2].values.reshape(30, 5))
+    assert backlash[:, 0] == pytest.approx(0.01)
+    assert (np.diff(backlash, axis=1) >= 0.0).all()
+    assert 0.4 < np.median(backlash[:, -1]) < 0.6
+    assert np.std(np.log(backlash[:, -1] - 0.01)) == pytest.approx(0.2, rel=0.4)
     # Before the onset nothing grows: at a quarter of life some have begun and some have not.
-    begun = play[:, 1] > 0.01 + 1e-9
+    begun = backlash[:, 1] > 0.01 + 1e-9
     assert 0 < begun.sum() < 30
 
 
@@ -69,10 +69,10 @@ def test_faults_grow_over_a_units_life(plan):
 def test_laws_of_growth_end_where_they_should(plan, law):
     text = POPULATION.replace('law = "power"', f'law = "{law}"').replace("spread = 0.2", "")
     text = text.replace("onset = [0.1, 0.5]", "")
-    play = np.degrees(resolved_of(plan, text).columns[2].values.reshape(30, 5))
-    assert play[0, [0, -1]] == pytest.approx([0.01, 0.5])
+    backlash = np.degrees(resolved_of(plan, text).columns[2].values.reshape(30, 5))
+    assert backlash[0, [0, -1]] == pytest.approx([0.01, 0.5])
     half = {"linear": 0.5, "power": 0.25, "exponential": np.expm1(1.0) / np.expm1(2.0)}[law]
-    assert play[0, 2] == pytest.approx(0.01 + 0.49 * half)
+    assert backlash[0, 2] == pytest.approx(0.01 + 0.49 * half)
 
 
 def test_another_quantity_leaves_the_units_as_they_are(plan):
@@ -140,7 +140,7 @@ BAD = {
     "choice": (
         POPULATION.replace('"friction.dynamic"', '"control.mode"'), "", "is a choice"
     ),
-    "unknown": (POPULATION.replace("play@", "plai@"), "", "did you mean 'play'"),
+    "unknown": (POPULATION.replace("backlash@", "baklash@"), "", "did you mean 'backlash'"),
     "onset": (POPULATION.replace("[0.1, 0.5]", "[0.5, 0.1]"), "", "not two ages"),
 }  # fmt: skip
 

@@ -19,7 +19,12 @@ def test_a_setting_without_a_unit_is_refused_with_both_readings(elevon_cli):
 
 
 def test_every_change_is_said_on_stderr(elevon_cli):
-    changes = ("motor.inertia=8 kg m2", "friction.dynamic=0.6", "drive.kind=pwm", "play.total=0")
+    changes = (
+        "motor.inertia=8 kg m2",
+        "friction.dynamic=0.6",
+        "drive.kind=pwm",
+        "backlash.total=0",
+    )
     settings = [part for change in changes for part in ("--set", change)]
     result = elevon_cli("show", "torino-rotary", *settings, "--json")
     assert json.loads(result.out)["name"] == "torino-rotary"
@@ -27,7 +32,7 @@ def test_every_change_is_said_on_stderr(elevon_cli):
     assert "motor.inertia 7.7 -> 80000 kg cm2, x 10390" in lines
     assert "friction.dynamic 0.3 -> 0.6 N m, x 2" in lines
     assert "drive.kind hysteresis -> pwm" in lines
-    assert "play.total 0.365568 -> 0 deg, x 0" in lines
+    assert "backlash.total 0.365568 -> 0 deg, x 0" in lines
 
 
 def test_what_is_not_changed_is_not_said(elevon_cli):
@@ -47,7 +52,7 @@ def test_in_python_a_number_is_si_and_a_text_has_a_unit():
 REFUSED = {
     "amplitude": ("[[command.terms]]\nkind = 'sine'\namplitude = 7\nfrequency = 1",
                   ["scenario.toml:4", "'7 deg'", "'7 rad'", "'7 mm'"]),
-    "phase": ("[[load.user.terms]]\nkind = 'sine'\namplitude = 7\nfrequency = 1\nphase = 90",
+    "phase": ("[[load.output.terms]]\nkind = 'sine'\namplitude = 7\nfrequency = 1\nphase = 90",
               ["phase", "'90 deg'", "'90 rad'"]),
     "speed": ("[command]\nmode = 'speed'\n[[command.terms]]\nkind = 'constant'\nvalue = 5",
               ["'5 rpm'", "'5 rad/s'"]),
@@ -55,8 +60,8 @@ REFUSED = {
     "points": ("[[command.terms]]\nkind = 'table'\ntimes = [0, 1]\nvalues = [0, 7]",
                ["values: 7", "'7 deg'"]),
     "temperature": ("[initial]\nwinding_temperature = 20", ["'20 degC'", "'20 K'"]),
-    "all at once": ("[initial]\nuser_position = 1\nwinding_temperature = 20",
-                    ["initial.user_position", "initial.winding_temperature"]),
+    "all at once": ("[initial]\noutput_position = 1\nwinding_temperature = 20",
+                    ["initial.output_position", "initial.winding_temperature"]),
 }  # fmt: skip
 
 
@@ -74,7 +79,8 @@ def test_what_is_the_same_in_every_unit_needs_none(tmp_path):
     path = tmp_path / "scenario.toml"
     path.write_text(
         "duration = 2\n[[command.terms]]\nkind = 'step'\ninitial = 0\nfinal = '7 deg'\ntime = 1\n"
-        "[[load.user.terms]]\nkind = 'constant'\nvalue = 50\n[parameters]\nfriction.dynamic = 0.4\n"
+        "[[load.output.terms]]\nkind = 'constant'\nvalue = 50\n"
+        "[parameters]\nfriction.dynamic = 0.4\n"
     )
     scenario = Scenario.load(path)
     changed = ACTUATOR.with_values(scenario.parameters)

@@ -30,7 +30,9 @@ LINES = {
     "elevon simulate torino-rotary --set drive.kind=hyst": "drive.kind=hysteresis",
     "elevon simulate torino-rotary --fault shorted": "shorted_switch@",
     "elevon simulate torino-rotary --fault demagnetisation@": "demagnetisation@motor",
-    "elevon simulate torino-rotary --record user_position,motor_sp": "user_position,motor_speed",
+    "elevon simulate torino-rotary --record output_position,motor_sp": (
+        "output_position,motor_speed"
+    ),
     "elevon simulate torino-rotary --scenario my_sc": "my_scenario.toml",
     "elevon calibrate --actuator nasa-b": "nasa-ballscrew",
 }

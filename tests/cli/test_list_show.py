@@ -114,7 +114,7 @@ def test_the_faults_of_an_actuator_are_its_own(elevon_cli):
     for first, second in (
         ("jam", "return_jam"),
         ("lubrication", "lubrication_loss"),
-        ("play", "adapter_gap"),
+        ("backlash", "adapter_gap"),
     ):
         assert f"`{second}`" in kinds[first]["effect"]
         assert f"`{first}`" in kinds[second]["effect"]
@@ -138,18 +138,18 @@ def test_places_that_nothing_reads_are_not_listed(elevon_cli):
 
 @pytest.mark.parametrize("what", ["faults", "parameters"])
 def test_what_a_fidelity_carries_and_declines_are_the_whole(elevon_cli, what):
-    """Split by --fidelity and --declined, nothing is lost; every refusal has its reason."""
+    """Split by --fidelity and --not-modelled, nothing is lost; every refusal has its reason."""
     whole = elevon_cli("list", what, "torino-rotary", "--json").json[what]
     asked = ("list", what, "torino-rotary", "--fidelity", "low")
     carried = elevon_cli(*asked, "--json").json[what]
-    declined = elevon_cli(*asked, "--declined", "--json").json[what]
+    not_modelled = elevon_cli(*asked, "--not-modelled", "--json").json[what]
     assert carried
-    assert declined
+    assert not_modelled
     assert all("low" in row["fidelities"] for row in carried)
-    assert all(row["declined"]["low"] for row in declined)
-    assert len(carried) + len(declined) == len(whole)
-    reason = declined[0]["declined"]["low"]
-    assert reason in elevon_cli(*asked, "--declined").out
+    assert all(row["not_modelled"]["low"] for row in not_modelled)
+    assert len(carried) + len(not_modelled) == len(whole)
+    reason = not_modelled[0]["not_modelled"]["low"]
+    assert reason in elevon_cli(*asked, "--not-modelled").out
 
 
 def test_faults_say_under_which_drives_they_act(elevon_cli):
@@ -160,7 +160,7 @@ def test_faults_say_under_which_drives_they_act(elevon_cli):
     assert {"hysteresis", "pwm"} <= set(kinds["short"]["drives"]["low"])
     idle = kinds["open_switch"]["resting"]
     assert {row["fidelity"] for row in idle} == {"low"}
-    assert all(row["reason"] == kinds["open_switch"]["declined"]["low"] for row in idle)
+    assert all(row["reason"] == kinds["open_switch"]["not_modelled"]["low"] for row in idle)
     assert "high (hysteresis pwm" in elevon_cli("list", "faults", "torino-rotary").out
 
 
@@ -168,8 +168,8 @@ def test_show_says_where_parameters_act(elevon_cli):
     """With which choice, at which fidelity and why not at the other."""
     text = elevon_cli("show", "torino-rotary").out
     assert "drive.kind = pwm" in text
-    asked = ("show", "torino-rotary", "--fidelity", "low", "--declined")
+    asked = ("show", "torino-rotary", "--fidelity", "low", "--not-modelled")
     rows = elevon_cli(*asked, "--json").json["parameters"]
     assert "solver.step" in [row["path"] for row in rows]
-    assert all(row["declined"]["low"] in elevon_cli(*asked).out for row in rows[:1])
+    assert all(row["not_modelled"]["low"] in elevon_cli(*asked).out for row in rows[:1])
     assert elevon_cli("show", "torino-rotary", "--fidelity", "lo").code == 2

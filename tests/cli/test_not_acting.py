@@ -87,19 +87,19 @@ def test_lists_say_where_it_acts(elevon_cli):
         for row in elevon_cli("list", "parameters", "torino-rotary", "--json").json["parameters"]
     }
     assert rows["solver.step"]["fidelities"] == ["high"]
-    assert rows["solver.step"]["declined"]["low"] in elevon_cli("show", "torino-rotary").out
+    assert rows["solver.step"]["not_modelled"]["low"] in elevon_cli("show", "torino-rotary").out
     assert rows["pwm.frequency"]["when"] == [
         "drive.kind = pwm",
         "inverter.dead_time away from 0 (fidelity low)",
     ]
     faults = elevon_cli("list", "faults", "torino-rotary")
-    declined = [
+    not_modelled = [
         row
         for row in elevon_cli("list", "faults", "torino-rotary", "--json").json["faults"]
-        if row["declined"]
+        if row["not_modelled"]
     ]
-    assert declined
-    assert all(row["declined"]["low"] in faults.out for row in declined)
+    assert not_modelled
+    assert all(row["not_modelled"]["low"] in faults.out for row in not_modelled)
 
 
 def test_a_comparison_names_what_neither_model_carries(elevon_cli, tmp_path):

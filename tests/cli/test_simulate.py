@@ -21,14 +21,14 @@ def test_json_contract(elevon_cli):
     assert data["steps"] == 20000
     assert data["wall_s"] > 0.0
     assert data["ns_per_step"] == pytest.approx(1e9 * data["wall_s"] / data["steps"])
-    assert set(data["final"]) >= {"user_position", "motor_speed", "current_a"}
+    assert set(data["final"]) >= {"output_position", "motor_speed", "current_a"}
     assert data["out"] is None
 
 
 def test_a_table_for_the_reader(elevon_cli):
     out = elevon_cli(*RUN).out
     assert "torino-rotary, high fidelity: ok" in out
-    assert "user_position" in out
+    assert "output_position" in out
 
 
 GEAR = ("simulate", "pisa-landing-gear", "--fidelity", "low")
@@ -42,7 +42,7 @@ def test_a_gear_shows_states_by_name_and_a_timeline(elevon_cli):
     last = {line.split()[0]: line.split() for line in out.splitlines() if line.strip()}
     assert last["state"][-1] == "locked"
     assert last["fault_code"][-1] == "none"
-    assert last["user_position"][1] == "mm"
+    assert last["output_position"][1] == "mm"
     assert {"brake_released", "current_mean", "motor_speed", "supply_voltage"} <= set(last)
 
 
@@ -57,7 +57,7 @@ def test_out(elevon_cli, tmp_path, ending):
     out = tmp_path / f"run{ending}"
     data = elevon_cli(*RUN, "--out", out, "--json").json
     assert data["out"] == str(out)
-    assert elevon.Recording.load(out).final["user_position"] == data["final"]["user_position"]
+    assert elevon.Recording.load(out).final["output_position"] == data["final"]["output_position"]
 
 
 def test_csv_of_several_clocks_is_checked_before_simulating(elevon_cli, tmp_path, monkeypatch):
@@ -87,7 +87,7 @@ def test_seed_and_everything_else_reach_the_run(elevon_cli, tmp_path):
     arguments = (
         "--scenario", scenario, "--set", "motor.inertia=9 kg cm2", "--set", "drive.kind=pwm",
         "--set", "control.noise_deviation=1e-5 rad", "--fault", "short@motor.phase_a=10 %",
-        "--fidelity", "high", "--record", "user_position@100 Hz", "--record", "current_a@every",
+        "--fidelity", "high", "--record", "output_position@100 Hz", "--record", "current_a@every",
     )  # fmt: skip
     first, same, other = (
         elevon_cli(*RUN, *arguments, "--seed", seed, "--json").json for seed in (1, 1, 2)
@@ -116,18 +116,21 @@ BAD = {
     "step and electrical pole": ((*RUN, "--set", "solver.step=20 ms"), "electrical pole"),
     "step and filter": ((*RUN, "--set", "solver.step=20 us"), "derivative filter"),
     "step and contact": (
-        (*RUN, "--set", "play.model=elastic", "--set", "play.stiffness=1e12"),
-        "play.stiffness",
+        (*RUN, "--set", "backlash.model=elastic", "--set", "backlash.stiffness=1e12"),
+        "backlash.stiffness",
     ),
     "no value": ((*RUN, "--set", "motor.inertia"), "PATH=VALUE"),
     "twice": ((*RUN, "--set", "gear.ratio=1", "--set", "gear.ratio=2"), "given twice"),
-    "unknown signal": ((*RUN, "--record", "user_positon@400 Hz"), "did you mean 'user_position'"),
-    "no rate": ((*RUN, "--record", "user_position"), "SIGNALS@RATE"),
-    "zero rate": ((*RUN, "--record", "user_position@0 Hz"), "must be positive"),
-    "unit of the rate": ((*RUN, "--record", "user_position@400 rad/s"), "expected a frequency"),
-    "rate that does not divide": ((*RUN, "--record", "user_position@300 Hz"), "nearest: 299.94"),
+    "unknown signal": (
+        (*RUN, "--record", "output_positon@400 Hz"),
+        "did you mean 'output_position'",
+    ),
+    "no rate": ((*RUN, "--record", "output_position"), "SIGNALS@RATE"),
+    "zero rate": ((*RUN, "--record", "output_position@0 Hz"), "must be positive"),
+    "unit of the rate": ((*RUN, "--record", "output_position@400 rad/s"), "expected a frequency"),
+    "rate that does not divide": ((*RUN, "--record", "output_position@300 Hz"), "nearest: 299.94"),
     "two rates": (
-        (*RUN, "--record", "user_position@400 Hz", "--record", "user_position@100 Hz"),
+        (*RUN, "--record", "output_position@400 Hz", "--record", "output_position@100 Hz"),
         "asked for twice",
     ),
     "too much": (

@@ -18,7 +18,7 @@ import numpy as np
 import elevon
 from elevon.errors import ElevonWarning
 from elevon.parameters import records
-from tests.contract import sets
+from tests.contract import shipped
 from tests.contract.cells import Cell, Choices, Variant, fault, severe
 
 #: Agreement in sign and within this factor ...
@@ -34,7 +34,7 @@ BESIDE = 0.05
 ALIKE = 1e-4
 
 #: Mechanical signals, torque, and the current that makes it (of a servo, of a landing gear).
-SIGNALS = ("user_position", "motor_speed", "motor_torque", "current_q", "current_mean")
+SIGNALS = ("output_position", "motor_speed", "motor_torque", "current_q", "current_mean")
 #: Window of the means, s, and the time between two readings, s: no carrier's period is a multiple.
 BAND, READ = 1e-3, 23e-6
 #: Runs in one batch: what they keep stays under a few hundred megabytes.
@@ -60,7 +60,7 @@ def shown(cell: Cell, variants: Sequence[Variant], duration: float | None = None
 
 
 def _batch(cell: Cell, variants: Sequence[Variant], duration: float | None) -> list[Shown]:
-    signals = set(SIGNALS) & set(sets.signals(cell.name, cell.fidelity))
+    signals = set(SIGNALS) & set(shipped.signals(cell.name, cell.fidelity))
     runs = [cell.of(variant, duration) for variant in variants]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ElevonWarning)
@@ -221,7 +221,7 @@ def _floors(cell: Cell, healthy: Shown) -> dict[str, float]:
 
 def _shared(name: str) -> Choices:
     """Choices that the low model declines, at their defaults: both then have the same model."""
-    actuator = sets.actuator(name)
+    actuator = shipped.actuator(name)
     return tuple(
         (path, record.choices[int(record.default)])
         for path, record in records(actuator.wiring).items()

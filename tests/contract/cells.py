@@ -20,7 +20,7 @@ import elevon
 from elevon.errors import ElevonWarning, NotActingWarning
 from elevon.parameters import records
 from elevon.simulate.prepare import prepare
-from tests.contract import sets
+from tests.contract import shipped
 
 Values = Mapping[str, Any]
 #: Parameters that are choices, and what is chosen.
@@ -82,7 +82,7 @@ class Cell:
 
     def actuator(self, values: Values | None = None) -> Any:
         """The actuator of this cell with some values changed."""
-        chosen = sets.actuator(self.name).with_values(dict(self.choices), asked=False)
+        chosen = shipped.actuator(self.name).with_values(dict(self.choices), asked=False)
         return chosen.with_values(values or {})
 
     def scenario(
@@ -95,13 +95,13 @@ class Cell:
 
         What the motion itself sets of the parameters `given` gives way to theirs.
         """
-        data = sets.onwards(self.name) if self.onwards else sets.motion(self.name)
+        data = shipped.onwards(self.name) if self.onwards else shipped.motion(self.name)
         if self.whole:
-            data = sets.default(self.name, self.whole)
+            data = shipped.default(self.name, self.whole)
         own = data.get("parameters", {})
         data["parameters"] = {path: value for path, value in own.items() if path not in given}
         if self.load:
-            data["load"] = {"user": {"terms": [{"kind": "constant", "value": self.load}]}}
+            data["load"] = {"output": {"terms": [{"kind": "constant", "value": self.load}]}}
         if duration is not None:
             data["duration"] = duration
         return elevon.Scenario.from_dict({**data, "fault": list(faults)})
@@ -138,7 +138,9 @@ class Cell:
 
     def faults(self) -> list[tuple[str, str, dict[str, Any]]]:
         """Kind, place and record of every fault that this fidelity carries."""
-        return [item for item in sets.places(self.name) if self.fidelity in item[2]["fidelities"]]
+        return [
+            item for item in shipped.places(self.name) if self.fidelity in item[2]["fidelities"]
+        ]
 
 
 def _outcome(recording: Any) -> Outcome:
@@ -177,7 +179,7 @@ def drives(name: str) -> list[Choices]:
 
     A choice under which the set does not move (no drive) can show no fault.
     """
-    actuator = sets.actuator(name)
+    actuator = shipped.actuator(name)
     others = [
         ((path, choice),)
         for path, record in records(actuator.wiring).items()
@@ -193,7 +195,7 @@ def _moves(name: str, choices: Choices) -> bool:
         cell = Cell(name, "low", chosen)
         if cell.refused(Variant()):
             return False
-        ways.append(float(np.ptp(cell.run([Variant()])[0].signals["user_position"])))
+        ways.append(float(np.ptp(cell.run([Variant()])[0].signals["output_position"])))
     return ways[1] > 0.5 * ways[0]
 
 
@@ -210,7 +212,7 @@ def load(name: str) -> float:
     for force in loads:
         cell = Cell(name, "low", load=force)
         outcome = cell.run([Variant()])[0]
-        way = outcome.signals["user_position"]
+        way = outcome.signals["output_position"]
         ways[force] = np.max(np.abs(way - way[0])) if outcome.status == "ok" else 0.0
     felt = [
         force

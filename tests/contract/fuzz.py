@@ -15,7 +15,7 @@ import numpy as np
 import elevon
 from elevon import _core
 from elevon.simulate.prepare import prepare_named, solver_step
-from tests.contract import sets
+from tests.contract import shipped
 
 #: Steps of a run: enough for control ticks, fault edges and several samples.
 STEPS = 1200
@@ -35,7 +35,7 @@ def loaded(name: str) -> elevon.Actuator:
 @cache
 def takes_actions(name: str) -> bool:
     """Is the actuator commanded by actions?"""
-    return sets.takes_actions(name)
+    return shipped.takes_actions(name)
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Case:
 def default_command(name: str) -> dict[str, Any]:
     """Something that moves from the start on."""
     if takes_actions(name):
-        return {"mode": "gear", "steps": [sets.step(0.0, "extend")]}
+        return {"mode": "gear", "steps": [shipped.step(0.0, "extend")]}
     return {"mode": "position", "terms": [{"kind": "step", "final": 0.02}]}
 
 
@@ -202,7 +202,7 @@ def mixed_cases(count: int, seed: int) -> Iterator[Case]:
     """Several parameters and a fault at once, drawn within their ranges where these are finite."""
     draw = np.random.default_rng(seed)
     known = {pair: _core.parameters(loaded(pair[0]).wiring) for pair in actuators()}
-    broken = {pair: sets.places(pair[0]) for pair in actuators()}
+    broken = {pair: shipped.places(pair[0]) for pair in actuators()}
     pairs = list(known)
     for _ in range(count):
         pair = pairs[draw.integers(len(pairs))]
@@ -225,4 +225,4 @@ def drawn(record: dict[str, Any], name: str, draw: np.random.Generator) -> Any:
 
 def actuators() -> list[tuple[str, str]]:
     """Every shipped set in each of its fidelities."""
-    return [(name, fidelity) for name in sets.names() for fidelity in sets.fidelities(name)]
+    return [(name, fidelity) for name in shipped.names() for fidelity in shipped.fidelities(name)]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tests.contract import sets
+from tests.contract import shipped
 from tests.contract.cells import Cell, Outcome, Variant, drives, fault, load, severe
 
 #: Parts of the severe severity: none, a trace, two away from whole counts so that rounding shows,
@@ -29,8 +29,8 @@ def cells(*, every: bool) -> list[Cell]:
     """One drive and no load; or every drive, each with no load, an opposing and an aiding one."""
     return [
         Cell(name, fidelity, choices, push)
-        for name in sets.names()
-        for fidelity in sets.fidelities(name)
+        for name in shipped.names()
+        for fidelity in shipped.fidelities(name)
         for choices in (drives(name) if every else [()])
         for push in ((0.0, load(name), -load(name)) if every else (0.0,))
     ]
@@ -139,7 +139,9 @@ def _labels(row: Row) -> Iterator[str]:
         names = f"{row.variants[i].name} and {row.variants[j].name.rpartition('=')[2]}"
         if acting and not labelled:
             yield f"{names}: act differently under one label, {one.severity[-1]:g}"
-        full = not one.differs(row.outcomes[-1])  # more does no more: the way is all in the play
+        full = not one.differs(
+            row.outcomes[-1]
+        )  # more does no more: the way is all in the backlash
         # A gap that closes without touching yet is there, though nothing feels it.
         unfelt = not row.counts and not other.differs(row.outcomes[0])
         if labelled and not acting and not row.rests and not full and not unfelt:
@@ -198,8 +200,8 @@ def _pairs(
 
 
 def _distance(outcome: Outcome, healthy: Outcome) -> float:
-    """Largest distance of the user's way from the healthy one late in a run, of its range."""
-    way, right = outcome.signals["user_position"], healthy.signals["user_position"]
+    """Largest distance of the output's way from the healthy one late in a run, of its range."""
+    way, right = outcome.signals["output_position"], healthy.signals["output_position"]
     late = healthy.time > LOOKED * healthy.time[-1]
     return float(np.max(np.abs(way - right)[late])) / max(float(np.ptp(right)), 1e-12)
 
@@ -207,7 +209,7 @@ def _distance(outcome: Outcome, healthy: Outcome) -> float:
 def recovery(cell: Cell, outcome: Outcome, healthy: Outcome) -> float:
     """The time in which a servo forgets a fault, s: back at its speed limit, then its slowest pole.
 
-    T = d / v + ln(d / d_end) / sigma with the largest distance d of the run, the user's speed limit
+    T = d / v + ln(d / d_end) / sigma with the largest distance d of the run, the output speed limit
     v, and the slowest pole sigma of the position loop (G) around the speed PID,
     J' s^3 + K_p s^2 + (K_p G + K_i) s + K_i G, J' = J + K_p T_d.
     """
@@ -220,9 +222,9 @@ def recovery(cell: Cell, outcome: Outcome, healthy: Outcome) -> float:
     inertia = value("motor.inertia") + gain * value("control.derivative_time")
     poles = np.roots([inertia, gain, gain * position + integral, integral * position])
     slowest = min(-pole.real for pole in poles if pole != 0.0)
-    way, right = outcome.signals["user_position"], healthy.signals["user_position"]
+    way, right = outcome.signals["output_position"], healthy.signals["output_position"]
     moving = np.max(np.abs(outcome.signals["motor_speed"]))
-    ratio = moving / np.max(np.abs(outcome.signals["user_speed"]))
+    ratio = moving / np.max(np.abs(outcome.signals["output_speed"]))
     largest = float(np.max(np.abs(way - right)))
     back = largest * ratio / value("control.speed_limit")
     return float(back + np.log(largest / (FORGOTTEN * np.ptp(right))) / slowest)

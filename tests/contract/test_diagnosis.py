@@ -16,22 +16,22 @@ from elevon.diagnose.bymodel.candidates import CANDIDATES
 from elevon.diagnose.byroles.candidates import candidates_of, counted_of, switched_of
 from elevon.diagnose.standard import Day, StandardTest, day_logs, diagnosed, standard_tests
 from elevon.units import parse_quantity
-from tests.contract import sets
+from tests.contract import shipped
 
-TESTED = [name for name in sets.names() if standard_tests(sets.actuator(name))]
+TESTED = [name for name in shipped.names() if standard_tests(shipped.actuator(name))]
 #: Severities, of the largest that is considered.
 PARTS = (1.0, 0.25, 0.0625)
 
 
 def every(count: int | None, name: str) -> list[Any]:
     """Faults that the low model has, or some of them, spread over the catalogue."""
-    known = candidates_of(sets.actuator(name))
+    known = candidates_of(shipped.actuator(name))
     return list(known if count is None else known[:: max(1, len(known) // count)][:count])
 
 
 def severities(name: str, fault: Any, parts: tuple[float, ...]) -> tuple[float, ...]:
     """What is there or not is there; the rest at parts of the largest."""
-    actuator = sets.actuator(name)
+    actuator = shipped.actuator(name)
     there = fault.kind in counted_of(actuator) | switched_of(actuator)
     return (1.0,) if there else tuple(part * fault.high for part in parts)
 
@@ -40,7 +40,7 @@ def missed(
     name: str, test: StandardTest, faults: list[Any], parts: tuple[float, ...], limited: bool
 ) -> list[str]:
     """Faults that are neither named, nor among equivalents, nor said to be unseen with a reason."""
-    actuator = sets.actuator(name)
+    actuator = shipped.actuator(name)
     asked = [f.key for f in faults] if limited else None
     wanted = [(f, s) for f in faults for s in severities(name, f, parts)]
     days = [Day((f.text(s),), 10 + k) for k, (f, s) in enumerate(wanted)]
@@ -71,7 +71,7 @@ def halved(test: StandardTest) -> StandardTest:
 @pytest.mark.parametrize("name", TESTED)
 def test_some_faults_are_found_or_said_to_be_unseen(name: str) -> None:
     """The largest severity of a few faults of the catalogue, in half of one test."""
-    test = halved(standard_tests(sets.actuator(name))[0])
+    test = halved(standard_tests(shipped.actuator(name))[0])
     able = [fault for fault in every(None, name) if weighed(name, fault.key)]
     few = able[:: max(1, len(able) // 3)][:3]
     assert missed(name, test, few, PARTS[:1], limited=True) == []
@@ -79,7 +79,7 @@ def test_some_faults_are_found_or_said_to_be_unseen(name: str) -> None:
 
 def weighed(name: str, key: str) -> bool:
     """Whether a fault is a candidate of an actuator's diagnosis; the long test asks for all."""
-    by_model = stand_of(sets.actuator(name).wiring).equipment == "rotary"
+    by_model = stand_of(shipped.actuator(name).wiring).equipment == "rotary"
     return not by_model or key in {c.key for c in CANDIDATES}
 
 
@@ -89,7 +89,7 @@ def weighed(name: str, key: str) -> bool:
     [
         pytest.param(name, test, id=f"{name}-{test.name}")
         for name in TESTED
-        for test in standard_tests(sets.actuator(name))
+        for test in standard_tests(shipped.actuator(name))
     ],
 )
 def test_every_fault_at_three_severities(name: str, test: StandardTest) -> None:
@@ -101,7 +101,7 @@ def test_every_fault_at_three_severities(name: str, test: StandardTest) -> None:
 @pytest.mark.parametrize("name", TESTED)
 def test_every_fault_of_the_catalogue_is_weighed_or_said_to_be_unseen(name: str) -> None:
     """What the healthy log's answer says covers the catalogue, each with a limit or a reason."""
-    actuator = sets.actuator(name)
+    actuator = shipped.actuator(name)
     test = standard_tests(actuator)[0]
     baseline, log = day_logs(actuator, test, [Day((), 1), Day((), 2)])
     answer = diagnosed(actuator, log, [baseline])

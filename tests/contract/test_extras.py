@@ -93,8 +93,8 @@ def test_a_command_whose_extra_is_missing_says_which(tmp_path, monkeypatch, caps
 
 def _recording():
     time = np.arange(50) / 100
-    values = {"user_position": np.sin(time) / 3.0, "force": np.where(time > 0.2, np.nan, 1e300)}
-    return Recording.build(time, values, {"user_position": "rad", "force": "N"})
+    values = {"output_position": np.sin(time) / 3.0, "force": np.where(time > 0.2, np.nan, 1e300)}
+    return Recording.build(time, values, {"output_position": "rad", "force": "N"})
 
 
 @pytest.mark.parametrize("writes", [True, False])

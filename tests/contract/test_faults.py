@@ -11,7 +11,7 @@ import math
 import pytest
 
 import elevon
-from tests.contract import sets
+from tests.contract import shipped
 from tests.contract.cells import Cell, fault
 from tests.contract.matrix import FEW, PARTS, cells, lasting, of_one_drive, silent, wrong
 
@@ -27,7 +27,7 @@ def test_severity_zero_is_healthy_and_a_severe_fault_is_not(cell: Cell) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", sets.names())
+@pytest.mark.parametrize("name", shipped.names())
 def test_every_drive_and_load_at_every_severity(name: str) -> None:
     """Every choice of a drive under which the set moves; without a load, against one, with one."""
     mine = [cell for cell in cells(every=True) if cell.name == name]
@@ -47,13 +47,13 @@ def test_a_cleared_fault_is_forgotten(cell: Cell) -> None:
     assert list(lasting(cell)) == []
 
 
-@pytest.mark.parametrize("name", sets.names())
+@pytest.mark.parametrize("name", shipped.names())
 def test_severity_out_of_range_is_refused_by_name(name: str) -> None:
     """Above the maximum (if there is one), below the minimum, and NaN."""
-    for kind, place, record in sets.places(name):
+    for kind, place, record in shipped.places(name):
         ends = (record["maximum"] + 1.0, record["minimum"] - 1.0)
         for severity in (math.nan, *(end for end in ends if math.isfinite(end))):
-            scenario = sets.scenario(name, dict(fault(kind, place, record, severity)))
+            scenario = shipped.scenario(name, dict(fault(kind, place, record, severity)))
             with pytest.raises(elevon.InputError) as caught:
-                elevon.simulate(sets.actuator(name), scenario)
+                elevon.simulate(shipped.actuator(name), scenario)
             assert kind in str(caught.value) or "severity" in str(caught.value)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.contract import sets
+from tests.contract import shipped
 from tests.contract.agreement import apart
 from tests.contract.cells import Choices, drives, load
 
@@ -13,7 +13,7 @@ PUSHES = {"no_load": 0.0, "opposing": 1.0, "aiding": -1.0}
 
 @pytest.mark.long
 @pytest.mark.parametrize("push", PUSHES.values(), ids=PUSHES)
-@pytest.mark.parametrize("name", sets.names())
+@pytest.mark.parametrize("name", shipped.names())
 def test_both_models_agree_on_every_fault_that_both_carry(name: str, push: float) -> None:
     """In every drive, in sign and within a factor of 1.5 on the features they share."""
     parted = {

@@ -10,11 +10,11 @@ import pytest
 
 from elevon import _core
 from elevon.parameters import records
-from tests.contract import sets
+from tests.contract import shipped
 from tests.contract.acting import changed, claims, says, shows, variants
 from tests.contract.cells import Cell, Variant, fault, load
 
-CASES = [(name, fidelity) for name in sets.names() for fidelity in sets.fidelities(name)]
+CASES = [(name, fidelity) for name in shipped.names() for fidelity in shipped.fidelities(name)]
 EVERY = pytest.mark.parametrize(("name", "fidelity"), CASES)
 #: The longest motion at high fidelity takes ten seconds: only in the long run.
 SHORT = pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def false(name: str, fidelity: str, count: int | None) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("name", sets.names())
+@pytest.mark.parametrize("name", shipped.names())
 def test_what_is_said_not_to_act_changes_no_bit_of_the_low_model(name: str) -> None:
     """One other value of each."""
     assert false(name, "low", 1) == []
@@ -97,4 +97,4 @@ def test_what_is_said_not_to_act_changes_no_bit_at_any_value(name: str, fidelity
 @EVERY
 def test_every_parameter_shows_or_is_said_not_to_act(name: str, fidelity: str) -> None:
     """All of them."""
-    assert idle(name, fidelity, list(records(sets.actuator(name).wiring))) == []
+    assert idle(name, fidelity, list(records(shipped.actuator(name).wiring))) == []

@@ -1,4 +1,4 @@
-"""Every wiring says which of its signals play which role: whoever reads logs asks for roles."""
+"""Every wiring says which of its signals backlash which role: whoever reads logs asks for roles."""
 
 import pytest
 
@@ -22,7 +22,7 @@ def test_roles_are_named_once_in_units_of_the_si():
 
 
 @pytest.mark.parametrize(("wiring", "fidelity"), WIRINGS)
-def test_every_wiring_plays_the_roles_of_a_drives_log(wiring, fidelity):
+def test_every_wiring_has_the_roles_of_a_drives_log(wiring, fidelity):
     signals = _core.signals(wiring, fidelity)
     played = {signal["role"] for signal in signals if signal["role"]}
     assert played <= ROLES.keys()
@@ -36,4 +36,4 @@ def test_features_are_made_of_the_same_roles():
     assert set(FEATURE_ROLES) <= ROLES.keys()
     for role in FEATURE_ROLES:
         assert players(role), role
-    assert players("output_position") == ("encoder_position", "user_position")
+    assert players("output_position") == ("encoder_position", "output_position")

@@ -34,21 +34,21 @@ def test_the_unit_differs_from_the_published_one_and_from_day_to_day(base):
 
 def test_faults_follow_the_life():
     assert faults_at(life(), 0.0) == []
-    play, friction = faults_at(life(), 2000.0)
-    assert (play.kind, float(play.severity)) == ("play", pytest.approx(0.01))
+    backlash, friction = faults_at(life(), 2000.0)
+    assert (backlash.kind, float(backlash.severity)) == ("backlash", pytest.approx(0.01))
     assert (friction.kind, float(friction.severity)) == ("friction", pytest.approx(0.5))
     assert [law.key for law in demo_mission().laws()] == [
-        f"{f.kind}@{f.place}" for f in (play, friction)
+        f"{f.kind}@{f.place}" for f in (backlash, friction)
     ]
 
 
 def test_the_picture_moves_with_the_simulated_motion(base):
     demo = SimpleNamespace(hidden=hidden_unit(base, 0), life=life())
     new, worn = motion(demo, 0.0), motion(demo, 3000.0)
-    assert np.ptp(new.user) == pytest.approx(14.0, rel=0.1)
-    gaps = [float(np.ptp(m.driver - m.user)) for m in (new, worn)]
-    assert gaps == pytest.approx([new.play, worn.play], rel=0.1)
-    assert worn.play - new.play == pytest.approx(np.degrees(0.015))
+    assert np.ptp(new.output) == pytest.approx(14.0, rel=0.1)
+    gaps = [float(np.ptp(m.driver - m.output)) for m in (new, worn)]
+    assert gaps == pytest.approx([new.backlash, worn.backlash], rel=0.1)
+    assert worn.backlash - new.backlash == pytest.approx(np.degrees(0.015))
     markup = str(mechanism([("new", new), ("<worn>", worn)]))
     assert markup.count("<animateTransform") == 6
     assert "&lt;worn&gt;" in markup

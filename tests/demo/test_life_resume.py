@@ -18,7 +18,7 @@ from elevon.prognose.life import Life
 from elevon.prognose.requirement import Requirement
 from elevon.report import Report
 
-KEY = "play@transmission"
+KEY = "backlash@transmission"
 
 
 def tables():
@@ -26,12 +26,12 @@ def tables():
     grid = Grid(tuple(np.array([0.0, law.highest]) for law in laws))
     names = dict.fromkeys(name for law in laws for name in law.drivers)
     drivers = {name: np.full(4, 30000.0 if name == "friction_work" else 300.0) for name in names}
-    asked = (Requirement(name="play", measure="severity", fault=KEY, limit=0.015),)
+    asked = (Requirement(name="backlash", measure="severity", fault=KEY, limit=0.015),)
     return Response(laws, asked, (0.015,), ("rad",), grid, drivers, np.zeros((4, 1)), 4, "low")
 
 
 class Answer(SimpleNamespace):
-    """A diagnosis of a play."""
+    """A diagnosis of a backlash."""
 
     def __init__(self, severity):
         super().__init__(
@@ -44,7 +44,7 @@ class Answer(SimpleNamespace):
         )
 
     def to_dict(self):
-        cause = {"kind": "play", "place": "transmission", "unit": "rad", "probability": 0.9,
+        cause = {"kind": "backlash", "place": "transmission", "unit": "rad", "probability": 0.9,
                  "severity": self.severity, "interval": [0.9 * self.severity, 1.1 * self.severity],
                  "equivalents": []}  # fmt: skip
         return {"status": "faulty", "faults": [cause], "best": {"faults": [KEY]}, "detectable": {}}
@@ -98,7 +98,7 @@ class Story:
 
     def calibrate(self, _logs, base, **_options):
         self.step("calibration")()
-        return Recovered(base.with_values({"play.total": 0.001}, source="calibration"), (), ())
+        return Recovered(base.with_values({"backlash.total": 0.001}, source="calibration"), (), ())
 
     def write(self, path, _result, *, force):
         assert force

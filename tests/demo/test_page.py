@@ -25,13 +25,13 @@ def row(path, unit, before, truth, value, half):
 
 
 ROWS = [
-    row("play.total", "rad", 0.00638, 0.0116009, 0.0116057, 1.4e-5),
+    row("backlash.total", "rad", 0.00638, 0.0116009, 0.0116057, 1.4e-5),
     row("sensor.encoder.offset", "rad", 0.0, -0.0014901, -0.0014893, 4e-5),
     row("sensor.encoder.gain", "1", 1.0, 1.0, 0.9999986, 3.3e-6),
     row("derived.inertia", "kg m2", None, 0.00268796, 0.00267851, 1.3e-5),
     row("friction.viscous", "N m s/rad", 0.00334, 0.0038954, 0.0039013, 1e-6),
 ]
-NOTES = {"derived.inertia": "all inertia on the fast shaft"}
+NOTES = {"derived.inertia": "all inertia on the motor shaft"}
 
 
 @pytest.fixture(scope="module")
@@ -62,9 +62,9 @@ def test_values_stand_in_the_units_of_the_set_with_the_digits_of_their_interval(
     table, cells, texts, points = section(demo, ROWS)
     space = "\N{NO-BREAK SPACE}"
     assert all(len(line) == len(table.columns) for line in table.rows)
-    play = cells["play.total"]
-    assert play[0] == f"play.total{space}[deg]"
-    assert play[1:6] == [
+    backlash = cells["backlash.total"]
+    assert backlash[0] == f"backlash.total{space}[deg]"
+    assert backlash[1:6] == [
         "0.3655", "0.6647", "0.6650", f"0.6642{space}to{space}0.6658", f"+0.04{space}%",
     ]  # fmt: skip
     assert cells["derived.inertia"][0].endswith(f"[kg{space}cm2]")
@@ -75,7 +75,7 @@ def test_values_stand_in_the_units_of_the_set_with_the_digits_of_their_interval(
         assert low != high
         assert "-" not in line[4]
         assert " " not in "".join(line)
-    assert points == ["derived.inertia: all inertia on the fast shaft", "a finding"]
+    assert points == ["derived.inertia: all inertia on the motor shaft", "a finding"]
     assert "4 of 5 are inside" in texts[0]
     assert "bias" in texts[0]
     assert "bias" not in section(demo, [ROWS[0]])[2][0]
@@ -86,7 +86,7 @@ def test_nothing_of_the_errors_is_outside_the_figure(demo):
     axes = errors_figure(shown).axes[0]
     low, high = axes.get_xlim()
     values = [x for line in axes.lines for x in np.atleast_1d(line.get_xdata())]
-    assert low < min(values) < -40.0  # the published play
+    assert low < min(values) < -40.0  # the published backlash
     assert max(values) < high
     labels = [text.get_text() for text in axes.get_yticklabels()]
     assert labels == [r["path"] for r in reversed(shown)]

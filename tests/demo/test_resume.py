@@ -20,7 +20,7 @@ from elevon.calibrate.validation import SignalError, Trace, Validation
 from elevon.cli import main
 from elevon.demo.finished import FinishedSteps, work_key
 from elevon.demo.hidden import RECOVERED, hidden_actuator
-from elevon.demo.results import Plays, Recovered, validation_from_json, validation_to_json
+from elevon.demo.results import Backlashes, Recovered, validation_from_json, validation_to_json
 from elevon.demo.run import run_demo
 from elevon.errors import OutputExistsError
 from elevon.report import Report
@@ -36,17 +36,17 @@ def base():
     return Actuator.load("torino-rotary")
 
 
-def plays():
+def backlashes():
     rows = [
         RowResult(row, 1.0 / 3.0, row.measured_total_deg, math.pi, 0.1, 0.2, 0.3, 0.0045)
         for row in measured_rows()
     ]
-    return Plays(tuple(rows), (Check("one", 0.1, 0.2, "deg"), Check("nan", math.nan, 1.0)))
+    return Backlashes(tuple(rows), (Check("one", 0.1, 0.2, "deg"), Check("nan", math.nan, 1.0)))
 
 
 def found(base):
     fitted = base.with_values(
-        {"friction.dynamic": 0.1 + 0.2, "drive.kind": "pwm", "play.total": 1.0 / 3.0e2},
+        {"friction.dynamic": 0.1 + 0.2, "drive.kind": "pwm", "backlash.total": 1.0 / 3.0e2},
         source="calibration",
     )
     paths = [*RECOVERED, "control.position_gain"]
@@ -81,8 +81,8 @@ def validation(name, logs, factor):
 
 
 def test_results_come_back_from_json_to_the_bit(base):
-    table = plays()
-    again = Plays.from_json(json.loads(json.dumps(table.to_json())))
+    table = backlashes()
+    again = Backlashes.from_json(json.loads(json.dumps(table.to_json())))
     assert again.rows == table.rows
     assert repr(again.checks) == repr(table.checks)
     result = found(base)
@@ -178,7 +178,7 @@ class Chain:
         monkeypatch.setattr(sys.modules["elevon.simulate"], "simulate", counted)
         replaced = {
             "elevon.reproduce.backlash.reproduce_backlash": self.backlash,
-            "elevon.reproduce.backlash.page.backlash_report": lambda _result: Report("plays"),
+            "elevon.reproduce.backlash.page.backlash_report": lambda _result: Report("backlashes"),
             "elevon.logs.importing.import_log": lambda path: path,
             "elevon.logs.importing.same_rate": lambda _logs: None,
             "elevon.calibrate.log.bench_log": lambda path: SimpleNamespace(name=path.name),
@@ -197,7 +197,7 @@ class Chain:
 
     def backlash(self, **_options):
         self.step("backlash")
-        return plays()
+        return backlashes()
 
     def calibrate(self, logs, _actuator, **_options):
         assert [log.name for log in logs] == self.logs[:-1]

@@ -20,7 +20,7 @@ from tests.diagnose.virtual import bench_logs
 
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
 NAME = "backlash.csv"
-FEW = ["play@transmission", "friction@transmission"]
+FEW = ["backlash@transmission", "friction@transmission"]
 
 
 def bench(folder, seed, *faults, fidelity="low", settings=(), procedure="backlash"):
@@ -41,7 +41,7 @@ def logs(tmp_path_factory):
     return {
         "base": bench(root / "base", 1),
         "healthy": bench(root / "healthy", 2),
-        "play": bench(root / "play", 3, "play@transmission=0.13 deg"),
+        "backlash": bench(root / "backlash", 3, "backlash@transmission=0.13 deg"),
         "short": bench(root / "short", 4, "short@motor.phase_b=0.2"),
     }
 
@@ -64,7 +64,10 @@ def test_a_healthy_log_is_healthy(unit, logs):
 
 @pytest.mark.parametrize(
     ("name", "key", "severity"),
-    [("play", "play@transmission", np.radians(0.13)), ("short", "short@motor.phase_a", 0.2)],
+    [
+        ("backlash", "backlash@transmission", np.radians(0.13)),
+        ("short", "short@motor.phase_a", 0.2),
+    ],
 )
 def test_a_fault_is_isolated_with_its_severity(unit, logs, name, key, severity):
     result = answer(unit, logs[name], logs["base"])
@@ -76,7 +79,7 @@ def test_a_fault_is_isolated_with_its_severity(unit, logs, name, key, severity):
     assert cause.severity == pytest.approx(severity, rel=0.1)
     against = {item.fault: item for item in result.alternatives}
     assert key not in against
-    moved = "lost_motion" if name == "play" else "voltage_order_2"
+    moved = "lost_motion" if name == "backlash" else "voltage_order_2"
     assert against[""].name in (moved, "current_order_2")
     assert against[""].left > 3.0
     assert against["friction@transmission"].probability < 0.01
@@ -124,10 +127,10 @@ def test_an_answer_does_not_depend_on_what_was_asked_before(unit, logs, baseline
         return {k: v for k, v in whole.items() if k != "seconds"}
 
     _RECENT.clear()
-    alone = said("play")
+    alone = said("backlash")
     _RECENT.clear()
     other = said("healthy")
-    assert said("play") == alone != other
+    assert said("backlash") == alone != other
 
 
 def test_the_runs_of_a_baseline_stand_about_the_logs_own_healthy_run(unit, logs):
@@ -167,31 +170,33 @@ def test_a_faulty_baseline_is_named_and_left_out(unit, logs):
 
 def test_the_command_line(elevon_cli, logs, tmp_path):  # noqa: F811
     page = tmp_path / "page.html"
-    result = elevon_cli("diagnose", logs["play"], "--actuator", "torino-rotary", "--baseline",
-                        logs["base"], "--fault", "play@transmission", "--fault",
+    result = elevon_cli("diagnose", logs["backlash"], "--actuator", "torino-rotary", "--baseline",
+                        logs["base"], "--fault", "backlash@transmission", "--fault",
                         "friction@transmission", "--report", page, "--json")  # fmt: skip
     assert result.code == 0
     document = json.loads(result.out)
     assert document["status"] == "faulty"
-    assert document["faults"][0]["kind"] == "play"
-    assert "Play has grown by" in page.read_text()
+    assert document["faults"][0]["kind"] == "backlash"
+    assert "Backlash has grown by" in page.read_text()
     assert "what speaks against each" in page.read_text()
     assert "Signals against the healthy model" in page.read_text()
-    refused = elevon_cli("diagnose", logs["play"], "--actuator", "torino-rotary", "--fault", "rust")
+    refused = elevon_cli(
+        "diagnose", logs["backlash"], "--actuator", "torino-rotary", "--fault", "rust"
+    )
     assert refused.code == 2
     assert (
         elevon_cli(
-            "diagnose", logs["play"], "--actuator", "torino-rotary", "--false-alarm", "0"
+            "diagnose", logs["backlash"], "--actuator", "torino-rotary", "--false-alarm", "0"
         ).code
         == 2
     )
 
 
 def test_the_model_with_what_is_named_shows_what_the_log_shows(unit, logs):
-    """The page's signals: the healthy model misses the play that the log has, the named one not."""
+    """The page's signals: the healthy model misses the log's backlash, the named one does not."""
     from elevon.diagnose.bymodel.traces import traces_of
 
-    items = read_test_logs([logs["play"]])
+    items = read_test_logs([logs["backlash"]])
     result = diagnose(items, unit, baselines=read_test_logs([logs["base"]]), faults=FEW)
     (traces,) = traces_of(items, unit, result)
     gap = traces.panels[0]
@@ -237,18 +242,18 @@ def test_logs_that_cannot_be_diagnosed(unit, logs, tmp_path):
     with pytest.raises(InputError, match="rotary"):
         answer(Actuator.load("nasa-ballscrew"), logs["healthy"])
     with pytest.raises(UnknownNameError):
-        answer(unit, logs["healthy"], faults=["play@moon"])
+        answer(unit, logs["healthy"], faults=["backlash@moon"])
     with pytest.raises(InputError, match="not weighed by the model: with it"):
         answer(unit, logs["healthy"], faults=["open_phase@motor.phase_a"])
 
 
 def test_a_log_without_measured_current_tells_what_is_left(unit, logs, tmp_path):
-    column = logs["play"].read_text().splitlines()[0].split(",").index("Drive_axis_1.r78")
+    column = logs["backlash"].read_text().splitlines()[0].split(",").index("Drive_axis_1.r78")
     without = _edited(
-        logs["play"], tmp_path / NAME, lambda rows: [r[:column] + r[column + 1 :] for r in rows]
+        logs["backlash"], tmp_path / NAME, lambda rows: [r[:column] + r[column + 1 :] for r in rows]
     )
     result = answer(unit, without, faults=FEW)
-    assert result.best == ("play@transmission",)
+    assert result.best == ("backlash@transmission",)
     assert any("r78" in text for text in result.findings)
 
 
@@ -257,8 +262,10 @@ def test_missing_stretches_are_left_out(unit, logs, tmp_path):
         for row in rows[3000:3600]:
             row[4] = row[6] = "nan"
 
-    result = answer(unit, _edited(logs["play"], tmp_path / NAME, blank), logs["base"], faults=FEW)
-    assert result.best == ("play@transmission",)
+    result = answer(
+        unit, _edited(logs["backlash"], tmp_path / NAME, blank), logs["base"], faults=FEW
+    )
+    assert result.best == ("backlash@transmission",)
     assert any("samples are missing" in text for text in result.findings)
 
 
@@ -293,7 +300,7 @@ def test_severities_cover_what_was_drawn():
     ("fault", "best"),
     [
         (None, ()),
-        ("play@transmission=0.13 deg", ("play@transmission",)),
+        ("backlash@transmission=0.13 deg", ("backlash@transmission",)),
         ("friction@transmission=0.25", ("friction@transmission",)),
         ("short@motor.phase_c=0.2", ("short@motor.phase_a",)),
         ("eccentricity_static@motor=0.1", ("eccentricity_static@motor",)),

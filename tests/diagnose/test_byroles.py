@@ -7,7 +7,7 @@ from elevon import Actuator, Recording, Scenario, simulate
 from elevon.cli import main
 from elevon.diagnose.byroles import diagnose_by_roles
 from elevon.diagnose.byroles.asked import same_test
-from elevon.diagnose.byroles.candidates import candidates_of, declined_of
+from elevon.diagnose.byroles.candidates import candidates_of, not_modelled_of
 from elevon.diagnose.byroles.load import load_alike, read_load
 from elevon.diagnose.byroles.log import _onset, role_log
 from elevon.diagnose.byroles.numbers import numbers_of
@@ -37,36 +37,36 @@ def log(actuator, *faults, day=None, start=0.3):
     names, seconds = "encoder_position,resolver_position,resolver_speed,current_q_meas", 5
     if actuator.wiring == "landing_gear":
         command = {"mode": "gear", "steps": [{"time": start, "action": "extend"}]}
-        names, seconds = "state,user_position,speed_meas,current_mean,proximity_25", 4
+        names, seconds = "state,output_position,speed_meas,current_mean,proximity_25", 4
     scenario = Scenario.from_dict({"duration": seconds, "command": command, "fault": list(faults)})
     return simulate(unit, scenario, fidelity="low", record=f"command,{names}@200 Hz")
 
 
-def test_play_of_a_screw_is_named_and_a_healthy_day_is_healthy(screw):
-    few = ["play@transmission", "gain_drift@control.position"]
+def test_backlash_of_a_screw_is_named_and_a_healthy_day_is_healthy(screw):
+    few = ["backlash@transmission", "gain_drift@control.position"]
     base = [("base", log(screw, day=1))]
     healthy = diagnose_by_roles(
         [("h", log(screw, day=2, start=0.41))], screw, baselines=base, faults=few
     )
     assert healthy.status == "healthy"
-    fault = {"kind": "play", "place": "transmission", "severity": "0.4 mm"}
+    fault = {"kind": "backlash", "place": "transmission", "severity": "0.4 mm"}
     worn = diagnose_by_roles([("w", log(screw, fault, day=3))], screw, baselines=base, faults=few)
     assert worn.status == "faulty"
-    assert worn.best == ("play@transmission",)
+    assert worn.best == ("backlash@transmission",)
     assert worn.faults[0].interval[0] < 4e-4 < worn.faults[0].interval[1]
     assert worn.unobservable == ()  # both are seen, others were not asked for
 
 
 def test_two_faults_of_a_screw_are_named_together(screw):
-    few = ["play@transmission", "gain_drift@control.position", "short@motor.phase_a"]
+    few = ["backlash@transmission", "gain_drift@control.position", "short@motor.phase_a"]
     base = [("base", log(screw, day=1))]
-    play = {"kind": "play", "place": "transmission", "severity": "0.4 mm"}
+    backlash = {"kind": "backlash", "place": "transmission", "severity": "0.4 mm"}
     gain = {"kind": "gain_drift", "place": "control.position", "severity": -0.5}
     said = diagnose_by_roles(
-        [("w", log(screw, play, gain, day=3))], screw, baselines=base, faults=few
+        [("w", log(screw, backlash, gain, day=3))], screw, baselines=base, faults=few
     )
-    assert set(said.best) == {"play@transmission", "gain_drift@control.position"}
-    low, high = next(c.interval for c in said.faults if c.kind == "play")
+    assert set(said.best) == {"backlash@transmission", "gain_drift@control.position"}
+    low, high = next(c.interval for c in said.faults if c.kind == "backlash")
     assert low < 4e-4 < high
     assert all(c.probability > 0.9 for c in said.faults)
 
@@ -74,7 +74,7 @@ def test_two_faults_of_a_screw_are_named_together(screw):
 PAIRS = [
     ("nasa-ballscrew", "sine-opposing", [
         ("short@motor.phase_a=0.25", "gain_drift@control.position=-0.4"),
-        ("play@transmission=0.0004", "gain@sensor.current_a=0.2"),
+        ("backlash@transmission=0.0004", "gain@sensor.current_a=0.2"),
         ("demagnetisation@motor=0.2", "lubrication_loss@screw=0.9"),
         ("gain@sensor.encoder=0.01", "eccentricity_static@motor=0.2"),
     ]),
@@ -123,7 +123,7 @@ def test_a_gear_is_diagnosed_whenever_its_action_came(gear):
 def test_a_baseline_that_is_itself_faulty_is_left_out(screw):
     worn = {"kind": "friction", "place": "transmission", "severity": 5.0}
     base = [("wrong", log(screw, worn, day=4)), ("right", log(screw, day=4))]
-    few = ["play@transmission", "gain_drift@control.position"]
+    few = ["backlash@transmission", "gain_drift@control.position"]
     for baselines, named in ((base[:1], ["wrong"]), (base[1:], [])):
         result = diagnose_by_roles(
             [("h", log(screw, day=2))], screw, baselines=baselines, faults=few
@@ -214,7 +214,7 @@ def test_what_cannot_be_diagnosed_is_refused(screw):
     with pytest.raises(InputError, match="role 'command'"):
         role_log(good.select(["encoder_position"]), "x", screw)
     with pytest.raises(UnknownNameError):
-        diagnose_by_roles([("x", good)], screw, faults=["play@moon"])
+        diagnose_by_roles([("x", good)], screw, faults=["backlash@moon"])
     with pytest.raises(InputError, match="at least one"):
         diagnose_by_roles([], screw)
     still = Scenario.from_dict({"duration": 2, "command": {"mode": "position"}})
@@ -224,14 +224,14 @@ def test_what_cannot_be_diagnosed_is_refused(screw):
 
 
 @pytest.mark.parametrize("name", ["nasa-ballscrew", "pisa-landing-gear", "torino-rotary"])
-def test_every_fault_is_a_candidate_or_declined_with_a_reason(name):
+def test_every_fault_is_a_candidate_or_not_modelled_with_a_reason(name):
     from elevon.faults import catalogue
 
     actuator = Actuator.load(name)
     said = {(c.kind, p) for c in candidates_of(actuator) for p in (c.place, *c.same)}
-    said |= {(item["kind"], item["place"]) for item in declined_of(actuator)}
+    said |= {(item["kind"], item["place"]) for item in not_modelled_of(actuator)}
     assert said == {(r.kind, p) for r in catalogue(actuator.wiring) for p in r.places}
-    assert all(item["reason"] for item in declined_of(actuator))
+    assert all(item["reason"] for item in not_modelled_of(actuator))
     assert len(factors_of(actuator)) >= 4
 
 
@@ -239,12 +239,12 @@ def test_the_command_line(screw, tmp_path, capsys):
     path = tmp_path / "log.csv"
     log(screw, day=5).save(path)
     code = main(["diagnose", str(path), "--actuator", "nasa-ballscrew", "--fault",
-                 "play@transmission", "--json",
+                 "backlash@transmission", "--json",
                  "--report", str(tmp_path / "page.html")])  # fmt: skip
     assert code == 0
     page = (tmp_path / "page.html").read_text()
     assert "Signals against the healthy model" in page
-    assert "play@transmission" in page.partition("What these logs can tell")[2]
+    assert "backlash@transmission" in page.partition("What these logs can tell")[2]
     assert '"status": "healthy"' in capsys.readouterr().out
     asked = ["--actuator", "nasa-ballscrew", "--method", "surrogate"]
     assert main(["diagnose", str(path), *asked]) == 2
@@ -260,7 +260,7 @@ def loaded_log(actuator, gives, *faults, seconds=3.0, day=1, force=1500.0):
     scenario = Scenario.from_dict({
         "duration": seconds,
         "command": {"mode": "position", "terms": [sine]},
-        "load": {"user": {"terms": [table]}},
+        "load": {"output": {"terms": [table]}},
         "fault": list(faults),
     })  # fmt: skip
     names = "encoder_position,resolver_position,resolver_speed,speed_ref,current_q_meas"
@@ -270,25 +270,25 @@ def loaded_log(actuator, gives, *faults, seconds=3.0, day=1, force=1500.0):
     columns, units, roles = {}, {}, {}
     for role in made.roles:
         channel = made.role(role)
-        back = gives * load / actuator.parameters.value("play.stiffness")
+        back = gives * load / actuator.parameters.value("backlash.stiffness")
         columns[role] = channel.values - (back if role == "output_position" else 0.0)
         units[role], roles[role] = channel.unit, role
     columns["load"], units["load"], roles["load"] = load, "N", "load"
     return Recording.build(time, columns, units, meta={"roles": roles})
 
 
-def test_a_screw_that_gives_under_its_load_is_healthy_and_its_play_is_seen(screw):
-    few = ["play@transmission", "gain_drift@control.position"]
+def test_a_screw_that_gives_under_its_load_is_healthy_and_its_backlash_is_seen(screw):
+    few = ["backlash@transmission", "gain_drift@control.position"]
     base = [("base", loaded_log(screw, 1.0))]
     healthy = diagnose_by_roles(
         [("h", loaded_log(screw, 1.0, day=2))], screw, baselines=base, faults=few
     )
     assert (healthy.status, healthy.findings) == ("healthy", ())  # its baseline is not left out
-    play = {"kind": "play", "place": "transmission", "severity": "60 um"}
+    backlash = {"kind": "backlash", "place": "transmission", "severity": "60 um"}
     worn = diagnose_by_roles(
-        [("w", loaded_log(screw, 1.0, play, day=3))], screw, baselines=base, faults=few
+        [("w", loaded_log(screw, 1.0, backlash, day=3))], screw, baselines=base, faults=few
     )
-    assert worn.best == ("play@transmission",)
+    assert worn.best == ("backlash@transmission",)
     assert worn.faults[0].interval[0] < 6e-5 < worn.faults[0].interval[1]
     stiff = [("s", loaded_log(screw, 0.0))]  # its stiffness is uncertain by its own size
     assert diagnose_by_roles(stiff, screw, baselines=stiff, faults=few).findings == ()

@@ -6,11 +6,11 @@ import pytest
 from elevon.diagnose.bymodel import diagnose
 from elevon.diagnose.bymodel.candidates import CANDIDATES
 from elevon.diagnose.bymodel.case import Case
-from elevon.diagnose.bymodel.declined import declined
 from elevon.diagnose.bymodel.detection import Detector
 from elevon.diagnose.bymodel.diagnosis import answer_of
 from elevon.diagnose.bymodel.evidence import Evidence
 from elevon.diagnose.bymodel.healthy import healthy
+from elevon.diagnose.bymodel.not_modelled import not_modelled
 from elevon.diagnose.bymodel.replay import Replay
 from elevon.diagnose.bymodel.words import sentence
 from elevon.errors import InputError
@@ -20,43 +20,45 @@ from elevon.reproduce.diagnosis_limits.logs import Trial, bench_logs
 from elevon.reproduce.diagnosis_limits.unit import draw_unit
 
 NAMES = ("lost_motion", "dry_current", "viscous_current", "voltage_order_1", "speed_gain")
-PLAY = next(c for c in CANDIDATES if c.kind == "play")
+BACKLASH = next(c for c in CANDIDATES if c.kind == "backlash")
 
 
 def _case(shown, baselines=(), *, held=False):
-    """A unit whose evidence is 1 with a deviation of 2 %; play moves the lost motion only."""
+    """A unit whose evidence is 1 with a deviation of 2 %; backlash moves the lost motion only."""
     rng = np.random.default_rng(0)
     draws = 1.0 + 0.02 * rng.standard_normal((40, len(NAMES)))
-    grid = np.linspace(0.0, PLAY.high, 6)
+    grid = np.linspace(0.0, BACKLASH.high, 6)
     moved = np.zeros((6, len(NAMES)))
     moved[:, 0] = grid / 0.01
     std = np.full(len(NAMES), 1e-3)
-    model = Replay(Evidence(NAMES, np.ones(5), std), {PLAY.key: grid}, {PLAY.key: moved}, draws)
+    model = Replay(
+        Evidence(NAMES, np.ones(5), std), {BACKLASH.key: grid}, {BACKLASH.key: moved}, draws
+    )
     logs = [Evidence(NAMES, np.array(values), std) for values in baselines]
     unit = healthy(model, NAMES, logs, held=held)
     return Case("log", Evidence(NAMES, np.array(shown), std), unit, model)
 
 
-def test_the_catalogue_is_weighed_akin_or_declined_each_fault_once():
+def test_the_catalogue_is_weighed_akin_or_not_modelled_each_fault_once():
     weighed = [(c.kind, p) for c in CANDIDATES for p in (c.place, *c.same)]
     weighed += [name for c in CANDIDATES for name in c.akin]
-    weighed += [(item["kind"], item["place"]) for item in declined()]
+    weighed += [(item["kind"], item["place"]) for item in not_modelled()]
     known = [(r.kind, place) for r in catalogue("rotary") for place in r.places]
     assert sorted(weighed) == sorted(known)
 
 
 def test_something_else_is_told_from_what_is_weighed():
     base = [[1.0] * 5]
-    other = answer_of([_case([1, 2, 0, 1.3, 2], base)], [PLAY], 0.05, [], other=True)
+    other = answer_of([_case([1, 2, 0, 1.3, 2], base)], [BACKLASH], 0.05, [], other=True)
     assert (other.status, other.best) == ("faulty", ())
     assert other.p_other > 0.9
     assert other.p_fault > 0.9
     assert "none of the weighed faults" in sentence(other)
     assert any("no fault that is weighed" in text for text in other.findings)
-    play = answer_of([_case([1.5, 1, 1, 1, 1], base)], [PLAY], 0.05, [], other=True)
-    assert play.best == (PLAY.key,)
-    assert play.p_other < 0.01
-    well = answer_of([_case([1.01, 1, 0.98, 1, 1], base)], [PLAY], 0.05, [], other=True)
+    backlash = answer_of([_case([1.5, 1, 1, 1, 1], base)], [BACKLASH], 0.05, [], other=True)
+    assert backlash.best == (BACKLASH.key,)
+    assert backlash.p_other < 0.01
+    well = answer_of([_case([1.01, 1, 0.98, 1, 1], base)], [BACKLASH], 0.05, [], other=True)
     assert well.status == "healthy"
     assert well.p_other < 0.01
 
@@ -100,14 +102,14 @@ CLEAR = {
     "demagnetisation@motor": 0.15,
     "local_demagnetisation@motor": 0.4, "sag@supply": 0.3, "gain@sensor.current_a": 0.15,
     "offset@sensor.current_a": 0.3, "friction@transmission": 0.5, "lubrication@transmission": 2.0,
-    "play@transmission": 0.004, "bearing@bearing.outer": 0.002, "stator_rub@motor": 0.5,
+    "backlash@transmission": 0.004, "bearing@bearing.outer": 0.002, "stator_rub@motor": 0.5,
     "bearing@bearing.cage": 0.1, "tooth_wear@gear": 0.004, "chipped_tooth@gear": 0.004,
     "jam@transmission": 0.3, "gain_drift@control.position": 0.03, "gain_drift@control.speed": 0.4,
     "dropout@sensor.resolver": 0.2, "mismatch@sensor.resolver": 0.05,
     "offset@sensor.resolver": 0.05, "offset@sensor.encoder": 0.02, "gain@sensor.resolver": 0.01,
     "gain@sensor.encoder": 0.01, "missing_counts@sensor.encoder": 0.1,
-    "dark_sectors@sensor.encoder": 0.1, "winding_short@sensor.resolver.sine": 0.1,
-    "winding_short@sensor.resolver.excitation": 0.3, "winding_open@sensor.resolver.sine": 1.0,
+    "dark_sectors@sensor.encoder": 0.1, "resolver_short@sensor.resolver.sine": 0.1,
+    "resolver_short@sensor.resolver.excitation": 0.3, "resolver_open@sensor.resolver.sine": 1.0,
     "stuck@sensor.resolver": 1.0, "stuck@sensor.encoder": 1.0, "stuck@sensor.current_a": 1.0,
     "dead@sensor.encoder": 1.0, "dead@sensor.current_a": 1.0,
 }  # fmt: skip
@@ -123,9 +125,9 @@ def bench():
 @pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
 @pytest.mark.parametrize("test", ["noload", "loaded"])
 def test_no_fault_of_the_catalogue_is_called_another(bench, test, tmp_path):
-    """Each is named, equivalent, or declined with a reason that says what it may be named."""
+    """Each is named, equivalent, or not_modelled with a reason that says what it may be named."""
     unit, actuator, baselines = bench
-    reasons = {f"{i['kind']}@{i['place']}": i["reason"] for i in declined()}
+    reasons = {f"{i['kind']}@{i['place']}": i["reason"] for i in not_modelled()}
     wrong = []
     faults = list(CLEAR.items())
     trials = [

@@ -1,21 +1,21 @@
-"""Lost motion of a user that is dragged through its play, and of one that flies in it."""
+"""Lost motion of an output that is dragged through its backlash, and of one that flies in it."""
 
 import numpy as np
 import pytest
 
-from elevon.calibrate.play import through_play
+from elevon.calibrate.backlash import through_backlash
 from elevon.diagnose.bymodel.evidence import Signals, evidence
 
-RATIO, PLAY = 124.0, 0.009
+RATIO, BACKLASH = 124.0, 0.009
 TIME = np.arange(0.0, 20.0, 0.0025)
 
 
-def shown(user):
-    """Evidence of a sine of 7 deg whose user stands where it is told."""
+def shown(output):
+    """Evidence of a sine of 7 deg whose output stands where it is told."""
     motor = RATIO * (0.17 + 0.12 * np.sin(2.0 * np.pi * 0.2 * TIME))
     speed = np.gradient(motor, TIME)
     count = 2.0 * np.pi / 80_000
-    position = np.floor(user(motor / RATIO) / count) * count
+    position = np.floor(output(motor / RATIO) / count) * count
     flat, good = np.zeros_like(TIME), np.ones(len(TIME), dtype=bool)
     signals = Signals(
         TIME,
@@ -39,23 +39,23 @@ def lost(evident):
     return evident.values[at], evident.std[at]
 
 
-def test_a_dragged_user_shows_its_play_between_the_directions():
-    result = shown(lambda driver: through_play(driver, PLAY))
+def test_a_dragged_output_shows_its_backlash_between_the_directions():
+    result = shown(lambda driver: through_backlash(driver, BACKLASH))
     assert not result.floats
-    assert lost(result)[0] == pytest.approx(PLAY, rel=0.01)
+    assert lost(result)[0] == pytest.approx(BACKLASH, rel=0.01)
 
 
-def test_a_user_that_flies_from_end_to_end_shows_its_play_by_the_width():
-    """The directions alone would say that there is hardly any play."""
-    bounce = 0.5 * PLAY * np.sign(np.sin(2.0 * np.pi * 7.3 * TIME))
+def test_a_output_that_flies_from_end_to_end_shows_its_backlash_by_the_width():
+    """The directions alone would say that there is hardly any backlash."""
+    bounce = 0.5 * BACKLASH * np.sign(np.sin(2.0 * np.pi * 7.3 * TIME))
     result = shown(lambda driver: driver + bounce)
     assert result.floats
     value, std = lost(result)
-    assert value == pytest.approx(PLAY, rel=0.01)
-    assert 0.0 < std < 0.01 * PLAY
+    assert value == pytest.approx(BACKLASH, rel=0.01)
+    assert 0.0 < std < 0.01 * BACKLASH
 
 
-def test_without_play_rounding_does_not_float():
+def test_without_backlash_rounding_does_not_float():
     result = shown(lambda driver: driver)
     assert not result.floats
     assert abs(lost(result)[0]) < 2e-5

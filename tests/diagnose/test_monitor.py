@@ -22,7 +22,7 @@ from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
 
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
 SINE = {"kind": "sine", "amplitude": "7 deg", "bias": "10 deg", "frequency": "0.4 Hz"}
-FEW = ["play@transmission", "friction@transmission"]
+FEW = ["backlash@transmission", "friction@transmission"]
 ONSET = 13.0  # s
 
 
@@ -97,7 +97,7 @@ def streams(unit):
     faults = {
         "base": [],
         "healthy": [],
-        "play": [f"play@transmission=0.1 deg:step(time={ONSET} s)"],
+        "backlash": [f"backlash@transmission=0.1 deg:step(time={ONSET} s)"],
         "friction": [f"friction@transmission=0.5:step(time={ONSET} s)"],
     }
     noise = {"motor_speed": 0.05, "current_q_meas": 0.02, "voltage_q_ref": 0.5}
@@ -122,7 +122,7 @@ def test_a_fault_that_begins_is_told_soon_and_a_healthy_day_is_quiet(monitor, st
     quiet = monitor.fresh()
     quiet.feed_log(streams["healthy"])
     assert quiet.alarm is None
-    for kind, severity in (("play", np.radians(0.1)), ("friction", 0.5)):
+    for kind, severity in (("backlash", np.radians(0.1)), ("friction", 0.5)):
         watch = monitor.fresh()
         watch.feed_log(streams[kind])
         alarm = watch.alarm
@@ -137,7 +137,7 @@ def test_a_fault_that_begins_is_told_soon_and_a_healthy_day_is_quiet(monitor, st
 
 
 def test_samples_fed_in_any_portions_say_what_the_log_says(monitor, streams):
-    item = streams["play"]
+    item = streams["backlash"]
     whole = monitor.fresh()
     whole.feed_log(item)
     fed = monitor.fresh()
@@ -182,14 +182,14 @@ def test_another_motion_is_left_out(monitor, streams):
     from dataclasses import replace
 
     item = streams["healthy"]
-    faster = replace(item, log=replace(item.log, user=1.5 * item.log.user))
+    faster = replace(item, log=replace(item.log, output=1.5 * item.log.output))
     steps = monitor.fresh().feed_log(faster)
     assert {step.skipped for step in steps} == {"not the baselines' motion"}
 
 
 def test_the_command(elevon_cli, tmp_path):  # noqa: F811
     logs = []
-    for seed, fault in ((1, []), (2, ["--fault", "play@transmission=0.1 deg:step(time=11 s)"])):
+    for seed, fault in ((1, []), (2, ["--fault", "backlash@transmission=0.1 deg:step(time=11 s)"])):
         out = tmp_path / str(seed)
         made = elevon_cli("bench", "run", "backlash", "--actuator", "torino-rotary", "--fidelity",
                           "low", "--seed", seed, "--out", out, *fault)  # fmt: skip
@@ -202,7 +202,7 @@ def test_the_command(elevon_cli, tmp_path):  # noqa: F811
     assert document["status"] == "alarm"
     assert document["window"] == pytest.approx(5.0)
     assert document["alarm"]["time"] > 11.0
-    assert document["alarm"]["causes"][0]["kind"] == "play"
+    assert document["alarm"]["causes"][0]["kind"] == "backlash"
     assert len(document["steps"]) == 3  # the first second of motion is none
     assert document["steps"][0]["start"] >= 1.0
     said = elevon_cli("monitor", logs[0], *options)

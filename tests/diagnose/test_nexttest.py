@@ -18,7 +18,7 @@ from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
 
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
 SHORT, FRICTION = "short@motor.phase_a", "friction@transmission"
-PLAY = "play@transmission"
+BACKLASH = "backlash@transmission"
 
 
 def _set(probability, *faults):
@@ -86,14 +86,14 @@ def test_two_results_agree_more_than_one():
 
 def test_a_log_says_of_what_it_cannot_show_that_nothing_is_there():
     """A fault that was not weighed looks like none; beside another one, like that one alone."""
-    detectable = {key: 0.1 for key in RESULT["detectable"] if key != PLAY}
+    detectable = {key: 0.1 for key in RESULT["detectable"] if key != BACKLASH}
     belief, prior = (
         _weights(Belief.after([{**RESULT, "detectable": detectable}])),
         _weights(Belief.prior()),
     )
     moved = {keys: weight / prior[keys] for keys, weight in belief.items()}
-    assert moved[PLAY,] == pytest.approx(moved[()], rel=1e-9)
-    assert moved[PLAY, SHORT] == pytest.approx(moved[SHORT,], rel=1e-9)
+    assert moved[BACKLASH,] == pytest.approx(moved[()], rel=1e-9)
+    assert moved[BACKLASH, SHORT] == pytest.approx(moved[SHORT,], rel=1e-9)
     assert moved[SHORT,] > 2.0 * moved[()]
 
 

@@ -20,7 +20,7 @@ from elevon.worklog import finished
 from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
 
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
-FRICTION, PLAY, SHORT, ROUND, GAIN = CAUSES
+FRICTION, BACKLASH, SHORT, ROUND, GAIN = CAUSES
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -57,7 +57,7 @@ def monitor():
 
 
 def _vector(**values):
-    """Friction, play, three phases, eccentricity and its phase, gain: 0 to 1 over the range."""
+    """Friction, backlash, three phases, eccentricity and its phase, gain: 0 to 1 over the range."""
     low, high = limits()[GAIN]
     start = {"friction": 0.0, "short_b": 0.0, "gain": -low / (high - low)} | values
     return np.array([start["friction"], 0.0, 0.0, start["short_b"], 0.0, 0.0, 0.0, start["gain"]])
@@ -72,13 +72,13 @@ def test_the_misfit_is_least_at_the_truth(monitor):
     assert cost[0] < 1e-4
     assert (cost[1:] > 20 * cost[0]).all()
     assert monitor.severities(truth) == pytest.approx(
-        {FRICTION: 0.5, PLAY: 0.0, SHORT: 0.3, ROUND: 0.0, GAIN: 0.0}, abs=1e-12
+        {FRICTION: 0.5, BACKLASH: 0.0, SHORT: 0.3, ROUND: 0.0, GAIN: 0.0}, abs=1e-12
     )
 
 
 def test_an_outcome_survives_its_file():
     for reached in (1.5, float("nan")):
-        one = Outcome("play", "genetic", 0.1, 2000, 1.4, reached)
+        one = Outcome("backlash", "genetic", 0.1, 2000, 1.4, reached)
         again = Outcome.of(json.loads(json.dumps(one.to_dict(), allow_nan=False)))
         assert again.to_dict() == one.to_dict()
 

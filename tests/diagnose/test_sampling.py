@@ -15,10 +15,10 @@ pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
 AT = (0.05, 0.5, 0.95)
 KNOWN = {c.key: c for c in CANDIDATES}
 FAULTS = {
-    "play": ["play@transmission=0.13 deg"],
+    "backlash": ["backlash@transmission=0.13 deg"],
     "friction": ["friction@transmission=0.25"],
     "short": ["short@motor.phase_a=0.2"],
-    "play and friction": ["play@transmission=0.13 deg", "friction@transmission=0.25"],
+    "backlash and friction": ["backlash@transmission=0.13 deg", "friction@transmission=0.25"],
     "friction and short": ["friction@transmission=0.25", "short@motor.phase_a=0.2"],
 }
 
@@ -78,7 +78,7 @@ def by_grids(frame, few):
     return said, np.array(ends).T
 
 
-@pytest.mark.parametrize("name", ["friction", "play and friction"])
+@pytest.mark.parametrize("name", ["friction", "backlash and friction"])
 def test_grids_say_what_sampling_says(frames, name):
     frame, few = frames[name]
     said, ends = by_grids(frame, few)

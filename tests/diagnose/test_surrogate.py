@@ -35,7 +35,7 @@ from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
 from tests.diagnose.virtual import bench_logs
 
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
-PLAY = "play@transmission=0.3 deg"
+BACKLASH = "backlash@transmission=0.3 deg"
 SHORT = "short@motor.phase_b=0.25"
 
 
@@ -46,9 +46,9 @@ def unit():
 
 @pytest.fixture(scope="module")
 def logs(unit):
-    cases = [(1, []), (2, []), (3, [PLAY]), (4, [SHORT]), (5, ["gain@sensor.encoder=0.1"])]
+    cases = [(1, []), (2, []), (3, [BACKLASH]), (4, [SHORT]), (5, ["gain@sensor.encoder=0.1"])]
     return dict(
-        zip(("base", "healthy", "play", "short", "far"), bench_logs(unit, cases), strict=True)
+        zip(("base", "healthy", "backlash", "short", "far"), bench_logs(unit, cases), strict=True)
     )
 
 
@@ -65,7 +65,7 @@ def test_features_are_the_evidence_and_the_position_gain(unit, logs):
     shown = log_features(logs["healthy"], unit)
     assert set(NAMES) <= set(UNITS)
     values = dict(zip(NAMES, shown.values, strict=True))
-    assert values["lost_motion"] == pytest.approx(unit.parameters.value("play.total"), rel=0.01)
+    assert values["lost_motion"] == pytest.approx(unit.parameters.value("backlash.total"), rel=0.01)
     gain = unit.parameters.value("control.position_gain")
     assert values["following_gain"] == pytest.approx(1.0 / gain, rel=0.005)
     assert np.isnan(values["brake_current"])
@@ -75,7 +75,7 @@ def test_evidence_without_deviations_is_the_same(unit, logs):
     """The surrogate and the model's runs need the numbers alone; they must be the same ones."""
     log = logs["short"].log
     signals = Signals(
-        log.time, log.user, log.motor, log.speed_ref, log.speed, log.current_target, log.current,
+        log.time, log.output, log.motor, log.speed_ref, log.speed, log.current_target, log.current,
         logs["short"].voltage, None, None, (150.0, 1.0), log.good,
     )  # fmt: skip
     value = unit.parameters.value
@@ -112,7 +112,7 @@ def test_a_change_is_a_share_where_it_scales():
 
 
 @pytest.mark.parametrize(
-    ("name", "best"), [("healthy", ()), ("play", (FAULTS[0],)), ("short", (FAULTS[3],))]
+    ("name", "best"), [("healthy", ()), ("backlash", (FAULTS[0],)), ("short", (FAULTS[3],))]
 )
 def test_the_surrogate_names_the_fault(unit, logs, name, best):
     result = diagnose_by_surrogate([logs[name]], unit, baselines=[logs["base"]])
@@ -121,7 +121,7 @@ def test_the_surrogate_names_the_fault(unit, logs, name, best):
     assert not any("outside" in text for text in result.findings)
     if best:
         cause = result.faults[0]
-        true = np.radians(0.3) if name == "play" else 0.25
+        true = np.radians(0.3) if name == "backlash" else 0.25
         assert cause.interval[0] < true < cause.interval[1]
     if name == "short":
         assert set(cause.equivalents) == {("short", "motor.phase_b"), ("short", "motor.phase_c")}
@@ -171,7 +171,7 @@ def test_a_faulty_baseline_is_named(unit, logs):
         return replace(item, log=replace(item.log, name=name))
 
     healthy = [logs["base"], logs["healthy"]]  # of one name, as files of two folders are
-    faulty = named(logs["play"], "third")
+    faulty = named(logs["backlash"], "third")
     log = bench_logs(unit, [(9, [])])
     result = diagnose_by_surrogate(log, unit, baselines=[*healthy, faulty])
     assert result.status == "healthy"
@@ -188,7 +188,9 @@ def test_what_was_not_trained_is_said(unit, logs):
     assert any("outside the training set" in text for text in result.findings)
     with pytest.raises(InputError, match="not trained on such a test"):
         diagnose_by_surrogate(bench_logs(unit, [(1, [])], procedure="chirp"), unit)
-    without = replace(logs["play"], log=replace(logs["play"].log, current_signal="current_ref"))
+    without = replace(
+        logs["backlash"], log=replace(logs["backlash"].log, current_signal="current_ref")
+    )
     with pytest.raises(InputError, match="r78"):
         diagnose_by_surrogate([without], unit)
 
@@ -212,7 +214,7 @@ def test_a_unit_unlike_the_trained_ones_is_said():
 
 
 def test_a_log_without_voltage_is_still_read(unit, logs):
-    without = replace(logs["play"], voltage=None)
+    without = replace(logs["backlash"], voltage=None)
     result = diagnose_by_surrogate([without], unit, baselines=[logs["base"]])
     assert result.best == (FAULTS[0],)
 
@@ -270,7 +272,7 @@ def test_a_unit_whose_current_loop_bears_no_such_derivative_gets_a_slower_one(un
 
 
 def test_the_command_line(elevon_cli, tmp_path):  # noqa: F811
-    for name, seed, faults in (("base", 1, []), ("log", 3, ["--fault", PLAY])):
+    for name, seed, faults in (("base", 1, []), ("log", 3, ["--fault", BACKLASH])):
         elevon_cli("bench", "run", "backlash", "--actuator", "torino-rotary", "--fidelity", "low",
                    "--out", tmp_path / name, "--seed", seed, *faults)  # fmt: skip
     log, base = (tmp_path / n / "backlash.csv" for n in ("log", "base"))

@@ -19,9 +19,9 @@ SAYS = {
     "first_run.py": "greatest position: 6.",
     "short_in_a_phase.py": "shorted: ripple of the q voltage",
     "own_variant.py": "light.toml reaches 4.5 deg after",
-    "batch_to_pandas.py": "(200, 52) {'play': 1.0",
+    "batch_to_pandas.py": "(200, 52) {'backlash': 1.0",
     "own_controller.py": "0.09",
-    "many_runs.py": "play@transmission=0.9 deg lost motion",
+    "many_runs.py": "backlash@transmission=0.9 deg lost motion",
 }
 
 

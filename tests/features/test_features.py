@@ -27,8 +27,13 @@ def _runs(name, amplitude, faults=(), frequency="4 Hz", duration="0.3 s"):
 @pytest.mark.parametrize(
     ("name", "fidelity", "amplitude", "faults"),
     [
-        ("torino-rotary", "high", "4 deg", ["short@motor.phase_a=0.2", "play@transmission=1 deg"]),
-        ("torino-rotary", "low", "4 deg", ["play@transmission=1 deg"]),
+        (
+            "torino-rotary",
+            "high",
+            "4 deg",
+            ["short@motor.phase_a=0.2", "backlash@transmission=1 deg"],
+        ),
+        ("torino-rotary", "low", "4 deg", ["backlash@transmission=1 deg"]),
         ("nasa-ballscrew", "high", "0.5 mm", []),
     ],
 )
@@ -50,7 +55,9 @@ def test_features_while_simulating_equal_those_of_the_recording_to_the_bit(
 
 
 def test_lanes_threads_and_company_change_no_bit():
-    runs = _runs("torino-rotary", "4 deg", ["short@motor.phase_a=0.2", "play@transmission=1 deg"])
+    runs = _runs(
+        "torino-rotary", "4 deg", ["short@motor.phase_a=0.2", "backlash@transmission=1 deg"]
+    )
     alone = [simulate_batch([run], record=(), features="all@400 Hz")[0] for run in runs]
     together = simulate_batch(runs, record="motor_speed@1 kHz", features="all@400 Hz")
     for one, other in zip(alone, together, strict=True):
@@ -58,12 +65,12 @@ def test_lanes_threads_and_company_change_no_bit():
 
 
 def test_a_fault_moves_its_feature():
-    faults = ["short@motor.phase_a=0.2", "play@transmission=0.5 deg"]
+    faults = ["short@motor.phase_a=0.2", "backlash@transmission=0.5 deg"]
     runs = _runs("torino-rotary", "7 deg", faults, "1 Hz", "1 s")
-    healthy, short, play = [
+    healthy, short, backlash = [
         r.meta["features"] for r in simulate_batch(runs, record=(), features="all@2 kHz")
     ]
-    extra = play["lost_motion"] - healthy["lost_motion"]
+    extra = backlash["lost_motion"] - healthy["lost_motion"]
     assert extra == pytest.approx(np.deg2rad(0.5), rel=0.02)
     assert short["switching_rate"] > 1.15 * healthy["switching_rate"]
 

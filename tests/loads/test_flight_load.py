@@ -124,7 +124,7 @@ def test_scaling_reaches_the_limit_exactly_and_keeps_the_shape():
 def test_scenario_terms():
     table = flight_load(flight(), SURFACE, arm=0.1)
     scenario = table.scenario()
-    term = scenario["load"]["user"]["terms"][0]
+    term = scenario["load"]["output"]["terms"][0]
     assert term["kind"] == "table"
     assert term["times"] == [0.0, 1.0, 2.0]
     assert term["values"] == table.load.tolist()

@@ -1,4 +1,4 @@
-"""A synthetic drive trace with a known truth: servo with play, independent of the simulator."""
+"""A synthetic drive trace with a known truth: servo with backlash, independent of the simulator."""
 
 import math
 from dataclasses import dataclass
@@ -19,11 +19,11 @@ class Truth:
     frequency: float
     phase: float
     bias: float
-    play: float
+    backlash: float
     trigger: float
 
 
-def play_operator(x, width):
+def backlash_operator(x, width):
     out, state = np.empty_like(x), x[0]
     for k, value in enumerate(x):
         state = min(max(state, value - width / 2), value + width / 2)
@@ -39,7 +39,7 @@ def servo_log(
     bias=math.radians(10.0),
     frequency=0.2,
     phase=0.3,
-    play=math.radians(0.3656),
+    backlash=math.radians(0.3656),
     zero=0.0,
     trigger=1.2345,
     noise=1.0,
@@ -47,7 +47,7 @@ def servo_log(
 ):
     """Ideal speed loop inside the published position loop, run at 8 kHz, logged at `rate`.
 
-    The user encoder is quantised to 1/80000 turn and noisy before it is fed back, so the log's
+    The output encoder is quantised to 1/80000 turn and noisy before it is fed back, so the log's
     reconstruction is as imperfect as the real one's.
     """
     rng = np.random.default_rng(seed)
@@ -58,7 +58,7 @@ def servo_log(
     count = 2 * math.pi / 80000
     jitter = rng.normal(0.0, 0.3 * count * noise, n)
     motor = np.empty(n)
-    user = np.empty(n)
+    output = np.empty(n)
     reference = np.empty(n)
     m, u = zero * RATIO, 0.0
     w, limit = 0.0, 500 * math.pi / 30
@@ -67,9 +67,9 @@ def servo_log(
         if k % 8 == 0:
             measured = round((u + jitter[k]) / count) * count
             w = min(max(GAIN * (command[k] - measured), -limit), limit)
-        motor[k], user[k], reference[k] = m, measured, w
+        motor[k], output[k], reference[k] = m, measured, w
         m += w / fine
-        u = min(max(u, m / RATIO - play / 2), m / RATIO + play / 2)
+        u = min(max(u, m / RATIO - backlash / 2), m / RATIO + backlash / 2)
     step = int(fine / rate)
     pick = slice(0, n, step)
     speed = np.gradient(motor, 1 / fine)[pick] + rng.normal(0, 0.05 * noise, len(t[pick]))
@@ -77,7 +77,7 @@ def servo_log(
     current = torque / 1.4 + rng.normal(0, 0.02 * noise, len(speed))
     signals = {
         "time": t[pick],
-        "encoder_position": user[pick],
+        "encoder_position": output[pick],
         "resolver_position": motor[pick],
         "speed_ref": reference[pick],
         "motor_speed": speed,
@@ -87,7 +87,7 @@ def servo_log(
         "voltage_q_ref": 1.4 * speed + 2.75 * current,
         "trigger": (t[pick] >= trigger).astype(float),
     }
-    return Truth(signals, amplitude, frequency, phase, bias, play, trigger)
+    return Truth(signals, amplitude, frequency, phase, bias, backlash, trigger)
 
 
 @pytest.fixture(scope="session")

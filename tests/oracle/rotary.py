@@ -1,6 +1,6 @@
 """The rotary actuator as a hybrid automaton in scipy: another language, another method.
 
-Between two events (a relay switching, the shaft stopping or starting, the play closing) the
+Between two events (a relay switching, the shaft stopping or starting, the backlash closing) the
 actuator is a smooth differential equation. It is integrated here by an adaptive Runge-Kutta pair,
 and every event is located on the dense output, so nothing is shared with the fixed-step core but
 the published equations.
@@ -37,7 +37,7 @@ class Numbers:
     friction_dynamic: float
     torque_maximum: float
     ratio: float
-    half_play: float
+    half_backlash: float
     supply: float
     half_band: float
     gain_position: float
@@ -55,23 +55,23 @@ class Numbers:
 
 @dataclass
 class Mode:
-    """Discrete state: legs high, direction of sliding (0 stuck), side of the play in contact (0
+    """Discrete state: legs high, direction of sliding (0 stuck), side of the backlash in contact (0
     free).
     """
 
     legs: list[bool] = field(default_factory=lambda: [False, False, False])
     slide: int = 0
     contact: int = 0
-    user: float = 0.0
+    output: float = 0.0
     transitions: int = 0
 
 
 def controller(
-    p: Numbers, t: float, y: np.ndarray, user: float, command: Callable[[float], float]
+    p: Numbers, t: float, y: np.ndarray, output: float, command: Callable[[float], float]
 ) -> tuple[float, float, float]:
     """Speed error, unsaturated and saturated torque reference."""
     w, xi, x = y[3], y[5], y[6]
-    w_ref = min(max(p.gain_position * (command(t) - user), -p.speed_limit), p.speed_limit)
+    w_ref = min(max(p.gain_position * (command(t) - output), -p.speed_limit), p.speed_limit)
     e = w_ref - w
     t_ref = p.kp * e + xi
     if p.derivative_time > 0:
@@ -80,9 +80,9 @@ def controller(
     return e, t_ref, min(max(t_ref, -limit), limit)
 
 
-def user_position(p: Numbers, y: np.ndarray, mode: Mode) -> float:
-    """Output of the play operator."""
-    return mode.user if mode.contact == 0 else y[4] / p.ratio - mode.contact * p.half_play
+def output_position(p: Numbers, y: np.ndarray, mode: Mode) -> float:
+    """Output of the backlash operator."""
+    return mode.output if mode.contact == 0 else y[4] / p.ratio - mode.contact * p.half_backlash
 
 
 def coefficients(p: Numbers, th: float) -> list[float]:
@@ -108,7 +108,7 @@ def derivative(
 
     def rhs(t: float, y: np.ndarray) -> list[float]:
         w = y[3]
-        e, t_ref, t_sat = controller(p, t, y, user_position(p, y, mode), command)
+        e, t_ref, t_sat = controller(p, t, y, output_position(p, y, mode), command)
         k = coefficients(p, y[4])
         drop = [v[j] - r[j] * y[j] - k[j] * w for j in range(3)]
         v_n = sum(drop[j] / ind[j] for j in range(3)) / inverse
@@ -127,13 +127,13 @@ def derivative(
 
 
 def events(p: Numbers, mode: Mode, command: Callable[[float], float]) -> list[Callable[..., float]]:
-    """Functions whose downward zero ends the segment: three relays, friction, play."""
+    """Functions whose downward zero ends the segment: three relays, friction, backlash."""
 
     def relay(j: int) -> Callable[[float, np.ndarray], float]:
         sign = 1.0 if mode.legs[j] else -1.0
 
         def margin(t: float, y: np.ndarray) -> float:
-            current = controller(p, t, y, user_position(p, y, mode), command)[2] / p.kt
+            current = controller(p, t, y, output_position(p, y, mode), command)[2] / p.kt
             shape = math.sin(p.pole_pairs * y[4] + p.electrical_offset - j * THIRD)
             return p.half_band + sign * (current * shape - y[j])
 
@@ -144,10 +144,10 @@ def events(p: Numbers, mode: Mode, command: Callable[[float], float]) -> list[Ca
             return p.friction_static - abs(active_torque(p, y))
         return mode.slide * y[3]
 
-    def play(t: float, y: np.ndarray) -> float:
-        return p.half_play - abs(y[4] / p.ratio - mode.user) if mode.contact == 0 else 1.0
+    def backlash(t: float, y: np.ndarray) -> float:
+        return p.half_backlash - abs(y[4] / p.ratio - mode.output) if mode.contact == 0 else 1.0
 
-    found = [relay(0), relay(1), relay(2), friction, play]
+    found = [relay(0), relay(1), relay(2), friction, backlash]
     for f in found:
         f.terminal, f.direction = True, -1  # type: ignore[attr-defined]
     return found
@@ -159,20 +159,20 @@ def switch(p: Numbers, mode: Mode, index: int, y: np.ndarray) -> None:
         mode.legs[index] = not mode.legs[index]
         mode.transitions += 1
     elif index == 4:
-        mode.contact = 1 if y[4] / p.ratio > mode.user else -1
+        mode.contact = 1 if y[4] / p.ratio > mode.output else -1
     else:
         torque = active_torque(p, y)
         held = mode.slide != 0 and abs(torque) <= p.friction_static
         mode.slide = 0 if held else (1 if torque > 0 else -1)
         y[3] = 0.0
         if mode.contact and mode.slide == -mode.contact:
-            mode.user = y[4] / p.ratio - mode.contact * p.half_play
+            mode.output = y[4] / p.ratio - mode.contact * p.half_backlash
             mode.contact = 0
 
 
 @dataclass(frozen=True)
 class Trace:
-    """Dense samples of one run: time s, currents A (3 columns), speed rad/s, motor and user angle
+    """Dense samples of one run: time s, currents A (3 columns), speed rad/s, motor and output angle
     rad.
     """
 
@@ -180,7 +180,7 @@ class Trace:
     currents: np.ndarray
     speed: np.ndarray
     motor: np.ndarray
-    user: np.ndarray
+    output: np.ndarray
     transitions: int
 
 
@@ -191,8 +191,8 @@ def simulate(
     sample: float = 1e-5,
     rtol: float = 1e-8,
 ) -> Trace:
-    """Run from rest, all legs low, play centred. Absolute tolerances are 1e-9 of the natural scale
-    of each state.
+    """Run from rest, all legs low, backlash centred. Absolute tolerances are 1e-9 of the natural
+    scale of each state.
     """
     grid = np.arange(round(duration / sample) + 1) * sample
     states, users = np.zeros((grid.size, 7)), np.zeros(grid.size)
@@ -218,7 +218,7 @@ def simulate(
             states[filled:stop] = out.sol(grid[filled:stop]).T
             angle = states[filled:stop, 4] / p.ratio
             users[filled:stop] = (
-                mode.user if mode.contact == 0 else angle - mode.contact * p.half_play
+                mode.output if mode.contact == 0 else angle - mode.contact * p.half_backlash
             )
             filled = stop
         for index, hits in enumerate(out.t_events):

@@ -5,7 +5,7 @@ What is compared and why not more: a relay switches when a ramp of about 1 A per
 threshold, and each instant moves the next one, so two correct programs lose each other's switching
 instants within some milliseconds. Position, speed, means and RMS values over whole windows and the
 ripple's envelope survive that; instants do not. The tolerances are those of reference work on this
-drive: position 1e-4 rad RMS at the motor over 124 at the user, RMS currents 1 % here, because 50
+drive: position 1e-4 rad RMS at the motor over 124 at the output, RMS currents 1 % here, because 50
 ms hold only some 300 switchings (the 0.1 % of long runs averages thousands).
 """
 
@@ -37,7 +37,7 @@ from tests.physics.rig import (
 DURATION = 0.05
 AMPLITUDE, FREQUENCY = math.radians(7.0), 1.0
 STATIC, DYNAMIC, VISCOUS, BRAKE = 0.12, 0.06, 1e-3, 0.5
-HALF_PLAY = math.radians(0.1)
+HALF_BACKLASH = math.radians(0.1)
 GAIN, SPEED_LIMIT, KP, KI, DERIVATIVE, FILTER = (
     1000 / 60 * RATIO,
     500 * math.pi / 30,
@@ -59,7 +59,7 @@ SETTINGS = (
         "friction.static": STATIC,
         "friction.dynamic": DYNAMIC,
         "friction.viscous": VISCOUS,
-        "play.total": 2 * HALF_PLAY,
+        "backlash.total": 2 * HALF_BACKLASH,
         "control.position_gain": GAIN,
         "control.speed_limit": SPEED_LIMIT,
         "control.speed_gain": KP,
@@ -73,7 +73,7 @@ SETTINGS = (
         "control.current_limit": CURRENT_LIMIT,
         "control.noise_deviation": 0.0,
         "control.sample_time": 0.0,
-        "control.position_feedback": "user",
+        "control.position_feedback": "output",
         "sensor.current.noise_deviation": 0.0,
         "sensor.current.bits": 0,
     }
@@ -95,7 +95,7 @@ def oracle(short: float, half_band: float = HALF_BAND) -> Trace:
         friction_dynamic=DYNAMIC + BRAKE,
         torque_maximum=1e3,
         ratio=RATIO,
-        half_play=HALF_PLAY,
+        half_backlash=HALF_BACKLASH,
         supply=SUPPLY,
         half_band=half_band,
         gain_position=GAIN,
@@ -121,7 +121,9 @@ def core(short: float) -> Any:
 def run_core(short: float, settings: dict[str, Any], duration: float) -> Any:
     """The case with further settings, for some other time."""
     fault = [{"kind": "short", "place": "motor.phase_a", "severity": short}] if short else []
-    names = "current_a,current_b,current_c,motor_speed,motor_position,user_position,leg_transitions"
+    names = (
+        "current_a,current_b,current_c,motor_speed,motor_position,output_position,leg_transitions"
+    )
     return run(
         SETTINGS | settings,
         duration=duration,
@@ -138,7 +140,7 @@ def both(name: str, short: float) -> tuple[np.ndarray, np.ndarray]:
     column = {
         "motor_speed": trace.speed,
         "motor_position": trace.motor,
-        "user_position": trace.user,
+        "output_position": trace.output,
     }
     if name.startswith("current"):
         theirs = trace.currents[:, "abc".index(name[-1])]
@@ -152,19 +154,19 @@ CASES = pytest.mark.parametrize("short", [0.0, SHORT], ids=["healthy", "short"])
 
 @CASES
 def test_the_case_is_worth_comparing(short: float) -> None:
-    """It moves, closes the play, saturates nothing for ever, and switches hundreds of times."""
+    """It moves, closes the backlash, saturates nothing for ever, and switches hundreds of times."""
     trace = oracle(short)
     assert trace.motor[-1] > 1.0
-    assert trace.user[-1] > 0.0
+    assert trace.output[-1] > 0.0
     assert trace.transitions > 100
 
 
 @CASES
 def test_positions_agree(short: float) -> None:
-    """RMS 1e-4 rad at the user would pass a wrong model over 50 ms; 0.2 % of the travel does
+    """RMS 1e-4 rad at the output would pass a wrong model over 50 ms; 0.2 % of the travel does
     not.
     """
-    for name in ("motor_position", "user_position"):
+    for name in ("motor_position", "output_position"):
         ours, theirs = both(name, short)
         assert np.sqrt(np.mean((ours - theirs) ** 2)) < 2e-3 * np.max(np.abs(theirs)), name
 
@@ -277,7 +279,7 @@ def test_located_crossings_do_not_depend_on_the_step_as_sampled_ones_do() -> Non
 
 
 def test_located_crossings_leave_position_and_currents_where_they_are() -> None:
-    """Position to 5e-3 rad RMS at the motor, 4e-5 at the user; RMS currents to 3 % over 50 ms."""
+    """Position to 5e-3 rad RMS at the motor, 4e-5 at the output; RMS currents to 3 % over 50 ms."""
     plain, located = core(0.0), run_core(0.0, LOCATED, DURATION)
     gap = plain["motor_position"].values - located["motor_position"].values
     assert math.sqrt(np.mean(gap**2)) < 5e-3

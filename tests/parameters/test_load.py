@@ -47,10 +47,10 @@ def test_a_base_may_be_a_file_beside_it(write):
 
 def test_a_folder_of_the_user_is_searched(write, monkeypatch):
     path = write(BASE + entry(), "shop-floor.toml")
-    monkeypatch.setenv("ELEVON_SETS", str(path.parent))
+    monkeypatch.setenv("ELEVON_ACTUATORS", str(path.parent))
     assert load_set("shop-floor").name == "mine"
-    monkeypatch.setenv("ELEVON_SETS", str(path.parent / "nowhere"))
-    with pytest.raises(InputError, match="ELEVON_SETS"):
+    monkeypatch.setenv("ELEVON_ACTUATORS", str(path.parent / "nowhere"))
+    with pytest.raises(InputError, match="ELEVON_ACTUATORS"):
         load_set("torino-rotary")
 
 
@@ -185,8 +185,8 @@ def test_values_that_contradict_each_other_are_refused_before_the_run(path, valu
 
 
 def test_contact_stiffness_too_large_for_the_step_is_named():
-    stiff = ACTUATOR.with_values({"play.model": "elastic", "play.stiffness": 1e12})
-    with pytest.raises(InputError, match=r"play\.stiffness"):
+    stiff = ACTUATOR.with_values({"backlash.model": "elastic", "backlash.stiffness": 1e12})
+    with pytest.raises(InputError, match=r"backlash\.stiffness"):
         elevon.simulate(stiff, elevon.Scenario.from_dict({"duration": "10 ms"}))
 
 

@@ -67,9 +67,9 @@ def test_controller_believes_the_motor_it_has():
     assert value("control.torque_constant") == pytest.approx(believed, rel=1e-6)
 
 
-def test_play_is_the_intrinsic_one():
-    assert value("play.total") == pytest.approx(math.radians(0.365568), rel=1e-12)
-    assert value("play.total") == pytest.approx(0.00638, abs=1e-5)
+def test_backlash_is_the_intrinsic_one():
+    assert value("backlash.total") == pytest.approx(math.radians(0.365568), rel=1e-12)
+    assert value("backlash.total") == pytest.approx(0.00638, abs=1e-5)
 
 
 def test_position_gain_and_speed_limit():
@@ -100,14 +100,16 @@ def test_assumed_numbers_follow_from_what_their_notes_say():
     assert value("pwm.integral_gain") == pytest.approx(
         value("motor.winding_resistance") * omega, rel=1e-3
     )
-    stiffness, inertia = value("play.stiffness"), value("load.inertia")
+    stiffness, inertia = value("backlash.stiffness"), value("load.inertia")
     damping = 2.0 * 0.3 * math.sqrt(stiffness * inertia)
-    assert value("play.damping") == pytest.approx(damping, rel=0.01)
+    assert value("backlash.damping") == pytest.approx(damping, rel=0.01)
 
 
 def test_stiffness_is_that_of_the_forty_drops():
     """68.16 N/deg on each of two cables at 0.08 m."""
-    assert value("play.stiffness") == pytest.approx(2 * 68.16 * 0.08 * 180.0 / math.pi, rel=0.002)
+    assert value("backlash.stiffness") == pytest.approx(
+        2 * 68.16 * 0.08 * 180.0 / math.pi, rel=0.002
+    )
 
 
 def test_gains_place_well_damped_poles_below_the_derivative_limit():
@@ -129,16 +131,16 @@ def test_values_do_not_contradict_each_other(fidelity):
 def test_follows_a_step_without_overshoot_and_settles(fidelity):
     step = {"duration": "2 s", "command": {"terms": [{"kind": "step", "final": "2 deg"}]}}
     recording = elevon.simulate(ACTUATOR, elevon.Scenario.from_dict(step), fidelity=fidelity)
-    user = recording["user_position"].to("deg")
-    assert user.max() < 2.0 * 1.02
-    assert abs(user[-1] - 2.0) < 0.02
+    output = recording["output_position"].to("deg")
+    assert output.max() < 2.0 * 1.02
+    assert abs(output[-1] - 2.0) < 0.02
 
 
 def test_follows_the_campaign_sine_with_the_lag_of_a_proportional_loop():
     """A P position loop follows a ramp with the error speed / gain, and nothing else."""
     scenario = elevon.Scenario.from_dict(ACTUATOR.default_scenario).replaced(duration="5 s")
-    recording = elevon.simulate(ACTUATOR, scenario, record="command,user_position@400 Hz")
-    error = recording["command"].values - recording["user_position"].values
+    recording = elevon.simulate(ACTUATOR, scenario, record="command,output_position@400 Hz")
+    error = recording["command"].values - recording["output_position"].values
     speed = math.radians(7.0) * 2.0 * math.pi * 0.2
     lag = speed / (value("control.position_gain") / value("gear.ratio"))
     assert np.abs(error[400:]).max() < 1.3 * lag

@@ -52,7 +52,7 @@ FREE_SHAFT = MOTOR | {
     "friction.viscous": 0.0,
     "gear.efficiency": 1.0,
     "gear.efficiency_aiding": 1.0,
-    "play.total": 0.0,
+    "backlash.total": 0.0,
     "stop.upper": 1e6,
     "stop.lower": -1e6,
 }

@@ -133,7 +133,7 @@ def steady(faults: list[dict[str, Any]], **values: Any) -> Any:
         mode="speed",
         command=[constant(37.7)],
         record=f"current_ref,motor_position,motor_speed,motor_torque,{PHASES}@10 kHz",
-        scenario={"fault": faults, "load": {"user": {"terms": [constant(4500.0)]}}},
+        scenario={"fault": faults, "load": {"output": {"terms": [constant(4500.0)]}}},
         name=NAME,
     )
 

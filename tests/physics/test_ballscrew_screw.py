@@ -19,7 +19,7 @@ AFAR = {"stop.upper": 10.0, "stop.lower": -10.0}
 FREE = {
     "drive.kind": "off", "friction.static": 0.0, "friction.dynamic": 0.0, "friction.viscous": 0.0,
     "screw.preload": 0.0, "load.friction": 0.0, "load.damping": 0.0, "thermal.model": "off",
-    "play.model": "operator", "play.total": 0.0,
+    "backlash.model": "operator", "backlash.total": 0.0,
 }  # fmt: skip
 ROTOR = 102e-4 + 3.2e-4 + 60.0 * LEAD**2
 
@@ -48,7 +48,7 @@ def free(
         else "motor_speed,motor_position,"
         "friction_torque,screw_efficiency,screw_efficiency_aiding,spall_torque,ram_position@50 kHz",
         scenario={
-            "load": {"user": {"terms": [constant(load)]}},
+            "load": {"output": {"terms": [constant(load)]}},
             "initial": {"motor_speed": speed},
         },
         name=NAME,
@@ -152,7 +152,7 @@ def test_the_nut_is_heated_by_its_friction() -> None:
               "screw.nut_capacity": 2.0, "screw.nut_to_air": 1.5}  # fmt: skip
     rec = run(
         FREE | values, duration=2.0, record="nut_temperature,heat_nut,winding_temperature@10 Hz",
-        scenario={"load": {"user": {"terms": [constant(4000.0)]}},
+        scenario={"load": {"output": {"terms": [constant(4000.0)]}},
                   "initial": {"motor_speed": 10.0}},
         name=NAME,
     )  # fmt: skip
@@ -170,7 +170,7 @@ def test_a_return_jam_shows_in_the_nuts_temperature() -> None:
         rec = run(
             {}, duration=20.0, record="nut_temperature@1 Hz", fidelity="low", name=NAME,
             command=[term("sine", amplitude="50 mm", frequency="0.19 Hz")],
-            scenario={"load": {"user": {"terms": [constant(4500.0)]}}, "fault": fault},
+            scenario={"load": {"output": {"terms": [constant(4500.0)]}}, "fault": fault},
         )  # fmt: skip
         warm[len(fault)] = rec.final["nut_temperature"] - 293.15
     # Mean of driving and aiding: (1/eta - eta') of 0.222 and 1.125.
@@ -185,7 +185,7 @@ def test_the_accelerometer_shows_the_passes_through_its_resonance(
     rec = run(
         FREE | {f"screw.spall_{place}": 2e-3, "motor.inertia": 1e6, "vibration.model": "resonance"},
         duration=1.0, record="vibration,motor_position@20 kHz", name=NAME,
-        scenario={"load": {"user": {"terms": [constant(4500.0)]}},
+        scenario={"load": {"output": {"terms": [constant(4500.0)]}},
                   "initial": {"motor_speed": 20.0}},
     )  # fmt: skip
     angle, shown = rec["motor_position"].values, rec["vibration"].values
@@ -322,7 +322,7 @@ def test_groove_spall_is_felt_only_under_the_nut() -> None:
 def test_impossible_screws_are_refused(values: dict[str, Any], words: list[str]) -> None:
     """Path, value and limit are in the message."""
     with pytest.raises(elevon.InputError) as caught:
-        run(values, duration=1e-3, record="user_position@1 kHz", name=NAME)
+        run(values, duration=1e-3, record="output_position@1 kHz", name=NAME)
     for word in words:
         assert word in str(caught.value)
 
@@ -332,7 +332,13 @@ def test_a_jam_blocks_whole_circuits_that_exist(severity: float, words: str) -> 
     """Refused with the two nearest whole numbers, or the number there is."""
     fault = {"kind": "return_jam", "place": "screw.return_channel", "severity": severity}
     with pytest.raises(elevon.InputError, match=words):
-        run({}, duration=1e-3, record="user_position@1 kHz", scenario={"fault": [fault]}, name=NAME)
+        run(
+            {},
+            duration=1e-3,
+            record="output_position@1 kHz",
+            scenario={"fault": [fault]},
+            name=NAME,
+        )
 
 
 @pytest.mark.signature("adapter_gap", "adapter")
@@ -343,12 +349,12 @@ def test_gap_of_the_adapter_is_lost_motion_at_the_load() -> None:
         {},
         duration=2.0,
         command=[term("triangle", amplitude="20 mm", frequency="1 Hz")],
-        record="ram_position,user_position,joint_force@5 kHz",
+        record="ram_position,output_position,joint_force@5 kHz",
         scenario={"fault": [fault]},
         name=NAME,
     )
     late = rec["ram_position"].time > 1.0
-    lag = (rec["ram_position"].values - rec["user_position"].values)[late]
+    lag = (rec["ram_position"].values - rec["output_position"].values)[late]
     pressed = rec["joint_force"].values[late]
     beyond = np.abs(lag) - 0.51e-3
     assert np.max(beyond) == pytest.approx(np.max(np.abs(pressed)) / 5e7, abs=2e-5)

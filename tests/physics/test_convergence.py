@@ -23,7 +23,7 @@ def swing(method: str, step: float) -> tuple[float, float]:
         mode="speed",
         command=[],
         record="motor_position,motor_speed@1 kHz",
-        scenario={"initial": {"motor_position": 1.0, "user_position": 1.0 / RATIO}},
+        scenario={"initial": {"motor_position": 1.0, "output_position": 1.0 / RATIO}},
     )
     time = rec["motor_position"].time
     angle, speed = rec["motor_position"].values, rec["motor_speed"].values

@@ -125,9 +125,9 @@ def test_the_limit_of_a_carrier_drive_is_that_of_its_current_loop_at_a_higher_ga
 
 
 def test_relays_looked_at_every_step_bear_any_derivative_a_tick_does_not() -> None:
-    """Steady at K_p T_d of five inertias, with and without play; with a tick 1 is the limit."""
-    elastic = {"play.model": "elastic", "play.damping": 20.0, "load.inertia": 0.5}
-    for extra in ({}, {"play.stiffness": 1e4, **elastic}):
+    """Steady at K_p T_d of five inertias, with and without backlash; with a tick 1 is the limit."""
+    elastic = {"backlash.model": "elastic", "backlash.damping": 20.0, "load.inertia": 0.5}
+    for extra in ({}, {"backlash.stiffness": 1e4, **elastic}):
         assert actuator(loop(HYSTERESIS, 5.0, **extra)).findings() == []
         assert scatter(loop(HYSTERESIS, 5.0, **extra)) < 0.6
     ticking = {"control.sample_time": 2e-3}

@@ -216,31 +216,31 @@ def test_stator_rub_brakes_once_a_turn(fidelity: str) -> None:
 
 @pytest.mark.signature("tooth_wear", "gear")
 @BOTH
-def test_tooth_wear_opens_the_play_over_each_mesh(fidelity: str) -> None:
-    """Pushed forwards, the user lags by half the play and the wear's sin^2 of the mesh."""
-    play, wear = 1e-3, 4e-4
+def test_tooth_wear_opens_the_backlash_over_each_mesh(fidelity: str) -> None:
+    """Pushed forwards, the output lags by half the backlash and the wear's sin^2 of the mesh."""
+    backlash, wear = 1e-3, 4e-4
     rec = coasting(
-        {"play.total": play},
+        {"backlash.total": backlash},
         fault("tooth_wear", "gear", wear),
         fidelity,
         speed=20.0,
         duration=1.0,
-        record="motor_position,user_position@2 kHz",
+        record="motor_position,output_position@2 kHz",
     )
-    motor, user = values(rec, "motor_position", "user_position")
+    motor, output = values(rec, "motor_position", "output_position")
     gone = motor > 0.5
-    lag = motor / RATIO - user
-    half = 0.5 * play + 0.5 * wear * np.sin(TEETH * motor / 2) ** 2
+    lag = motor / RATIO - output
+    half = 0.5 * backlash + 0.5 * wear * np.sin(TEETH * motor / 2) ** 2
     assert lag[gone] == pytest.approx(half[gone], abs=1e-12)
 
 
 @BOTH
 def test_tooth_wear_ripples_the_torque_at_the_mesh_under_load(fidelity: str) -> None:
-    """|T_user| dh/dtheta: the load's torque on the shaft is modulated at the order of the teeth."""
+    """|T_output| dh/dtheta: the load's torque on the shaft varies at the order of the teeth."""
     load, wear = 50.0, 4e-4
     rec = coasting(
         {},
-        {**fault("tooth_wear", "gear", wear), "load": {"user": {"terms": [constant(load)]}}},
+        {**fault("tooth_wear", "gear", wear), "load": {"output": {"terms": [constant(load)]}}},
         fidelity,
         speed=60.0,
         duration=0.3,
@@ -253,26 +253,26 @@ def test_tooth_wear_ripples_the_torque_at_the_mesh_under_load(fidelity: str) -> 
 
 @pytest.mark.signature("chipped_tooth", "gear")
 @BOTH
-def test_chipped_tooth_opens_the_play_once_a_turn(fidelity: str) -> None:
-    """The lag is that of the play but while the chipped tooth carries: a cos^2 over its mesh."""
-    play, chip, angle = 1e-3, 2e-3, 1.0
+def test_chipped_tooth_opens_the_backlash_once_a_turn(fidelity: str) -> None:
+    """The lag is the backlash's but while the chipped tooth carries: a cos^2 over its mesh."""
+    backlash, chip, angle = 1e-3, 2e-3, 1.0
     rec = coasting(
-        {"play.total": play},
+        {"backlash.total": backlash},
         fault("chipped_tooth", "gear", chip, angle=angle),
         fidelity,
         speed=20.0,
         duration=1.0,
-        record="motor_position,user_position@2 kHz",
+        record="motor_position,output_position@2 kHz",
     )
-    motor, user = values(rec, "motor_position", "user_position")
-    lag = (motor / RATIO - user)[motor > 0.5]
+    motor, output = values(rec, "motor_position", "output_position")
+    lag = (motor / RATIO - output)[motor > 0.5]
     turned = (motor[motor > 0.5] - angle + math.pi) % (2 * math.pi) - math.pi
     away = np.abs(turned) > 2 * math.pi / TEETH
-    assert lag[away] == pytest.approx(0.5 * play, abs=1e-12)
+    assert lag[away] == pytest.approx(0.5 * backlash, abs=1e-12)
     opened = [
         lag[(motor[motor > 0.5] > k) & (motor[motor > 0.5] < k + 6)].max() for k in (1, 7, 13)
     ]
-    assert opened == pytest.approx([0.5 * play + 0.5 * chip] * 3, rel=0.05)
+    assert opened == pytest.approx([0.5 * backlash + 0.5 * chip] * 3, rel=0.05)
 
 
 @pytest.mark.parametrize("name", ["torino-rotary", "nasa-ballscrew"])
@@ -301,14 +301,14 @@ def test_both_actuators_carry_them_under_load(
                     "drive.kind": "off",
                     "friction.static": 0.0,
                     "friction.dynamic": 0.0,
-                    "play.model": "operator",
+                    "backlash.model": "operator",
                 },
                 name=name,
                 duration=0.5,
                 record=f"{signal},motor_position@2 kHz",
                 scenario=faults
                 | {
-                    "load": {"user": {"terms": [constant(-load)]}},
+                    "load": {"output": {"terms": [constant(-load)]}},
                     "initial": {"motor_speed": 40.0},
                 },
                 fidelity=fidelity,

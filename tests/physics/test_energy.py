@@ -19,13 +19,13 @@ STORES = ("energy_kinetic", "energy_magnetic")
 LOADS = {
     "no load": {},
     "brake": {"load": {"brake": {"terms": [constant(1.0)]}}},
-    "user load": {"load": {"user": {"terms": [constant(100.0)]}}},
+    "output load": {"load": {"output": {"terms": [constant(100.0)]}}},
 }
 # Two masses: the contact's spring stores, its damper loses; both are in the impact account.
 ELASTIC = {
-    "play.model": "elastic",
-    "play.stiffness": 1e4,
-    "play.damping": 20.0,
+    "backlash.model": "elastic",
+    "backlash.stiffness": 1e4,
+    "backlash.damping": 20.0,
     "load.inertia": 0.5,
     "load.stiffness": 0.8,
 }
@@ -38,7 +38,7 @@ DRIVES = {
     "lossy-hysteresis": HYSTERESIS | LOSSY,
     "lossy-pwm": PWM | LOSSY,
     "lossy-located": HYSTERESIS | LOSSY | {"inverter.relay_crossing": "located"},
-    "elastic-play": HYSTERESIS | ELASTIC,
+    "elastic-backlash": HYSTERESIS | ELASTIC,
 }
 
 

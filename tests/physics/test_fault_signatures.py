@@ -144,39 +144,39 @@ def test_lubrication_raises_the_moving_current_in_proportion_to_speed() -> None:
     assert extra == pytest.approx(0.5 * viscous * 30.0 / (1.5 * K), rel=0.02)
 
 
-@pytest.mark.signature("play", "transmission")
+@pytest.mark.signature("backlash", "transmission")
 @pytest.mark.parametrize("extra", [0.13, 0.4])
-def test_play_widens_the_lost_motion_by_its_severity(extra: float) -> None:
-    """Motor minus user over a reversal: the healthy total plus the extra one."""
+def test_backlash_widens_the_lost_motion_by_its_severity(extra: float) -> None:
+    """Motor minus output over a reversal: the healthy total plus the extra one."""
 
     def lost(faults: list[dict[str, Any]]) -> float:
         rec = run(
             MOTOR | HYSTERESIS,
             duration=1.0,
             command=[term("sine", amplitude="7 deg", frequency="1 Hz")],
-            record="motor_position,user_position@2 kHz",
+            record="motor_position,output_position@2 kHz",
             scenario={"fault": faults},
         )
-        gap = rec["motor_position"].values / 124 - rec["user_position"].values
+        gap = rec["motor_position"].values / 124 - rec["output_position"].values
         return float(np.ptp(gap))
 
-    more = lost([fault("play", "transmission", f"{extra} deg")]) - lost([])
+    more = lost([fault("backlash", "transmission", f"{extra} deg")]) - lost([])
     assert math.degrees(more) == pytest.approx(extra, rel=1e-6)
 
 
 @pytest.mark.signature("jam", "transmission")
 def test_jam_stops_the_output_at_its_place() -> None:
-    """A seizure torque far above the motor's at 3 deg: the output goes no further than the play
+    """A seizure torque far above the motor's at 3 deg: the output goes no further than the backlash
     allows.
     """
     rec = run(
         MOTOR | HYSTERESIS,
         duration=1.0,
         command=[term("ramp", slope="10 deg/s")],
-        record="user_position@1 kHz",
+        record="output_position@1 kHz",
         scenario={"fault": [fault("jam", "transmission", 100.0, position="3 deg")]},
     )
-    assert math.degrees(rec.final["user_position"]) == pytest.approx(3.0, abs=0.5)
+    assert math.degrees(rec.final["output_position"]) == pytest.approx(3.0, abs=0.5)
 
 
 @pytest.mark.signature("gain_drift", "control")
@@ -207,7 +207,7 @@ def test_lost_resolver_makes_the_position_jump_and_recover() -> None:
     it back.
     """
     command = [term("sine", amplitude="7 deg", frequency="0.5 Hz")]
-    record = "user_position,motor_speed,resolver_position@1 kHz"
+    record = "output_position,motor_speed,resolver_position@1 kHz"
     healthy = run(MOTOR | HYSTERESIS, duration=2.0, command=command, record=record)
     gap = {"kind": "intermittent", "start": "0.3 s", "period": "10 s", "duty": 0.05}
     dropout = {**fault("dropout", "sensor.resolver", 0.5, period="0.05 s"), "profile": gap}
@@ -218,7 +218,7 @@ def test_lost_resolver_makes_the_position_jump_and_recover() -> None:
         record=record,
         scenario={"fault": [dropout]},
     )
-    strayed = np.abs(lost["user_position"].values - healthy["user_position"].values)
+    strayed = np.abs(lost["output_position"].values - healthy["output_position"].values)
     assert np.degrees(strayed.max()) > 0.01
     assert np.max(np.abs(np.diff(lost["resolver_position"].values))) > 3 * np.max(
         np.abs(np.diff(healthy["resolver_position"].values))
@@ -270,11 +270,11 @@ def test_missing_counts_make_the_encoder_read_short() -> None:
         MOTOR | HYSTERESIS,
         duration=1.0,
         command=[term("ramp", slope="10 deg/s")],
-        record="user_position,encoder_position@1 kHz",
+        record="output_position,encoder_position@1 kHz",
         scenario={"fault": [fault("missing_counts", "sensor.encoder", 0.1)]},
     )
     assert rec.final["encoder_position"] == pytest.approx(
-        0.9 * rec.final["user_position"], rel=0.02
+        0.9 * rec.final["output_position"], rel=0.02
     )
 
 

@@ -14,7 +14,7 @@ RUBBING = FREE_SHAFT | {"friction.static": STATIC, "friction.dynamic": DYNAMIC}
 
 
 def shaft(torque: float) -> dict[str, object]:
-    """A scenario with a constant signed torque on the fast shaft."""
+    """A scenario with a constant signed torque on the motor shaft."""
     return {"load": {"shaft": {"terms": [constant(torque)]}}}
 
 
@@ -94,14 +94,14 @@ def test_brake_resists_whichever_way_and_never_drives(sign: int) -> None:
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("load", [50.0, -50.0])
 def test_load_dependent_friction_opposing_and_aiding(direction: int, load: float) -> None:
-    """User load T: the shaft feels T/i plus (1/eta - 1)|T|/i opposing or (1 - eta')|T|/i aiding.
+    """Output load T: the shaft feels T/i plus (1/eta - 1)|T|/i opposing or (1 - eta')|T|/i aiding.
 
     Efficiencies of the published lever example; 20 ms of coasting, compared as a mean deceleration.
     """
     opposing, aiding = 0.9000, 0.8911
     settings = RUBBING | {"gear.efficiency": opposing, "gear.efficiency_aiding": aiding}
     start, duration = direction * 60.0, 0.02
-    scenario = {"load": {"user": {"terms": [constant(load)]}}, "initial": {"motor_speed": start}}
+    scenario = {"load": {"output": {"terms": [constant(load)]}}, "initial": {"motor_speed": start}}
     rec = run(settings, duration=duration, record="motor_speed@1 kHz", scenario=scenario)
     added = (1 / opposing - 1) if load * direction > 0 else (1 - aiding)
     torque = -load / 124 - direction * (DYNAMIC + added * abs(load) / 124)

@@ -16,7 +16,7 @@ FIDELITIES = ["high", "low"]
 
 
 def shaft(*terms: dict[str, Any]) -> dict[str, Any]:
-    """A scenario with these signed torques on the fast shaft."""
+    """A scenario with these signed torques on the motor shaft."""
     return {"load": {"shaft": {"terms": list(terms)}}}
 
 

@@ -13,7 +13,7 @@ from tests.physics.rig import HYSTERESIS, PWM, actuator, make_scenario, run, ter
 
 COMMAND = [term("sine", amplitude="7 deg", frequency="2 Hz")]
 NOISY = {"control.noise_deviation": 1e-4, "sensor.current.noise_deviation": 0.02}
-NAMES = ["user_position", "motor_speed", "current_a", "current_q", "motor_torque"]
+NAMES = ["output_position", "motor_speed", "current_a", "current_q", "motor_torque"]
 DRIVES = {"hysteresis": HYSTERESIS, "pwm": PWM}
 
 
@@ -36,12 +36,16 @@ def test_same_seed_same_bits_other_seed_other_noise(drive: str) -> None:
 @pytest.mark.parametrize("drive", DRIVES)
 @pytest.mark.parametrize(
     "record",
-    ["user_position@400 Hz", "motor_speed,current_q@15.625 kHz", "@every", "drive_log@400 Hz"],
+    ["output_position@400 Hz", "motor_speed,current_q@15.625 kHz", "@every", "drive_log@400 Hz"],
 )
 def test_recording_does_not_change_the_run(drive: str, record: str) -> None:
     """Cutting the run at recording ticks moves no bit."""
     plain = run(
-        DRIVES[drive] | NOISY, duration=0.03, command=COMMAND, record="user_position@10 Hz", seed=3
+        DRIVES[drive] | NOISY,
+        duration=0.03,
+        command=COMMAND,
+        record="output_position@10 Hz",
+        seed=3,
     )
     same(plain, run(DRIVES[drive] | NOISY, duration=0.03, command=COMMAND, record=record, seed=3))
 
@@ -112,8 +116,8 @@ def test_order_in_the_batch_does_not_matter(alone: list[Any]) -> None:
 def test_batch_identity_in_both_fidelities(fidelity: str) -> None:
     """The low model too, which carries a part of what differs."""
     runs = batch(5)
-    record = ["user_position,motor_speed,current_q@400 Hz"]
+    record = ["output_position,motor_speed,current_q@400 Hz"]
     together = elevon.simulate_batch(runs, fidelity=fidelity, record=record)
     for r, many in zip(runs, together, strict=True):
         one = elevon.simulate(r.actuator, r.scenario, fidelity=fidelity, record=record, seed=r.seed)
-        same(one, many, ["user_position", "motor_speed", "current_q"])
+        same(one, many, ["output_position", "motor_speed", "current_q"])

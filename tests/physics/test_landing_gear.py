@@ -100,8 +100,8 @@ def test_the_third_phase_brakes_as_much_at_low_as_at_high() -> None:
 
 def test_lever_is_the_triangle_and_virtual_work_is_an_identity() -> None:
     """Both loop equations close and h = dx/dalpha = g sin(a + b), all to rounding."""
-    rec = gear((0.0, "extend"), duration=8.0, record="user_position,lever_angle,lever_arm@200 Hz")
-    ram = np.minimum(rec["user_position"].values, value("lever.stroke"))
+    rec = gear((0.0, "extend"), duration=8.0, record="output_position,lever_angle,lever_arm@200 Hz")
+    ram = np.minimum(rec["output_position"].values, value("lever.stroke"))
     arm, d, e = value("lever.arm"), value("lever.pivot_x"), value("lever.pivot_y")
     length = value("lever.length_retracted") + ram
 
@@ -226,7 +226,7 @@ def test_free_fall_extends_and_locks_without_the_motor(fidelity: str) -> None:
     assert rec.final["released"] == 1.0
     assert np.max(np.abs(rec["current_line"].values)) == 0.0
     assert np.ptp(rec["motor_position"].values) == 0.0
-    speed = rec["user_speed"].values
+    speed = rec["output_speed"].values
     assert speed.max() == pytest.approx(0.081, rel=0.05)
 
 
@@ -253,10 +253,10 @@ def test_low_and_high_fidelity_agree_on_the_stroke(factor: float, supply: float)
         times, currents = [], []
         for fidelity in ("low", "high"):
             rec = gear((0.1, action), duration=9.0, start=start, fidelity=fidelity, values=values,
-                       record="state,current_mean,user_position@1 kHz")  # fmt: skip
+                       record="state,current_mean,output_position@1 kHz")  # fmt: skip
             state = rec["state"]
             times.append(state.time[(state.values == end) & (state.time > 0.2)][0])
-            ram = rec["user_position"].values
+            ram = rec["output_position"].values
             middle = (ram > 0.1) & (ram < 0.16)
             currents.append(np.mean(rec["current_mean"].values[middle]))
         assert times[0] == pytest.approx(times[1], rel=0.02)

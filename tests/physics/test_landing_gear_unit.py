@@ -156,7 +156,7 @@ def test_a_leg_that_moves_at_rest_is_a_fault(start: str | None, phase: int) -> N
     assert found - nut[0] == pytest.approx(5e-4, abs=1e-4)
     # 2 g would run away; the short leaves some 0.6 mm/s.
     assert rec.final["software_brake"] == 1.0
-    assert 0.0 < rec.final["user_speed"] < 1.5e-3
+    assert 0.0 < rec.final["output_speed"] < 1.5e-3
     assert "at rest" in rec.meta["message"]
 
 
@@ -190,7 +190,7 @@ def test_the_motor_holds_before_the_brake_opens(values: dict[str, Any], fidelity
     rec = gear((0.1, "retract"), duration=1.5, start="130 mm", fidelity=fidelity,
                values={"load.factor": 3.5, **values})  # fmt: skip
     assert rec["nut_position"].values.max() - 0.130 < 2e-4
-    assert rec.final["user_speed"] < -0.02
+    assert rec.final["output_speed"] < -0.02
 
 
 def test_without_any_of_them_the_load_takes_the_motor_along() -> None:
@@ -338,14 +338,14 @@ def test_names_that_nobody_knows_get_the_near_ones() -> None:
 
 def test_a_lock_loaded_beyond_its_strength_ends_the_run() -> None:
     """The watch names the lock."""
-    overload = {"user": {"terms": [{"kind": "constant", "value": "80 kN"}]}}
+    overload = {"output": {"terms": [{"kind": "constant", "value": "80 kN"}]}}
     with pytest.raises(DivergedError, match="lock_force"):
         gear(duration=0.1, start=EXTENDED, load=overload)
 
 
 def test_an_open_triangle_is_refused_with_its_position() -> None:
     """The first ram position at which it does not close, and the lengths."""
-    with pytest.raises(elevon.InputError, match=r"does not close at user_position = [\d.]+ mm"):
+    with pytest.raises(elevon.InputError, match=r"does not close at output_position = [\d.]+ mm"):
         gear((0.1, "extend"), duration=1.0, values={"lever.arm": "0.12 m"})
 
 

@@ -14,7 +14,7 @@ from tests.physics.rig import PWM, actuator, constant, make_scenario, run, term
 FIDELITIES = ("high", "low")
 #: EMF constant of the set, V s/rad.
 K = 0.9004
-LOADED = {"load": {"user": {"terms": [constant("50 N m")]}}}
+LOADED = {"load": {"output": {"terms": [constant("50 N m")]}}}
 #: A flywheel that keeps its speed over the run, so that only the torque speaks.
 FLYWHEEL = {"load.inertia": 5e4, "friction.static": 0.0, "friction.dynamic": 0.0,
             "friction.viscous": 0.0, "gear.efficiency": 1.0, "gear.efficiency_aiding": 1.0,
@@ -81,7 +81,7 @@ def test_lost_feedback_opens_the_bridge() -> None:
 
 def test_trip_current() -> None:
     """The drive trips above the peak that load and band ask for, and not below it."""
-    scenario = {"load": {"user": {"terms": [constant("600 N m")]}}}
+    scenario = {"load": {"output": {"terms": [constant("600 N m")]}}}
     for fidelity in FIDELITIES:
         for trip, expected in ((5.5, "tripped"), (8.0, "ok")):
             values = {"inverter.trip_current": trip, "control.speed_feedforward": 0.0}
@@ -158,7 +158,7 @@ def test_quadrature_current_is_that_of_the_rotor() -> None:
     assert late(rec, "current_q") == pytest.approx(
         late(rec, "current_q_meas") * math.cos(0.8), rel=0.005
     )
-    stalled = {"load": {"user": {"terms": [constant("800 N m")]}},
+    stalled = {"load": {"output": {"terms": [constant("800 N m")]}},
                "fault": [fault("open_phase", "motor.phase_a", 1.0)]}  # fmt: skip
     high, low = both({}, "current_q", scenario=stalled, mode="torque", command="10 N m")
     assert low == pytest.approx(high, rel=0.05)
@@ -197,7 +197,7 @@ def test_loop_short_over_whole_turns(
     values |= {"thermal.model": "off"} if name == "nasa-ballscrew" else {}
     scenario = make_scenario(
         duration=0.8, mode="speed", command=[constant("40 rad/s")],
-        extra={"load": {"user": {"terms": [constant(load)]}},
+        extra={"load": {"output": {"terms": [constant(load)]}},
                "fault": [fault("short", "motor.phase_a", severity)]},
     )  # fmt: skip
     means = []
@@ -238,19 +238,19 @@ NASA = {"thermal.model": "off", "load.stiffness": 0.0}
 LEAD = 0.010 / (2 * math.pi)
 
 
-@pytest.mark.parametrize("play", ["elastic", "operator"])
+@pytest.mark.parametrize("backlash", ["elastic", "operator"])
 @pytest.mark.parametrize("fidelity", FIDELITIES)
 @pytest.mark.parametrize("blocked", [0, 1])
 @pytest.mark.parametrize("brake", [0.0, 1000.0])
 def test_screw_current_against_the_closed_form(
-    play: str, fidelity: str, blocked: int, brake: float
+    backlash: str, fidelity: str, blocked: int, brake: float
 ) -> None:
     """All force at the joint passes the screw: load, and the load side's friction and brake."""
-    if fidelity == "low" and play == "elastic":
-        pytest.skip("the low fidelity keeps the play operator")
+    if fidelity == "low" and backlash == "elastic":
+        pytest.skip("the low fidelity keeps the backlash operator")
     scenario: dict[str, Any] = {
         "load": {
-            "user": {"terms": [constant("4003 N")]},
+            "output": {"terms": [constant("4003 N")]},
             "brake": {"terms": [constant(f"{brake} N")]},
         }
     }
@@ -258,7 +258,7 @@ def test_screw_current_against_the_closed_form(
         scenario["fault"] = [fault("return_jam", "screw.return_channel", blocked)]
     speed = 0.06 / LEAD
     names = "current_q_meas,motor_speed,screw_efficiency@1 kHz"
-    rec = run(NASA | {"play.model": play}, duration=0.7, mode="speed",
+    rec = run(NASA | {"backlash.model": backlash}, duration=0.7, mode="speed",
               command=[term("constant", value=f"{speed!r} rad/s")], record=names,
               scenario=scenario, fidelity=fidelity, name="nasa-ballscrew")  # fmt: skip
     w = float(np.mean(rec["motor_speed"].values[-300:]))

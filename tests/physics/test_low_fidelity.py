@@ -70,13 +70,13 @@ def test_low_follows_high_under_the_pwm_drive(load: float) -> None:
             LOW,
             duration=2.0,
             command=command,
-            record="user_position@400 Hz",
+            record="output_position@400 Hz",
             fidelity=fidelity,
             scenario=scenario,
         )
         for fidelity in ("high", "low")
     ]
-    high, low = (rec["user_position"].values[400:] for rec in runs)
+    high, low = (rec["output_position"].values[400:] for rec in runs)
     assert np.sqrt(np.mean((high - low) ** 2)) < 0.005 * math.radians(7.0)
 
 

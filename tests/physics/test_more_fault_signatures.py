@@ -125,19 +125,19 @@ def test_resolver_offset_costs_torque_by_the_cosine_of_the_electrical_error() ->
 @pytest.mark.signature("gain", "encoder")
 @pytest.mark.parametrize(("kind", "severity"), [("offset", 0.01), ("gain", 0.05)])
 def test_encoder_error_moves_the_output_the_other_way(kind: str, severity: float) -> None:
-    """The loop brings the reading to the command: user = command - offset, or command/(1+gain)."""
+    """The loop brings the reading to the command: command - offset, or command / (1 + gain)."""
     command = 0.2
     rec = run(
         MOTOR | HYSTERESIS | {"control.position_feedback": "encoder"},
         duration=3.0,
         command=[constant(command)],
-        record="user_position,encoder_position@1 kHz",
+        record="output_position,encoder_position@1 kHz",
         scenario={"fault": [fault(kind, "sensor.encoder", severity)]},
     )
     expected = command - severity if kind == "offset" else command / (1 + severity)
-    assert rec.final["user_position"] == pytest.approx(expected, abs=2e-3)
+    assert rec.final["output_position"] == pytest.approx(expected, abs=2e-3)
     shown = rec.final["encoder_position"]
-    true = rec.final["user_position"]
+    true = rec.final["output_position"]
     count = 2 * math.pi / 80000
     wanted = true + severity if kind == "offset" else true * (1 + severity)
     assert shown == pytest.approx(wanted, abs=1.01 * count)
@@ -166,23 +166,23 @@ def test_missing_turns_show_in_each_phase_alike() -> None:
     assert sizes[1:] == pytest.approx(sizes[:1] * 2, rel=0.1)
 
 
-def test_growing_play_only_ever_widens() -> None:
-    """A ramp of extra play: the lost motion of each later cycle is larger."""
+def test_growing_backlash_only_ever_widens() -> None:
+    """A ramp of extra backlash: the lost motion of each later cycle is larger."""
     rec = run(
         MOTOR | HYSTERESIS,
         duration=3.0,
         command=[term("sine", amplitude="7 deg", frequency="1 Hz")],
-        record="motor_position,user_position@2 kHz",
+        record="motor_position,output_position@2 kHz",
         scenario={
             "fault": [
                 {
-                    **fault("play", "transmission", "0.5 deg"),
+                    **fault("backlash", "transmission", "0.5 deg"),
                     "profile": {"kind": "ramp", "start": "0 s", "end": "3 s"},
                 }
             ]
         },
     )
-    gap = rec["motor_position"].values / 124 - rec["user_position"].values
+    gap = rec["motor_position"].values / 124 - rec["output_position"].values
     cycles = [np.ptp(part) for part in np.array_split(gap, 3)]
     assert cycles[0] < cycles[1] < cycles[2]
 

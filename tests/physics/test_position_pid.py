@@ -13,11 +13,11 @@ GAIN, INTEGRAL, DERIVATIVE, FILTER = 9000.0, 0.15, 0.02, 10.0
 FREE = {
     "control.structure": "pid", "control.pid_gain": GAIN, "control.pid_integral_time": INTEGRAL,
     "control.pid_derivative_time": DERIVATIVE, "control.pid_derivative_filter": FILTER,
-    "control.position_feedback": "user", "control.current_limit": 1e3,
+    "control.position_feedback": "output", "control.current_limit": 1e3,
     "control.sample_time": 0.0, "drive.kind": "pwm", "friction.static": 0.0,
     "friction.dynamic": 0.0, "friction.viscous": 0.0, "screw.preload": 0.0, "load.friction": 0.0,
     "load.damping": 0.0, "screw.efficiency": 1.0, "screw.efficiency_aiding": 1.0,
-    "play.total": 0.0, "inverter.supply_voltage": 600.0, "thermal.model": "off",
+    "backlash.total": 0.0, "inverter.supply_voltage": 600.0, "thermal.model": "off",
 }  # fmt: skip
 STEP = {"low": {"low.step": 1e-4}, "high": {"solver.step": 2e-6}}
 SCENARIO = Scenario.from_dict(
@@ -29,7 +29,7 @@ SCENARIO = Scenario.from_dict(
         },
     }
 )
-RECORD = "user_position,current_ref@1 kHz"
+RECORD = "output_position,current_ref@1 kHz"
 
 
 def actuator(fidelity: str, changes: dict[str, str | float] | None = None) -> Actuator:
@@ -60,7 +60,7 @@ def test_the_loop_is_that_of_the_textbook(fidelity: str, limit: float) -> None:
     """Within the current loop's own lag and the step; of the range."""
     free = actuator(fidelity)
     done = simulate(free, SCENARIO, fidelity=fidelity, record=RECORD)
-    shown = done["user_position"]
+    shown = done["output_position"]
     expected = linear(free, shown.time)
     assert np.abs(shown.values - expected).max() < limit * np.ptp(expected)
     assert np.ptp(expected) > 0.009  # it overshoots: the zeros are complex
@@ -72,7 +72,7 @@ def test_batches_have_the_bits_of_single_runs() -> None:
     together = simulate_batch(runs, fidelity="low", record=RECORD)
     for run, item in zip(runs, together, strict=True):
         alone = simulate(run.actuator, SCENARIO, fidelity="low", record=RECORD)
-        assert np.array_equal(alone["user_position"].values, item["user_position"].values)
+        assert np.array_equal(alone["output_position"].values, item["output_position"].values)
 
 
 @pytest.mark.parametrize("fidelity", ["low", "high"])
@@ -83,7 +83,7 @@ def test_at_rest_the_error_is_the_load_over_the_gain(fidelity: str) -> None:
     loaded = actuator(fidelity, changes)
     done = simulate(loaded, held, fidelity=fidelity, record=RECORD)
     expected = -900.0 * loaded.parameters.value("screw.lead") / GAIN
-    assert done["user_position"].values[-1] == pytest.approx(expected, rel=0.02)
+    assert done["output_position"].values[-1] == pytest.approx(expected, rel=0.02)
 
 
 @pytest.mark.parametrize("fidelity", ["low", "high"])

@@ -10,7 +10,7 @@ import pytest
 
 from tests.physics.rig import FREE_SHAFT, HYSTERESIS, MOTOR, PWM, RATIO, P, constant, run, term
 
-SHOWN = "resolver_speed,user_position,encoder_position"
+SHOWN = "resolver_speed,output_position,encoder_position"
 CURRENTS = "current_a,current_a_meas,current_b,current_b_meas"
 BOTH = pytest.mark.parametrize("fidelity", ["high", "low"])
 
@@ -38,14 +38,14 @@ def there(start: float, end: float) -> dict[str, Any]:
     return {"kind": "intermittent", "start": start, "period": 10.0, "duty": (end - start) / 10.0}
 
 
-@pytest.mark.signature("winding_short", "resolver")
+@pytest.mark.signature("resolver_short", "resolver")
 @BOTH
 @pytest.mark.parametrize(("place", "a", "b"), [("sine", 0.6, 1.0), ("cosine", 1.0, 0.6)])
 def test_shorted_resolver_winding_shows_the_angle_of_its_channels(
     fidelity: str, place: str, a: float, b: float
 ) -> None:
     """atan2(a sin, b cos), unwrapped; sampling error none, rounding of some hundred radians."""
-    rec = spun(fidelity, [fault("winding_short", f"sensor.resolver.{place}", 0.4)])
+    rec = spun(fidelity, [fault("resolver_short", f"sensor.resolver.{place}", 0.4)])
     theta = rec["motor_position"].values
     error = np.angle(np.exp(1j * (np.arctan2(a * np.sin(theta), b * np.cos(theta)) - theta)))
     assert rec["resolver_position"].values == pytest.approx(theta + error, abs=1e-9)
@@ -55,18 +55,18 @@ def test_shorted_resolver_winding_shows_the_angle_of_its_channels(
 @BOTH
 def test_shorted_excitation_turns_no_angle_until_the_signal_is_lost(fidelity: str) -> None:
     """70 % of the amplitude is where the converter gives up (ASSUMED)."""
-    weak = spun(fidelity, [fault("winding_short", "sensor.resolver.excitation", 0.29)])
+    weak = spun(fidelity, [fault("resolver_short", "sensor.resolver.excitation", 0.29)])
     assert np.array_equal(weak["resolver_position"].values, weak["motor_position"].values)
-    lost = spun(fidelity, [fault("winding_short", "sensor.resolver.excitation", 0.31)])
+    lost = spun(fidelity, [fault("resolver_short", "sensor.resolver.excitation", 0.31)])
     assert np.ptp(lost["resolver_position"].values) == 0.0
     assert np.all(lost["resolver_speed"].values == 0.0)
 
 
-@pytest.mark.signature("winding_open", "resolver")
+@pytest.mark.signature("resolver_open", "resolver")
 @pytest.mark.parametrize(("place", "zero"), [("sine", 0.0), ("cosine", math.pi / 2)])
 def test_open_resolver_winding_leaves_multiples_of_half_a_turn(place: str, zero: float) -> None:
     """One channel alone tells only on which side the shaft stands; 0.1 % stray coupling."""
-    rec = spun("high", [fault("winding_open", f"sensor.resolver.{place}", 1)])
+    rec = spun("high", [fault("resolver_open", f"sensor.resolver.{place}", 1)])
     theta, shown = rec["motor_position"].values, rec["resolver_position"].values
     halves = zero + math.pi * np.round((theta - zero) / math.pi)
     away = np.abs(np.angle(np.exp(2j * (theta - zero - math.pi / 2)))) > 0.1
@@ -76,7 +76,7 @@ def test_open_resolver_winding_leaves_multiples_of_half_a_turn(place: str, zero:
 @BOTH
 def test_without_excitation_the_shown_angle_stands(fidelity: str) -> None:
     """Neither channel has a signal."""
-    none = spun(fidelity, [fault("winding_open", "sensor.resolver.excitation", 1)])
+    none = spun(fidelity, [fault("resolver_open", "sensor.resolver.excitation", 1)])
     assert np.ptp(none["resolver_position"].values) == 0.0
 
 
@@ -89,9 +89,9 @@ def test_dark_sector_takes_its_share_of_the_disc(fidelity: str) -> None:
     speed = 3.0 / 4.0 * 2.0 * math.pi * 20.0
     dark = fault("dark_sectors", "sensor.encoder", 0.25, position="180 deg", sectors=1)
     rec = spun(fidelity, [dark], speed, **{"gear.ratio": 20.0})
-    user, shown = rec["user_position"].values, rec["encoder_position"].values
-    assert shown[-1] == pytest.approx(0.75 * user[-1], abs=2.0 * math.pi / 80e3 * 2)
-    disc = np.mod(4.0 * user / (2.0 * math.pi), 1.0)
+    output, shown = rec["output_position"].values, rec["encoder_position"].values
+    assert shown[-1] == pytest.approx(0.75 * output[-1], abs=2.0 * math.pi / 80e3 * 2)
+    disc = np.mod(4.0 * output / (2.0 * math.pi), 1.0)
     inside = (disc[:-1] > 0.38) & (disc[:-1] < 0.62) & (disc[1:] < 0.62) & (disc[1:] > 0.38)
     assert np.all(np.diff(shown)[inside] == 0.0)
     assert np.all(np.diff(shown)[(disc[:-1] > 0.65) | (disc[1:] < 0.35)] > 0.0)
@@ -104,12 +104,12 @@ def test_dark_sector_takes_its_share_of_the_disc(fidelity: str) -> None:
 def test_encoder_that_stood_still_comes_back(fidelity: str, kind: str, lost: float) -> None:
     """A stuck reading is the true one again, a dead encoder has lost the counts of its time."""
     rec = spun(fidelity, [fault(kind, "sensor.encoder", 1, profile=there(0.3, 0.7))], RATIO)
-    time, user = rec["user_position"].time, rec["user_position"].values
+    time, output = rec["output_position"].time, rec["output_position"].values
     shown = rec["encoder_position"].values
     gone = (time > 0.3) & (time < 0.699)
     assert np.ptp(shown[gone]) == 0.0
     assert shown[gone][0] == pytest.approx(0.3, abs=2e-3)
-    assert user[-1] - shown[-1] == pytest.approx(lost, abs=2e-3)
+    assert output[-1] - shown[-1] == pytest.approx(lost, abs=2e-3)
 
 
 @pytest.mark.signature("stuck", "resolver")
@@ -164,13 +164,13 @@ def test_dark_sector_carries_a_loop_on_the_encoder_too_far(fidelity: str) -> Non
         MOTOR | HYSTERESIS | {"control.position_feedback": "encoder"},
         duration=3.0,
         command=[term("ramp", slope="12 deg/s", end=2.0)],
-        record="user_position,encoder_position@1 kHz",
+        record="output_position,encoder_position@1 kHz",
         scenario={"fault": [dark]},
         fidelity=fidelity,
     )
     assert math.degrees(rec.final["encoder_position"]) == pytest.approx(24.0, abs=0.3)
-    # A tenth of the disc is a fortieth of a user turn.
-    assert math.degrees(rec.final["user_position"]) == pytest.approx(24.0 + 9.0, abs=0.3)
+    # A tenth of the disc is a fortieth of an output turn.
+    assert math.degrees(rec.final["output_position"]) == pytest.approx(24.0 + 9.0, abs=0.3)
 
 
 @BOTH
@@ -183,11 +183,11 @@ def test_jam_waits_for_a_passage_after_its_onset(fidelity: str) -> None:
         MOTOR | HYSTERESIS,
         duration=2.0,
         command=[term("triangle", amplitude="5 deg", frequency="0.25 Hz")],
-        record="user_position@1 kHz",
+        record="output_position@1 kHz",
         scenario={"fault": [jam]},
         fidelity=fidelity,
     )
-    time, position = rec["user_position"].time, np.degrees(rec["user_position"].values)
+    time, position = rec["output_position"].time, np.degrees(rec["output_position"].values)
     assert np.max(position) == pytest.approx(5.0, abs=0.6)
     assert position[-1] == pytest.approx(3.0, abs=0.6)
     assert np.array_equal(rec["fault_1"].values, np.where(time >= 1.0, 100.0, 0.0))

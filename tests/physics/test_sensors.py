@@ -20,10 +20,10 @@ def swinging(settings: dict[str, object], record: str) -> object:
     return run(FREE_SHAFT | settings, duration=0.5, record=f"{record}@4 kHz", scenario=SWING)
 
 
-def test_encoder_shows_whole_counts_of_the_user_position() -> None:
+def test_encoder_shows_whole_counts_of_the_output_position() -> None:
     """80000 counts a turn; the shown position is never more than one count from the true one."""
     shown, true = values(
-        swinging({}, "encoder_position,user_position"), "encoder_position", "user_position"
+        swinging({}, "encoder_position,output_position"), "encoder_position", "output_position"
     )
     counts = shown / COUNT
     assert counts == pytest.approx(np.round(counts), abs=1e-6)

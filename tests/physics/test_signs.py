@@ -30,15 +30,15 @@ def final(
 @BOTH
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_positive_current_positive_torque_positive_motion(fidelity: str, sign: float) -> None:
-    """A torque command: current, torque, speed, motor and user position share its sign."""
+    """A torque command: current, torque, speed, motor and output position share its sign."""
     end = final("torque", 0.2 * sign, fidelity)
-    for name in ("current_q", "motor_torque", "motor_speed", "motor_position", "user_position"):
+    for name in ("current_q", "motor_torque", "motor_speed", "motor_position", "output_position"):
         assert end[name] * sign > 0, name
     assert end["motor_torque"] == pytest.approx(1.5 * K * end["current_q"], rel=1e-6)
 
 
 @BOTH
-@pytest.mark.parametrize("place", ["shaft", "user"])
+@pytest.mark.parametrize("place", ["shaft", "output"])
 def test_positive_load_opposes_positive_motion(fidelity: str, place: str) -> None:
     """Drive off: a positive load turns the shaft backwards."""
     load = {place: {"terms": [constant(0.05 if place == "shaft" else 5.0)]}}
@@ -60,22 +60,22 @@ def test_error_is_command_less_measured(fidelity: str) -> None:
     """A command above the output asks for positive speed."""
     end = final("position", 1.0, fidelity)
     assert end["speed_ref"] > 0
-    assert end["user_position"] > 0
+    assert end["output_position"] > 0
 
 
 @BOTH
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_user_follows_on_the_trailing_side_of_the_play(fidelity: str, sign: float) -> None:
-    """Moving forwards the user side lags by half the play, backwards it leads."""
+def test_output_follows_on_the_trailing_side_of_the_backlash(fidelity: str, sign: float) -> None:
+    """Moving forwards the output side lags by half the backlash, backwards it leads."""
     rec = run(
-        FREE_SHAFT | PWM | {"play.total": 0.01},
+        FREE_SHAFT | PWM | {"backlash.total": 0.01},
         duration=0.3,
         mode="speed",
         command=[constant(20.0 * sign)],
         record="motor_speed@100 Hz",
         fidelity=fidelity,
     )
-    lag = rec.final["motor_position"] / 124 - rec.final["user_position"]
+    lag = rec.final["motor_position"] / 124 - rec.final["output_position"]
     assert lag == pytest.approx(0.005 * sign, rel=1e-6)
 
 

@@ -19,10 +19,10 @@ SHAFT = FREE_SHAFT | {
     "stop.lower": -STOP,
 }
 ELASTIC = {
-    "play.model": "elastic",
-    "play.total": math.radians(0.4),
-    "play.stiffness": STIFFNESS,
-    "play.damping": 3e3,
+    "backlash.model": "elastic",
+    "backlash.total": math.radians(0.4),
+    "backlash.stiffness": STIFFNESS,
+    "backlash.damping": 3e3,
     "load.inertia": 0.05,
 }
 WAYS: dict[str, dict[str, Any]] = {
@@ -38,7 +38,7 @@ CASES = [(way, "high") for way in WAYS] + [("explicit", "low"), ("bristles", "lo
 
 
 def shaft(*terms: dict[str, Any]) -> dict[str, Any]:
-    """A scenario with these torques on the fast shaft, positive driving forwards."""
+    """A scenario with these torques on the motor shaft, positive driving forwards."""
     return {"load": {"shaft": {"terms": list(terms)}}}
 
 
@@ -116,37 +116,37 @@ def test_anti_windup_at_rest_freezes_at_a_stop(way: str) -> None:
 
 @pytest.mark.parametrize("method", ["explicit", "semi_implicit"])
 @pytest.mark.parametrize("sign", [1, -1])
-def test_an_elastic_user_stops_where_the_stop_stands(method: str, sign: int) -> None:
-    """The second mass never passes; the motor comes to rest on the contact, half the play and
+def test_an_elastic_output_stops_where_the_stop_stands(method: str, sign: int) -> None:
+    """The second mass never passes; the motor comes to rest on the contact, half the backlash and
     T i / K further.
     """
-    start = {"motor_position": sign * STOP * RATIO, "user_position": 0.999 * sign * STOP}
+    start = {"motor_position": sign * STOP * RATIO, "output_position": 0.999 * sign * STOP}
     rec = run(
         SHAFT | ELASTIC | {"solver.method": method},
         duration=1.0,
         record=[
-            "motor_position,motor_speed,user_position@2 kHz",
-            "user_speed,stop_torque,friction_torque@2 kHz",
+            "motor_position,motor_speed,output_position@2 kHz",
+            "output_speed,stop_torque,friction_torque@2 kHz",
         ],
         scenario=shaft(constant(-sign * TORQUE)) | {"initial": start},
     )
-    motor, speed, user, user_speed, held, friction = values(
+    motor, speed, output, output_speed, held, friction = values(
         rec,
         "motor_position",
         "motor_speed",
-        "user_position",
-        "user_speed",
+        "output_position",
+        "output_speed",
         "stop_torque",
         "friction_torque",
     )
-    assert np.max(sign * user) == STOP
+    assert np.max(sign * output) == STOP
     late = rec["motor_position"].time > 0.8
-    assert np.all(user[late] == sign * STOP)
-    assert np.all(user_speed[late] == 0.0)
+    assert np.all(output[late] == sign * STOP)
+    assert np.all(output_speed[late] == 0.0)
     assert np.all(speed[late] == 0.0)
     through = (sign * TORQUE - friction[late]) * RATIO
     assert held[late] * RATIO == pytest.approx(through, rel=1e-9)
-    beyond = motor[late] / RATIO - user[late]
+    beyond = motor[late] / RATIO - output[late]
     assert beyond == pytest.approx(sign * math.radians(0.2) + through / STIFFNESS, rel=1e-9)
 
 

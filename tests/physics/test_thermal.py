@@ -96,7 +96,7 @@ def test_high_and_low_heat_alike() -> None:
         {
             "duration": 2.0,
             "command": {"terms": [{"kind": "sine", "amplitude": "20 mm", "frequency": "0.5 Hz"}]},
-            "load": {"user": {"terms": [constant(4500.0)]}},
+            "load": {"output": {"terms": [constant(4500.0)]}},
         }
     )
     actuator = elevon.Actuator.load(NAME)
@@ -200,6 +200,6 @@ def test_it_serves_the_rotary_actuator_too() -> None:
 def test_impossible_temperatures_are_refused(values: dict[str, Any], words: list[str]) -> None:
     """Path, value and limit."""
     with pytest.raises(elevon.InputError) as caught:
-        run(values, duration=1e-3, record="user_position@1 kHz", name=NAME)
+        run(values, duration=1e-3, record="output_position@1 kHz", name=NAME)
     for word in words:
         assert word in str(caught.value)

@@ -1,4 +1,4 @@
-"""End stops, inertia and spring on the user side, seizure."""
+"""End stops, inertia and spring on the output side, seizure."""
 
 from __future__ import annotations
 
@@ -58,10 +58,10 @@ def test_a_shaft_leaves_its_stop_when_pulled_back() -> None:
     assert position[late] == pytest.approx(np.maximum(fallen, -stop * RATIO), abs=1e-3)
 
 
-def test_user_inertia_counts_divided_by_the_ratio_squared() -> None:
-    """theta = T t^2 / (2 (J + J_u / i^2)), a user inertia that doubles the total."""
-    user = INERTIA * RATIO**2
-    rec = pushed({"load.inertia": user}, 0.5, 0.2, "motor_position@1 kHz")
+def test_output_inertia_counts_divided_by_the_ratio_squared() -> None:
+    """theta = T t^2 / (2 (J + J_u / i^2)), an output inertia that doubles the total."""
+    output = INERTIA * RATIO**2
+    rec = pushed({"load.inertia": output}, 0.5, 0.2, "motor_position@1 kHz")
     expected = 0.5 * 0.2**2 / (2 * 2 * INERTIA)
     assert rec.final["motor_position"] == pytest.approx(expected, rel=1e-4)
 

@@ -43,7 +43,7 @@ def common() -> object:
 def test_one_simulated_second_is_a_million_steps_and_four_hundred_samples(common: object) -> None:
     """No step more, no sample twice."""
     assert common.meta["steps"] == 1_000_000
-    time = common["user_position"].time
+    time = common["output_position"].time
     assert time.size in (400, 401)
     assert np.allclose(np.diff(time), 2.5e-3, rtol=0, atol=1e-12)
 
@@ -52,8 +52,8 @@ def test_angle_and_transitions_agree_with_the_yardstick(
     common: object, yardstick: dict[str, float]
 ) -> None:
     """0.01 deg and 5 %: the agreement the benchmark stands on."""
-    assert math.degrees(common.final["user_position"]) == pytest.approx(
-        yardstick["user_deg"], abs=0.01
+    assert math.degrees(common.final["output_position"]) == pytest.approx(
+        yardstick["output_deg"], abs=0.01
     )
     assert common.final["leg_transitions"] == pytest.approx(yardstick["transitions"], rel=0.05)
 
@@ -71,6 +71,6 @@ def test_low_fidelity_takes_a_hundredth_of_the_steps() -> None:
         elevon.Actuator.load("torino-rotary"),
         job.scenario(1.0),
         fidelity="low",
-        record=["user_position@400 Hz"],
+        record=["output_position@400 Hz"],
     )
     assert rec.meta["steps"] <= 10_000

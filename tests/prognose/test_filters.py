@@ -15,7 +15,7 @@ from elevon.prognose.particle import resampled
 from elevon.prognose.predict import check_order
 from tests.prognose.units import law, process
 
-KEY = "play@transmission"
+KEY = "backlash@transmission"
 
 
 def seen(usage, value, deviation, **fields):
@@ -64,7 +64,7 @@ def test_particles_and_sigma_points_agree_with_the_exact_posterior(prior):
 
 
 def test_several_faults_grow_together_and_each_is_seen_by_its_own_inspections():
-    unit = process(law(1e-3, "play"), law(1e-3, "friction"), limits=(9.0, 9.0))
+    unit = process(law(1e-3, "backlash"), law(1e-3, "friction"), limits=(9.0, 9.0))
     flt = ParticleFilter(unit, count=4000, seed=1)
     for usage in (100.0, 250.0, 300.0, 700.0):
         flt.update(
@@ -201,9 +201,9 @@ def test_a_diagnosis_far_off_is_an_outlier_and_is_noted():
 
 def test_a_diagnosis_becomes_an_inspection():
     item = law()
-    cause = {"kind": "play", "place": "gear", "probability": 0.9, "severity": 0.015,
+    cause = {"kind": "backlash", "place": "gear", "probability": 0.9, "severity": 0.015,
              "interval": [0.01, 0.0175],
-             "equivalents": [{"kind": "play", "place": "transmission"}]}  # fmt: skip
+             "equivalents": [{"kind": "backlash", "place": "transmission"}]}  # fmt: skip
     data = {"faults": [cause], "detectable": {KEY: 0.003}}
     got = inspection(data, [item], usage=5.0).seen[KEY]
     assert (got.severity, got.low, got.high) == pytest.approx((0.015, 0.00304, 0.00152), rel=1e-3)
@@ -222,7 +222,7 @@ def test_a_diagnosis_becomes_an_inspection():
     assert more.seen["friction@transmission"].high > 2.0  # diagnosis looks up to 2
     unlikely = {"faults": [{**cause, "probability": 0.3}], "detectable": {KEY: 0.003}}
     assert inspection(unlikely, [item], usage=5.0).seen[KEY] == Seen(None, 0.001, 0.001)
-    assert got.common == pytest.approx(COMMON["play"][0] * 0.015)
+    assert got.common == pytest.approx(COMMON["backlash"][0] * 0.015)
     relative, absolute = COMMON["friction"]
     assert more.seen["friction@transmission"].common == pytest.approx(
         math.hypot(relative * 1.98, absolute)

@@ -74,7 +74,7 @@ def test_an_unknown_coefficient_and_a_bad_law_are_refused():
     with pytest.raises(UnknownNameError, match="wear"):
         LAWS["gear_wear"].with_values({"weer": 1.0})
     with pytest.raises(UnknownNameError, match="driver"):
-        law(kind="play").__class__(**{**vars(LAWS["spall"]), "drivers": ("shaft_way",)})
+        law(kind="backlash").__class__(**{**vars(LAWS["spall"]), "drivers": ("shaft_way",)})
     with pytest.raises(RangeError, match="grain"):
         law(grain=-1.0)
 
@@ -118,10 +118,10 @@ def test_ends_do_not_depend_on_whether_their_course_is_kept():
 
 
 def test_the_first_of_two_requirements_is_named_with_its_share():
-    unit = process(law(1e-3, "play"), law(1e-3, "friction"), limits=(1.0, 1.5))
+    unit = process(law(1e-3, "backlash"), law(1e-3, "friction"), limits=(1.0, 1.5))
     rng = np.random.default_rng(3)
     future = look_ahead(unit, unit.start(2000, rng), Usage(), rng)
-    # The factors are lognormal and independent: friction first where its is 1.5 times play's.
+    # The factors are lognormal and independent: friction first where its is 1.5 times backlash's.
     from scipy.stats import norm
 
     expected = norm.sf(np.log(1.5) / (0.8 * np.sqrt(2.0)))

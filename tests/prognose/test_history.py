@@ -9,8 +9,8 @@ from elevon.errors import InputError, Interrupted
 from elevon.prognose import LAWS
 from elevon.prognose.history import diagnosed, read_history
 
-KEY = "play@transmission"
-CAUSE = {"kind": "play", "place": "transmission", "probability": 0.9, "severity": 2e-3,
+KEY = "backlash@transmission"
+CAUSE = {"kind": "backlash", "place": "transmission", "probability": 0.9, "severity": 2e-3,
          "interval": [1e-3, 3e-3]}  # fmt: skip
 STAMP = {"usage": 300, "unit": "flights"}
 
@@ -25,16 +25,16 @@ def history(place, *entries):
 @pytest.mark.parametrize(
     ("entry", "text"),
     [
-        ({"faults": {"kind": "play"}}, "0.json: faults = .* is not a list"),
-        ({"faults": [{"kind": "play"}]}, r"0.json: faults\[0\]: .*kind, place and a number"),
-        ({"faults": ["play"]}, r"0.json: faults\[0\]: 'play' has not"),
+        ({"faults": {"kind": "backlash"}}, "0.json: faults = .* is not a list"),
+        ({"faults": [{"kind": "backlash"}]}, r"0.json: faults\[0\]: .*kind, place and a number"),
+        ({"faults": ["backlash"]}, r"0.json: faults\[0\]: 'backlash' has not"),
         ({"faults": [{**CAUSE, "probability": "high"}]}, r"faults\[0\]: .*probability"),
         ({"faults": [{**CAUSE, "probability": 1.5}]}, "probability = 1.5 is outside 0 to 1"),
         ({"faults": [{**CAUSE, "severity": None}]}, f"0.json: {KEY}: .* not numbers"),
         ({"faults": [{**CAUSE, "severity": 5e-3}]}, "severity 0.005 is not within 0.001 to 0.003"),
         ({"faults": [], "detectable": [KEY]}, "0.json: detectable = "),
         ({"faults": [], "detectable": {KEY: 0.0}}, f"detectable {KEY} = 0.0 is no number above 0"),
-        ({"faults": [CAUSE], "reset": ["ply@transmission"]}, "reset: .*did you mean 'play@"),
+        ({"faults": [CAUSE], "reset": ["ply@transmission"]}, "reset: .*did you mean 'backlash@"),
     ],
 )
 def test_a_diagnosis_that_is_none_is_refused_by_file_place_and_value(tmp_path, entry, text):

@@ -16,7 +16,7 @@ from elevon.prognose.particle import resampled
 from elevon.prognose.requirement import Requirement
 from tests.prognose.units import law
 
-KEY, UNITS = "play@transmission", {"current": "A", "error": "rad"}
+KEY, UNITS = "backlash@transmission", {"current": "A", "error": "rad"}
 RATE = 1e-3
 
 

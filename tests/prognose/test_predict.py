@@ -13,13 +13,13 @@ from elevon.prognose.history import read_history, write_stamp
 from elevon.prognose.requirement import Requirement
 from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
 
-KEY = "play@transmission"
+KEY = "backlash@transmission"
 FLIGHT = {
     "unit": "flights", "hours": 1.5, "repeats": 200,
     "scenario": {
         "duration": "10 s",
         "command": {"terms": [{"kind": "sine", "amplitude": "7 deg", "frequency": "0.2 Hz"}]},
-        "load": {"user": {"terms": [
+        "load": {"output": {"terms": [
             {"kind": "sine", "amplitude": "60 N m", "frequency": "0.2 Hz"}]}},
     },
     "requirement": [
@@ -50,7 +50,7 @@ def inspections(rate=4e-6, uses=(300, 700, 1200, 2000)):
 def diagnosis(severity):
     return {
         "status": "faulty",
-        "faults": [{"kind": "play", "place": "transmission", "probability": 0.99,
+        "faults": [{"kind": "backlash", "place": "transmission", "probability": 0.99,
                     "severity": severity, "interval": [severity - 4e-4, severity + 4e-4]}],
         "detectable": {KEY: 3e-4},
     }  # fmt: skip
@@ -66,9 +66,9 @@ def folder(place, **stamps):
 
 def test_the_answer_is_where_the_model_meets_its_requirement(unit, tables):
     result = predict(inspections(), unit, mission(), response=tables)
-    play = np.linspace(0.0, LAWS["gear_wear"].highest, 400)
-    errors = tables.measured(play[:, None])[0]
-    end = np.interp(np.radians(1.0), errors, play) / 4e-6
+    backlash = np.linspace(0.0, LAWS["gear_wear"].highest, 400)
+    errors = tables.measured(backlash[:, None])[0]
+    end = np.interp(np.radians(1.0), errors, backlash) / 4e-6
     low, high = result.interval
     assert low < end - 2000.0 < high
     assert result.median == pytest.approx(end - 2000.0, rel=0.25)
@@ -98,7 +98,7 @@ def test_a_last_diagnosis_beyond_the_requirement_is_said_even_where_it_is_taken_
     last = Inspection(2100.0, {KEY: Seen(0.028, 3e-4, 3e-4)}, name="last.json")
     result = predict([*inspections(), last], unit, mission(), response=tables)
     (said,) = [text for text in result.findings if "last.json" in text]
-    assert "if what it says of play@transmission is true, the unit has failed" in said
+    assert "if what it says of backlash@transmission is true, the unit has failed" in said
     assert "requirement error: 1" in said
     assert "deg, limit 1 deg" in said
     near = Inspection(2100.0, {KEY: Seen(4e-6 * 2100.0, 3e-4, 3e-4)}, name="last.json")
@@ -108,14 +108,14 @@ def test_a_last_diagnosis_beyond_the_requirement_is_said_even_where_it_is_taken_
 def test_margin_and_severity_limits_and_a_least_value(unit):
     stall = {"name": "stall", "measure": "stall_load", "limit": "1200 N m", "slope": "10 deg/s",
              "load_slope": "150 N m/s", "margin": 0.1}  # fmt: skip
-    bare = {"name": "play", "measure": "severity", "fault": KEY, "limit": "0.5 deg"}
+    bare = {"name": "backlash", "measure": "severity", "fault": KEY, "limit": "0.5 deg"}
     asked = mission(requirement=[stall, bare, *FLIGHT["requirement"]])
     tables = respond(unit, asked)
     assert tables.thresholds[0] == pytest.approx(1320.0)
     reserve = tables.reserve(np.array([[0.0], [np.radians(0.5)], [np.radians(0.6)]]))
     assert reserve[1] == pytest.approx([1.0, 0.0, -0.2])
     assert reserve[0, 0] == pytest.approx(tables.values[0, 0] / 1320.0 - 1.0)
-    assert predict(inspections(), unit, asked, response=tables).first["play"] == 1.0
+    assert predict(inspections(), unit, asked, response=tables).first["backlash"] == 1.0
 
 
 def test_a_law_of_ones_own(unit):
@@ -124,7 +124,7 @@ def test_a_law_of_ones_own(unit):
 
     base = LAWS["gear_wear"]
     own = Law(
-        name="creep", text="", source="a user's", kind="play", place="transmission", unit="rad",
+        name="creep", text="", source="a user's", kind="backlash", place="transmission", unit="rad",
         rate=creep, drivers=("shaft_travel",), highest=base.highest,
         coefficients={"pace": base.coefficients["wear"]},
     )  # fmt: skip
@@ -246,7 +246,7 @@ def test_the_command_line(elevon_cli, tmp_path):  # noqa: F811
 def test_a_history_of_logs_is_diagnosed_on_the_way(elevon_cli, tmp_path):  # noqa: F811
     place = tmp_path / "unit"
     for k, use in enumerate((0, 500, 1000, 1500)):
-        fault = () if use == 0 else ("--fault", f"play@transmission={4e-6 * use!r}")
+        fault = () if use == 0 else ("--fault", f"backlash@transmission={4e-6 * use!r}")
         logs = []
         for test in ("backlash", "chirp"):
             options = ("--actuator", "torino-rotary", "--fidelity", "low", "--seed", k, *fault)
@@ -260,9 +260,9 @@ def test_a_history_of_logs_is_diagnosed_on_the_way(elevon_cli, tmp_path):  # noq
     got = elevon_cli("predict", place, "--actuator", "torino-rotary", "--mission", flight, "--json")
     assert got.code == 0, got.err
     answer = json.loads(got.out)
-    (play,) = answer["faults"]
-    assert play["severity"] == pytest.approx(4e-6 * 1500, rel=0.1)
-    assert play["inspections"] == 3
+    (backlash,) = answer["faults"]
+    assert backlash["severity"] == pytest.approx(4e-6 * 1500, rel=0.1)
+    assert backlash["inspections"] == 3
 
 
 def test_the_airs_temperature_sets_what_the_actuator_has():
@@ -271,7 +271,7 @@ def test_the_airs_temperature_sets_what_the_actuator_has():
     assert set(every) == {"thermal.ambient", "motor.winding_temperature"}
     assert set(warm.scenarios(known=["motor.winding_temperature"]).parameters) < set(every)
     with pytest.raises(InputError, match=r"temperature: the actuator has neither thermal.ambient"):
-        warm.scenarios(known=["play.total"])
+        warm.scenarios(known=["backlash.total"])
 
 
 def test_the_time_of_the_tables_is_told_whoever_made_them(unit, tables):
@@ -293,11 +293,11 @@ def test_a_ball_screw_and_its_stall_load():
         "scenario": {
             "duration": "4 s",
             "command": {"terms": [{"kind": "sine", "amplitude": "20 mm", "frequency": "0.5 Hz"}]},
-            "load": {"user": {"terms": [
+            "load": {"output": {"terms": [
                 {"kind": "sine", "amplitude": "2000 N", "frequency": "0.5 Hz"}]}},
         },
         "requirement": [
-            {"name": "play", "measure": "severity", "fault": KEY, "limit": "0.5 mm"},
+            {"name": "backlash", "measure": "severity", "fault": KEY, "limit": "0.5 mm"},
             {"name": "stall", "measure": "stall_load", "limit": "3000 N", "slope": "20 mm/s",
              "load_slope": "1500 N/s"},
         ],

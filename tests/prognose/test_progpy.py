@@ -31,8 +31,8 @@ class TestWithProgpy:
                                              save_freq=50.0)  # fmt: skip
         assert result.times[-1] == pytest.approx(end(1e-3, 2.0, 1.0), abs=6.0)
         state = result.event_states[-1]
-        assert state["play limit"] == pytest.approx(0.0, abs=0.01)
-        shown = np.array([z["play@transmission"] for z in result.outputs])
+        assert state["backlash limit"] == pytest.approx(0.0, abs=0.01)
+        shown = np.array([z["backlash@transmission"] for z in result.outputs])
         expected = np.expm1(1e-3 * np.array(result.times))
         np.testing.assert_allclose(shown, expected, rtol=1e-4, atol=1e-6)
 
@@ -47,8 +47,8 @@ class TestWithProgpy:
         np.testing.assert_array_equal(back.own[:, 1], units.own[:, 1])
         np.testing.assert_allclose(back.growth[back.active], units.growth[units.active])
         with pytest.raises(InputError, match="damage friction"):
-            from_samples([{"damage play@transmission": 0.0, "growth play@transmission": 0.0,
-                           "form play@transmission": 0.0}], unit)  # fmt: skip
+            from_samples([{"damage backlash@transmission": 0.0, "growth backlash@transmission": 0.0,
+                           "form backlash@transmission": 0.0}], unit)  # fmt: skip
 
     def test_its_monte_carlo_predicts_the_ends_that_ours_does(self):
         from progpy.predictors import MonteCarlo
@@ -61,6 +61,6 @@ class TestWithProgpy:
             to_samples(units, unit), lambda *_: model.InputContainer({}), n_samples=40, dt=20.0,
             horizon=5000.0, save_freq=5000.0,
         )  # fmt: skip
-        ends = np.array([t["play limit"] for t in theirs.time_of_event])
+        ends = np.array([t["backlash limit"] for t in theirs.time_of_event])
         assert np.median(ends) == pytest.approx(np.median(ours), rel=0.12)
         assert np.std(ends) == pytest.approx(np.std(ours), rel=0.5)

@@ -7,7 +7,7 @@ from elevon.prognose.grid import Grid
 from elevon.prognose.requirement import Requirement
 
 
-def law(rate=1e-3, kind="play", *, power=0.0, rate_spread=0.0, **fields):
+def law(rate=1e-3, kind="backlash", *, power=0.0, rate_spread=0.0, **fields):
     """Growth rate x (1 + damage)^power a repetition; the closed form is in `end`."""
     fields = {"form_spread": 0.0, "highest": 4.0, **fields}
     return Law(

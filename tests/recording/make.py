@@ -16,8 +16,8 @@ def ordinary():
     time = np.arange(400) / 400
     drive = Recording.build(
         time,
-        {"user_position": np.sin(time), "motor_speed": np.cos(7 * time)},
-        {"user_position": "rad", "motor_speed": "rad/s"},
+        {"output_position": np.sin(time), "motor_speed": np.cos(7 * time)},
+        {"output_position": "rad", "motor_speed": "rad/s"},
         clock="drive",
         rate=400,
         meta={"actuator": "torino-rotary", "status": "ok", "seed": 3, "scenario": {"x": [1, 2.5]}},

@@ -22,7 +22,7 @@ from tests.recording.make import one_clock, ordinary
 def test_parquet_carries_units_and_plain_pages(tmp_path):
     file = pq.ParquetFile(ordinary().save(tmp_path / "a.parquet"))
     schema = file.schema_arrow
-    assert schema.names == ["clock", "time", "user_position", "motor_speed", "force"]
+    assert schema.names == ["clock", "time", "output_position", "motor_speed", "force"]
     assert schema.field("force").metadata[b"unit"] == b"N"
     known = {"PLAIN", "RLE", "RLE_DICTIONARY", "PLAIN_DICTIONARY"}
     for group in range(file.num_row_groups):
@@ -67,7 +67,7 @@ def test_netcdf_is_read_by_xarray(tmp_path):
         assert dict(dataset.sizes)["time_cell"] == 5
         assert dataset["force"].attrs["units"] == "N"
         assert float(dataset["force"][0]) == 1.0
-        assert dataset["user_position"].dims == ("time_drive",)
+        assert dataset["output_position"].dims == ("time_drive",)
 
 
 @pytest.mark.parametrize("way", ["external", "soft", "storage", "virtual", "group", "text"])

@@ -21,7 +21,10 @@ def healthy():
 
 @pytest.fixture(scope="module")
 def faulty():
-    faults = ["play@transmission=1 deg:step(time=1 s)", "short@motor.phase_a=0.2:step(time=2 s)"]
+    faults = [
+        "backlash@transmission=1 deg:step(time=1 s)",
+        "short@motor.phase_a=0.2:step(time=2 s)",
+    ]
     return elevon.simulate("torino-rotary", {**SCENARIO, "fault": faults}, fidelity="low")
 
 
@@ -34,11 +37,11 @@ def test_command_against_output_then_error_current_speed(healthy):
         ("speed", "rpm"),
     ]
     position, error, _, _ = panels
-    assert list(position.lines) == ["command", "motor_position / 124", "user_position"]
-    difference = healthy["command"].values - healthy["user_position"].values
+    assert list(position.lines) == ["command", "motor_position / 124", "output_position"]
+    difference = healthy["command"].values - healthy["output_position"].values
     assert next(iter(error.lines.values())) == pytest.approx(np.rad2deg(difference))
-    motor, user = position.lines["motor_position / 124"], position.lines["user_position"]
-    assert np.abs(motor - user).max() < 0.5  # on one scale, apart by the play
+    motor, output = position.lines["motor_position / 124"], position.lines["output_position"]
+    assert np.abs(motor - output).max() < 0.5  # on one scale, apart by the backlash
 
 
 def test_a_speed_command_is_held_against_the_speed():
@@ -52,9 +55,9 @@ def test_a_speed_command_is_held_against_the_speed():
 
 
 def test_faults_are_named_with_their_severity_and_time(faulty):
-    play, short = bands(faulty)
-    assert (play.text, play.kind) == ("play@transmission = 1 deg", "fault")
-    assert (play.start, play.end) == pytest.approx((1.0, 3.0), abs=0.01)
+    backlash, short = bands(faulty)
+    assert (backlash.text, backlash.kind) == ("backlash@transmission = 1 deg", "fault")
+    assert (backlash.start, backlash.end) == pytest.approx((1.0, 3.0), abs=0.01)
     assert short.text == "short@motor.phase_a = 0.2"
     assert short.start == pytest.approx(2.0, abs=0.01)
 
@@ -71,8 +74,8 @@ def test_states_of_a_control_unit_are_named():
 
 def test_a_spectrum_shows_a_sine_at_its_height():
     time = np.arange(4000) / 1000
-    values = {"command": 0 * time, "user_position": 0.01 * np.sin(2 * np.pi * 50 * time)}
-    recording = elevon.Recording.build(time, values, {"command": "rad", "user_position": "rad"})
+    values = {"command": 0 * time, "output_position": 0.01 * np.sin(2 * np.pi * 50 * time)}
+    recording = elevon.Recording.build(time, values, {"command": "rad", "output_position": "rad"})
     (spectrum,) = spectra(overview(recording))
     line = next(iter(spectrum.lines.values()))
     assert spectrum.time[np.argmax(line)] == pytest.approx(50.0, abs=0.3)
@@ -86,9 +89,9 @@ def test_another_run_is_drawn_over_it(healthy, faulty, tmp_path):
     assert titles[:4] == ["position", "error", "current", "speed"]
     assert titles[4:] == [f"spectrum of the {name}" for name in ("error", "current", "speed")]
     lines = {line.get_label(): line for line in figure.axes[0].lines}
-    other = lines["user_position (healthy.parquet)"]
+    other = lines["output_position (healthy.parquet)"]
     assert other.get_linestyle() == "--"
-    assert other.get_ydata() == pytest.approx(np.rad2deg(healthy["user_position"].values))
+    assert other.get_ydata() == pytest.approx(np.rad2deg(healthy["output_position"].values))
 
 
 def test_named_channels_and_what_has_no_command_stand_by_unit(faulty):
@@ -104,7 +107,7 @@ def test_command_line(tmp_path, capsys):
     fault = ["--fault", "short@motor.phase_a=0.3:step(time=0.2 s)"]
     assert main([*run, *fault, "--plot", str(page), "--compare", str(healthy), "--spectra"]) == 0
     text = page.read_text("utf-8")
-    assert "user_position (healthy.parquet)" in text
+    assert "output_position (healthy.parquet)" in text
     assert "short@motor.phase_a = 0.3: 0.2 to 0.5 s" in text
     assert "spectrum of the current" in text
     assert main([*run, "--compare", str(healthy)]) == 2

@@ -45,12 +45,12 @@ def test_gaps_interrupt_the_line():
 
 
 def test_units_can_be_chosen():
-    figure = ordinary().plot(["user_position"], units={"user_position": "rad"})
+    figure = ordinary().plot(["output_position"], units={"output_position": "rad"})
     assert figure.axes[0].get_ylabel() == "[rad]"
     with pytest.raises(UnitError):
-        ordinary().plot(["user_position"], units={"user_position": "m"})
+        ordinary().plot(["output_position"], units={"output_position": "m"})
     with pytest.raises(UnknownNameError):
-        ordinary().plot(["user_position"], units={"user_positoin": "deg"})
+        ordinary().plot(["output_position"], units={"output_positoin": "deg"})
 
 
 def test_page_is_self_contained_and_carries_the_data(tmp_path):

@@ -10,10 +10,10 @@ from tests.recording.make import ordinary
 
 def test_channels_are_found_by_name():
     recording = ordinary()
-    channel = recording["user_position"]
+    channel = recording["output_position"]
     assert (channel.unit, channel.clock.name, len(channel)) == ("rad", "drive", 400)
     assert channel.time is recording.clocks["drive"].time
-    assert recording.names == list(recording) == ["user_position", "motor_speed", "force"]
+    assert recording.names == list(recording) == ["output_position", "motor_speed", "force"]
     assert "force" in recording
     assert len(recording) == 3
     assert "status" not in recording
@@ -21,8 +21,8 @@ def test_channels_are_found_by_name():
 
 
 def test_an_unknown_channel_names_the_nearest():
-    with pytest.raises(UnknownNameError, match="'user_positon'; did you mean 'user_position'"):
-        ordinary()["user_positon"]
+    with pytest.raises(UnknownNameError, match="'output_positon'; did you mean 'output_position'"):
+        ordinary()["output_positon"]
 
 
 def test_values_and_time_are_read_only_and_the_given_array_stays_writable():
@@ -150,7 +150,7 @@ def test_select():
     assert recording.select(["force"]).names == ["force"]
     assert list(recording.select(["force"]).clocks) == ["cell"]
     drive = recording.select(clock="drive")
-    assert drive.names == ["user_position", "motor_speed"]
+    assert drive.names == ["output_position", "motor_speed"]
     assert np.shares_memory(drive["motor_speed"].values, recording["motor_speed"].values)
     assert drive.meta == recording.meta
     with pytest.raises(UnknownNameError):
@@ -161,8 +161,8 @@ def test_window_cuts_every_clock_and_moves_the_gaps():
     part = ordinary().window(0.013, 0.5)
     assert part["force"].time.tolist() == [0.013, 0.021, 0.5]
     assert part.clocks["cell"].gaps == (1,)
-    assert part["user_position"].time[0] >= 0.013
-    assert part["user_position"].time[-1] == 0.5
+    assert part["output_position"].time[0] >= 0.013
+    assert part["output_position"].time[-1] == 0.5
     assert len(ordinary().window(5, 6)["force"]) == 0
     assert len(ordinary().window(6, 5)["force"]) == 0
     assert ordinary().window().equals(ordinary())
@@ -187,7 +187,7 @@ def test_repr_says_what_is_inside():
     assert "400 Hz, 400 samples" in text
     assert "irregular, 5 samples" in text
     assert "1 gaps" in text
-    assert "'rad', 400 samples on 'drive'" in repr(ordinary()["user_position"])
+    assert "'rad', 400 samples on 'drive'" in repr(ordinary()["output_position"])
     assert Recording([]).status == "measured"
 
 
@@ -207,6 +207,6 @@ def test_to_xarray():
 
 def test_to_arrow():
     table = ordinary().to_arrow("drive")
-    assert table.column_names == ["time", "user_position", "motor_speed"]
+    assert table.column_names == ["time", "output_position", "motor_speed"]
     assert table.schema.field("motor_speed").metadata[b"unit"] == b"rad/s"
     assert table.num_rows == 400

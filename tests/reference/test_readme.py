@@ -150,9 +150,11 @@ def test_commands_of_a_page_in_their_order(page, tmp_path):
 def test_scenarios_page_holds_a_scenario(tmp_path):
     (tmp_path / "a.toml").write_text(_blocks("docs/scenarios.md", "toml")[0], "utf-8")
     scenario = elevon.Scenario.load(tmp_path / "a.toml")
-    run = elevon.simulate("torino-rotary", scenario, fidelity="low", record="user_position@100 Hz")
+    run = elevon.simulate(
+        "torino-rotary", scenario, fidelity="low", record="output_position@100 Hz"
+    )
     assert run.status == "ok"
-    assert run["user_position"].to("deg")[0] == pytest.approx(2.0)
+    assert run["output_position"].to("deg")[0] == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The backlash campaign: geometry, and (long) all fifteen plays through the command."""
+"""The backlash campaign: geometry, and (long) all fifteen backlashes through the command."""
 
 import json
 import math
@@ -33,18 +33,18 @@ def test_geometry():
 
 
 @pytest.mark.long
-def test_all_fifteen_plays_come_back(tmp_path, capsys):
+def test_all_fifteen_backlashes_come_back(tmp_path, capsys):
     assert main(["reproduce", "torino-backlash", "--json", "--out", str(tmp_path)]) == 0
     values = json.loads(capsys.readouterr().out)
     assert values["status"] == "pass"
     assert values["encoder_count_deg"] == pytest.approx(360.0 / 80000.0)
     assert len(values["rows"]) == 15
     for row in values["rows"]:
-        limit = values["encoder_count_deg"] + 0.02 * row["play_in_deg"]
-        assert row["play_in_deg"] == row["measured_total_deg"]
-        assert abs(row["play_out_deg"] - row["play_in_deg"]) <= limit
-        assert row["play_out_deg"] != row["play_in_deg"]  # measured, not handed through
-        assert row["lost_motion_deg"] == pytest.approx(row["play_in_deg"], abs=0.0045)
+        limit = values["encoder_count_deg"] + 0.02 * row["backlash_in_deg"]
+        assert row["backlash_in_deg"] == row["measured_total_deg"]
+        assert abs(row["backlash_out_deg"] - row["backlash_in_deg"]) <= limit
+        assert row["backlash_out_deg"] != row["backlash_in_deg"]  # measured, not handed through
+        assert row["lost_motion_deg"] == pytest.approx(row["backlash_in_deg"], abs=0.0045)
     page = (tmp_path / "report.html").read_text("utf-8")
     assert page.count("<svg") == 3
     assert "checks pass" in page

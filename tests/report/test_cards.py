@@ -12,7 +12,7 @@ SCENARIO = {
     "duration": "50 ms",
     "text": "a < b & c",
     "command": {"terms": [{"kind": "sine", "amplitude": "7 deg", "frequency": "5 Hz"}]},
-    "load": {"user": {"terms": [{"kind": "constant", "value": "3 N m"}]}},
+    "load": {"output": {"terms": [{"kind": "constant", "value": "3 N m"}]}},
     "fault": ["short@motor.phase_a=0.1:step(time=10 ms)"],
     "parameters": {"motor.inertia": "9 kg cm2"},
 }
@@ -28,7 +28,7 @@ def _text(html):
 
 @pytest.fixture(scope="module")
 def recording():
-    record = ["user_position,motor_speed@1 kHz", "current_q@2 kHz"]
+    record = ["output_position,motor_speed@1 kHz", "current_q@2 kHz"]
     return elevon.simulate("torino-rotary", SCENARIO, record=record)
 
 
@@ -38,7 +38,7 @@ def test_a_recording_shows_status_clocks_units_and_curves(recording):
     for word in ("ok", "torino-rotary", "at_1000_hz", "at_2000_hz", "deg", "rpm", *recording.names):
         assert word in text
     assert html.count("<polyline") == len(recording)
-    assert f"{np.rad2deg(recording['user_position'].values[-1]):.5g}" in text
+    assert f"{np.rad2deg(recording['output_position'].values[-1]):.5g}" in text
 
 
 def test_an_actuator_shows_every_parameter_with_its_unit_and_source():
@@ -54,7 +54,7 @@ def test_a_scenario_shows_what_is_asked_what_acts_and_what_breaks():
         "0.05 s",
         "a < b & c",
         "sine(amplitude=7 deg",
-        "load: user",
+        "load: output",
         "short@motor.phase_a",
     ):
         assert word in text
@@ -91,9 +91,9 @@ def test_a_calibration_shows_its_intervals_and_what_it_cannot_tell():
     actuator = elevon.Actuator.load("torino-rotary")
     value, interval = 7.913e-4, (7.85e-4, 7.98e-4)
     item = Estimate("motor.inertia", value, 4e-6, interval, "kg m2", "plant", old=7.7e-4)
-    html = calibration_card(actuator, ["a.csv"], [item], {"play.total": "no reversal"})
+    html = calibration_card(actuator, ["a.csv"], [item], {"backlash.total": "no reversal"})
     text = _text(html)
-    for word in ("torino-rotary", "a.csv", "motor.inertia", "kg cm2", "7.7", "play.total"):
+    for word in ("torino-rotary", "a.csv", "motor.inertia", "kg cm2", "7.7", "backlash.total"):
         assert word in text
     assert "7.91 7.85 7.98" in text
     assert "no reversal" in text

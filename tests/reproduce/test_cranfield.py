@@ -79,7 +79,7 @@ def test_figures_of_made_up_faults(data):
     assert all(0.0 <= row["low"] <= row["high"] <= 1.0 for row in values["rows"])
     json.dumps(values, allow_nan=False)
     page = cranfield_report(result).html()
-    assert page.index("told apart with") < page.index("<svg")
+    assert page.index("distinguished with") < page.index("<svg")
 
 
 def test_shuffled_labels_are_not_learned(data):

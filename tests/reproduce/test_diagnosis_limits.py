@@ -60,13 +60,16 @@ def test_the_plan_has_the_logs_it_must_have(plan):
 
 
 def test_an_answer_counts_only_when_it_names_all_and_nothing_else():
-    play, short = Injected("play", "transmission", 0.01), Injected("short", "motor.phase_b", 0.2)
+    backlash, short = (
+        Injected("backlash", "transmission", 0.01),
+        Injected("short", "motor.phase_b", 0.2),
+    )
     places = (("short", "motor.phase_b"), ("short", "motor.phase_c"))
     said = answer(("short", "motor.phase_a", 0.2), equivalents=places)
     row = {"test": "noload", "group": "single", "unit": 0}
     assert judged(said, "x", **row, truth=[short]).named
-    assert not judged(said, "x", **row, truth=[play]).named
-    assert not judged(said, "x", **row, truth=[short, play]).named
+    assert not judged(said, "x", **row, truth=[backlash]).named
+    assert not judged(said, "x", **row, truth=[short, backlash]).named
     other = answer(("short", "motor.phase_a", 0.2), equivalents=(*places, ("friction", "x")))
     assert not judged(other, "x", **row, truth=[short]).named
     assert not judged(replace(said, status="healthy"), "x", **row, truth=[short]).named
@@ -90,7 +93,7 @@ def test_days_differ_and_the_unit_stays():
     unit = draw_unit(3, 1)
     days = [of_the_day(unit, seed).parameters for seed in (1, 2)]
     assert days[0].value("friction.dynamic") != days[1].value("friction.dynamic")
-    assert days[0].value("play.total") == days[1].value("play.total")
+    assert days[0].value("backlash.total") == days[1].value("backlash.total")
     ratio = [day.value("friction.dynamic") / unit.actuator.parameters.value("friction.dynamic")
              for day in days]  # fmt: skip
     assert np.abs(np.array(ratio) - 1.0).max() < 0.13

@@ -19,13 +19,13 @@ from elevon.reproduce.fault_limits_table import limits_table
 
 
 def limit(**given):
-    own = {"actuator": "a", "test": "t", "kind": "play", "place": "transmission", "unit": "m"}
+    own = {"actuator": "a", "test": "t", "kind": "backlash", "place": "transmission", "unit": "m"}
     return Limit(**{**own, "limit": 1e-3, **given})
 
 
 def test_a_fault_counts_where_it_is_named_or_equivalent():
     cause = Cause(
-        "friction", "transmission", "1", 0.9, 0.3, (0.2, 0.4), (("play", "transmission"),)
+        "friction", "transmission", "1", 0.9, 0.3, (0.2, 0.4), (("backlash", "transmission"),)
     )
     answer = Diagnosis(("log",), "faulty", 0.9, 0.05, 1e-4, (cause,), (), 0.9, (), {}, (), (), 0.1)
     assert names_it(answer, limit())
@@ -99,8 +99,8 @@ def test_the_table_has_each_fault_in_each_test():
         limit(kind="sag", place="supply", unit="1", test="u", limit=0.25),
     )
     text = limits_table(FaultLimits(rows, {"a": (1, 20)}, "low", 3), "elevon x")
-    assert "| `play@transmission` [m] | 0.001 | - |" in text
+    assert "| `backlash@transmission` [m] | 0.001 | - |" in text
     assert "| `sag@supply` | - | 0.25 |" in text
     assert "1 of 20 (0 to 25 %) healthy logs called faulty" in text
-    assert "* `play@transmission` (u), `sag@supply` (t): moves nothing" in text
+    assert "* `backlash@transmission` (u), `sag@supply` (t): moves nothing" in text
     assert "    elevon x --table FILE" in text

@@ -94,7 +94,7 @@ def test_the_histories_pass_their_own_checks_and_worse_inspections_do_not():
 def test_the_rows_say_what_the_inspections_err_by():
     result = InspectionErrors(0, 6, drawn(1))
     rows = {(row["fault"], row["days"]): row for row in result.rows()}
-    assert list(rows) == [("play@transmission", 1), ("friction@transmission", 1),
+    assert list(rows) == [("backlash@transmission", 1), ("friction@transmission", 1),
                           ("friction@transmission", 3), ("short@motor.phase_a", 1)]  # fmt: skip
     short, expected = rows["short@motor.phase_a", 1], INSPECTIONS["insulation"]
     np.testing.assert_allclose(
@@ -124,17 +124,17 @@ def test_one_unit_is_refused():
 
 @pytest.mark.long
 def test_a_small_run_goes_on_where_it_stopped(tmp_path, monkeypatch, capsys):
-    """Two units, a severity of play and one of friction, another seed than the judged one."""
+    """Two units, a severity of backlash and one of friction, another seed than the judged one."""
     small = (
-        Growing("gear_wear", "play@transmission", (2e-3,)),
+        Growing("gear_wear", "backlash@transmission", (2e-3,)),
         Growing("lubricant_loss", "friction@transmission", (1.0,)),
     )
     monkeypatch.setattr(plan, "FAULTS", small)
     rows = inspect_units(seed=77, units=2, folder=tmp_path)
     monkeypatch.setattr(campaign, "_severity", None)
     assert inspect_units(seed=77, units=2, folder=tmp_path) == rows
-    play = [row for row in rows if row.law == "gear_wear"]
-    assert max(abs(row.error) for row in play) < 0.1 * 2e-3
+    backlash = [row for row in rows if row.law == "gear_wear"]
+    assert max(abs(row.error) for row in backlash) < 0.1 * 2e-3
     friction = [row for row in rows if row.law == "lubricant_loss"]
     assert {row.days for row in friction} == {1, 3}
     assert max(abs(row.error) for row in friction) < 0.15

@@ -13,7 +13,7 @@ from elevon.reproduce.nasa.baseline import baseline_matrix
 from elevon.reproduce.nasa.features import orders
 
 SHORT = 6.0
-RUNS = "command,user_position,current_a,current_b,current_c@2 kHz"
+RUNS = "command,output_position,current_a,current_b,current_c@2 kHz"
 
 
 def actuator(values: dict[str, Any] | None = None) -> Any:
@@ -30,7 +30,7 @@ def statistics(
     rec = elevon.simulate(actuator(), scenario, record=RUNS)
     late = rec["command"].time > 2.0
     current = np.stack([rec[f"current_{p}"].values[late] for p in "abc"])
-    error = rec["command"].values[late] - rec["user_position"].values[late]
+    error = rec["command"].values[late] - rec["output_position"].values[late]
     return float(np.sqrt(np.mean(current**2))), float(np.sqrt(np.mean(error**2)))
 
 
@@ -109,7 +109,7 @@ def test_the_limit_of_the_voltage_is_where_the_motor_stops_following() -> None:
                 "duration": 0.6,
                 "command": {"mode": "speed", "terms": [
                     {"kind": "constant", "value": share * rate * 2 * np.pi / 0.01}]},
-                "load": {"user": {"terms": [{"kind": "constant", "value": 4500.0}]}},
+                "load": {"output": {"terms": [{"kind": "constant", "value": 4500.0}]}},
             }
         )  # fmt: skip
         reached[share] = elevon.simulate(weak, scenario, record="ram_speed@1 kHz").final[

@@ -64,7 +64,7 @@ def test_inspections_err_as_said_and_name_what_they_do_not_see():
     assert shown.std() == pytest.approx(float(drawn.own(np.array(0.2))), rel=0.1)
     stated = [item.seen["short@motor.phase_a"].high for item in seen]
     np.testing.assert_allclose(stated, drawn.stated(shown), rtol=1e-6)
-    assert all(item.seen["play@transmission"].severity is None for item in seen)
+    assert all(item.seen["backlash@transmission"].severity is None for item in seen)
 
 
 def test_friction_is_said_against_the_healthy_days_and_not_beyond_what_diagnosis_looks_at():

@@ -15,14 +15,14 @@ FREE = {
     "friction.static": 0.0,
     "friction.dynamic": 0.0,
     "friction.viscous": 0.0,
-    "play.total": 0.0,
+    "backlash.total": 0.0,
     "drive.kind": "pwm",
 }
 
 
 @pytest.fixture(scope="module")
 def free():
-    """A linear actuator: no friction, no play, continuous currents."""
+    """A linear actuator: no friction, no backlash, continuous currents."""
     return elevon.Actuator.load("torino-rotary").with_values(FREE)
 
 
@@ -56,7 +56,7 @@ def test_the_linear_model_is_what_a_multisine_measures(free):
     assert measured.gain[0] == pytest.approx(1.0, abs=0.05)  # it follows a slow command
 
 
-def test_play_and_friction_lower_the_coherence(free):
+def test_backlash_and_friction_lower_the_coherence(free):
     linear = frequency_response(free, 1.0, 8.0, "0.5 deg", fidelity="low", realisations=4)
     worn = free.with_values({"friction.static": "0.4 N m", "friction.dynamic": "0.3 N m"})
     stiff = frequency_response(worn, 1.0, 8.0, "0.05 deg", fidelity="low", realisations=4)

@@ -80,7 +80,7 @@ REFUSED = {
     "short@motor.phase_a=-0.1": (RangeError, "outside"),
     "short@motor.phase_a=nan": (RangeError, "not a finite number"),
     "short@motor.phase_a=0.1 N": (InputError, "is a force"),
-    "play@transmission=1 m": (InputError, "expected an angle"),
+    "backlash@transmission=1 m": (InputError, "expected an angle"),
     "short@motor.phase_a=0.1,phase=1": (UnknownNameError, "unknown attribute 'phase'"),
     "jam@transmission=1,postion=1": (UnknownNameError, "did you mean 'position'"),
     "jam@transmission=1,position": (InputError, "name=value"),
@@ -145,11 +145,11 @@ def test_the_severity_applied_is_recorded():
     scenario = elevon.Scenario.from_dict({"duration": "0.1 s"}).with_faults(
         [
             Fault("friction", "transmission", 0.5, profile=Profile("step", {"time": "50 ms"})),
-            "play@transmission=0.1 deg:ramp(end=100 ms)",
+            "backlash@transmission=0.1 deg:ramp(end=100 ms)",
         ]
     )
     recording = elevon.simulate(
-        elevon.Actuator.load("torino-rotary"), scenario, record="user_position@1 kHz"
+        elevon.Actuator.load("torino-rotary"), scenario, record="output_position@1 kHz"
     )
     assert [label["channel"] for label in recording.labels] == ["fault_1", "fault_2"]
     step, ramp = recording["fault_1"], recording["fault_2"]

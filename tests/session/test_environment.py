@@ -36,7 +36,7 @@ def test_an_episode_is_a_session(env):
         session.set(command=0.8)
         session.advance("5 ms")
         steps += 1
-        assert seen[0] == session["user_position"]
+        assert seen[0] == session["output_position"]
         assert seen[2] == 0.02 * np.sin(6 * info["time"])
         assert reward == pytest.approx(-((seen[0] - seen[2]) ** 2) - 1e-3 * 0.16)
         assert not stopped

@@ -6,7 +6,7 @@ import pytest
 import elevon
 from elevon.errors import ArgumentTypeError, InputError, RangeError, UnknownNameError
 
-SIGNALS = ("user_position", "motor_speed", "current_q")
+SIGNALS = ("output_position", "motor_speed", "current_q")
 CASES = [
     (name, fidelity)
     for name in ("torino-rotary", "nasa-ballscrew", "pisa-landing-gear")
@@ -57,15 +57,15 @@ def test_set_commands_are_those_of_a_scenario(fidelity):
     table = {"kind": "table", "times": [0.0, 0.01, 0.02, 0.03], "hold": True}
     scenario = {"duration": "40 ms", "command": {"terms": [{**table, "values": list(values)}]}}
     once = elevon.simulate(
-        "torino-rotary", scenario, fidelity=fidelity, record="user_position@100 Hz"
+        "torino-rotary", scenario, fidelity=fidelity, record="output_position@100 Hz"
     )
     session = elevon.Session("torino-rotary", fidelity=fidelity)
     read = []
     for value in values:
-        read.append(session["user_position"])
+        read.append(session["output_position"])
         session.set(command=value)
         session.advance("10 ms")
-    assert np.array_equal([*read, session["user_position"]], once["user_position"].values)
+    assert np.array_equal([*read, session["output_position"]], once["output_position"].values)
 
 
 def test_lanes_are_single_runs():
@@ -84,9 +84,9 @@ def test_lanes_are_single_runs():
         session.set(command=commands[run])
     for session in (many, *single):
         session.advance("20 ms")
-        session.set(user="1 N m")
+        session.set(output="1 N m")
         session.advance("20 ms")
-    assert many["user_position"].shape == (11,)
+    assert many["output_position"].shape == (11,)
     for signal in SIGNALS:
         assert [many[signal][0], many[signal][10]] == [session[signal] for session in single]
     assert many.status == ["ok"] * 11
@@ -121,7 +121,7 @@ def test_a_state_is_saved_and_restored():
 def test_a_parameter_changes_while_it_runs():
     """The same torque turns a free shaft of ten times the inertia a tenth as fast."""
     free = {"friction.static": 0.0, "friction.dynamic": 0.0, "friction.viscous": 0.0}
-    still = {"gear.inertia": 0.0, "load.inertia": 0.0, "play.total": 0.0, "drive.kind": "pwm"}
+    still = {"gear.inertia": 0.0, "load.inertia": 0.0, "backlash.total": 0.0, "drive.kind": "pwm"}
     actuator = elevon.Actuator.load("torino-rotary").with_values({**free, **still})
     inertia = actuator.parameters["motor.inertia"].value
     session = elevon.Session(actuator, mode="torque", fidelity="low")
@@ -179,7 +179,7 @@ def test_what_the_equations_in_use_leave_out_is_refused_with_the_remedy():
 def test_own_controller_on_one_and_on_many():
     """A proportional controller of speed by torque: an exponential with the time J / K."""
     free = {"friction.static": 0.0, "friction.dynamic": 0.0, "friction.viscous": 0.0}
-    still = {"gear.inertia": 0.0, "load.inertia": 0.0, "play.total": 0.0, "drive.kind": "pwm"}
+    still = {"gear.inertia": 0.0, "load.inertia": 0.0, "backlash.total": 0.0, "drive.kind": "pwm"}
     actuator = elevon.Actuator.load("torino-rotary").with_values({**free, **still})
     wanted, rise = 20.0, 0.02
     gain = actuator.parameters["motor.inertia"].value / rise

@@ -9,7 +9,7 @@ import elevon
 from elevon.errors import ArgumentTypeError
 
 SHORT = {"duration": "20 ms", "command": {"terms": [{"kind": "step", "final": "1 deg"}]}}
-RECORD = "user_position@400 Hz"
+RECORD = "output_position@400 Hz"
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,7 @@ def test_a_scenario_is_an_object_a_dict_or_a_file(actuator, expected, tmp_path):
     )
     for scenario in (SHORT, path, str(path)):
         again = elevon.simulate("torino-rotary", scenario, record=RECORD)
-        assert again["user_position"].equals(expected["user_position"])
+        assert again["output_position"].equals(expected["output_position"])
 
 
 def test_without_a_scenario_the_actuators_own_runs(actuator):

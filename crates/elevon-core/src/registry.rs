@@ -29,12 +29,12 @@ pub struct Kind {
 pub const KINDS: &[Kind] = &[
     Kind {
         name: "rotary",
-        text: "three-phase motor, inverter, gearbox with friction and play",
+        text: "three-phase motor, inverter, gearbox with friction and backlash",
         fidelities: &[("high", Model::RotaryHigh), ("low", Model::RotaryLow)],
     },
     Kind {
         name: "ballscrew",
-        text: "three-phase motor, inverter, ball screw, ram with play and a load side of its own",
+        text: "three-phase motor, inverter, ball screw, ram with backlash and a load side of its own",
         fidelities: &[("high", Model::BallscrewHigh), ("low", Model::BallscrewLow)],
     },
     Kind {
@@ -118,7 +118,7 @@ impl Model {
     /// The faults that this fidelity carries.
     pub fn faults(self) -> Vec<FaultKind> {
         let (groups, fidelity) = (self.groups(), self.fidelity());
-        self.catalogue().into_iter().filter(|f| f.declined(groups, fidelity).is_none()).collect()
+        self.catalogue().into_iter().filter(|f| f.not_modelled(groups, fidelity).is_none()).collect()
     }
     /// The parameters that do not act in a run with these values and faults, and why.
     pub fn not_acting(self, raw: &[f64], faults: &[FaultSpec], paths: Option<&[String]>) -> Vec<(String, String)> {

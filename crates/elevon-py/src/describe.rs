@@ -66,17 +66,17 @@ pub fn wirings(py: Python<'_>) -> Dicts<'_> {
 }
 
 /// The fidelities that carry something, and why the others decline it.
-fn carried(d: &Bound<'_, PyDict>, declined: impl Fn(Fidelity) -> Option<&'static str>) -> PyResult<()> {
+fn carried(d: &Bound<'_, PyDict>, not_modelled: impl Fn(Fidelity) -> Option<&'static str>) -> PyResult<()> {
     let both = [Fidelity::High, Fidelity::Low];
     let name = |f: &Fidelity| Fidelity::NAMES[*f as usize];
-    d.set_item("fidelities", both.iter().filter(|f| declined(**f).is_none()).map(name).collect::<Vec<_>>())?;
+    d.set_item("fidelities", both.iter().filter(|f| not_modelled(**f).is_none()).map(name).collect::<Vec<_>>())?;
     let reasons = PyDict::new(d.py());
     for fidelity in both {
-        if let Some(reason) = declined(fidelity) {
+        if let Some(reason) = not_modelled(fidelity) {
             reasons.set_item(name(&fidelity), reason)?;
         }
     }
-    d.set_item("declined", reasons)
+    d.set_item("not_modelled", reasons)
 }
 
 #[pyfunction]
@@ -96,7 +96,7 @@ pub fn parameters<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
         let choices = if let Range::Choice(names) = v.range { Some(names.to_vec()) } else { None };
         d.set_item("choices", choices)?;
         d.set_item("when", v.acts.when.iter().map(ToString::to_string).collect::<Vec<_>>())?;
-        carried(d, |fidelity| v.acts.declined(fidelity))
+        carried(d, |fidelity| v.acts.not_modelled(fidelity))
     })
 }
 
@@ -171,7 +171,7 @@ pub fn faults<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
         }
         d.set_item("targets", targets)?;
         d.set_item("whole", f.counted())?;
-        carried(d, |fidelity| f.declined(model.groups(), fidelity))
+        carried(d, |fidelity| f.not_modelled(model.groups(), fidelity))
     })
 }
 

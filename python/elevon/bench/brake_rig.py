@@ -62,7 +62,7 @@ class BrakeRig:
 
     @property
     def limit(self) -> float:
-        """Greatest torque on the fast shaft [N m]."""
+        """Greatest torque on the motor shaft [N m]."""
         return self.disk_torque / self.chain_ratio
 
 
@@ -100,7 +100,7 @@ class BrakeRun:
     time : ndarray, shape (n,)
         Seconds of the load cell's clock, from the trigger.
     asked, torque : ndarray, shape (n,)
-        Set point, and what the brake can oppose, on the fast shaft [N m].
+        Set point, and what the brake can oppose, on the motor shaft [N m].
     noise : ndarray, shape (n,)
         Disturbance of each sample of the cell [N], offset and drift included.
     """
@@ -112,7 +112,7 @@ class BrakeRun:
 
 
 def set_point(terms: Sequence[Term], time: Floats) -> Floats:
-    """Return the sum of the brake's terms [N m, fast shaft] at instants [s] after the trigger.
+    """Return the sum of the brake's terms [N m, motor shaft] at instants [s] after the trigger.
 
     Raises
     ------
@@ -162,7 +162,7 @@ def brake_loop(
     cell : CellState
         Its load cell.
     terms : sequence of Term
-        Set point on the fast shaft [N m].
+        Set point on the motor shaft [N m].
     duration : float
         Seconds of the load cell's clock, from the trigger.
     rng : Generator
@@ -189,7 +189,7 @@ def brake_loop(
 
 
 def _loop(rig: BrakeRig, cell: CellState, asked: Floats, noise: Floats, converter: Hx711) -> Floats:
-    """Return the torque on the fast shaft, sample by sample; as fractions of the disk's torque."""
+    """Return the torque on the motor shaft, sample by sample; as fractions of the disk's torque."""
     period = 1.0 / converter.rate
     newtons = rig.disk_torque / rig.arm
     torque = np.empty_like(asked)

@@ -1,4 +1,4 @@
-"""The load module: springs or weights on two cables of the winding guide, at the user's side."""
+"""The load module: springs or weights on two cables of the winding guide, at the output's side."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ class Springs:
 
     @property
     def torsional(self) -> float:
-        """Stiffness at the user: 2 K r^2 [N m/rad]."""
+        """Stiffness at the output: 2 K r^2 [N m/rad]."""
         return 2.0 * self.stiffness * self.radius**2
 
     @property
     def preload(self) -> float:
-        """Torque at the user's zero [N m]."""
+        """Torque at the output's zero [N m]."""
         return 2.0 * self.stiffness * self.radius * self.extension
 
     @property
@@ -54,11 +54,11 @@ class Springs:
 
     @property
     def bearing_torque(self) -> float:
-        """Dry friction that force causes, at the user [N m]."""
+        """Dry friction that force causes, at the output [N m]."""
         return self.radial_force * _BEARING
 
-    def forces(self, user: Floats) -> Floats:
-        """Sum of the two cables' forces [N] at user positions [rad].
+    def forces(self, output: Floats) -> Floats:
+        """Sum of the two cables' forces [N] at output positions [rad].
 
         Raises
         ------
@@ -66,10 +66,11 @@ class Springs:
             A cable would go slack: a cable cannot push, and a run with a slack one is not the run
             that was computed.
         """
-        reach = self.extension + self.radius * user
+        reach = self.extension + self.radius * output
         if reach.min() < 0.0:
             raise InputError(
-                f"spring: the cables go slack at a user position of {float(user.min()):.4g} rad; "
+                "spring: the cables go slack at an output position of "
+                f"{float(output.min()):.4g} rad; "
                 f"give an extension of {self.extension - float(reach.min()):.3g} m or more"
             )
         return 2.0 * self.stiffness * reach
@@ -77,14 +78,14 @@ class Springs:
 
 @dataclass(frozen=True, slots=True)
 class Weights:
-    """Masses on the cables: torque at the user over time [s after the trigger]."""
+    """Masses on the cables: torque at the output over time [s after the trigger]."""
 
     times: tuple[float, ...]
     forces: tuple[float, ...]
     radius: float
 
     def table(self, start: float) -> dict[str, Any]:
-        """Return the load term [N m at the user], `start` s into the log."""
+        """Return the load term [N m at the output], `start` s into the log."""
         return {
             "kind": "table",
             "times": [0.0, *(start + t for t in self.times)],

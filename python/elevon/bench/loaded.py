@@ -151,7 +151,7 @@ def _begin(step: TraceStep, actuator: Actuator, start: float) -> dict[str, Any]:
         return {}
     at = float(_values(step.command.terms, np.zeros(1), start, "m")[0])
     turned = at * known.value("gear.ratio") / known.value("screw.lead")
-    return {} if at == 0.0 else {"motor_position": turned, "user_position": at}
+    return {} if at == 0.0 else {"motor_position": turned, "output_position": at}
 
 
 def _command(step: TraceStep, start: float) -> dict[str, Any]:
@@ -265,7 +265,7 @@ def _forces(setups: Sequence[LoadedSetup]) -> list[tuple[Floats, Floats, Scenari
         for k, run in zip(at, runs, strict=True):
             force = _force(setups[k], run, grids[k])
             table = {"kind": "table", "times": grids[k].tolist(), "values": force.tolist()}
-            loaded = setups[k].scenario.replaced(load={"user": {"terms": [table]}})
+            loaded = setups[k].scenario.replaced(load={"output": {"terms": [table]}})
             out[k] = (grids[k], force, loaded)
     return out
 
@@ -273,7 +273,9 @@ def _forces(setups: Sequence[LoadedSetup]) -> list[tuple[Floats, Floats, Scenari
 def _motion(actuator: Actuator) -> str:
     """What the force is computed from, a few times in each of its steps."""
     step = solver_step(actuator, "low")
-    return f"user_position,user_speed@{1.0 / (max(1, int(_FINE * _GRID / step)) * step):.12g} Hz"
+    return (
+        f"output_position,output_speed@{1.0 / (max(1, int(_FINE * _GRID / step)) * step):.12g} Hz"
+    )
 
 
 def _force(setup: LoadedSetup, run: Recording, times: Floats) -> Floats:
@@ -282,7 +284,7 @@ def _force(setup: LoadedSetup, run: Recording, times: Floats) -> Floats:
     assert setup.stand.force is not None
     clock = run.clock().time
     position, speed = (
-        np.interp(times, clock, run[name].values) for name in ("user_position", "user_speed")
+        np.interp(times, clock, run[name].values) for name in ("output_position", "output_speed")
     )
     terms = _values(setup.force.terms, times, setup.conditions.start)
     asked = asked_force(setup.force, terms, position, speed)

@@ -1,4 +1,4 @@
-"""The play-setting micrometer: reading d -> centre distance -> play, as computed and as measured.
+"""The backlash-setting micrometer: reading -> centre distance -> backlash, computed and measured.
 
 The encoder's wheel meshes with the output ring; a slide at 45 deg moves it away. Numbers:
 test-bench thesis (2022), "Backlash evaluation", and its table of fifteen positions.
@@ -13,13 +13,13 @@ import numpy as np
 from elevon.errors import RangeError
 
 __all__ = [
-    "INTRINSIC_PLAY",
+    "INTRINSIC_BACKLASH",
     "MEASURED",
     "centre_distance",
-    "geometric_play",
-    "measured_play",
+    "geometric_backlash",
+    "measured_backlash",
     "micrometer_for",
-    "total_play",
+    "total_backlash",
 ]
 
 ZERO_READING = 14.0  # mm: the wheel in full mesh
@@ -28,9 +28,11 @@ SLOPE = math.radians(45.0)  # of the slide
 PRESSURE_ANGLE = math.radians(20.0)
 MODULE = 2.0  # mm
 TEETH = 88
-INTRINSIC_PLAY = math.radians(0.365568)  # rad at the user: what is left with the wheel in full mesh
+INTRINSIC_BACKLASH = math.radians(
+    0.365568
+)  # rad at the output: what is left with the wheel in full mesh
 
-#: Micrometer reading [mm] and total play [rad] at the user, as measured on the bench.
+#: Micrometer reading [mm] and total backlash [rad] at the output, as measured on the bench.
 MEASURED: tuple[tuple[float, float], ...] = (
     (14.0, 0.0064),
     (13.8, 0.0087),
@@ -62,53 +64,53 @@ def centre_distance(reading: float) -> float:
     return ZERO_DISTANCE + (ZERO_READING - reading) * math.sin(SLOPE)
 
 
-def geometric_play(reading: float) -> float:
-    """Play [rad, total, user] that the centre distance adds: B = 2 dC tan(alpha) / r_pitch."""
+def geometric_backlash(reading: float) -> float:
+    """Total output backlash [rad] that the centre distance adds: B = 2 dC tan(alpha) / r_pitch."""
     spread = centre_distance(reading) - ZERO_DISTANCE
     return 2.0 * spread * math.tan(PRESSURE_ANGLE) / (MODULE * TEETH / 2.0)
 
 
-def measured_play(reading: float) -> float:
-    """Total play [rad, at the user] measured at a reading [mm], linear between the table's rows."""
+def measured_backlash(reading: float) -> float:
+    """Total backlash [rad, at the output] measured at a reading [mm], linear between rows."""
     _check_reading(reading)
-    readings, plays = zip(*reversed(MEASURED), strict=True)
-    return float(np.interp(reading, readings, plays))
+    readings, backlashes = zip(*reversed(MEASURED), strict=True)
+    return float(np.interp(reading, readings, backlashes))
 
 
-def total_play(reading: float, curve: str = "geometric") -> float:
-    """Total play [rad, at the user], intrinsic play included.
+def total_backlash(reading: float, curve: str = "geometric") -> float:
+    """Total backlash [rad, at the output], intrinsic backlash included.
 
     Parameters
     ----------
     reading : float
         Micrometer reading [mm].
     curve : str
-        ``geometric`` (intrinsic play plus `geometric_play`) or ``measured``. They part beyond
-        some 2.5 mm of travel: the printed teeth are not exact involutes.
+        ``geometric`` (intrinsic backlash plus `geometric_backlash`) or ``measured``. They part
+        beyond some 2.5 mm of travel: the printed teeth are not exact involutes.
     """
     if curve == "geometric":
-        return INTRINSIC_PLAY + geometric_play(reading)
+        return INTRINSIC_BACKLASH + geometric_backlash(reading)
     if curve == "measured":
-        return measured_play(reading)
+        return measured_backlash(reading)
     raise RangeError(f"curve = {curve!r}; valid: 'geometric', 'measured'")
 
 
-def micrometer_for(play: float, curve: str = "geometric") -> float:
-    """Micrometer reading [mm] that sets a total play [rad, at the user].
+def micrometer_for(backlash: float, curve: str = "geometric") -> float:
+    """Micrometer reading [mm] that sets a total backlash [rad, at the output].
 
     Raises
     ------
     RangeError
-        A play the slide cannot set.
+        A backlash the slide cannot set.
     """
-    low, high = total_play(ZERO_READING, curve), total_play(MEASURED[-1][0], curve)
-    if not low <= play <= high:
-        raise RangeError(f"play {play:.6g} rad: the slide sets {low:.6g} to {high:.6g} rad")
+    low, high = total_backlash(ZERO_READING, curve), total_backlash(MEASURED[-1][0], curve)
+    if not low <= backlash <= high:
+        raise RangeError(f"backlash {backlash:.6g} rad: the slide sets {low:.6g} to {high:.6g} rad")
     if curve == "geometric":
-        rise = (play - INTRINSIC_PLAY) * MODULE * TEETH / 4.0 / math.tan(PRESSURE_ANGLE)
+        rise = (backlash - INTRINSIC_BACKLASH) * MODULE * TEETH / 4.0 / math.tan(PRESSURE_ANGLE)
         return ZERO_READING - rise / math.sin(SLOPE)
-    readings, plays = zip(*MEASURED, strict=True)
-    return float(np.interp(play, plays, readings))
+    readings, backlashes = zip(*MEASURED, strict=True)
+    return float(np.interp(backlash, backlashes, readings))
 
 
 def _check_reading(reading: float) -> None:

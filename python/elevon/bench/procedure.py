@@ -33,9 +33,9 @@ from elevon.scenario.scenario import Command, Term
 from elevon.units import parse_quantity
 
 __all__ = [
+    "BacklashStep",
     "BrakeStep",
     "ForceStep",
-    "PlayStep",
     "Procedure",
     "RigStep",
     "SettingsStep",
@@ -73,20 +73,20 @@ def _plain_name(value: str) -> str:
     return value
 
 
-class PlayStep(_Frozen):
-    """Set the play: by the micrometer, as a net play (intrinsic play added), or in total.
+class BacklashStep(_Frozen):
+    """Set the backlash: by the micrometer, net (the intrinsic one added), or in total.
 
     Attributes
     ----------
     micrometer : quantity, optional
         Reading, mm.
     curve : str
-        ``geometric`` or ``measured``: how a reading becomes a play.
+        ``geometric`` or ``measured``: how a reading becomes a backlash.
     net, total : quantity, optional
-        Play at the user; `net` is what the spacing adds to the gear's own.
+        Backlash at the output; `net` is what the spacing adds to the gear's own.
     """
 
-    kind: Literal["play"]
+    kind: Literal["backlash"]
     micrometer: Quantity | None = None
     curve: Literal["geometric", "measured"] = "measured"
     net: Quantity | None = None
@@ -96,7 +96,7 @@ class PlayStep(_Frozen):
     def _one(self) -> Self:
         given = [n for n in ("micrometer", "net", "total") if getattr(self, n) is not None]
         if len(given) != 1:
-            raise ValueError("a play needs exactly one of 'micrometer', 'net', 'total'")
+            raise ValueError("a backlash needs exactly one of 'micrometer', 'net', 'total'")
         try:
             self.value()
         except InputError as error:
@@ -104,18 +104,18 @@ class PlayStep(_Frozen):
         return self
 
     def value(self) -> float:
-        """Return the total play at the user [rad]."""
-        from elevon.bench.micrometer import INTRINSIC_PLAY, total_play
+        """Return the total backlash at the output [rad]."""
+        from elevon.bench.micrometer import INTRINSIC_BACKLASH, total_backlash
 
         if self.micrometer is not None:
             reading = 1e3 * parse_quantity(self.micrometer, "m", "micrometer")
-            return total_play(reading, self.curve)
-        text, extra = (self.net, INTRINSIC_PLAY) if self.net is not None else (self.total, 0.0)
+            return total_backlash(reading, self.curve)
+        text, extra = (self.net, INTRINSIC_BACKLASH) if self.net is not None else (self.total, 0.0)
         assert text is not None
-        play = parse_quantity(text, "rad", "play")
-        if play < 0.0:
-            raise InputError(f"play = {text} must not be negative")
-        return play + extra
+        backlash = parse_quantity(text, "rad", "backlash")
+        if backlash < 0.0:
+            raise InputError(f"backlash = {text} must not be negative")
+        return backlash + extra
 
 
 class BrakeStep(_Frozen):
@@ -124,7 +124,7 @@ class BrakeStep(_Frozen):
     Attributes
     ----------
     terms : tuple of Term
-        Sum of waveforms, N m on the fast shaft, counted from the trigger.
+        Sum of waveforms, N m on the motor shaft, counted from the trigger.
     """
 
     kind: Literal["brake"]
@@ -143,7 +143,7 @@ class SpringStep(_Frozen):
     radius : quantity
         Of the winding guide, m.
     extension : quantity
-        Of each spring while the user stands at zero, m.
+        Of each spring while the output stands at zero, m.
     mover : quantity
         Displacement of the mover, m: adds a radial force on the guide.
     """
@@ -301,7 +301,7 @@ class TraceStep(_Frozen):
         return value
 
 
-_Load = PlayStep | BrakeStep | SpringStep | WeightsStep | ForceStep | RigStep
+_Load = BacklashStep | BrakeStep | SpringStep | WeightsStep | ForceStep | RigStep
 Step = Annotated[
     _Load | SettingsStep | TraceStep,
     Field(discriminator="kind"),

@@ -12,9 +12,9 @@ import numpy as np
 from elevon.bench.brake_rig import BrakeRig, BrakeRun, CellState, brake_loop
 from elevon.bench.load_module import Springs, Weights, springs_of, weights_of
 from elevon.bench.procedure import (
+    BacklashStep,
     BrakeStep,
     ForceStep,
-    PlayStep,
     Procedure,
     RigStep,
     SettingsStep,
@@ -46,7 +46,7 @@ class Conditions:
     trigger, start : float
         Instants of the trigger and of the command's start, on the drive's clock [s].
     zero : float
-        Where in the play the motor stands at first: -0.5 to 0.5 of it.
+        Where in the backlash the motor stands at first: -0.5 to 0.5 of it.
     cell : CellState
         The load cell.
     seed : int
@@ -64,7 +64,7 @@ class Conditions:
 class Rig:
     """The bench as it stands: what the steps so far have made of it."""
 
-    play: float | None = None
+    backlash: float | None = None
     brake: tuple[Term, ...] = ()
     springs: Springs | None = None
     weights: Weights | None = None
@@ -81,7 +81,7 @@ class Setup:
     trace : TraceStep
         The step.
     actuator : Actuator
-        With the play and the settings of the steps before it.
+        With the backlash and the settings of the steps before it.
     scenario : Scenario
         Command, loads and faults on the drive's clock.
     conditions : Conditions
@@ -170,9 +170,11 @@ def _check(actuator: Actuator) -> None:
         )
 
 
-def _changed(rig: Rig, step: PlayStep | BrakeStep | SpringStep | WeightsStep | SettingsStep) -> Rig:
-    if isinstance(step, PlayStep):
-        return replace(rig, play=step.value())
+def _changed(
+    rig: Rig, step: BacklashStep | BrakeStep | SpringStep | WeightsStep | SettingsStep
+) -> Rig:
+    if isinstance(step, BacklashStep):
+        return replace(rig, backlash=step.value())
     if isinstance(step, BrakeStep):
         return replace(rig, brake=step.terms)
     if isinstance(step, SpringStep):
@@ -190,8 +192,8 @@ def _setup(
     faults: Sequence[Fault | str],
 ) -> Setup:
     values: dict[str, str | float] = dict(rig.settings)
-    if rig.play is not None:
-        values["play.total"] = rig.play
+    if rig.backlash is not None:
+        values["backlash.total"] = rig.backlash
     if rig.springs is not None:
         values["load.stiffness"] = rig.springs.torsional
     ready = actuator.with_values(values, source="set on the bench", place=f"trace {step.name}")
@@ -213,8 +215,8 @@ def _setup(
 
 def _initial(actuator: Actuator, conditions: Conditions) -> dict[str, float]:
     value = actuator.parameters.value
-    motor = conditions.zero * value("play.total") * value("gear.ratio")
-    return {"motor_position": motor, "user_position": 0.0}
+    motor = conditions.zero * value("backlash.total") * value("gear.ratio")
+    return {"motor_position": motor, "output_position": 0.0}
 
 
 def _brake(rig: Rig, conditions: Conditions, duration: float) -> BrakeRun | None:
@@ -231,17 +233,17 @@ def _loads(
 ) -> dict[str, Any]:
     """Loads on the drive's clock."""
     resist: list[dict[str, Any]] = []
-    user: list[dict[str, Any]] = []
+    output: list[dict[str, Any]] = []
     if brake is not None:
         times = conditions.trigger + brake.time * (1.0 + conditions.cell.clock_drift)
         resist.append({"kind": "table", "times": times.tolist(), "values": brake.torque.tolist()})
     if rig.springs is not None:
-        user.append({"kind": "constant", "value": rig.springs.preload})
+        output.append({"kind": "constant", "value": rig.springs.preload})
         bearing = rig.springs.bearing_torque / actuator.parameters.value("gear.ratio")
         resist.append({"kind": "constant", "value": bearing})
     if rig.weights is not None:
-        user.append(rig.weights.table(conditions.trigger))
-    return {"brake": {"terms": resist}, "user": {"terms": user}}
+        output.append(rig.weights.table(conditions.trigger))
+    return {"brake": {"terms": resist}, "output": {"terms": output}}
 
 
 def _command(step: TraceStep, start: float) -> dict[str, Any]:

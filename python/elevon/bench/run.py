@@ -171,11 +171,11 @@ def run_procedure(
     faults : sequence of Fault or str
         In every log.
     seed : int
-        Of chance: command start, zero in the play, load cell, noise.
+        Of chance: command start, zero in the backlash, load cell, noise.
     fidelity : str
         ``high`` or ``low``; the low model has no d current, so its column is left out.
     layout : DriveFormat, optional
-        How the trace is written; default: degrees, encoder on the fast shaft, rms.
+        How the trace is written; default: degrees, encoder on the motor shaft, rms.
     truth : path, optional
         File (JSON) for what the logs' reader does not know.
     force : bool

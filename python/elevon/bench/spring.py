@@ -175,7 +175,7 @@ class SpringDesign:
 
     @property
     def torsional_stiffness(self) -> float:
-        """Stiffness of both springs at the user shaft [N m/rad]: 2 K r^2."""
+        """Stiffness of both springs at the output shaft [N m/rad]: 2 K r^2."""
         return 2.0 * self.stiffness * (0.5 * self.task.guide_diameter) ** 2
 
     @property

@@ -34,7 +34,7 @@ _LOGGED = {
     "current_d_meas": "current_d_meas",
     "current_q_meas": "current_q_meas",
 }
-_CELL = ("motor_speed", "friction_torque", "user_position")
+_CELL = ("motor_speed", "friction_torque", "output_position")
 _VOLTAGES = ("voltage_q_ref", "voltage_q_meas")
 
 
@@ -103,10 +103,10 @@ def cell_signals(setup: Setup, recording: Recording) -> tuple[Floats, Floats] | 
         return None
     count = int((clock[-1] - conditions.trigger) / stretch * converter.rate) + 1
     time = np.arange(count, dtype=np.float64) / converter.rate
-    user = np.asarray(recording["user_position"].values, dtype=np.float64)
+    output = np.asarray(recording["output_position"].values, dtype=np.float64)
     force = np.zeros_like(time)
     if rig.springs is not None:
-        all_forces = rig.springs.forces(user)
+        all_forces = rig.springs.forces(output)
         force += np.interp(conditions.trigger + time * stretch, clock, all_forces)
     if rig.weights is not None:
         force += rig.weights.at(np.asarray(time * stretch, dtype=np.float64))

@@ -1,9 +1,9 @@
 """Covariance of estimates from the spread of their scores over blocks of time.
 
-Residuals of a log are coloured (friction, play, filters) and partly systematic (the model is not
-the bench). Samples are therefore counted in blocks longer than the residual remembers: the scores
-of a block are summed over all signals, and the spread of these sums is what a repetition of the
-experiment would show (cluster-robust sandwich, with the finite-number correction).
+Residuals of a log are coloured (friction, backlash, filters) and partly systematic (the model is
+not the bench). Samples are therefore counted in blocks longer than the residual remembers: the
+scores of a block are summed over all signals, and the spread of these sums is what a repetition of
+the experiment would show (cluster-robust sandwich, with the finite-number correction).
 """
 
 from __future__ import annotations

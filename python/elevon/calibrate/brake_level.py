@@ -31,7 +31,7 @@ class Brake:
     Attributes
     ----------
     known : str
-        ``torque``: level on the fast shaft [N m]; ``force``: level [N], arm unknown; ``on``:
+        ``torque``: level on the motor shaft [N m]; ``force``: level [N], arm unknown; ``on``:
         nothing but that it acted; ``off``.
     time, level : ndarray, shape (m,)
         Seconds from the log's first sample, and the size of the resistive torque or force.

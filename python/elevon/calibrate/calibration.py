@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.calibrate.acceptance import accept, missing, shortened, undetermined, with_values
+from elevon.calibrate.backlashes import PER_LOG
 from elevon.calibrate.direct import saturated_speed
 from elevon.calibrate.dynamic import Dynamic, dynamic_stage
 from elevon.calibrate.estimate import Estimate
@@ -20,7 +21,6 @@ from elevon.calibrate.kinematics import KINEMATIC, CommandFit
 from elevon.calibrate.log import BenchLog
 from elevon.calibrate.outcome import Outcome, log_facts
 from elevon.calibrate.plant import Torque
-from elevon.calibrate.plays import PER_LOG
 from elevon.calibrate.regression import Regression
 from elevon.calibrate.signals import Signals, signal_stage
 from elevon.errors import InputError, Interrupted, unknown
@@ -142,7 +142,7 @@ def calibrate(
     free : sequence of str, optional
         Parameter paths to estimate; default: all that the logs determine.
     per_log : sequence of str
-        Of `elevon.calibrate.plays.PER_LOG`: estimated for each log too, as ``PATH[LOG]``.
+        Of `elevon.calibrate.backlashes.PER_LOG`: estimated for each log too, as ``PATH[LOG]``.
     fidelity : str
         Of the model runs: ``low`` or ``high``.
     transient : float, optional

@@ -223,6 +223,6 @@ def within_inertia(actuator: Actuator, values: Mapping[str, str | float]) -> dic
 
 
 def _other_inertia(actuator: Actuator) -> float:
-    """Inertia on the fast shaft beside the motor's own."""
+    """Inertia on the motor shaft beside the motor's own."""
     value = actuator.parameters.value
     return value("gear.inertia") + value("load.inertia") / value("gear.ratio") ** 2

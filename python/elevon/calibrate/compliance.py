@@ -27,13 +27,13 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ComplianceCalibration:
-    """The answer, in SI at the user shaft.
+    """The answer, in SI at the output shaft.
 
     Attributes
     ----------
     estimates : tuple of Estimate
-        ``play.stiffness`` [N m/rad], ``derived.dead_zone`` [rad]: angle lost at the smallest load,
-        one ``derived.group_offset[k]`` [rad] a further group.
+        ``backlash.stiffness`` [N m/rad], ``derived.dead_zone`` [rad]: angle lost at the smallest
+        load, one ``derived.group_offset[k]`` [rad] a further group.
     residual : ndarray, shape (n,)
         Measured less fitted loss [rad].
     outliers : tuple of int
@@ -67,7 +67,7 @@ def calibrate_compliance(
     Parameters
     ----------
     torque : array_like, shape (n,)
-        Torque of the load at the user [N m].
+        Torque of the load at the output [N m].
     loss : array_like, shape (n,)
         Angle lost between motor over ratio and encoder [rad].
     weight : array_like of int, shape (n,)
@@ -104,7 +104,7 @@ def calibrate_compliance(
     high = 1.0 / float(beta[0] - half[0]) if beta[0] > half[0] else math.inf
     estimates = [
         Estimate(
-            "play.stiffness",
+            "backlash.stiffness",
             stiffness,
             stiffness**2 * float(std[0]),
             (low, high),

@@ -233,7 +233,9 @@ def _fixed(
         static = static_following(actuator.parameters, start["friction.dynamic"])
         values.setdefault("friction.static", static)
         values.setdefault("friction.dynamic", start["friction.dynamic"])
-    fixed = {p: v for p, v in values.items() if p not in {"play.total", "sensor.encoder.offset"}}
+    fixed = {
+        p: v for p, v in values.items() if p not in {"backlash.total", "sensor.encoder.offset"}
+    }
     return fixed | within_inertia(actuator, fixed)
 
 

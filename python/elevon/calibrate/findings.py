@@ -100,14 +100,16 @@ def _convention(torque: Torque, actuator: Actuator) -> list[str]:
 def amplitude_findings(commands: Sequence[CommandFit], estimates: Sequence[Estimate]) -> list[str]:
     """Name a constant amplitude factor between the bench and the model, and where it sits."""
     says = []
-    play = next((item for item in estimates if item.path == "play.total"), None)
-    if play is not None and "floats" in play.note:
+    backlash = next((item for item in estimates if item.path == "backlash.total"), None)
+    if backlash is not None and "floats" in backlash.note:
         says.append(
-            "the user is not dragged through the play but moves within it on its own (its inertia "
-            "is not small against its friction): play.total comes from the span of the two "
+            "the output is not carried through the backlash by friction but moves within it "
+            "on its own (its inertia "
+            "is not small against its friction): backlash.total comes from the span of the two "
             "positions' difference and holds the give of the contacts; encoder gain and delay "
-            "cannot be told; a model whose user has no inertia will miss the user's position by "
-            "up to half the play"
+            "cannot be told; a model whose output has no inertia will miss the output's "
+            "position by "
+            "up to half the backlash"
         )
     gain = next((item for item in estimates if item.path == "sensor.encoder.gain"), None)
     if gain is not None and abs(gain.value - 1.0) > max(_FACTOR, 3.0 * gain.std):

@@ -1,6 +1,7 @@
 """What positions, speeds and set points tell without any torque.
 
-Play, encoder gain and offset from the two positions; speed sensor from the motor's angle; position
+Backlash, encoder gain and offset from the two positions; speed sensor from the motor's angle;
+position
 gain and amplitude of the command from set point and encoder; the speed limit where it is held.
 """
 
@@ -30,7 +31,7 @@ Floats = npt.NDArray[np.float64]
 
 #: Paths that come from positions alone, not from the dynamic fit.
 KINEMATIC = (
-    "play.total",
+    "backlash.total",
     "sensor.encoder.offset",
     "sensor.encoder.gain",
     "control.position_gain",
@@ -94,7 +95,7 @@ def command_fit(log: BenchLog, gain: float, limit: float) -> CommandFit | None:
     Parameters
     ----------
     log : BenchLog
-        With the user's position.
+        With the output's position.
     gain : float
         Position gain to start from [1/s].
     limit : float
@@ -105,10 +106,10 @@ def command_fit(log: BenchLog, gain: float, limit: float) -> CommandFit | None:
     CommandFit or None
         None where the position is missing or no waveform explains the set point.
     """
-    if log.user is None:
+    if log.output is None:
         return None
     try:
-        trace = reconstruct(log.time, log.speed_ref, log.user, gain=gain, limit=limit)
+        trace = reconstruct(log.time, log.speed_ref, log.output, gain=gain, limit=limit)
         if log.note is not None and log.note.command is not None and log.note.command.terms:
             return _noted_with_gain(log, align_noted(trace, log.note), gain, limit)
         kind = log.note.waveform if log.note else None
@@ -119,7 +120,7 @@ def command_fit(log: BenchLog, gain: float, limit: float) -> CommandFit | None:
             fit = fit_waveform(trace, kind) if kind else best_waveform(trace)
     except InputError:
         return None
-    spread = float(np.std(log.user))
+    spread = float(np.std(log.output))
     if not spread > 0.0 or fit.rms > 3.0 * _SMALL * spread:
         return None
     return _with_gain(log, fit, gain, limit)
@@ -129,17 +130,17 @@ def _noted_with_gain(
     log: BenchLog, noted: NotedCommand, gain: float, limit: float
 ) -> CommandFit | None:
     """Gain under a command noted in full: noted = set point / gain + position, its instant free."""
-    assert log.user is not None
+    assert log.output is not None
     inside = log.good & (np.abs(log.speed_ref) < 0.999 * limit) & (log.time >= noted.start)
-    t, ref, user = log.time[inside], log.speed_ref[inside] / gain, log.user[inside]
+    t, ref, output = log.time[inside], log.speed_ref[inside] / gain, log.output[inside]
     if inside.sum() < _LEAST:
         return None
     slope = np.gradient(noted.values, log.time)[inside]
     design = np.column_stack((ref, slope))
-    data = noted.values[inside] - user
+    data = noted.values[inside] - output
     (inverse, shift), *_ = np.linalg.lstsq(design, data, rcond=None)
     rest = data - design @ np.array([inverse, shift])
-    if float(rest.std()) > _SMALL * float(np.std(user)) or not inverse > 0.0:
+    if float(rest.std()) > _SMALL * float(np.std(output)) or not inverse > 0.0:
         return None
     std = np.sqrt(np.maximum(np.diag(robust_covariance(design, rest)), 0.0))
     start, rms = noted.start + float(shift), float(np.sqrt(np.mean(rest**2)))
@@ -166,20 +167,20 @@ def _with_gain(log: BenchLog, fit: WaveformFit, gain: float, limit: float) -> Co
     names = [n for n in FREE[fit.kind] if math.isfinite(fit.values[n])]
     inside = log.good & (np.abs(log.speed_ref) < 0.999 * limit)
     inside &= (log.time >= fit.window[0]) & (log.time <= fit.window[1])
-    assert log.user is not None
-    t, ref, user = log.time[inside], log.speed_ref[inside] / gain, log.user[inside]
+    assert log.output is not None
+    t, ref, output = log.time[inside], log.speed_ref[inside] / gain, log.output[inside]
     start = np.array([*(fit.values[n] for n in names), 1.0])
     scale = np.array([*(max(abs(fit.values[n]), 1e-3) for n in names), 1.0])
 
     def residual(x: Floats) -> Floats:
         values = {**fit.values, **dict(zip(names, map(float, x[:-1]), strict=True))}
-        return np.asarray(evaluate(fit.kind, values, t) - ref * x[-1] - user, dtype=np.float64)
+        return np.asarray(evaluate(fit.kind, values, t) - ref * x[-1] - output, dtype=np.float64)
 
     best = least_squares(residual, start, x_scale=scale * 1e-2, jac="3-point", max_nfev=100)
     if not best.success:
         return None
     rest = np.asarray(best.fun)
-    if float(rest.std()) > _SMALL * float(np.std(user)):
+    if float(rest.std()) > _SMALL * float(np.std(output)):
         return None
     covariance = robust_covariance(np.asarray(best.jac), rest)
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))

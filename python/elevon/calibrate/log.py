@@ -46,8 +46,8 @@ class BenchLog:
         Torque current, peak [A].
     current_signal : str
         ``current_q_meas`` or, where no current is measured, ``current_ref``: its set point.
-    motor, user : ndarray, shape (n,), or None
-        Positions [rad]: motor at the fast shaft, encoder at the user.
+    motor, output : ndarray, shape (n,), or None
+        Positions [rad]: motor at the motor shaft, encoder at the output.
     brake : Brake
         What is known of the brake.
     note : CommandNote or None
@@ -67,7 +67,7 @@ class BenchLog:
     current_signal: str
     current_target: Floats
     motor: Floats | None
-    user: Floats | None
+    output: Floats | None
     brake: Brake
     note: CommandNote | None
     good: npt.NDArray[np.bool_]
@@ -147,7 +147,7 @@ def bench_log(imported: ImportedLog) -> BenchLog:
     for needed in _NEEDED:
         if needed not in recording.roles:
             raise InputError(
-                f"{name}: no channel plays {needed}; calibration needs a speed set point, the "
+                f"{name}: no channel backlashes {needed}; calibration needs a speed set point, the "
                 f"motor's speed and a torque current; roles: {', '.join(recording.roles) or 'none'}"
             )
     current_role = next((r for r in _CURRENTS if r in recording.roles), None)
@@ -175,7 +175,7 @@ def bench_log(imported: ImportedLog) -> BenchLog:
         current_signal=_CURRENTS[current_role],
         current_target=current if target is None else target,
         motor=_optional(recording, time, "motor_position"),
-        user=_optional(recording, time, "output_position"),
+        output=_optional(recording, time, "output_position"),
         brake=brake_of(recording, imported.note, time, start, speed),
         note=imported.note,
         good=good,

@@ -143,12 +143,12 @@ def _constant(sheet: _Sheet, scale: Callable[[Floats], float]) -> None:
 
 
 def _whole_inertia(sheet: _Sheet, scale: Callable[[Floats], float]) -> float:
-    """All inertia on the fast shaft, and what the current alone tells of it."""
+    """All inertia on the motor shaft, and what the current alone tells of it."""
     total = sheet.add(
         "derived.inertia",
         "kg m2",
         lambda b: scale(b) * b[0],
-        "all inertia on the fast shaft",
+        "all inertia on the motor shaft",
         in_set=False,
     )
     sheet.add(

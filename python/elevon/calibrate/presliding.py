@@ -75,7 +75,7 @@ def presliding_friction(
 
     What no log settles enters the deviation as the difference it makes: the law of the fall from
     static to dynamic friction, the shape of the current's lag, how the shaft moves between two
-    samples, and what rubs only beyond the play.
+    samples, and what rubs only beyond the backlash.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def presliding_friction(
         replace(windows, steps=np.repeat(even, _FINE, axis=1)),
     ):
         others.append(_fit(other, dry, best.exponent, best.x).static)
-    # What rubs beyond the play rubs in the motion, not yet where the shaft moves off.
+    # What rubs beyond the backlash rubs in the motion, not yet where the shaft moves off.
     beyond = dry - float(best.x[4])
     variance, degrees = best.variance(windows)
     spread = sum((other - best.static) ** 2 for other in others) + beyond**2

@@ -1,8 +1,8 @@
 """The dynamic fit's model runs: the actuator driven by each log's measured speed set point.
 
 Driving with the set point that was logged cuts the position loop open: the command need not be
-known, positions do not drift, and play plays no part. What is compared is the speed and the torque
-current that the model's speed controller, drive, motor and friction make of it.
+known, positions do not drift, and backlash has no part. What is compared is the speed and the
+torque current that the model's speed controller, drive, motor and friction make of it.
 """
 
 from __future__ import annotations

@@ -92,7 +92,7 @@ def replay_scenario(
     roles = recording.roles
     for role in ("command", "output_position"):
         if role not in roles:
-            raise InputError(f"{name}: no channel plays {role!r}; roles: {', '.join(roles)}")
+            raise InputError(f"{name}: no channel backlashes {role!r}; roles: {', '.join(roles)}")
     stand = _stand(recording)
     position = recording.role("output_position")
     time = np.asarray(position.time - position.time[0], dtype=np.float64)
@@ -101,7 +101,7 @@ def replay_scenario(
         load["rig_speed"] = _table(time, _speed(time, np.asarray(position.values)))
     elif "load" in roles:
         channel = recording.role("load")
-        load["user"] = _table(channel.time - position.time[0], channel.values)
+        load["output"] = _table(channel.time - position.time[0], channel.values)
     initial = dict(stand.get("initial", {})) or {"nut_position": float(position.values[0])}
     scenario = Scenario.from_dict(
         {

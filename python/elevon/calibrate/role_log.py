@@ -78,7 +78,7 @@ def role_channels(recording: Recording, name: str, needed: Sequence[str]) -> dic
     roles = recording.roles
     for role in needed:
         if role not in roles:
-            raise InputError(f"{name}: no channel plays {role!r}; roles: {', '.join(roles)}")
+            raise InputError(f"{name}: no channel backlashes {role!r}; roles: {', '.join(roles)}")
     clock = np.asarray(recording.role(needed[0]).time, dtype=np.float64)
     if len(clock) < _FEWEST:
         raise InputError(f"{name}: {len(clock)} samples; at least {_FEWEST}")

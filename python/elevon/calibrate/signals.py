@@ -83,7 +83,7 @@ def signal_stage(
     advance : callable
         Called with the done fraction; may raise to stop.
     per_log : sequence of str
-        Paths to estimate for each log: of `elevon.calibrate.plays.PER_LOG`.
+        Paths to estimate for each log: of `elevon.calibrate.backlashes.PER_LOG`.
     """
     estimates, findings = position_estimates(logs, actuator, per_log)
     advance(0.25)

@@ -59,7 +59,7 @@ def thinned(log: BenchLog) -> BenchLog:
         current=group_means(log.current, count),
         current_target=group_means(log.current_target, count),
         motor=mean(log.motor),
-        user=mean(log.user),
+        output=mean(log.output),
         brake=brake,
         good=good,
     )

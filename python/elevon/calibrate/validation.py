@@ -223,10 +223,10 @@ def _trace(
     from elevon.scenario import Scenario
     from elevon.simulate import simulate
 
-    if log.user is None or log.motor is None:
+    if log.output is None or log.motor is None:
         raise InputError(
             f"{log.name}: validation needs both positions (r4820, r4821): they give the command "
-            "and the play"
+            "and the backlash"
         )
     command, how = _command(log, actuator)
     known = log.brake.known not in _UNMEASURED
@@ -259,20 +259,20 @@ def _trace(
             "initial": {
                 "motor_position": shift,
                 "motor_speed": float(log.speed[0]),
-                "user_position": _start(log, offset, middle, actuator),
+                "output_position": _start(log, offset, middle, actuator),
             },
         }
     )
     model = actuator
     feedback = str(actuator.parameters["control.position_feedback"].value)
-    if feedback == "user" and offset != 0.0:
+    if feedback == "output" and offset != 0.0:
         model = actuator.with_values({"control.position_feedback": "encoder"})
     rate = f"{1.0 / log.period:.9g} Hz"
     recording = simulate(model, scenario, fidelity=fidelity, record=_record(model, fidelity, rate))
     clock = recording["motor_speed"].time
     simulated = {name: np.interp(log.time, clock, recording[name].values) for name in SIGNALS}
     logged = {
-        "encoder_position": log.user,
+        "encoder_position": log.output,
         "motor_speed": log.speed,
         "current_q_meas": log.current,
     }
@@ -292,14 +292,14 @@ def _record(actuator: Actuator, fidelity: str, rate: str) -> str:
 
 
 def _start(log: BenchLog, offset: float, middle: float, actuator: Actuator) -> float:
-    """Return where the user begins: as the encoder shows it, at an end of the play at most.
+    """Return where the output begins: as the encoder shows it, at an end of the backlash at most.
 
-    What noise and errors of the sensors add beyond the play is nowhere an actuator can stand.
+    What noise and errors of the sensors add beyond the backlash is nowhere an actuator can stand.
     """
-    assert log.user is not None
-    shown = float(log.user[0]) - offset if np.isfinite(log.user[0]) else middle
+    assert log.output is not None
+    shown = float(log.output[0]) - offset if np.isfinite(log.output[0]) else middle
     value = actuator.parameters.value
-    half = 0.5 * (value("play.total") + value("play.extra"))
+    half = 0.5 * (value("backlash.total") + value("backlash.extra"))
     return float(np.clip(shown, middle - half, middle + half))
 
 
@@ -311,8 +311,8 @@ def _command(log: BenchLog, actuator: Actuator) -> tuple[Floats, str]:
     """
     value = actuator.parameters.value
     gain, limit = value("control.position_gain"), value("control.speed_limit")
-    assert log.user is not None
-    trace = reconstruct(log.time, log.speed_ref, log.user, gain=gain, limit=limit)
+    assert log.output is not None
+    trace = reconstruct(log.time, log.speed_ref, log.output, gain=gain, limit=limit)
     if trace.coverage < 0.05:
         raise InputError(
             f"{log.name}: the speed set point is inside its limit ({limit:.4g} rad/s) for only "

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from elevon.calibrate.backlash import BacklashFit, fit_backlash
+from elevon.calibrate.backlashes import backlashes_differ, differing_backlashes, pooled_backlash
 from elevon.calibrate.estimate import Estimate, quantile
 from elevon.calibrate.kinematics import CommandFit, speed_limit, speed_sensor
 from elevon.calibrate.log import BenchLog
-from elevon.calibrate.play import PlayFit, fit_play
-from elevon.calibrate.plays import differing_plays, plays_differ, pooled_play
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -21,14 +21,14 @@ __all__ = ["gain_estimate", "position_estimates"]
 _OTHER = 0.005  # relative: a limit nearer the set's than this is the set's
 _ROUNDED = 0.1  # counts: what rounding to counts may shift where every stroke turns alike
 _TURNS = 0.2  # share of that in the encoder's gain
-_FLAT = 0.25  # counts: the same where the user stands still in the play, long at one count
+_FLAT = 0.25  # counts: the same where the output stands still in the backlash, long at one count
 _LOOSE = 0.05  # relative deviation above which the position gain is not determined
 
 
 def position_estimates(
     logs: Sequence[BenchLog], actuator: Actuator, per_log: Sequence[str] = ()
 ) -> tuple[list[Estimate], tuple[str, ...]]:
-    """Return play, encoder, speed sensor and speed limit as far as the logs show them, and words.
+    """Return backlash, encoder, speed sensor, speed limit as far as the logs show, and words.
 
     Parameters
     ----------
@@ -37,40 +37,40 @@ def position_estimates(
     actuator : Actuator
         Values before.
     per_log : sequence of str
-        Of `elevon.calibrate.plays.PER_LOG`: estimated for each log.
+        Of `elevon.calibrate.backlashes.PER_LOG`: estimated for each log.
     """
-    estimates, findings = _play_estimates(logs, actuator, "play.total" in per_log)
+    estimates, findings = _backlash_estimates(logs, actuator, "backlash.total" in per_log)
     return [*estimates, *_speed_estimates(logs), *_limit_estimates(logs, actuator)], findings
 
 
-def _play_estimates(
+def _backlash_estimates(
     logs: Sequence[BenchLog], actuator: Actuator, each: bool
 ) -> tuple[list[Estimate], tuple[str, ...]]:
-    """Play and encoder; of logs whose plays differ the encoder alone, and each log's play."""
+    """Backlash and encoder; where backlashes differ the encoder alone, and each log's backlash."""
     value = actuator.parameters.value
     ratio, count = value("gear.ratio"), encoder_count(actuator)
-    plays = differing_plays(logs, ratio, count)
-    play = pooled_play(plays) if plays else fit_play(logs, ratio, count)
-    if play is None:
+    backlashes = differing_backlashes(logs, ratio, count)
+    backlash = pooled_backlash(backlashes) if backlashes else fit_backlash(logs, ratio, count)
+    if backlash is None:
         return [], ()
-    estimates = _play(play, count, actuator)
-    estimates += [_initial(log, play, count, ratio) for log in logs if _both_positions(log)]
-    own = plays
-    if each and not plays:
-        fits = {log.name: fit_play([log], ratio, count) for log in logs}
+    estimates = _backlash(backlash, count, actuator)
+    estimates += [_initial(log, backlash, count, ratio) for log in logs if _both_positions(log)]
+    own = backlashes
+    if each and not backlashes:
+        fits = {log.name: fit_backlash([log], ratio, count) for log in logs}
         own = {name: fit for name, fit in fits.items() if fit is not None}
     if each:
-        estimates += [_own_play(name, fit, count, actuator) for name, fit in own.items()]
-    if not plays:
+        estimates += [_own_backlash(name, fit, count, actuator) for name, fit in own.items()]
+    if not backlashes:
         return estimates, ()
-    rest = [item for item in estimates if item.path != "play.total"]
-    return rest, (plays_differ(plays, value("play.extra")),)
+    rest = [item for item in estimates if item.path != "backlash.total"]
+    return rest, (backlashes_differ(backlashes, value("backlash.extra")),)
 
 
-def _own_play(name: str, play: PlayFit, count: float, actuator: Actuator) -> Estimate:
-    """Play of one log."""
-    total = _play(play, count, actuator)[0]
-    return replace(total, path=f"play.total[{name}]", in_set=False, note="of this log alone")
+def _own_backlash(name: str, backlash: BacklashFit, count: float, actuator: Actuator) -> Estimate:
+    """Backlash of one log."""
+    total = _backlash(backlash, count, actuator)[0]
+    return replace(total, path=f"backlash.total[{name}]", in_set=False, note="of this log alone")
 
 
 def _speed_estimates(logs: Sequence[BenchLog]) -> list[Estimate]:
@@ -117,31 +117,31 @@ def _limit_estimates(logs: Sequence[BenchLog], actuator: Actuator) -> list[Estim
 
 
 def encoder_count(actuator: Actuator) -> float:
-    """One count of the user encoder [rad at the user]."""
+    """One count of the output encoder [rad at the output]."""
     value = actuator.parameters.value
     counts = value("sensor.encoder.pulses") * value("sensor.encoder.edges")
     return 2.0 * math.pi / (counts * value("sensor.encoder.wheel_ratio"))
 
 
-def _play(play: PlayFit, count: float, actuator: Actuator) -> list[Estimate]:
+def _backlash(backlash: BacklashFit, count: float, actuator: Actuator) -> list[Estimate]:
     value = actuator.parameters.value
-    extra = value("play.extra")
-    total, offset = play.play[0] - extra, play.offset[0] + 0.5 * count
+    extra = value("backlash.extra")
+    total, offset = backlash.backlash[0] - extra, backlash.offset[0] + 0.5 * count
     # The model's encoder truncates; one that rounds would sit half a count lower.
-    offset_std = math.hypot(play.offset[1], count / math.sqrt(12.0))
+    offset_std = math.hypot(backlash.offset[1], count / math.sqrt(12.0))
     rounded = _ROUNDED * count
-    total_std = math.hypot(play.play[1], rounded)
+    total_std = math.hypot(backlash.backlash[1], rounded)
     resolver = value("sensor.resolver.offset") / value("gear.ratio")
     rows = [
         _made(
-            "play.total",
+            "backlash.total",
             total,
             total_std,
-            play.degrees,
+            backlash.degrees,
             unit="rad",
             register="plant",
-            old=value("play.total"),
-            note=f"total, at the user{'; it floats: from the span' if play.floats else ''}",
+            old=value("backlash.total"),
+            note=f"total, at the output{'; it floats: from the span' if backlash.floats else ''}",
             in_set=total >= 0.0,
         ),
         _made(
@@ -149,49 +149,50 @@ def _play(play: PlayFit, count: float, actuator: Actuator) -> list[Estimate]:
             offset + resolver,
             offset_std,
             math.inf,
-            half=quantile(play.degrees) * math.hypot(play.offset[1], rounded) + 0.5 * count,
+            half=quantile(backlash.degrees) * math.hypot(backlash.offset[1], rounded) + 0.5 * count,
             unit="rad",
             register="sensor",
             old=value("sensor.encoder.offset"),
-            note="encoder less motor over ratio, the play centred: only the difference is known",
+            note="encoder less motor over ratio, backlash centred: only the difference is known",
         ),
     ]
-    return rows if play.floats else [*rows, *_encoder(play, actuator, rounded)]
+    return rows if backlash.floats else [*rows, *_encoder(backlash, actuator, rounded)]
 
 
 def _both_positions(log: BenchLog) -> bool:
-    return log.motor is not None and log.user is not None
+    return log.motor is not None and log.output is not None
 
 
-def _initial(log: BenchLog, play: PlayFit, count: float, ratio: float) -> Estimate:
-    """Where in the play the motor stood when a log began."""
+def _initial(log: BenchLog, backlash: BacklashFit, count: float, ratio: float) -> Estimate:
+    """Where in the backlash the motor stood when a log began."""
     assert log.motor is not None
-    assert log.user is not None
-    seen = play.gain[0] * log.motor[0] / ratio + play.offset[0] - log.user[0]
+    assert log.output is not None
+    seen = backlash.gain[0] * log.motor[0] / ratio + backlash.offset[0] - log.output[0]
     return _made(
         f"initial.lead[{log.name}]",
         float(seen),
-        math.hypot(play.offset[1], count / math.sqrt(12.0)),
+        math.hypot(backlash.offset[1], count / math.sqrt(12.0)),
         math.inf,
-        half=quantile(play.degrees) * math.hypot(play.offset[1], _ROUNDED * count) + 0.5 * count,
+        half=quantile(backlash.degrees) * math.hypot(backlash.offset[1], _ROUNDED * count)
+        + 0.5 * count,
         unit="rad",
         register="initial",
         old=None,
-        note="motor over ratio less user at the first sample; 0: the middle of the play",
+        note="motor over ratio less output at the first sample; 0: the middle of the backlash",
     )
 
 
-def _encoder(play: PlayFit, actuator: Actuator, rounded: float) -> list[Estimate]:
+def _encoder(backlash: BacklashFit, actuator: Actuator, rounded: float) -> list[Estimate]:
     """Delay and gain of the encoder against the motor's sensor."""
     # All counts between the turns tell the gain, only those at the turns are rounded alike.
-    gain, std = play.gain[0], math.hypot(play.gain[1], _TURNS * rounded / play.reach)
+    gain, std = backlash.gain[0], math.hypot(backlash.gain[1], _TURNS * rounded / backlash.reach)
     seen = abs(gain - 1.0) > max(3.0 * std, 1e-4)
     return [
         _made(
             "sensor.encoder_delay",
-            play.delay[0],
-            play.delay[1],
-            play.degrees,
+            backlash.delay[0],
+            backlash.delay[1],
+            backlash.degrees,
             unit="s",
             register="sensor",
             old=None,
@@ -201,7 +202,7 @@ def _encoder(play: PlayFit, actuator: Actuator, rounded: float) -> list[Estimate
             "sensor.encoder.gain",
             gain,
             std,
-            play.degrees,
+            backlash.degrees,
             unit="1",
             register="sensor",
             old=actuator.parameters.value("sensor.encoder.gain"),
@@ -251,7 +252,7 @@ def gain_estimate(fits: Sequence[CommandFit], old: float, count: float) -> Estim
     old : float
         Gain before [1/s].
     count : float
-        One count of the encoder at the user [rad]: what rounding may shift counts like noise.
+        One count of the encoder at the output [rad]: what rounding may shift counts like noise.
     """
     rounded = [math.hypot(fit.gain_std, _FLAT * count * fit.gain / fit.reach) for fit in fits]
     good = [

@@ -180,14 +180,14 @@ def _reported(resolved: Resolved, idle: dict[Doubt, int]) -> list[str]:
     if idle and not resolved.allow_not_acting:
         doubt, number = next(iter(idle.items()))
         raise NotActingError(f"run {number}: {doubt.text} (allow_not_acting = true allows it)")
-    declined = [
-        Doubt(NotActingWarning, _declined(name, resolved.fidelity, reason))
+    not_modelled = [
+        Doubt(NotActingWarning, _not_modelled(name, resolved.fidelity, reason))
         for name, reason in resolved.not_carried().items()
     ]
-    report([[*declined, *idle]], strict=False)
-    return [doubt.text for doubt in (*declined, *idle)]
+    report([[*not_modelled, *idle]], strict=False)
+    return [doubt.text for doubt in (*not_modelled, *idle)]
 
 
-def _declined(name: str, fidelity: str, reason: str) -> str:
+def _not_modelled(name: str, fidelity: str, reason: str) -> str:
     why = f": {reason}" if reason else ""
     return f"fault {name} is not simulated, fidelity {fidelity} does not carry it{why}"

@@ -185,7 +185,7 @@ class Resolved:
         """Return the faults that the fidelity does not carry, each with the core's reason."""
         records = {n: record_of_fault(n, self.wiring) for n in self.fault_names()}
         return {
-            name: record.declined.get(self.fidelity, "")
+            name: record.not_modelled.get(self.fidelity, "")
             for name, record in records.items()
             if self.fidelity not in record.fidelities
         }

@@ -19,7 +19,7 @@ class Acting(Protocol):
         ...
 
     @property
-    def declined(self) -> Mapping[str, str]:
+    def not_modelled(self) -> Mapping[str, str]:
         """Why the others do not."""
         ...
 
@@ -32,10 +32,10 @@ def check(fidelity: str | None, wirings: Sequence[str]) -> None:
         check_fidelity(wiring, str(fidelity))
 
 
-def chosen(record: Acting, fidelity: str | None, declined: bool) -> bool:
-    """Whether `--fidelity` and `--declined` leave a record in the list."""
-    if declined:
-        return bool(record.declined) if fidelity is None else fidelity in record.declined
+def chosen(record: Acting, fidelity: str | None, not_modelled: bool) -> bool:
+    """Whether `--fidelity` and `--not-modelled` leave a record in the list."""
+    if not_modelled:
+        return bool(record.not_modelled) if fidelity is None else fidelity in record.not_modelled
     return fidelity is None or fidelity in record.fidelities
 
 

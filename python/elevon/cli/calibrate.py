@@ -57,7 +57,7 @@ FreeOption = Annotated[
 PerLogOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--per-log", metavar="PATH", help="Estimated for each log too: play.total; repeatable."
+        "--per-log", metavar="PATH", help="Estimated for each log too: backlash.total; repeatable."
     ),
 ]
 FidelityOption = Annotated[str, typer.Option(help="Of the model runs: low or high.")]
@@ -266,7 +266,7 @@ def _agreement(
     """Old and new values in closed loop on the same logs, where positions were logged."""
     from elevon.calibrate.validation import validate
 
-    if any(log.user is None or log.motor is None for log in data):
+    if any(log.output is None or log.motor is None for log in data):
         say("a log lacks a position: the closed loop is not compared")
         return None, None
     try:

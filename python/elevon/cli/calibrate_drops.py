@@ -58,7 +58,7 @@ def run_drops(path: Path, actuator: Actuator) -> tuple[ComplianceCalibration, di
         np.radians([drop.loss_deg for drop in mended]),
         weight=np.unique(loads, return_inverse=True)[1],
         group=np.array(first, dtype=np.int64),
-        old=actuator.parameters.value("play.stiffness"),
+        old=actuator.parameters.value("backlash.stiffness"),
     )
     facts = {
         "rows": len(drops),

@@ -94,7 +94,7 @@ def check_loop_options(fidelity: str, per_log: Sequence[str] | None) -> None:
     if per_log:
         raise InputError(
             "--per-log: these logs have no two positions and set points to estimate each log's "
-            "play from; leave it out"
+            "backlash from; leave it out"
         )
 
 

@@ -80,16 +80,18 @@ OnlyFidelityOption = Annotated[
         autocompletion=completion.fidelities,
     ),
 ]
-DeclinedOption = Annotated[
+NotModelledOption = Annotated[
     bool,
-    typer.Option("--declined", help="Only what a fidelity (--fidelity: this one) does not carry."),
+    typer.Option(
+        "--not-modelled", help="Only what a fidelity (--fidelity: this one) does not carry."
+    ),
 ]
 RecordOption = Annotated[
     list[str] | None,
     typer.Option(
         "--record",
         metavar="SIGNALS@RATE",
-        help="Such as 'user_position,motor_speed@400 Hz' or 'current_a@every'; repeatable.",
+        help="Such as 'output_position,motor_speed@400 Hz' or 'current_a@every'; repeatable.",
         autocompletion=completion.signals,
     ),
 ]

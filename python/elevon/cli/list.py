@@ -10,9 +10,9 @@ from elevon.cli import completion
 from elevon.cli.acting import by_drive, check, chosen
 from elevon.cli.common import (
     ActuatorArgument,
-    DeclinedOption,
     FidelityOption,
     JsonOption,
+    NotModelledOption,
     OnlyFidelityOption,
 )
 from elevon.cli.groups import NamingGroup
@@ -31,7 +31,7 @@ app = typer.Typer(
 
 @app.command()
 def actuators(*, json: JsonOption = False) -> None:
-    """List the actuators that can be named: the shipped ones and those in ELEVON_SETS."""
+    """List the actuators that can be named: the shipped ones and those in ELEVON_ACTUATORS."""
     from elevon.documents import read_toml
     from elevon.parameters.find import set_paths
 
@@ -89,7 +89,7 @@ def parameters(
     actuator: ActuatorArgument,
     *,
     fidelity: OnlyFidelityOption = None,
-    declined: DeclinedOption = False,
+    not_modelled: NotModelledOption = False,
     json: JsonOption = False,
 ) -> None:
     """List the parameters an actuator's model has: unit, range, meaning, where each acts."""
@@ -107,13 +107,13 @@ def parameters(
             "default": record.default_value(),
             "register": record.register,
             "fidelities": list(record.fidelities),
-            "declined": dict(record.declined),
+            "not_modelled": dict(record.not_modelled),
             "when": list(record.when),
             "acts": record.acts_text,
             "text": record.text,
         }
         for record in records(wiring).values()
-        if chosen(record, fidelity, declined)
+        if chosen(record, fidelity, not_modelled)
     ]
     _print("parameters", rows, json, ("path", "unit", "range", "text", "acts"))
 
@@ -130,7 +130,7 @@ def faults(
     ] = None,
     *,
     fidelity: OnlyFidelityOption = None,
-    declined: DeclinedOption = False,
+    not_modelled: NotModelledOption = False,
     json: JsonOption = False,
 ) -> None:
     """List the fault catalogue: kind, places, unit, range, where each acts, effect, source.
@@ -138,10 +138,10 @@ def faults(
     With an actuator: only what acts in it, in its own ranges, with the drives under which it acts
     at each fidelity.
     """
-    rows = [row for row in _faults(actuator, fidelity) if chosen(row[1], fidelity, declined)]
+    rows = [row for row in _faults(actuator, fidelity) if chosen(row[1], fidelity, not_modelled)]
     shown = [{"wiring": wiring, **_fault(record), **acts} for wiring, record, acts in rows]
     first, where = (("wiring",), "fidelities") if actuator is None else ((), "acts")
-    columns = ("kind", "places", "unit", "range", where, "effect", "source", "declined")
+    columns = ("kind", "places", "unit", "range", where, "effect", "source", "not_modelled")
     _print("faults", shown, json, (*first, *columns))
 
 
@@ -171,7 +171,7 @@ def _fault(record: FaultRecord) -> dict[str, Any]:
         "range": record.range_text,
         "attributes": [dict(item) for item in record.attributes],
         "fidelities": list(record.fidelities),
-        "declined": dict(record.declined),
+        "not_modelled": dict(record.not_modelled),
         "effect": record.effect,
         "source": record.source,
     }
@@ -276,7 +276,7 @@ def _print(what: str, rows: list[dict[str, Any]], json: bool, columns: tuple[str
         print_json({what: rows})
         return
     cells = [[_cell(row[column]) for column in columns] for row in rows]
-    print_table(columns, cells, optional=("acts", "declined"))
+    print_table(columns, cells, optional=("acts", "not_modelled"))
 
 
 def _cell(value: Any) -> str:

@@ -178,7 +178,7 @@ def _scenario(table: LoadTable) -> str:
         f"position scale {table.position_scale:.6g}\n"
         f'duration = {table.time[-1]:.9g}\n[command]\nmode = "position"\n'
         + term("command.terms", table.position, "m" if table.linear else "rad")
-        + term("load.user.terms", table.load, "N" if table.linear else "N m")
+        + term("load.output.terms", table.load, "N" if table.linear else "N m")
     )
 
 

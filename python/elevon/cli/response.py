@@ -36,10 +36,10 @@ def response(
     amplitude: Annotated[
         str | None, typer.Option(help="Greatest command about its mean; by default 1 deg or 1 mm.")
     ] = None,
-    output: Annotated[str, typer.Option(help="Signal that answers.")] = "user_position",
+    output: Annotated[str, typer.Option(help="Signal that answers.")] = "output_position",
     mode: Annotated[str, typer.Option(help="Commanded: position, speed or torque.")] = "position",
     bias: Annotated[str, typer.Option(help="Mean of the command.")] = "0",
-    load: Annotated[str, typer.Option(help="Constant load on the user side.")] = "0",
+    load: Annotated[str, typer.Option(help="Constant load on the output side.")] = "0",
     method: Annotated[str, typer.Option(help="multisine or sweep.")] = "multisine",
     realisations: Annotated[int, typer.Option(min=1, help="Independent inputs.")] = 6,
     fidelity: FidelityOption = "high",
@@ -96,12 +96,12 @@ def _check_plot(plot: Path | None, *, force: bool) -> None:
 
 
 def _usual(actuator: Actuator, mode: str) -> str:
-    """Return a command small against the stroke: one that play and friction still shape."""
+    """Return a command small against the stroke: one that backlash and friction still shape."""
     from elevon.scenario.compile import signal_units
 
     if mode != "position":
         return {"speed": "60 rpm", "torque": "0.5 N m"}.get(mode, "1")
-    linear = signal_units(actuator.wiring, "high")["user_position"] == "m"
+    linear = signal_units(actuator.wiring, "high")["output_position"] == "m"
     return "1 mm" if linear else "1 deg"
 
 

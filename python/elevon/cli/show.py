@@ -10,9 +10,9 @@ import typer
 from elevon.cli.acting import check, chosen
 from elevon.cli.common import (
     ActuatorArgument,
-    DeclinedOption,
     ForceOption,
     JsonOption,
+    NotModelledOption,
     OnlyFidelityOption,
     SetOption,
     check_outputs,
@@ -36,20 +36,20 @@ def show(
     ] = None,
     notes: Annotated[bool, typer.Option("--notes", help="Show the notes as well.")] = False,
     fidelity: OnlyFidelityOption = None,
-    declined: DeclinedOption = False,
+    not_modelled: NotModelledOption = False,
     force: ForceOption = False,
     json: JsonOption = False,
 ) -> None:
     """Show an actuator: block diagram, parameters with units, sources, where they act; references.
 
-    --fidelity and --declined choose among the parameters.
+    --fidelity and --not-modelled choose among the parameters.
     """
     from elevon.diagram import diagram_svg, diagram_text, diagrams
 
     check_outputs([svg, schema], force=force)
     loaded = read_actuator(actuator, settings)
     check(fidelity, [loaded.wiring])
-    parameters = _chosen(loaded, fidelity, declined)
+    parameters = _chosen(loaded, fidelity, not_modelled)
     if svg is not None:
         from elevon.files import write_text
 
@@ -70,12 +70,12 @@ def show(
             typer.echo(f"{key}: {text}")
 
 
-def _chosen(loaded: Any, fidelity: str | None, declined: bool) -> list[Any]:
+def _chosen(loaded: Any, fidelity: str | None, not_modelled: bool) -> list[Any]:
     from elevon.parameters import records
 
     known = records(loaded.wiring)
     every = loaded.parameters.values()
-    return [each for each in every if chosen(known[each.path], fidelity, declined)]
+    return [each for each in every if chosen(known[each.path], fidelity, not_modelled)]
 
 
 def _print_parameters(loaded: Any, parameters: list[Any], notes: bool) -> None:
@@ -128,7 +128,7 @@ def _as_json(loaded: Any, svg: Path | None, parameters: list[Any]) -> dict[str, 
                 "old": p.old,
                 "text": known[p.path].text,
                 "fidelities": list(known[p.path].fidelities),
-                "declined": dict(known[p.path].declined),
+                "not_modelled": dict(known[p.path].not_modelled),
                 "when": list(known[p.path].when),
             }
             for p in parameters

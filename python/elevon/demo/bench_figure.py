@@ -15,7 +15,7 @@ __all__ = ["bench_figure"]
 _BOXES = (
     ("Drive", "position, speed, current", 0.0, 2.6, "blue"),
     ("Motor", "resolver", 2.7, 2.6, "blue"),
-    ("Gearbox 1:124", "friction, play", 5.4, 2.6, "blue"),
+    ("Gearbox 1:124", "friction, backlash", 5.4, 2.6, "blue"),
     ("Output ring", "encoder", 8.1, 2.6, "blue"),
     ("Chain and disk brake", "servo, torque loop", 2.7, 1.3, "green"),
     ("Load cell", "24 bit, own clock", 5.4, 1.3, "green"),
@@ -45,7 +45,7 @@ def bench_figure() -> Figure:
             _arrow(axes, start, end)
         _line(axes, ((9.15, 3.45), (9.15, 3.85), (1.05, 3.85)))
         _arrow(axes, (1.05, 3.85), (1.05, 3.45))
-        axes.text(5.1, 3.9, "user position", ha="center", va="bottom")
+        axes.text(5.1, 3.9, "output position", ha="center", va="bottom")
         _line(axes, ((1.05, 0.0), (1.05, -0.35), (6.45, -0.35), (6.45, 0.0)), style=":")
         text = "the trigger: an edge in the trace, the zero of the load cell's file"
         axes.text(3.75, -0.42, text, ha="center", va="top", size=8)

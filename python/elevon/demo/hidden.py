@@ -12,11 +12,11 @@ from elevon.parameters.relations import torque_constant
 __all__ = ["RECOVERED", "hidden_actuator"]
 
 #: What the demonstration expects to find again, and how far a value may be off (relative). Of the
-#: inertias only the sum on the fast shaft acts, so the sum is what is held against the truth.
+#: inertias only the sum on the motor shaft acts, so the sum is what is held against the truth.
 RECOVERED: dict[str, float] = {
     "friction.dynamic": 0.02,
     "friction.viscous": 0.02,
-    "play.total": 0.02,
+    "backlash.total": 0.02,
     "motor.emf_constant": 0.02,
     "derived.inertia": 0.02,
     "control.speed_gain": 0.02,
@@ -55,7 +55,7 @@ def hidden_actuator(base: Actuator, seed: int) -> Actuator:
         "control.torque_constant": torque_constant(emf),
         "pwm.emf_constant": emf,
         "drive.kind": "pwm",
-        "play.total": value("play.total") + math.radians(rng.uniform(0.2, 1.0)),
+        "backlash.total": value("backlash.total") + math.radians(rng.uniform(0.2, 1.0)),
         "sensor.encoder.offset": math.radians(rng.normal(0.0, 0.2)),
         "sensor.current.offset_a": float(rng.normal(0.0, 0.01)),
         "sensor.current.offset_b": float(rng.normal(0.0, 0.01)),

@@ -71,10 +71,12 @@ def demo_report(demo: Demo) -> Report:
 def _bench(report: Report, demo: Demo) -> None:
     section = report.section(
         "The bench",
-        "The actuator, its user-side encoder, and a disk brake on the motor's shaft. The brake is "
+        "The actuator, its output-side encoder, and a disk brake on the motor's shaft. The brake "
+        "is "
         "closed by a servo in a torque loop on a load cell, which samples on a clock of its own. "
         "The drive's trace holds what the drive's sensors show, at 400 Hz: no true position, no "
-        "true current, no command. When the command began, where in the play the motor stood, the "
+        "true current, no command. When the command began, where in the backlash the motor stood, "
+        "the "
         "cell's offset and its clock's error were left to chance.",
     )
     section.figure(
@@ -93,10 +95,17 @@ def _bench(report: Report, demo: Demo) -> None:
         ]
         for k, log in enumerate(logs)
     ]
-    columns = ["Log", "Brake", "Trigger at [s]", "Command begins at [s]", "Motor in the play [%]"]
+    columns = [
+        "Log",
+        "Brake",
+        "Trigger at [s]",
+        "Command begins at [s]",
+        "Motor in the backlash [%]",
+    ]
     formats = ["", "", ".3f", ".3f", "+.0f"]
     caption = (
-        "What chance set; the calibration was given none of it. Where the motor stands in the play "
+        "What chance set; the calibration was given none of it. Where the motor stands in the "
+        "backlash "
         "at first: 0 is the middle, \N{PLUS-MINUS SIGN}50 its ends."
     )
     section.table(Table(columns, rows, caption, formats=formats))
@@ -224,13 +233,14 @@ def _backlash(report: Report, demo: Demo) -> None:
     worst = max(demo.backlash.rows, key=lambda row: abs(row.error_deg) / row.limit_deg)
     section = report.section(
         "The published backlash table, recomputed",
-        "Fifteen measured plays, put into the simulated actuator and recovered from its encoder "
+        "Fifteen measured backlashes, put into the simulated actuator and recovered from its "
+        "encoder "
         f"alone. Largest error against its limit: row {worst.measured.row}, "
         f"{abs(worst.error_deg):.4f} of {worst.limit_deg:.4f} deg. All rows and traces: "
         "backlash.html in this folder.",
     )
     section.figure(
-        summary_figure(demo.backlash.rows), "Total play against the spacing of the gears."
+        summary_figure(demo.backlash.rows), "Total backlash against the spacing of the gears."
     )
 
 

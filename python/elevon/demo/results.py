@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from elevon.calibrate import Calibration
     from elevon.reproduce.backlash import BacklashResult
 
-__all__ = ["Plays", "Recovered", "Step", "validation_from_json", "validation_to_json"]
+__all__ = ["Backlashes", "Recovered", "Step", "validation_from_json", "validation_to_json"]
 
 
 @dataclass(frozen=True)
@@ -54,14 +54,14 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Plays:
+class Backlashes:
     """The recomputed backlash table, without its traces."""
 
     rows: tuple[RowResult, ...]
     checks: tuple[Check, ...]
 
     @classmethod
-    def of(cls, result: BacklashResult) -> Plays:
+    def of(cls, result: BacklashResult) -> Backlashes:
         """Take the table from the whole result."""
         return cls(tuple(result.rows), tuple(result.checks))
 
@@ -73,7 +73,7 @@ class Plays:
         }
 
     @classmethod
-    def from_json(cls, data: Any) -> Plays:
+    def from_json(cls, data: Any) -> Backlashes:
         """Return the table again."""
         rows = (RowResult(**{**r, "measured": BacklashRow(**r["measured"])}) for r in data["rows"])
         return cls(tuple(rows), tuple(Check(**check) for check in data["checks"]))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from elevon.demo.finished import FinishedSteps, inputs_of, work_key
 from elevon.demo.hidden import RECOVERED, hidden_actuator
 from elevon.demo.procedure import HELD_OUT, LOADED, demo_procedure
-from elevon.demo.results import Plays, Recovered, validation_from_json, validation_to_json
+from elevon.demo.results import Backlashes, Recovered, validation_from_json, validation_to_json
 from elevon.demo.steps import Story, Work
 from elevon.parameters.relations import motor_torque_constant
 from elevon.progress import Progress, part
@@ -33,7 +33,7 @@ class Demo(Story):
 
     Attributes
     ----------
-    backlash, imported, calibration : Plays, list of ImportedLog, Recovered
+    backlash, imported, calibration : Backlashes, list of ImportedLog, Recovered
         Results.
     before, after : Validation
         Published and calibrated values against all logs, the held-out one among them.
@@ -41,7 +41,7 @@ class Demo(Story):
         True value by estimate.
     """
 
-    backlash: Plays = field(init=False)
+    backlash: Backlashes = field(init=False)
     imported: list[ImportedLog] = field(init=False)
     logs: list[BenchLog] = field(init=False)
     calibration: Recovered = field(init=False)
@@ -60,7 +60,7 @@ class Demo(Story):
         for path, limit in RECOVERED.items():
             true = self.truth[path]
             name = f"{path}: estimate against the hidden truth"
-            allowed = limit * abs(true) + (count if path == "play.total" else 0.0)
+            allowed = limit * abs(true) + (count if path == "backlash.total" else 0.0)
             error = abs(self.calibration[path].value - true)
             results.append(Check(name, 100.0 * error / abs(true), 100.0 * allowed / abs(true), "%"))
         return [*results, *self._held_out()]
@@ -104,7 +104,7 @@ class Demo(Story):
 
 
 def encoder_count(actuator: Actuator) -> float:
-    """Angle of one encoder edge at the user [rad]."""
+    """Angle of one encoder edge at the output [rad]."""
     from elevon.calibrate.zeros import encoder_count as count
 
     return count(actuator)
@@ -186,14 +186,14 @@ def _backlash(demo: Demo, progress: Progress | None) -> None:
 
     page = demo.folder / "backlash.html"
 
-    def work() -> Plays:
+    def work() -> Backlashes:
         result = reproduce_backlash(progress=progress)
         backlash_report(result).save(page, force=True)
-        return Plays.of(result)
+        return Backlashes.of(result)
 
     demo.backlash = demo.resumed(
-        "published backlash table, fifteen plays",
-        Work("backlash", work, Plays.to_json, Plays.from_json, files=[page]),
+        "published backlash table, fifteen backlashes",
+        Work("backlash", work, Backlashes.to_json, Backlashes.from_json, files=[page]),
     )
 
 
@@ -272,7 +272,7 @@ def _truth(demo: Demo) -> dict[str, float]:
     truth["derived.inertia"] = inertia + value("gear.inertia")
     truth["derived.integral_gain"] = value("control.speed_gain") / value("control.integral_time")
     for log in demo.bench_truth["logs"]:
-        zero = log["conditions"]["zero"] * log["parameters"]["play.total"]
+        zero = log["conditions"]["zero"] * log["parameters"]["backlash.total"]
         truth[f"initial.lead[{log['name']}.csv]"] = zero
     for log in (log for log in demo.bench_truth["logs"] if log["name"] == LOADED):
         cell, rig = log["conditions"]["cell"], log["brake"]

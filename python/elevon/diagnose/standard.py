@@ -96,10 +96,10 @@ def _read(trace: TraceStep) -> bool:
 
 def _up_to(procedure: Procedure, trace: TraceStep) -> Procedure:
     """Return the procedure with this trace alone, and what was set before it."""
-    from elevon.bench.procedure import PlayStep
+    from elevon.bench.procedure import BacklashStep
 
     at = next(k for k, step in enumerate(procedure.step) if step is trace)
-    before = [s for s in procedure.step[:at] if not isinstance(s, TraceStep | PlayStep)]
+    before = [s for s in procedure.step[:at] if not isinstance(s, TraceStep | BacklashStep)]
     return procedure.model_copy(update={"step": (*before, trace)})
 
 

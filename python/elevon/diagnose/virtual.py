@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elevon.bench.procedure import PlayStep, Procedure, TraceStep
+from elevon.bench.procedure import BacklashStep, Procedure, TraceStep
 from elevon.bench.traces import cell_signals, drive_signals
 from elevon.diagnose.bymodel.log import TestLog
 
@@ -20,10 +20,10 @@ __all__ = ["first_trace", "traced"]
 
 
 def first_trace(procedure: Procedure) -> Procedure:
-    """Return a procedure up to its first trace, with the unit's own play."""
+    """Return a procedure up to its first trace, with the unit's own backlash."""
     steps = []
     for step in procedure.step:
-        if not isinstance(step, PlayStep):
+        if not isinstance(step, BacklashStep):
             steps.append(step)
         if isinstance(step, TraceStep):
             break
@@ -69,7 +69,7 @@ def traced(
         current_signal="current_q_meas",
         current_target=shown["current_ref"],
         motor=shown["resolver_position"],
-        user=shown["encoder_position"],
+        output=shown["encoder_position"],
         brake=brake,
         note=note,
         good=np.ones(len(time), dtype=np.bool_),

@@ -18,8 +18,8 @@ __all__ = ["FaultRecord", "catalogue", "find_record"]
 class FaultRecord:
     """What the core's catalogue says about one kind of fault.
 
-    `declined` says for each fidelity without it why; `targets` which parameters it moves at each
-    place.
+    `not_modelled` says for each fidelity without it why; `targets` which parameters it moves at
+    each place.
     """
 
     kind: str
@@ -32,7 +32,7 @@ class FaultRecord:
     source: str
     attributes: tuple[Mapping[str, Any], ...]
     fidelities: tuple[str, ...]
-    declined: Mapping[str, str] = field(default_factory=dict)
+    not_modelled: Mapping[str, str] = field(default_factory=dict)
     targets: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
@@ -99,7 +99,7 @@ def catalogue(wiring: str) -> tuple[FaultRecord, ...]:
             source=item["source"],
             attributes=tuple(item["attributes"]),
             fidelities=tuple(item["fidelities"]),
-            declined=item["declined"],
+            not_modelled=item["not_modelled"],
             targets={place: tuple(paths) for place, paths in item["targets"].items()},
         )
         for item in _core.faults(wiring)

@@ -124,7 +124,7 @@ class Fault:
         record = find_record(self.kind, self.place, wiring, place)
         if fidelity not in record.fidelities:
             shown = ", ".join(record.fidelities)
-            reason = record.declined.get(fidelity, "")
+            reason = record.not_modelled.get(fidelity, "")
             why = f": {reason}" if reason else ""
             raise InputError(f"{start}{self.kind} exists at fidelity {shown}, not {fidelity}{why}")
         return {

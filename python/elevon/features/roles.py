@@ -16,7 +16,7 @@ ROLES: tuple[str, ...] = tuple(record["name"] for record in _core.feature_roles(
 
 @cache
 def players(role: str) -> tuple[str, ...]:
-    """Return the signals that play a role in any wiring, what a sensor shows before what is true.
+    """Return the signals that have a role in any wiring, what a sensor shows before what is true.
 
     They serve where neither the wiring nor a log's column map states its roles.
     """

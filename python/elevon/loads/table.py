@@ -47,7 +47,7 @@ class LoadTable:
     linear: bool = False
 
     def load_term(self, *, repeat: bool = False) -> dict[str, Any]:
-        """Return the table as one entry of ``load.user.terms``."""
+        """Return the table as one entry of ``load.output.terms``."""
         return _term(self.time, self.load, "N" if self.linear else "N m", repeat)
 
     def command_term(self, *, repeat: bool = False) -> dict[str, Any]:
@@ -59,7 +59,7 @@ class LoadTable:
         return {
             "duration": float(self.time[-1]),
             "command": {"mode": "position", "terms": [self.command_term()]},
-            "load": {"user": {"terms": [self.load_term()]}},
+            "load": {"output": {"terms": [self.load_term()]}},
         }
 
 

@@ -15,7 +15,7 @@ from elevon.recording import Recording
 __all__ = ["examine_channels"]
 
 _CLIP_SHARE = 0.01
-_FREE_TRAVEL = 0.08  # rad at the user: more than the widest play the bench can set (0.0457)
+_FREE_TRAVEL = 0.08  # rad at the output: more than the widest backlash the bench can set (0.0457)
 _CLIPPING = {"speed_ref", "motor_speed", "current_ref", "torque_current", "direct_current",
              "torque_voltage", "load_cell"}  # fmt: skip
 

@@ -1,6 +1,6 @@
 """Covariance of least-squares estimates when the residuals are coloured.
 
-Residuals of a log are never white (friction, play, filters), and the textbook covariance then
+Residuals of a log are never white (friction, backlash, filters), and the textbook covariance then
 claims far too much. Here the long-run covariance of the scores is estimated (Newey and West, 1987),
 after a first-order pre-whitening (Andrews and Monahan, 1992) that keeps it honest for slow ones.
 """

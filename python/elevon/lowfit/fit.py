@@ -190,7 +190,7 @@ class _Problem:
     def solve(self, paths: Sequence[str], rows: Sequence[int]) -> dict[str, float]:
         """Return the best values over the cases in `rows`, one coordinate after another, twice.
 
-        Each number acts in cases in which the other hardly does, and the play of a relay band
+        Each number acts in cases in which the other hardly does, and the backlash of a relay band
         makes the sum of squares uneven on a small scale: a bracketing search is safe where a
         gradient is not.
         """
@@ -282,7 +282,7 @@ def _total(errors: Sequence[Mapping[str, float]]) -> dict[str, float]:
 
 def _size(name: str, values: Array) -> float:
     """RMS; of a position, whose zero says nothing, RMS about the mean."""
-    return max(_rms(values - np.mean(values) if name == "user_position" else values), 1e-12)
+    return max(_rms(values - np.mean(values) if name == "output_position" else values), 1e-12)
 
 
 def _rms(values: Array) -> float:

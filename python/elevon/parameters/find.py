@@ -10,9 +10,9 @@ from elevon.errors import InputError, UnknownNameError, unknown
 __all__ = ["VARIABLE", "find_set", "is_shipped", "set_names", "set_paths"]
 
 #: Folders with more sets, separated like PATH.
-VARIABLE = "ELEVON_SETS"
+VARIABLE = "ELEVON_ACTUATORS"
 
-_SHIPPED = Path(__file__).parent / "sets"
+_SHIPPED = Path(__file__).parent.parent / "actuators"
 
 
 def set_paths() -> dict[str, Path]:

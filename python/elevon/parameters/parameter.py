@@ -41,7 +41,7 @@ class Parameter:
     interval : tuple of float, optional
         SI limits of the calibrated value's interval.
     changed : bool
-        The user gave another value than the set (or, in a set of the user's own, than its base):
+        The output gave another value than the set (or, in a set of the user's own, than its base):
         where it cannot act, that is said.
     """
 

@@ -19,7 +19,7 @@ __all__ = ["Record", "positions", "record_of", "records", "wiring_names", "wirin
 class Record:
     """What the core says about one parameter; numbers are SI.
 
-    `fidelities` are those that carry it, `declined` says of the others why not, and `when` what
+    `fidelities` are those that carry it, `not_modelled` says of the others why not, and `when` what
     must hold (all of it) for it to act.
     """
 
@@ -35,14 +35,14 @@ class Record:
     default: float | None
     choices: tuple[str, ...] | None
     fidelities: tuple[str, ...] = ()
-    declined: Mapping[str, str] = field(default_factory=dict)
+    not_modelled: Mapping[str, str] = field(default_factory=dict)
     when: tuple[str, ...] = ()
 
     @property
     def acts_text(self) -> str:
         """Where it acts, such as ``high; drive.kind = hysteresis``; empty: everywhere, always."""
-        where = [" ".join(self.fidelities) or "nowhere"] if self.declined else []
-        reasons = [f"not {name}: {why}" for name, why in self.declined.items()]
+        where = [" ".join(self.fidelities) or "nowhere"] if self.not_modelled else []
+        reasons = [f"not {name}: {why}" for name, why in self.not_modelled.items()]
         return "; ".join([*where, *self.when, *reasons])
 
     @property
@@ -175,6 +175,6 @@ def _record(item: Mapping[str, Any]) -> Record:
         default=None if item["default"] is None else float(item["default"]),
         choices=None if not choices else tuple(choices),
         fidelities=tuple(item["fidelities"]),
-        declined=item["declined"],
+        not_modelled=item["not_modelled"],
         when=tuple(item["when"]),
     )

@@ -79,10 +79,10 @@ def _spall(damage: Floats, drivers: Drivers, c: Values) -> Floats:
 
 _WEAR = Law(
     name="gear_wear",
-    text="play of the gear from the friction work done in it",
+    text="backlash of the gear from the friction work done in it",
     source="Archard 1953: worn volume is proportional to load times sliding way, hence to "
            "friction work",
-    kind="play", place="transmission", unit="rad",
+    kind="backlash", place="transmission", unit="rad",
     rate=_archard, drivers=("friction_work",), highest=0.03,
     coefficients={
         "wear": Coefficient(
@@ -99,9 +99,9 @@ LAWS: dict[str, Law] = {
     "gear_wear": _WEAR,
     "screw_wear": Law(
         name="screw_wear",
-        text="play of the screw and its nut from the friction work done in them",
+        text="backlash of the screw and its nut from the friction work done in them",
         source=_WEAR.source,
-        kind="play", place="transmission", unit="m",
+        kind="backlash", place="transmission", unit="m",
         rate=_archard, drivers=("friction_work",), highest=1e-3,
         coefficients={
             "wear": Coefficient(

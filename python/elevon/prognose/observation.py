@@ -34,7 +34,7 @@ _MISSED = 1e-3  # share of diagnoses that do not see a fault that is well there;
 #: this part of the error does not average out. Measured (docs/prognosis.md); a short's is the
 #: model's own, of either sign along the range.
 COMMON: Mapping[str, tuple[float, float]] = {
-    "play": (0.005, 0.0),
+    "backlash": (0.005, 0.0),
     "friction": (0.01, 0.02),
     "short": (0.01, 0.015),
 }

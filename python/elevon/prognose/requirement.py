@@ -45,7 +45,7 @@ class Measure:
     text : str
         What it is.
     unit : str
-        SI unit; ``output`` and ``load`` stand for those of the actuator's position and user load.
+        SI unit; ``output`` and ``load`` stand for those of the actuator's position and output load.
     roles : tuple of str
         Signals it needs.
     value : callable
@@ -241,7 +241,7 @@ _STALL_TIME = 12.0
 
 def _stall_runs(requirement: Requirement, mission: Scenario) -> list[Scenario]:
     terms = [{"kind": "ramp", "slope": requirement.slope}]
-    load = {"user": {"terms": [{"kind": "ramp", "slope": requirement.load_slope}]}}
+    load = {"output": {"terms": [{"kind": "ramp", "slope": requirement.load_slope}]}}
     return [_still(mission, _STALL_TIME, terms).replaced(load=load)]
 
 
@@ -300,7 +300,7 @@ MEASURES: dict[str, Measure] = {
         at_least=True, needs=("amplitude",),
     ),
     "stall_load": Measure(
-        "user load at which a motion against a rising load stops", "load", _BOTH, _stall_load,
+        "output load at which a motion against a rising load stops", "load", _BOTH, _stall_load,
         _stall_runs, at_least=True, needs=("slope", "load_slope"),
     ),
     "lock_time": Measure("time until the down-lock is engaged", "s", ("locked",), _lock_time),

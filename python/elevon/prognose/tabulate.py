@@ -190,11 +190,11 @@ def _scenario(scenario: Scenario, laws: Sequence[Law], point: Sequence[float]) -
 
 
 def _loaded(scenario: Scenario, factor: float) -> Scenario:
-    """Return the scenario with every term of the user's load scaled."""
+    """Return the scenario with every term of the output's load scaled."""
     data = scenario.to_dict()
-    terms = data.get("load", {}).get("user", {}).get("terms", [])
+    terms = data.get("load", {}).get("output", {}).get("terms", [])
     scaled = [_scaled(term, factor) for term in terms]
-    load = {**data.get("load", {}), "user": {"terms": scaled}}
+    load = {**data.get("load", {}), "output": {"terms": scaled}}
     return scenario.replaced(load=load) if terms else scenario
 
 
@@ -223,7 +223,7 @@ def _units(actuator: Actuator) -> tuple[str, str]:
 
     names = {s["role"]: s["unit"] for s in reversed(_core.signals(actuator.wiring, "low"))}
     ports = {p["name"]: p["unit"] for p in _core.ports(actuator.wiring)}
-    return names["output_position"], ports.get("user", "")
+    return names["output_position"], ports.get("output", "")
 
 
 def _runs(

@@ -1,6 +1,6 @@
 """Recordings as comma-separated text, for eyes, spreadsheets and other programs.
 
-The table is plain: a line of names with units (``time [s],user_position [rad]``), then numbers
+The table is plain: a line of names with units (``time [s],output_position [rad]``), then numbers
 with the digits that give back every bit (a NaN comes back as the plain one). Everything else, and
 the SHA-256 of the table's bytes, stands in a file beside it (`elevon.recording.beside`).
 

@@ -98,8 +98,8 @@ def overview(recording: Recording) -> list[Panel]:
 
 def _output(recording: Recording) -> Channel | None:
     """The true output where it is recorded (a simulation), else the measured one."""
-    if "user_position" in recording:
-        return recording["user_position"]
+    if "output_position" in recording:
+        return recording["output_position"]
     return _first(recording, "output_position", "motor_position")
 
 
@@ -142,7 +142,7 @@ def _over_ratio(motor: Channel, output: Channel) -> tuple[str, Floats] | None:
     """Return how the motor's angle is scaled to the output, and the scaled angle.
 
     The ratio is the median of those of the increments in fast motion, where the train is in
-    contact: reversals, in which play is crossed, do not count.
+    contact: reversals, in which backlash is crossed, do not count.
     """
     good = np.isfinite(motor.values) & np.isfinite(output.values)
     turned, moved = motor.values[good], output.values[good]

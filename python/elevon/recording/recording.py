@@ -30,7 +30,7 @@ class Recording:
     """Named channels on one or several clocks, with what is known about them.
 
     A simulated run and a measured log are the same type. Channels are found by name
-    (``recording["user_position"]``); values are SI and read-only.
+    (``recording["output_position"]``); values are SI and read-only.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ class Recording:
         return roles_of(self)
 
     def role(self, name: str) -> Channel:
-        """Return the channel that plays a role; `InputError` where none does."""
+        """Return the channel that has a role; `InputError` where none does."""
         return channel_of(self, name)
 
     def __getitem__(self, name: str) -> Channel:

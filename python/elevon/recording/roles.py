@@ -1,4 +1,4 @@
-"""Which channel of a recording plays which role, whatever the channels are called.
+"""Which channel of a recording backlashes which role, whatever the channels are called.
 
 A simulated recording has it from its wiring, a log from its column map: ``meta["roles"]``.
 """
@@ -26,7 +26,7 @@ def roles_of(recording: Recording) -> dict[str, str]:
 
 
 def channel_of(recording: Recording, role: str) -> Channel:
-    """Return the channel that plays a role.
+    """Return the channel that has a role.
 
     Raises
     ------

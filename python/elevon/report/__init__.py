@@ -1,8 +1,8 @@
 """Reports: one self-contained HTML page of text, tables, figures and checks.
 
 >>> from elevon.report import Check, Report
->>> report = Report("A measured play")
->>> _ = report.section("What was checked").checks([Check("play", 0.36, 0.37, "deg")])
+>>> report = Report("A measured backlash")
+>>> _ = report.section("What was checked").checks([Check("backlash", 0.36, 0.37, "deg")])
 >>> path = report.save("report.html")  # doctest: +SKIP
 """
 

@@ -38,12 +38,15 @@ __all__ = ["CASES", "OURS", "OptimisersResult", "reproduce_optimisers"]
 Floats = npt.NDArray[np.float64]
 #: Faults that are diagnosed, on the no-load run of the bench: those the project must see there.
 CASES: Mapping[str, Mapping[str, float]] = {
-    "play 0.13 deg": {"play@transmission": math.radians(0.13)},
+    "backlash 0.13 deg": {"backlash@transmission": math.radians(0.13)},
     "friction +25 %": {"friction@transmission": 0.25},
     "short 20 %": {"short@motor.phase_a": 0.20},
     "eccentricity 0.10": {"eccentricity_static@motor": 0.10},
     "position gain +2 %": {"gain_drift@control.position": 0.02},
-    "play and friction": {"play@transmission": math.radians(0.13), "friction@transmission": 0.25},
+    "backlash and friction": {
+        "backlash@transmission": math.radians(0.13),
+        "friction@transmission": 0.25,
+    },
 }
 OURS = ("model", "both", "surrogate")
 BUDGET = 2000

@@ -52,7 +52,7 @@ ROTARY_FAULTS = (
     "dead@sensor.current_a=1",
     "friction@transmission=0.25",
     "lubrication@transmission=1",
-    "play@transmission=0.3 deg",
+    "backlash@transmission=0.3 deg",
     "bearing@bearing.outer=1 mm",
     "bearing@bearing.cage=0.05 N m",
     "tooth_wear@gear=0.3 deg",
@@ -63,9 +63,9 @@ ROTARY_FAULTS = (
     "dropout@sensor.resolver=0.2",
     "mismatch@sensor.resolver=0.2",
     "offset@sensor.resolver=5 deg",
-    "winding_short@sensor.resolver.sine=0.2",
-    "winding_open@sensor.resolver.sine=1",
-    "winding_open@sensor.resolver.excitation=1",
+    "resolver_short@sensor.resolver.sine=0.2",
+    "resolver_open@sensor.resolver.sine=1",
+    "resolver_open@sensor.resolver.excitation=1",
     "offset@sensor.encoder=1 deg",
     "gain@sensor.encoder=0.01",
     "missing_counts@sensor.encoder=0.01",
@@ -75,14 +75,14 @@ ROTARY_FAULTS = (
 )
 """One severity of each line of the catalogue, of the size a diagnosis has to see (ASSUMED).
 
-What is on or off is on; mechanical wear is that of `play`; a contact between or from windings is
-100 ohm, which the drive feeds beside them without tripping; a resolver's winding loses what
+What is on or off is on; mechanical wear is that of `backlash`; a contact between or from windings
+is 100 ohm, which the drive feeds beside them without tripping; a resolver's winding loses what
 `mismatch` does. A sensor fails that the loops of the shipped set do not close over, where the
 catalogue offers one: a loop around a failed sensor runs away, and nothing is left to compare.
 """
 
 RECORD = (
-    "command,user_position,encoder_position,motor_position,motor_speed,current_q,voltage_q_meas"
+    "command,output_position,encoder_position,motor_position,motor_speed,current_q,voltage_q_meas"
 )
 SLOW_HZ, FAST_HZ = 2.0, 50.0
 """A feature's level is below the first cut-off, its ripple between the two."""
@@ -217,7 +217,7 @@ def _rows(
             (healthy, features_broken),
             (healthy_low, low.get(str(fault))),
             floors,
-            find_record(fault.kind, fault.place, run.actuator.wiring).declined.get("low", ""),
+            find_record(fault.kind, fault.place, run.actuator.wiring).not_modelled.get("low", ""),
         )
         for fault, features_broken in zip(parsed, broken, strict=True)
     ]
@@ -314,7 +314,7 @@ def _strongest(
     high: tuple[Mapping[str, float], Mapping[str, float]],
     low: tuple[Mapping[str, float], Mapping[str, float] | None],
     floors: Mapping[str, float],
-    declined: str,
+    not_modelled: str,
 ) -> Sensitivity:
     """Choose the feature in which the high model's change stands highest above the floor."""
     changes = {name: high[1][name] - value for name, value in high[0].items()}
@@ -326,6 +326,6 @@ def _strongest(
 
     name = max(changes, key=height)
     if low[1] is None:
-        reason = f"not in the low model: {declined}"
+        reason = f"not in the low model: {not_modelled}"
         return Sensitivity(fault, name, changes[name], math.nan, floors[name], reason)
     return Sensitivity(fault, name, changes[name], low[1][name] - low[0][name], floors[name])

@@ -182,7 +182,7 @@ def reproduce_hydraulic(
 
 def _middle(run: Recording) -> tuple[float, float, float]:
     """Ram speed in m/s over the middle tenth of the stroke; load in N and current in A there."""
-    ram = run["user_position"]
+    ram = run["output_position"]
     within = (ram.values > 0.119) & (ram.values < 0.145)
     time, place = ram.time[within], ram.values[within]
     if time.size < 2:

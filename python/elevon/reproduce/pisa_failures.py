@@ -37,7 +37,7 @@ __all__ = [
 ]
 
 RECORD = (
-    "state,fault_code,warning_code,locked,user_position,user_speed,nut_position,"
+    "state,fault_code,warning_code,locked,output_position,output_speed,nut_position,"
     "brake_released@500 Hz"
 )
 EXTENDED = 0.267
@@ -273,7 +273,7 @@ def judge(
         Whose codes they are.
     """
     state, locked = recording["state"], recording["locked"].values > 0.5
-    ram = recording["user_position"].values
+    ram = recording["output_position"].values
     names = code_names(wiring, "state")
     code = {word: number for number, word in names.items()}
     false = ((state.values == code["locked"]) & ~locked) | (
@@ -286,7 +286,7 @@ def judge(
         fault,
         phase.name,
         names[int(state.values[at])],
-        _true_state(bool(locked[at]), float(ram[at]), float(recording["user_speed"].values[at])),
+        _true_state(bool(locked[at]), float(ram[at]), float(recording["output_speed"].values[at])),
         not lasting.size,
         detected,
         time,

@@ -171,7 +171,7 @@ def _trace(test: _Test, log: Recording, mass: float, lead: float) -> Trace:
         1e3 * test.speed,
         log["load_cell"].time,
         1e3 * position,
-        1e3 * log["user_speed"].values,
+        1e3 * log["output_speed"].values,
         log["motor_speed"].values,
         np.asarray(-(force + mass * GRAVITY), dtype=np.float64),
         order,
@@ -223,7 +223,7 @@ def _run_rig(
     logs = simulate_batch(
         runs,
         fidelity="low",
-        record="nut_position,load_cell,user_speed,motor_speed@500 Hz",
+        record="nut_position,load_cell,output_speed,motor_speed@500 Hz",
         progress=progress,
     )
     for log in logs:
@@ -310,7 +310,7 @@ def _efficiency_rows(actuator: Actuator, seed: int, progress: Progress | None) -
 
 def _steady(run: Recording) -> tuple[float, float, float]:
     """Mean current, motor speed and load of the steady part of a retraction."""
-    ram, speed = run["user_position"].values, run["motor_speed"].values
+    ram, speed = run["output_position"].values, run["motor_speed"].values
     steady = (speed < -560.0) & (ram > 0.075) & (ram < 0.16)
     return (
         float(run["current_mean"].values[steady].mean()),

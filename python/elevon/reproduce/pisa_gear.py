@@ -22,7 +22,7 @@ COMMANDED = 0.1
 ENDS = {"extend": 2.0, "retract": 0.0}
 """State of the control unit that ends a stroke: locked, retracted."""
 RECORD = (
-    "state,user_position,motor_speed,speed_ref,current_mean,current_peak,voltage_ref,"
+    "state,output_position,motor_speed,speed_ref,current_mean,current_peak,voltage_ref,"
     "supply_voltage,load_force@1 kHz"
 )
 

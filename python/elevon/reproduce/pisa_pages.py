@@ -85,10 +85,10 @@ def _stroke_figure(row: FunctionalRow) -> Figure:
             (row.extension, "extension", COLOURS["blue"]),
             (row.retraction, "retraction", COLOURS["orange"]),
         ):
-            time = run["user_position"].time - COMMANDED
+            time = run["output_position"].time - COMMANDED
             shown = np.flatnonzero((time >= 0.0) & (time <= longest + 0.4))[::5]
             time = time[shown]
-            axes[0].plot(time, 1e3 * run["user_position"].values[shown], color=colour, label=name)
+            axes[0].plot(time, 1e3 * run["output_position"].values[shown], color=colour, label=name)
             axes[1].plot(time, run["motor_speed"].values[shown], color=colour)
             axes[1].plot(time, run["speed_ref"].values[shown], ":", color=colour, lw=1.0)
             axes[2].plot(time, run["current_mean"].values[shown], color=colour)
@@ -108,7 +108,7 @@ def _load_figure(row: FunctionalRow) -> Figure:
             (row.extension, "extension", COLOURS["blue"], "-"),
             (row.retraction, "retraction", COLOURS["orange"], "--"),
         ):
-            ram, load = run["user_position"].values, run["load_force"].values
+            ram, load = run["output_position"].values, run["load_force"].values
             # Beyond the stroke the housing or the lock carries the load.
             moving = (ram > 1e-4) & (ram < ram.max() - 1e-4)
             axes.plot(1e3 * ram[moving][::5], load[moving][::5], line, color=colour, label=name)

@@ -62,8 +62,8 @@ _SHOWN: Mapping[str, float] = {
     "offset m": 2e-3,
     "offset rad": 0.3,
     "phase_short": 0.2,
-    "play m": 0.5e-3,
-    "play rad": 0.015,
+    "backlash m": 0.5e-3,
+    "backlash rad": 0.015,
     "resistor_short": 0.2,
     "return_jam": 1.0,
     "sag": 0.4,
@@ -73,7 +73,7 @@ _SHOWN: Mapping[str, float] = {
     "tooth_wear m": 2e-4,
     "tooth_wear rad": 0.01,
     "unbalance": 2e-5,
-    "winding_short": 0.3,
+    "resolver_short": 0.3,
 }
 #: What a fault needs of its actuator to show at all; the healthy unit beside it has the same.
 _GIVEN: Mapping[str, Mapping[str, str]] = {
@@ -82,7 +82,7 @@ _GIVEN: Mapping[str, Mapping[str, str]] = {
 #: A failed release cable shows in no extension and no retraction: nobody pulls it.
 _SILENT = 1.0
 _SIGNALS = (
-    "user_position",
+    "output_position",
     "encoder_position",
     "motor_speed",
     "current_q",
@@ -239,7 +239,7 @@ def _motion(actuator: Actuator) -> Scenario:
         {
             "duration": "2 s",
             "command": {"terms": [sine]},
-            "load": {"user": {"terms": [{"kind": "constant", "value": load}]}},
+            "load": {"output": {"terms": [{"kind": "constant", "value": load}]}},
         }
     )
 

@@ -29,7 +29,7 @@ class FrequencyResponse:
         Output over input, in `unit`.
     coherence : ndarray, shape (n,)
         Share of the output's power that is linear in the input, 0 to 1: noise and nonlinearity
-        (play, friction, limits) take the rest.
+        (backlash, friction, limits) take the rest.
     std : ndarray, shape (n,)
         Relative standard deviation of the gain, and of the phase in rad; NaN of one realisation.
     input, output : str

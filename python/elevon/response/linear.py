@@ -105,7 +105,7 @@ def linearise(
     actuator: ActuatorLike,
     *,
     inputs: Sequence[str] = ("command",),
-    outputs: Sequence[str] = ("user_position",),
+    outputs: Sequence[str] = ("output_position",),
     mode: str = "position",
     command: float | str = 0.0,
     load: float | str = 0.0,
@@ -155,7 +155,7 @@ def linearise(
     unit = session.unit("command")
     at = {"command": parse_quantity(command, unit or "1", "command")}
     if load:
-        at["user"] = parse_quantity(load, session.unit("user"), "load")
+        at["output"] = parse_quantity(load, session.unit("output"), "load")
     session.set(**at)
     session.advance(round(parse_quantity(settle, "s", "settle") / session.step) * session.step)
     markov, half = (

@@ -32,7 +32,7 @@ def frequency_response(
     high: float | str,
     amplitude: float | str,
     *,
-    output: str = "user_position",
+    output: str = "output_position",
     mode: str = "position",
     bias: float | str = 0.0,
     load: float | str = 0.0,
@@ -44,7 +44,7 @@ def frequency_response(
 ) -> FrequencyResponse:
     """Measure the frequency response from the command to a signal.
 
-    A nonlinear actuator has the response of its amplitude: play and stick show at a small one,
+    A nonlinear actuator has the response of its amplitude: backlash and stick show at a small one,
     limits of current and voltage at a large one. The realisations differ in phases (multisine) or
     noise, and what differs between them lowers the coherence.
 
@@ -64,7 +64,7 @@ def frequency_response(
     bias : float or str
         Mean of the command.
     load : float or str
-        Constant load on the user side.
+        Constant load on the output side.
     method : str
         ``multisine``: about 24 lines at once, equally spaced over the logarithm; ``sweep``: a sine
         whose frequency rises steadily.
@@ -94,7 +94,7 @@ def frequency_response(
     units = signal_units(loaded.wiring, fidelity)
     if output not in units:
         raise unknown("signal", output, units, "output")
-    unit = unit_of_command[mode] or units["user_position"]
+    unit = unit_of_command[mode] or units["output_position"]
     first, last = _range(low, high)
     size = parse_quantity(amplitude, unit, "amplitude", shown_unit(unit))
     if not size > 0.0:
@@ -224,6 +224,6 @@ def _sample(high: float, step: float) -> float:
 def _scenario(
     duration: float, mode: str, terms: list[dict[str, Any]], load: float | str
 ) -> Scenario:
-    loads = {"load": {"user": {"terms": [{"kind": "constant", "value": load}]}}} if load else {}
+    loads = {"load": {"output": {"terms": [{"kind": "constant", "value": load}]}}} if load else {}
     command = {"mode": mode, "terms": terms}
     return Scenario.from_dict({"duration": duration, "command": command, **loads})

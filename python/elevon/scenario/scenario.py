@@ -118,7 +118,7 @@ class Action(_Frozen):
 
 
 class Command(Terms):
-    """What is asked: the user's position, the motor's speed or torque, or a sequence of actions.
+    """What is asked: the output's position, the motor's speed or torque, or a sequence of actions.
 
     Attributes
     ----------
@@ -146,11 +146,11 @@ class Load(_Frozen):
     Attributes
     ----------
     brake : Terms
-        N m on the fast shaft, resistive: adds to the dry friction.
+        N m on the motor shaft, resistive: adds to the dry friction.
     shaft : Terms
-        N m on the fast shaft, positive when it opposes positive motion.
-    user : Terms
-        N m (N for linear actuators) on the user side, positive when it opposes positive motion.
+        N m on the motor shaft, positive when it opposes positive motion.
+    output : Terms
+        N m (N for linear actuators) on the output side, positive when it opposes positive motion.
     weight_on_wheels : Terms
         1 while the aircraft stands on its wheels (landing gear).
     rig_speed : Terms
@@ -159,7 +159,7 @@ class Load(_Frozen):
 
     brake: Terms = Terms()
     shaft: Terms = Terms()
-    user: Terms = Terms()
+    output: Terms = Terms()
     weight_on_wheels: Terms = Terms()
     rig_speed: Terms = Terms()
 
@@ -212,7 +212,7 @@ class Scenario(_Frozen):
     command : Command
         Mode and sum of waveforms; nothing asked means a constant zero.
     loads : Load
-        Key ``load`` of the file: loads on the fast shaft and the user side.
+        Key ``load`` of the file: loads on the motor shaft and the output side.
     supply : Terms
         V; when empty, the set's own supply voltage.
     fault : tuple of Fault

@@ -26,7 +26,7 @@ def run_loop(
     controller: Controller | None = None,
     *,
     period: float | str = "1 ms",
-    record: Iterable[str] = ("command", "user_position"),
+    record: Iterable[str] = ("command", "output_position"),
     progress: Progress | None = None,
 ) -> list[Recording]:
     """Run a session, calling a controller at each of its ticks.

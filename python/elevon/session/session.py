@@ -100,7 +100,7 @@ class Session:
     ) -> None:
         runs = runs_of(actuator, scenario, mode, seed)
         self.many = not isinstance(actuator, (Actuator, str, os.PathLike))
-        prepared = [prepare(run, fidelity, "user_position@every") for run in runs]
+        prepared = [prepare(run, fidelity, "output_position@every") for run in runs]
         report([item.doubts for item in prepared], strict=False)
         wirings = {item.actuator.wiring for item in prepared}
         if len(wirings) > 1:
@@ -218,7 +218,7 @@ class Session:
         return self.names
 
     def set(self, **inputs: Value | Mapping[str, Any]) -> None:
-        """Set inputs, held from now on: ``command``, ``supply``, ``user``, ``shaft``, ``brake``...
+        """Set inputs, held from now on: ``command``, ``supply``, ``output``, ``brake``...
 
         Parameters
         ----------
@@ -311,7 +311,7 @@ class Session:
         controller: Callable[[Session], Any] | None = None,
         *,
         period: float | str = "1 ms",
-        record: Iterable[str] = ("command", "user_position"),
+        record: Iterable[str] = ("command", "output_position"),
         progress: Progress | None = None,
     ) -> list[Recording]:
         """Run on, calling an own controller at each tick of `period`; see `run_loop`."""

@@ -51,7 +51,7 @@ def simulate(
     fidelity : str
         ``high`` or ``low``.
     record : str or sequence of str, optional
-        What is kept, such as ``"user_position,motor_speed@400 Hz"``; see `record_plan`. Empty,
+        What is kept, such as ``"output_position,motor_speed@400 Hz"``; see `record_plan`. Empty,
         with `features`: nothing.
     features : str or sequence of str, optional
         Features computed while simulating, such as ``"all@400 Hz"``; see `elevon.features`. They

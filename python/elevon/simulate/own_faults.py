@@ -76,7 +76,7 @@ def resting(actuator: Actuator, record: FaultRecord) -> list[Resting]:
     for place, drive in cells:
         vector = _with_drive(actuator, drive)
         for fidelity in wirings()[actuator.wiring]["fidelities"]:
-            reason = record.declined.get(fidelity) or _idle(
+            reason = record.not_modelled.get(fidelity) or _idle(
                 actuator.wiring, fidelity, vector, record, place
             )
             if reason:

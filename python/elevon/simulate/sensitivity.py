@@ -38,7 +38,7 @@ class Sensitivities:
 
     Notes
     -----
-    At an instant where the friction sticks or slips, the play opens or closes, or a limit is
+    At an instant where the friction sticks or slips, the backlash opens or closes, or a limit is
     reached, the derivative jumps: it is that of the branch the run takes. Its integral over such an
     instant misses the displacement of the instant itself, so that a finite difference over many
     switches differs from it by the sum of these displacements.

@@ -47,7 +47,7 @@ def weights():
     ]
     return procedure(
         "weights",
-        {"kind": "settings", "parameters": {"play.model": "elastic"}},
+        {"kind": "settings", "parameters": {"backlash.model": "elastic"}},
         {"kind": "weights", "drops": drops},
         trace("weights", "8 s", {"kind": "constant", "value": "10 deg"}),
     )
@@ -89,7 +89,7 @@ def scores(sync, true):
 
 
 def test_a_stalled_shaft_gives_finite_deviations(tmp_path, actuator):
-    """The current has one sign: it and its size are one signal, the speed and the play none."""
+    """The current has one sign: it and its size are one signal, the speed and the backlash none."""
     ((_, report, true),) = logs(tmp_path, actuator, stall(), 1)
     sync = report.synchronisation
     assert sync["method"] == "trigger and correlation"

@@ -39,14 +39,14 @@ def test_what_is_written_is_read_back(tmp_path, truth, dialect):
     assert log.recording.meta["status"] == "measured"
 
 
-def test_play_and_ratio_are_reported(tmp_path, truth):
+def test_backlash_and_ratio_are_reported(tmp_path, truth):
     slow = DriveFormat(encoder_shaft="slow")
     path = write_drive_csv(tmp_path / "log.csv", truth.signals, layout=slow)
     text = next(f.text for f in import_log(path).report.findings if f.code == "shaft-confirmed")
     ratio = float(text.split("gear ratio seen ")[1].split(",")[0])
-    play = float(text.split("play about ")[1].split(" deg")[0])
+    backlash = float(text.split("backlash about ")[1].split(" deg")[0])
     assert ratio == pytest.approx(124.0, rel=0.002)
-    assert play == pytest.approx(math.degrees(truth.play), abs=0.05)
+    assert backlash == pytest.approx(math.degrees(truth.backlash), abs=0.05)
 
 
 def test_optional_columns_may_be_missing_and_extra_ones_are_kept(tmp_path, truth):

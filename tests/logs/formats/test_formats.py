@@ -29,7 +29,7 @@ name = "t"
 signal = "time"
 unit = "ms"
 [[column]]
-name = "user"
+name = "output"
 signal = "encoder_position"
 unit = "deg"
 sign = -1
@@ -52,7 +52,7 @@ def foreign(truth):
     s = truth.signals
     return {
         "t": s["time"] * 1e3,
-        "user": -s["encoder_position"] / DEG,
+        "output": -s["encoder_position"] / DEG,
         "motor": s["resolver_position"] / (2 * np.pi),
         "n": s["motor_speed"] * 30 / np.pi,
         "iq": s["current_q_meas"] * 1e3,

@@ -15,7 +15,7 @@ choices! {
     /// What makes a torque of a position command.
     Structure { Cascade "cascade", Pid "pid" }
     /// What closes the position loop.
-    Feedback { User "user", Encoder "encoder", Resolver "resolver" }
+    Feedback { Output "output", Encoder "encoder", Resolver "resolver" }
 }
 
 variables! {
@@ -23,7 +23,7 @@ variables! {
     ControlParameter, CONTROL {
         Mode => "mode", "-", "1", Choice(Mode::NAMES), Controller, Some(0.0), "what the command is: a position, a speed (bypasses the position loop) or a torque (bypasses both loops)",
             nowhere("the command of the scenario says what it is");
-        PositionGain => "position_gain", "G", "1/s", NonNegative, Controller, None, "user position error to fast-shaft speed reference",
+        PositionGain => "position_gain", "G", "1/s", NonNegative, Controller, None, "output position error to motor-shaft speed reference",
             when(&[Chosen("control.mode", &["position"]), Chosen("control.structure", &["cascade"])]);
         PositionGainScale => "position_gain_scale", "-", "1", NonNegative, Controller, Some(1.0), "healthy 1; drift of the position gain",
             when(&[Chosen("control.mode", &["position"]), Chosen("control.structure", &["cascade"])]);
@@ -47,7 +47,7 @@ variables! {
             when(&[Chosen("control.mode", &["position", "speed"]), CASCADE, Away("control.integral_time", 0.0)]);
         AntiWindupError => "anti_windup_error", "AW2", "1", Choice(ErrorHold::NAMES), Controller, Some(0.0), "freeze the integrator while the position error is below (T2) or above (T3) the threshold",
             when(&[Chosen("control.mode", &["position", "speed"]), CASCADE, Away("control.integral_time", 0.0)]);
-        AntiWindupThreshold => "anti_windup_threshold", "-", "rad", NonNegative, Controller, Some(0.0), "position error threshold of anti_windup_error, at the user",
+        AntiWindupThreshold => "anti_windup_threshold", "-", "rad", NonNegative, Controller, Some(0.0), "position error threshold of anti_windup_error, at the output",
             when(&[Chosen("control.mode", &["position", "speed"]), CASCADE, Away("control.integral_time", 0.0), Chosen("control.anti_windup_error", &["below", "above"])]);
         AntiWindupBackCalculation => "anti_windup_back_calculation", "AW3", "1/s", NonNegative, Controller, Some(0.0), "gain from (saturated - demanded) torque back to the integrator; 0: off",
             when(&[Chosen("control.mode", &["position", "speed"]), CASCADE, Away("control.integral_time", 0.0)]);
@@ -55,14 +55,14 @@ variables! {
             when(&[Chosen("control.mode", &["position", "speed"]), Either(&[Away("control.integral_time", 0.0), Away("control.pid_integral_time", 0.0)])]);
         SampleTime => "sample_time", "T_s", "s", NonNegative, Controller, Some(0.0), "sample time of the controller; 0: every solver step",
             when(&[In(Low, &[Away("screw.debris", 0.0)])]);
-        NoiseDeviation => "noise_deviation", "-", "rad", NonNegative, Controller, Some(0.0), "standard deviation of the band-limited noise on the command line (unit of the user position)";
+        NoiseDeviation => "noise_deviation", "-", "rad", NonNegative, Controller, Some(0.0), "standard deviation of the band-limited noise on the command line (unit of the output position)";
         NoiseSampleTime => "noise_sample_time", "-", "s", Positive, Controller, Some(1e-3), "the noise is held over this time, which sets its band",
             when(&[Away("control.noise_deviation", 0.0)]);
-        PositionFeedback => "position_feedback", "-", "1", Choice(Feedback::NAMES), Controller, Some(0.0), "what closes the position loop: the user position itself (the papers' model), the user encoder's counts, or the motor resolver divided by the ratio",
+        PositionFeedback => "position_feedback", "-", "1", Choice(Feedback::NAMES), Controller, Some(0.0), "what closes the position loop: the output position itself (the papers' model), the output encoder's counts, or the motor resolver divided by the ratio",
             when(&[Chosen("control.mode", &["position"])]);
         Structure => "structure", "-", "1", Choice(Structure::NAMES), Controller, Some(0.0), "a position error commands a speed and the speed error a torque (cascade), or one PID makes a torque of the position error (pid)",
             when(&[Chosen("control.mode", &["position"])]);
-        PidGain => "pid_gain", "K", "N m/rad", NonNegative, Controller, Some(0.0), "user position error to torque on the fast shaft, on all branches of the position PID",
+        PidGain => "pid_gain", "K", "N m/rad", NonNegative, Controller, Some(0.0), "output position error to torque on the motor shaft, on all branches of the position PID",
             when(&[Chosen("control.mode", &["position"]), Chosen("control.structure", &["pid"])]);
         PidIntegralTime => "pid_integral_time", "T_i", "s", NonNegative, Controller, Some(0.0), "integral time of the position PID; 0: no integral action",
             when(&[Chosen("control.mode", &["position"]), Chosen("control.structure", &["pid"]), Away("control.pid_gain", 0.0)]);

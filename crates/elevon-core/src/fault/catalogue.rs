@@ -75,8 +75,8 @@ impl FaultKind {
 
     /// Why a fidelity of an actuator of these parameters does not carry the fault, if so: it acts where the parameters act
     /// that it moves.
-    pub fn declined(&self, groups: &[Group], fidelity: Fidelity) -> Option<&'static str> {
+    pub fn not_modelled(&self, groups: &[Group], fidelity: Fidelity) -> Option<&'static str> {
         let moved = |path: &str| self.places.iter().flat_map(|p| p.targets).any(|t| t.path == path);
-        records(groups).filter(|(path, _)| moved(path)).find_map(|(_, v)| v.acts.declined(fidelity))
+        records(groups).filter(|(path, _)| moved(path)).find_map(|(_, v)| v.acts.not_modelled(fidelity))
     }
 }

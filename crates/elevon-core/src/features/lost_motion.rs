@@ -1,11 +1,11 @@
 //! Lost motion: how far the output lags behind the motor, more in one direction than in the other.
 //!
 //! Rows of motion follow `output = a + b angle -+ h`, the sign being that of the motion: least squares with one slope for both
-//! directions (analysis of covariance) in five sums a direction. The lost motion is `2 h`: play, and what the elastic parts
+//! directions (analysis of covariance) in five sums a direction. The lost motion is `2 h`: backlash, and what the elastic parts
 //! give way to a friction that changes its sign.
 //!
-//! A row weighs as the square of the angle travelled since the motion last turned back: rows on their way through the play,
-//! which show part of it, hardly count (a play `p` in strokes `d` reads low by less than `(p/d)^2` of itself), and no play need be known before.
+//! A row weighs as the square of the angle travelled since the motion last turned back: rows on their way through the backlash,
+//! which show part of it, hardly count (a backlash `p` in strokes `d` reads low by less than `(p/d)^2` of itself), and no backlash need be known before.
 
 use super::friction::LEAST_ROWS;
 use super::rows::{Columns, Role};
@@ -14,7 +14,7 @@ pub const RECORDS: [(&str, &str, &str); 2] = [
     (
         "lost_motion",
         "{output_position}",
-        "distance between the lines of output position over motor angle in backward and in forward motion, fitted with one slope, each row by the square of the motor angle travelled since the motion turned back; positive where the output lags (play, and friction over stiffness)",
+        "distance between the lines of output position over motor angle in backward and in forward motion, fitted with one slope, each row by the square of the motor angle travelled since the motion turned back; positive where the output lags (backlash, and friction over stiffness)",
     ),
     ("transmission_slope", "{output_position}/rad", "that slope: travel of the output per radian of the motor"),
 ];
@@ -98,10 +98,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_play_of_a_ratio_is_recovered() {
-        for (ratio, play) in [(124.0, 1.0e-4), (-124.0, 0.1)] {
-            // The output rests while the motor crosses the play.
-            let half = 0.5 * play * f64::abs(ratio);
+    fn the_backlash_of_a_ratio_is_recovered() {
+        for (ratio, backlash) in [(124.0, 1.0e-4), (-124.0, 0.1)] {
+            // The output rests while the motor crosses the backlash.
+            let half = 0.5 * backlash * f64::abs(ratio);
             let angle: Vec<f64> = (0..2000).map(|i| 900.0 + 40.0 * libm::sin(0.01 * f64::from(i))).collect();
             let speed: Vec<f64> = (0..2000).map(|i| 50.0 * libm::cos(0.01 * f64::from(i))).collect();
             let mut rests = angle[0];
@@ -117,8 +117,8 @@ mod tests {
             let (mut lost, mut out) = (LostMotion::new(1.0), Vec::new());
             lost.push(&rows);
             lost.finish(&mut out);
-            let seen_low = (play * f64::abs(ratio) / 80.0_f64).powi(2);
-            assert!((out[0] - play).abs() < play * (1e-6 + seen_low), "{} {play}", out[0]);
+            let seen_low = (backlash * f64::abs(ratio) / 80.0_f64).powi(2);
+            assert!((out[0] - backlash).abs() < backlash * (1e-6 + seen_low), "{} {backlash}", out[0]);
             assert!((out[1] * ratio - 1.0).abs() < 1e-6 + seen_low);
         }
     }

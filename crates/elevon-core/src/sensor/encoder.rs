@@ -5,13 +5,13 @@ use crate::variable::Own;
 use crate::variables;
 
 variables! {
-    /// The encoder on the user side.
+    /// The encoder on the output side.
     EncoderParameter, ENCODER {
         Pulses => "encoder.pulses", "-", "1", Positive, Sensor, Some(5000.0), "pulses per turn of the encoder";
         Edges => "encoder.edges", "-", "1", Positive, Sensor, Some(4.0), "edges counted per pulse";
-        WheelRatio => "encoder.wheel_ratio", "-", "1", Positive, Sensor, Some(4.0), "encoder turns per user turn (88 / 22 teeth)";
-        Offset => "encoder.offset", "-", "rad", Any, Sensor, Some(0.0), "offset of the shown user position";
-        Gain => "encoder.gain", "-", "1", Any, Sensor, Some(1.0), "gain of the shown user position";
+        WheelRatio => "encoder.wheel_ratio", "-", "1", Positive, Sensor, Some(4.0), "encoder turns per output turn (88 / 22 teeth)";
+        Offset => "encoder.offset", "-", "rad", Any, Sensor, Some(0.0), "offset of the shown output position";
+        Gain => "encoder.gain", "-", "1", Any, Sensor, Some(1.0), "gain of the shown output position";
         MissingCounts => "encoder.missing_counts", "-", "1", Unit, Sensor, Some(0.0), "fraction of the counts that are lost, spread evenly over the disc";
         DarkShare => "encoder.dark_share", "-", "1", Unit, Sensor, Some(0.0), "share of the disc in whose sectors no counts come";
         DarkSectors => "encoder.dark_sectors", "-", "1", Between(1.0, 1000.0), Sensor, Some(1.0), "number of dark sectors, equal and evenly spread; its whole part counts",
@@ -28,7 +28,7 @@ pub struct Encoder<S> {
     per_count: S,
     count: S,
     offset: S,
-    /// Dark sectors per unit of user travel, and where the first lies.
+    /// Dark sectors per unit of output travel, and where the first lies.
     sectors: S,
     first: S,
     /// Dark share of each sector's pitch, and counts over the pitch.
@@ -42,7 +42,7 @@ pub struct Encoder<S> {
 /// through where it was.
 #[derive(Clone, Copy, Debug)]
 pub struct EncoderState<S> {
-    user: S,
+    output: S,
     counts: S,
     /// Counts that did not come.
     lost: S,
@@ -50,7 +50,7 @@ pub struct EncoderState<S> {
 }
 
 impl<S: Scalar> Encoder<S> {
-    /// `turn` is the user travel over which the pulses are counted: 2 pi rad, or 1 m of a linear scale.
+    /// `turn` is the output travel over which the pulses are counted: 2 pi rad, or 1 m of a linear scale.
     pub fn derive(raw: &[S], turn: f64) -> Self {
         use EncoderParameter as P;
         let g = |p: P| raw[p as usize];
@@ -76,39 +76,39 @@ impl<S: Scalar> Encoder<S> {
         own.any_away([EncoderParameter::DarkShare, EncoderParameter::Dead, EncoderParameter::Stuck])
     }
 
-    pub fn start(&self, user: S) -> EncoderState<S> {
-        EncoderState { user, counts: (user * self.per_count).floor(), lost: S::zero(), shown: self.read(user) }
+    pub fn start(&self, output: S) -> EncoderState<S> {
+        EncoderState { output, counts: (output * self.per_count).floor(), lost: S::zero(), shown: self.read(output) }
     }
 
-    /// The pitch a user position lies in, whether it is dark there, and how much was dark from the zero up to it.
+    /// The pitch an output position lies in, whether it is dark there, and how much was dark from the zero up to it.
     #[inline(always)]
-    fn dark(&self, user: S) -> (S, S::Mask, S) {
+    fn dark(&self, output: S) -> (S, S::Mask, S) {
         let half = S::splat(0.5) * self.share;
-        let place = user * self.sectors - self.first;
+        let place = output * self.sectors - self.first;
         let pitch = place.round();
         let beyond = place - pitch;
         (pitch, beyond.abs().lt(half), pitch * self.share + beyond.clamp_abs(half))
     }
 
-    /// Counts on to the user position, and shows what came. Exact for steps of any length, since what a way loses depends on
+    /// Counts on to the output position, and shows what came. Exact for steps of any length, since what a way loses depends on
     /// its ends alone.
     #[inline(always)]
-    pub fn advance(&self, user: S, s: &mut EncoderState<S>) {
+    pub fn advance(&self, output: S, s: &mut EncoderState<S>) {
         let half = S::splat(0.5);
-        let ((pitch0, dark0, sum0), (pitch, dark, sum)) = (self.dark(s.user), self.dark(user));
+        let ((pitch0, dark0, sum0), (pitch, dark, sum)) = (self.dark(s.output), self.dark(output));
         let none = half.le(self.dead) | (dark0 & dark & pitch0.equals(pitch));
-        let moved = (user - s.user) * self.per_count;
+        let moved = (output - s.output) * self.per_count;
         s.lost = s.lost + S::select(none, moved, (sum - sum0) * self.pitch);
-        s.user = user;
-        s.counts = S::select(none, s.counts, (user * self.per_count - s.lost).floor());
+        s.output = output;
+        s.counts = S::select(none, s.counts, (output * self.per_count - s.lost).floor());
         let now = s.counts * self.count + self.offset;
         s.shown = S::select(half.le(self.stuck), s.shown, now);
     }
 
-    /// Shown user position: whole counts since the user's zero.
+    /// Shown output position: whole counts since the output's zero.
     #[inline(always)]
-    pub fn read(&self, user: S) -> S {
-        (user * self.per_count).floor() * self.count + self.offset
+    pub fn read(&self, output: S) -> S {
+        (output * self.per_count).floor() * self.count + self.offset
     }
 }
 
@@ -126,7 +126,7 @@ mod tests {
         Encoder::derive(&raw, TAU)
     }
 
-    /// Shown after moving in small steps through the given user positions.
+    /// Shown after moving in small steps through the given output positions.
     fn moved(e: &Encoder<f64>, s: &mut EncoderState<f64>, from: f64, to: f64) -> f64 {
         for i in 0..=10_000 {
             e.advance(from + (to - from) * f64::from(i) * 1e-4, s);
@@ -138,9 +138,9 @@ mod tests {
     fn a_whole_disc_shows_what_it_did() {
         let e = encoder(&[]);
         let mut s = e.start(0.0);
-        for user in [0.1, 0.77, -0.3] {
-            e.advance(user, &mut s);
-            assert_eq!(s.shown, e.read(user));
+        for output in [0.1, 0.77, -0.3] {
+            e.advance(output, &mut s);
+            assert_eq!(s.shown, e.read(output));
         }
     }
 
@@ -150,7 +150,7 @@ mod tests {
             let dark = [(P::DarkShare, 0.1), (P::DarkSectors, sectors), (P::DarkPosition, 0.3 * TAU)];
             let e = encoder(&dark);
             let mut s = e.start(0.0);
-            // Half a user turn is two turns of the disc.
+            // Half an output turn is two turns of the disc.
             let there = moved(&e, &mut s, 0.0, 0.5 * TAU);
             assert!((there - 0.9 * 0.5 * TAU).abs() < 1e-4, "{there}");
             let mut leaping = e.start(0.0);

@@ -34,7 +34,7 @@ variables! {
             when(&[Either(&[Away("bearing.outer_defect", 0.0), Away("bearing.inner_defect", 0.0), Away("bearing.ball_defect", 0.0)])]);
         RadialLoad => "radial_load", "F_r", "N", NonNegative, Plant, Some(30.0), "radial load at rest; ASSUMED: rotor's weight and the tension of a belt or mesh",
             when(&[Either(&[Away("bearing.outer_defect", 0.0), Away("bearing.inner_defect", 0.0), Away("bearing.ball_defect", 0.0)])]);
-        RadialPerTorque => "radial_per_torque", "-", "1/m", NonNegative, Plant, Some(100.0), "radial load per torque through the gear on the fast shaft; ASSUMED: 1/(r cos 20 deg) of a pinion of 10 mm",
+        RadialPerTorque => "radial_per_torque", "-", "1/m", NonNegative, Plant, Some(100.0), "radial load per torque through the gear on the motor shaft; ASSUMED: 1/(r cos 20 deg) of a pinion of 10 mm",
             when(&[Either(&[Away("bearing.outer_defect", 0.0), Away("bearing.inner_defect", 0.0), Away("bearing.ball_defect", 0.0)])]);
         DefectDepth => "defect_depth", "delta", "m", Between(0.0, 1e-3), Plant, Some(2e-4), "depth of the defects, unless the sag of a ball over their length is less",
             when(&[Either(&[Away("bearing.outer_defect", 0.0), Away("bearing.inner_defect", 0.0), Away("bearing.ball_defect", 0.0)])]);
@@ -84,7 +84,7 @@ impl<S: Scalar> Defect<S> {
     }
 }
 
-/// The bearing as the fast shaft feels it.
+/// The bearing as the motor shaft feels it.
 #[derive(Clone, Copy, Debug)]
 pub struct Bearing<S> {
     outer: Defect<S>,
@@ -101,7 +101,7 @@ pub struct Bearing<S> {
     per_pull: S,
 }
 
-/// What a bearing adds on the fast shaft.
+/// What a bearing adds on the motor shaft.
 #[derive(Clone, Copy, Debug)]
 pub struct BearingTorque<S> {
     /// Positive where it drives forwards.
@@ -143,7 +143,7 @@ impl<S: Scalar> Bearing<S> {
         }
     }
 
-    /// Torque and friction at a rotor angle; `through` is the torque through the gear on the fast shaft, `pull` the magnetic
+    /// Torque and friction at a rotor angle; `through` is the torque through the gear on the motor shaft, `pull` the magnetic
     /// pull. A defect of the inner ring passes the loaded zone once a turn of the shaft, one of a ball once a turn of the
     /// cage; one of the outer ring stays in it.
     #[inline(always)]

@@ -5,7 +5,7 @@ use crate::variable::Own;
 use crate::variables;
 
 variables! {
-    /// Friction, referred to the fast shaft.
+    /// Friction, referred to the motor shaft.
     FrictionParameter, FRICTION {
         Static => "static", "FSJ", "N m", NonNegative, Plant, None, "static friction limit";
         Dynamic => "dynamic", "FDJ", "N m", NonNegative, Plant, None, "dynamic dry friction";
@@ -19,7 +19,7 @@ variables! {
         ViscousScale => "viscous_scale", "-", "1", NonNegative, Plant, Some(1.0), "healthy 1; change of the lubricant",
             when(&[Away("friction.viscous", 0.0)]);
         JamTorque => "jam_torque", "T_jam", "N m", NonNegative, Plant, Some(0.0), "resistive torque once the mechanism has seized; 0: none";
-        JamPosition => "jam_position", "-", "rad", Any, Plant, Some(0.0), "user position at which it seizes when first reached",
+        JamPosition => "jam_position", "-", "rad", Any, Plant, Some(0.0), "output position at which it seizes when first reached",
             when(&[Away("friction.jam_torque", 0.0), Away("friction.jam_anywhere", 1.0)]);
         JamAnywhere => "jam_anywhere", "-", "1", Flag, Plant, Some(1.0), "1: seized wherever it is, 0: only from jam_position on",
             when(&[Away("friction.jam_torque", 0.0)]);
@@ -116,12 +116,12 @@ impl<S: Scalar> Friction<S> {
         S::select(rest, from_rest, torque - resist)
     }
 
-    /// Seizes where the user first reaches the jam's position while the jam is there; one that is gone holds nothing.
-    /// `side` is where the user stood when the jam came. One without a position holds from its first step on.
+    /// Seizes where the output first reaches the jam's position while the jam is there; one that is gone holds nothing.
+    /// `side` is where the output stood when the jam came. One without a position holds from its first step on.
     #[inline(always)]
-    pub fn seize(&self, user: S, side: &mut S, jammed: &mut S) {
+    pub fn seize(&self, output: S, side: &mut S, jammed: &mut S) {
         let present = S::zero().lt(self.jam_torque);
-        let from = user - self.jam_position;
+        let from = output - self.jam_position;
         let seized = S::select((from * *side).le(S::zero()), S::one(), *jammed);
         let here = S::select(present, seized, S::zero());
         *jammed = S::select(S::splat(0.5).le(self.jam_anywhere), S::one(), here);
@@ -152,12 +152,12 @@ mod tests {
         Friction::derive(&raw)
     }
 
-    /// Seized or not after each (torque, user position).
+    /// Seized or not after each (torque, output position).
     fn history(anywhere: f64, steps: &[(f64, f64)]) -> Vec<f64> {
         let (mut side, mut jammed) = (-1.0, 0.0);
         let mut seen = Vec::new();
-        for &(torque, user) in steps {
-            jam(torque, anywhere).seize(user, &mut side, &mut jammed);
+        for &(torque, output) in steps {
+            jam(torque, anywhere).seize(output, &mut side, &mut jammed);
             seen.push(jammed);
         }
         seen

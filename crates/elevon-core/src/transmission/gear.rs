@@ -1,4 +1,4 @@
-//! Gear ratio, inertia and load-dependent friction, end stops, user inertia and spring.
+//! Gear ratio, inertia and load-dependent friction, end stops, output inertia and spring.
 
 use crate::scalar::Scalar;
 use crate::transmission::stop::Stop;
@@ -8,15 +8,15 @@ use crate::variables;
 variables! {
     /// The gearbox.
     GearParameter, GEAR {
-        Ratio => "ratio", "i", "1", Positive, Plant, None, "fast-shaft speed over user speed";
-        Inertia => "inertia", "J_g", "kg m2", NonNegative, Plant, Some(0.0), "inertia of the gearbox on the fast shaft";
+        Ratio => "ratio", "i", "1", Positive, Plant, None, "motor-shaft speed over output speed";
+        Inertia => "inertia", "J_g", "kg m2", NonNegative, Plant, Some(0.0), "inertia of the gearbox on the motor shaft";
         Efficiency => "efficiency", "eta", "1", Fraction, Plant, Some(1.0), "efficiency under a load that opposes motion";
         EfficiencyAiding => "efficiency_aiding", "eta_prime", "1", Between(-1e3, 1.0), Plant, Some(1.0), "efficiency under a load that aids motion; 0 or less: the load cannot back-drive";
     }
 }
 
 variables! {
-    /// End stops, at the user.
+    /// End stops, at the output.
     StopParameter, STOP {
         Upper => "upper", "-", "rad", Any, Plant, None, "upper end stop";
         Lower => "lower", "-", "rad", Any, Plant, None, "lower end stop";
@@ -24,15 +24,15 @@ variables! {
 }
 
 variables! {
-    /// What hangs on the user side.
+    /// What hangs on the output side.
     LoadParameter, LOAD {
-        Inertia => "inertia", "J_u", "kg m2", NonNegative, Load, Some(0.0), "inertia on the user side";
-        Stiffness => "stiffness", "K_s", "N m/rad", NonNegative, Load, Some(0.0), "spring on the user side, torque proportional to the user position";
-        SpringZero => "spring_zero", "-", "rad", Any, Load, Some(0.0), "user position at which the spring is relaxed",
+        Inertia => "inertia", "J_u", "kg m2", NonNegative, Load, Some(0.0), "inertia on the output side";
+        Stiffness => "stiffness", "K_s", "N m/rad", NonNegative, Load, Some(0.0), "spring on the output side, torque proportional to the output position";
+        SpringZero => "spring_zero", "-", "rad", Any, Load, Some(0.0), "output position at which the spring is relaxed",
             when(&[Away("load.stiffness", 0.0)]);
-        Damping => "damping", "c_L", "N m s/rad", NonNegative, Load, Some(0.0), "viscous damping on the user side";
-        Friction => "friction", "F_L", "N m", NonNegative, Load, Some(0.0), "dry friction on the user side";
-        Constant => "constant", "T_0", "N m", Any, Load, Some(0.0), "constant load on the user side, such as a weight; positive opposes positive motion";
+        Damping => "damping", "c_L", "N m s/rad", NonNegative, Load, Some(0.0), "viscous damping on the output side";
+        Friction => "friction", "F_L", "N m", NonNegative, Load, Some(0.0), "dry friction on the output side";
+        Constant => "constant", "T_0", "N m", Any, Load, Some(0.0), "constant load on the output side, such as a weight; positive opposes positive motion";
     }
 }
 
@@ -45,14 +45,14 @@ pub struct Gear<S> {
     aiding: S,
     /// The end stops, felt by the motor through the gear, and where they stand.
     pub motor_stop: Stop<S>,
-    pub user_stop: Stop<S>,
+    pub output_stop: Stop<S>,
     pub stiffness: S,
     pub spring_zero: S,
     pub constant: S,
 }
 
 impl<S: Scalar> Gear<S> {
-    /// `ratio` is the motor's angle over the user's coordinate, `screw` the efficiencies of what follows the gear.
+    /// `ratio` is the motor's angle over the output's coordinate, `screw` the efficiencies of what follows the gear.
     pub fn derive(ratio: S, gear: &[S], stop: &[S], load: &[S], screw: [S; 2]) -> Self {
         let (upper, lower) = (stop[StopParameter::Upper as usize], stop[StopParameter::Lower as usize]);
         Self {
@@ -61,7 +61,7 @@ impl<S: Scalar> Gear<S> {
             opposing: S::one() / (gear[GearParameter::Efficiency as usize] * screw[0]) - S::one(),
             aiding: S::one() - gear[GearParameter::EfficiencyAiding as usize] * screw[1],
             motor_stop: Stop { upper: upper * ratio, lower: lower * ratio },
-            user_stop: Stop { upper, lower },
+            output_stop: Stop { upper, lower },
             stiffness: load[LoadParameter::Stiffness as usize],
             spring_zero: load[LoadParameter::SpringZero as usize],
             constant: load[LoadParameter::Constant as usize],
@@ -73,12 +73,12 @@ impl<S: Scalar> Gear<S> {
         own.any_away([GearParameter::Efficiency, GearParameter::EfficiencyAiding])
     }
 
-    /// Friction that a user torque adds on the fast shaft (Borello and Dalla Vedova 2006). `direction` is the
+    /// Friction that an output torque adds on the motor shaft (Borello and Dalla Vedova 2006). `direction` is the
     /// sign of the motion, or of the torque that would start it.
     #[inline(always)]
-    pub fn load_friction(&self, user_torque: S, direction: S) -> S {
-        let magnitude = user_torque.abs() * self.per_ratio;
-        let opposes = S::zero().lt(user_torque * direction);
+    pub fn load_friction(&self, output_torque: S, direction: S) -> S {
+        let magnitude = output_torque.abs() * self.per_ratio;
+        let opposes = S::zero().lt(output_torque * direction);
         magnitude * S::select(opposes, self.opposing, self.aiding)
     }
 }

@@ -1,5 +1,6 @@
-//! Mechanics between the motor shaft and the user.
+//! Mechanics between the motor shaft and the output.
 
+pub mod backlash;
 pub mod bearing;
 pub mod brake;
 pub mod friction;
@@ -10,7 +11,6 @@ pub mod lock;
 pub mod lubricant;
 pub mod nut_heat;
 pub mod planetary;
-pub mod play;
 pub mod roller_screw;
 pub mod screw;
 pub mod stop;

@@ -86,19 +86,19 @@ const RELIEVED: [f64; 5] = [1.53960, -1.19476, 1.13376, -0.67106, 0.19246];
 /// One defect that balls pass.
 #[derive(Clone, Copy, Debug)]
 struct Defect<S> {
-    /// Passes per fast-shaft radian.
+    /// Passes per motor-shaft radian.
     passes: S,
     /// One over the half width of a pass, in radians of the ball spacing.
     per_width: S,
     drop: S,
 }
 
-/// The screw as the fast shaft feels it.
+/// The screw as the motor shaft feels it.
 #[derive(Clone, Copy, Debug)]
 pub struct Screw<S> {
     pub efficiency: S,
     pub efficiency_aiding: S,
-    /// Friction torque of the preload on the fast shaft without load; under load the relieved half's share of it is left.
+    /// Friction torque of the preload on the motor shaft without load; under load the relieved half's share of it is left.
     pub preload_torque: S,
     /// Factor on the viscous friction: starved grease drags less.
     pub viscous: S,
@@ -121,7 +121,7 @@ fn coefficients<S: Scalar>(t: S, eta: S, aiding: S) -> [S; 2] {
     [(one - eta) * t / (eta + t * t), (one - aiding) * t / (one + aiding * t * t)]
 }
 
-/// Spalls of groove, nut and ball: passes a turn of the fast shaft by the bearing's kinematics, width against the ball
+/// Spalls of groove, nut and ball: passes a turn of the motor shaft by the bearing's kinematics, width against the ball
 /// spacing, depth of the chord that a ball sinks into them.
 fn defects<S: Scalar>(raw: &[S], cos: S, spacing: S, gear: S) -> [Defect<S>; 3] {
     use ScrewParameter as P;
@@ -249,7 +249,7 @@ impl<S: Scalar> Screw<S> {
     }
 
     /// Torque of the balls that fall into the spalls and climb out of them, and the mean friction they leave; both on
-    /// the fast shaft. `force` goes through the nut, `ram` is its position.
+    /// the motor shaft. `force` goes through the nut, `ram` is its position.
     #[inline(always)]
     pub fn spall(&self, angle: S, force: S, ram: S) -> (S, S) {
         let zero = S::zero();

@@ -1,9 +1,9 @@
-//! Worn and chipped teeth of the gear: play that depends on the angle, and the transmission error it leaves
+//! Worn and chipped teeth of the gear: backlash that depends on the angle, and the transmission error it leaves
 //! (docs/theory/friction.md, "Gear teeth").
 //!
-//! Wear takes most where the flanks slide, away from the pitch point: over a mesh cycle the play grows by s sin^2(N theta/2),
+//! Wear takes most where the flanks slide, away from the pitch point: over a mesh cycle the backlash grows by s sin^2(N theta/2),
 //! N meshes a turn. A chipped tooth opens it once a turn of its wheel, by b cos^2 over the mesh of that one tooth. The driven
-//! side lags by half the play at the flank that carries, so a torque through the gear pushes the shaft along the slope of
+//! side lags by half the backlash at the flank that carries, so a torque through the gear pushes the shaft along the slope of
 //! that lag: the torque ripple of the transmission error.
 
 use crate::scalar::Scalar;
@@ -18,8 +18,8 @@ variables! {
             when(&[Either(&[Away("gear.tooth_wear", 0.0), Away("gear.tooth_chip", 0.0)])]);
         TeethRatio => "teeth_ratio", "-", "1", AtLeast(1.0), Plant, Some(1.0), "turns of the motor per turn of that wheel; 1: it stands on the motor's shaft",
             when(&[Either(&[Away("gear.tooth_wear", 0.0), Away("gear.tooth_chip", 0.0)])]);
-        ToothWear => "tooth_wear", "s", "rad", NonNegative, Plant, Some(0.0), "healthy 0; total play added where worn flanks slide most, measured at the user";
-        ToothChip => "tooth_chip", "b", "rad", NonNegative, Plant, Some(0.0), "healthy 0; total play added while the chipped tooth carries, measured at the user";
+        ToothWear => "tooth_wear", "s", "rad", NonNegative, Plant, Some(0.0), "healthy 0; total backlash added where worn flanks slide most, measured at the output";
+        ToothChip => "tooth_chip", "b", "rad", NonNegative, Plant, Some(0.0), "healthy 0; total backlash added while the chipped tooth carries, measured at the output";
         ToothChipAngle => "tooth_chip_angle", "-", "rad", Any, Plant, Some(0.0), "angle of the wheel at which the chipped tooth carries",
             when(&[Away("gear.tooth_chip", 0.0)]);
     }
@@ -34,7 +34,7 @@ pub struct Teeth<S> {
     chip_angle: S,
 }
 
-/// Half the added play, and its slope over the motor's angle.
+/// Half the added backlash, and its slope over the motor's angle.
 #[derive(Clone, Copy, Debug)]
 pub struct Lag<S> {
     pub half: S,
@@ -81,7 +81,7 @@ impl<S: Scalar> Teeth<S> {
 }
 
 impl<S: Scalar> Lag<S> {
-    /// Torque on the motor's shaft by the torque `through` the gear at the user, positive where it drives forwards: the
+    /// Torque on the motor's shaft by the torque `through` the gear at the output, positive where it drives forwards: the
     /// flank that carries is the one the load presses on, and it yields as the lag grows.
     #[inline(always)]
     pub fn torque(&self, through: S) -> S {
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn wear_opens_the_play_away_from_the_pitch_point() {
+    fn wear_opens_the_backlash_away_from_the_pitch_point() {
         let t = teeth(&[(P::ToothWear, 2e-4), (P::TeethRatio, 3.0)]);
         assert!(t.lag(0.0).half.abs() < 1e-18);
         assert!((t.lag(3.0 * PI / 20.0).half - 1e-4).abs() < 1e-15);

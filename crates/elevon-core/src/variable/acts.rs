@@ -27,27 +27,27 @@ pub enum When {
 #[derive(Clone, Copy, Debug)]
 pub struct Acts {
     /// Why the fidelities do not carry it; empty: they do.
-    declined: [&'static str; 2],
+    not_modelled: [&'static str; 2],
     /// All of these must hold.
     pub when: &'static [When],
 }
 
 /// In both fidelities, whatever the other parameters are.
-pub const ALWAYS: Acts = Acts { declined: [""; 2], when: &[] };
+pub const ALWAYS: Acts = Acts { not_modelled: [""; 2], when: &[] };
 
 /// In the high fidelity only, and why not in the low one.
 pub const fn high_only(reason: &'static str) -> Acts {
-    Acts { declined: ["", reason], when: &[] }
+    Acts { not_modelled: ["", reason], when: &[] }
 }
 
 /// In the low fidelity only, and why not in the high one.
 pub const fn low_only(reason: &'static str) -> Acts {
-    Acts { declined: [reason, ""], when: &[] }
+    Acts { not_modelled: [reason, ""], when: &[] }
 }
 
 /// In no fidelity, and why.
 pub const fn nowhere(reason: &'static str) -> Acts {
-    Acts { declined: [reason; 2], when: &[] }
+    Acts { not_modelled: [reason; 2], when: &[] }
 }
 
 /// In both fidelities while all of `conditions` hold.
@@ -61,8 +61,8 @@ impl Acts {
     }
 
     /// Why a fidelity does not carry the parameter, if so.
-    pub fn declined(&self, fidelity: Fidelity) -> Option<&'static str> {
-        Some(self.declined[fidelity as usize]).filter(|reason| !reason.is_empty())
+    pub fn not_modelled(&self, fidelity: Fidelity) -> Option<&'static str> {
+        Some(self.not_modelled[fidelity as usize]).filter(|reason| !reason.is_empty())
     }
 }
 
@@ -117,7 +117,7 @@ impl Standing<'_> {
 
     /// Why the parameter of this record does not act in the run; `None`: it does.
     pub fn idle(&self, variable: &Variable) -> Option<String> {
-        if let Some(reason) = variable.acts.declined(self.fidelity) {
+        if let Some(reason) = variable.acts.not_modelled(self.fidelity) {
             return Some(format!("not carried at fidelity {}: {reason}", Fidelity::NAMES[self.fidelity as usize]));
         }
         let failed = variable.acts.when.iter().find(|c| !self.holds(c))?;

@@ -3,7 +3,7 @@
 /// Declares the roles: variant, name, SI units that a signal in this role may have, and what it is.
 macro_rules! roles {
     ($($variant:ident $name:literal [$($unit:literal),*] $text:literal;)*) => {
-        /// Of several recorded signals with one role the last in a wiring's table plays it: a sensor stands behind
+        /// Of several recorded signals with one role the last in a wiring's table backlashes it: a sensor stands behind
         /// what it senses.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Role { $($variant),* }

@@ -235,6 +235,6 @@ def _per_output(actuator: Actuator) -> float:
 
 
 def _torque_scale(actuator: Actuator) -> float:
-    """A torque that means something on the fast shaft: a tenth of what the drive can give."""
+    """A torque that means something on the motor shaft: a tenth of what the drive can give."""
     value = actuator.parameters.value
     return max(0.1 * value("control.torque_constant") * value("control.current_limit"), 1e-9)

@@ -31,9 +31,9 @@ CHANNELS: dict[str, str] = {
 }
 #: Roles of a recording that serve a channel, and names that do where no roles are stated.
 ROLES: dict[str, tuple[str, ...]] = {
-    "position": ("output_position", "encoder_position", "user_position"),
+    "position": ("output_position", "encoder_position", "output_position"),
     "motor_position": ("motor_position", "resolver_position"),
-    "speed": ("output_speed", "user_speed"),
+    "speed": ("output_speed", "output_speed"),
     "motor_speed": ("motor_speed", "resolver_speed"),
     "current": ("torque_current", "current_q_meas", "current_q"),
     "voltage": ("torque_voltage", "voltage_q_meas"),
@@ -202,7 +202,7 @@ def loop_log(recording: Recording, name: str, *, magnitude: bool | None = None) 
 
     command = channel(("command", "position_ref"))
     if command is None:
-        raise InputError(f"{name}: no channel plays the role 'command': nothing to run the loop on")
+        raise InputError(f"{name}: no channel has the role 'command': nothing to run the loop on")
     clock = recording[command].time
     served = {key: channel(words) for key, words in ROLES.items()}
     signals = {

@@ -23,7 +23,7 @@ Floats = npt.NDArray[np.float64]
 Shown = dict[str, Floats] | None
 
 _SOURCES = {
-    "position": "user_position",
+    "position": "output_position",
     "motor_position": "motor_position",
     "speed": "motor_speed",
     "motor_speed": "motor_speed",
@@ -77,7 +77,7 @@ class LoopModel:
             {
                 "duration": 1.0,
                 "command": {"mode": "position", "terms": [table]},
-                "load": {"user": {"terms": [dict(table)]}},
+                "load": {"output": {"terms": [dict(table)]}},
             }
         )
         names = ",".join(dict.fromkeys(_SOURCES[name] for name in self.channels))
@@ -97,12 +97,14 @@ class LoopModel:
         times, values = log.table
         inputs["command"] = [{**inputs["command"][0], "times": times, "values": values}]
         if log.load is not None:
-            inputs["user"] = [{**inputs["user"][0], "times": log.load[0], "values": log.load[1]}]
+            inputs["output"] = [
+                {**inputs["output"][0], "times": log.load[0], "values": log.load[1]}
+            ]
         at = self._start(log)
         speed = log.motion(self.per_output)[0]
         top = float(np.nanmax(np.abs(speed), initial=0.0))
         moving = float(np.nanmean(speed[:3])) if np.isfinite(speed[:3]).any() else 0.0
-        initial = {"motor_position": at * self.per_output, "user_position": at}
+        initial = {"motor_position": at * self.per_output, "output_position": at}
         if abs(moving) > 0.1 * top:
             initial["motor_speed"] = moving
         end = log.duration + 4.0 * log.period

@@ -254,8 +254,8 @@ def beside_motor(logs: Sequence[GearLog], actuator: Actuator) -> tuple[Floats, F
         }
     )
     run = simulate(
-        model, scenario, fidelity="low", record="user_position,equivalent_inertia@200 Hz"
+        model, scenario, fidelity="low", record="output_position,equivalent_inertia@200 Hz"
     )
     total = np.asarray(run["equivalent_inertia"].values, dtype=np.float64)
-    places = np.asarray(run["user_position"].values, dtype=np.float64)
+    places = np.asarray(run["output_position"].values, dtype=np.float64)
     return places, total - model.parameters.value("motor.inertia")

@@ -31,8 +31,8 @@ __all__ = ["calibrate_screw"]
 #: What no log of these roles shows.
 _NEVER = {
     "friction.static": "a reversal breaks away within a sample or two",
-    "play.total": "both positions are read on one side of the joint, or too coarsely",
-    "play.stiffness": "the joint gives by less than the corners' own error",
+    "backlash.total": "both positions are read on one side of the joint, or too coarsely",
+    "backlash.stiffness": "the joint gives by less than the corners' own error",
     "control.current_limit": "the logs do not reach this limit for long",
     "control.speed_limit": "the logs do not reach this limit",
     "inverter.supply_voltage": "the logs do not reach this limit",

@@ -107,7 +107,7 @@ CASES = (
     ),
     Case(
         "inspection-error",
-        "Inspect units by three logs each: how far the severities of play, friction, short err.",
+        "Inspect units by three logs each: the errors of backlash, friction and short.",
         "making and diagnosing inspections",
         _inspect,
         _show_inspect,

@@ -50,13 +50,13 @@ def _save_picture(result: Any, options: Options) -> None:
 
 
 def _show_backlash(values: Values, _result: Any) -> None:
-    columns = ("row", "measured_total_deg", "formula_deg", "play_in_deg", "play_out_deg",
+    columns = ("row", "measured_total_deg", "formula_deg", "backlash_in_deg", "backlash_out_deg",
                "error_deg", "limit_deg", "lost_motion_deg")  # fmt: skip
     rows = [[f"{row[key]:.4f}" for key in columns[1:]] for row in values["rows"]]
     print_table(
         [name.removesuffix("_deg").replace("_", " ") for name in columns],
         [[str(number), *row] for number, row in enumerate(rows, 1)],
-        title="total play at the user side [deg]",
+        title="total backlash at the output side [deg]",
     )
 
 
@@ -108,7 +108,7 @@ def _show_low_fidelity(values: Values, _result: Any) -> None:
 CASES = (
     Case(
         "torino-backlash",
-        "Simulate the no-load campaign at all fifteen measured plays and recover each play.",
+        "Simulate the no-load campaign at all fifteen measured backlashes and recover each.",
         "simulating 16 runs",
         _backlash,
         _show_backlash,

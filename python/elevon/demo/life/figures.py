@@ -110,15 +110,17 @@ def signals_figure(healthy: TestLog, worn: TestLog, ratio: float, usage: float) 
         ):
             data = log.log
             assert data.motor is not None
-            assert data.user is not None
+            assert data.output is not None
             keep = (data.time > 5.0) & (data.time < 15.0)
             time = data.time[keep] - 5.0
-            gap = np.degrees(data.motor / ratio - data.user)[keep]
+            gap = np.degrees(data.motor / ratio - data.output)[keep]
             axes[0].plot(time, gap - 0.5 * (gap.max() + gap.min()), color=COLOURS[colour], lw=1.2,
                          label=name)  # fmt: skip
             current = _smooth(data.current[keep], 9)
             axes[1].plot(time, current, color=COLOURS[colour], lw=0.9, label=name)
-        axes[0].set(ylabel="motor less user [deg]", title="Lost motion: both positions of the log")
+        axes[0].set(
+            ylabel="motor less output [deg]", title="Lost motion: both positions of the log"
+        )
         axes[1].set(ylabel="torque current [A]", xlabel="time [s]",
                     title="Current, smoothed over 20 ms")  # fmt: skip
         axes[0].margins(y=0.25)

@@ -21,29 +21,29 @@ Floats = npt.NDArray[np.float64]
 _FRAMES = 100
 _SECONDS = 5.0  # one sweep of the mission
 _SWING = 3.0  # drawn degrees a degree of the flap
-_GAP = 26.0  # drawn degrees a degree of play
+_GAP = 26.0  # drawn degrees a degree of backlash
 _PANEL = 440  # px
 
 
 @dataclass(frozen=True)
 class Motion:
-    """One sweep, shape (n,) each, angles at the user [deg].
+    """One sweep, shape (n,) each, angles at the output [deg].
 
     Attributes
     ----------
-    user, driver, command : ndarray
-        Flap, the motor's side of the play, what is asked.
+    output, driver, command : ndarray
+        Flap, the motor's side of the backlash, what is asked.
     motor : ndarray
         Motor angle [turns].
-    play : float
-        Total play.
+    backlash : float
+        Total backlash.
     """
 
-    user: Floats
+    output: Floats
     driver: Floats
     command: Floats
     motor: Floats
-    play: float
+    backlash: float
 
 
 def motion(demo: LifeDemo, usage: float) -> Motion:
@@ -56,19 +56,19 @@ def motion(demo: LifeDemo, usage: float) -> Motion:
     unit: Actuator = demo.hidden
     scenario = demo_mission().scenarios().replaced(duration=2.0 * _SECONDS)
     scenario = scenario.with_faults(faults_at(demo.life, usage))
-    record = f"user_position,motor_position,command@{_FRAMES / _SECONDS:g} Hz"
+    record = f"output_position,motor_position,command@{_FRAMES / _SECONDS:g} Hz"
     ready = prepare(Run(unit, scenario), "low", record, doubts=False)
     result = simulate_prepared([ready], fidelity="low")[0]
     rows = result["clocks"][ready.plan[0].name]["values"][_FRAMES : 2 * _FRAMES + 1]
-    user, motor, command = rows[:, 0], rows[:, 1], rows[:, 2]
+    output, motor, command = rows[:, 0], rows[:, 1], rows[:, 2]
     ratio = unit.parameters.value("gear.ratio")
-    play = unit.parameters.value("play.total") + float(demo.life.at(usage)[0])
+    backlash = unit.parameters.value("backlash.total") + float(demo.life.at(usage)[0])
     return Motion(
-        np.degrees(user),
+        np.degrees(output),
         np.degrees(motor / ratio),
         np.degrees(command),
         motor / (2.0 * math.pi),
-        math.degrees(play),
+        math.degrees(backlash),
     )
 
 
@@ -83,7 +83,7 @@ def mechanism(panels: list[tuple[str, Motion]]) -> Markup:
     from markupsafe import Markup
 
     width = _PANEL * len(panels)
-    largest = [float(np.abs(m.command - m.user).max()) for _, m in panels]
+    largest = [float(np.abs(m.command - m.output).max()) for _, m in panels]
     top = 1.15 * max(*largest, 1e-9)
     body = "".join(
         f'<g transform="translate({k * _PANEL} 0)">{_panel(title, m, top)}</g>'
@@ -132,13 +132,13 @@ def _motor(moved: Motion) -> str:
 
 
 def _joint(moved: Motion) -> str:
-    """Driving pin (orange) in the fork of the flap (blue); the gap is the play, enlarged."""
+    """Driving pin (orange) in the fork of the flap (blue); the gap is the backlash, enlarged."""
     x, y, r = 232.0, 142.0, 44.0
-    swing = _SWING * (moved.user - moved.user.mean())
-    gap = moved.driver - moved.user
+    swing = _SWING * (moved.output - moved.output.mean())
+    gap = moved.driver - moved.output
     middle = 0.5 * float(gap.max() + gap.min())
     pin = swing + _GAP * (gap - middle)
-    half = 0.5 * _GAP * moved.play + 8.0
+    half = 0.5 * _GAP * moved.backlash + 8.0
     flap = (
         f'<path d="M{x} {y - 14} C{x + 60} {y - 22} {x + 120} {y - 10} {x + 178} {y} '
         f'C{x + 120} {y + 10} {x + 60} {y + 22} {x} {y + 14} Z" fill="#2f7fd1" '
@@ -155,7 +155,7 @@ def _joint(moved: Motion) -> str:
         f"<g>{flap}{ring}{fork}{_turning(swing, x, y)}</g>"
         f"<g>{driver}{_turning(pin, x, y)}</g>"
         f'<text x="{x}" y="226" font-size="13" text-anchor="middle" fill="currentColor">'
-        f"gear with {moved.play:.2f} deg of play</text>"
+        f"gear with {moved.backlash:.2f} deg of backlash</text>"
         f'<text x="{x + 140}" y="188" font-size="13" text-anchor="middle" fill="currentColor">flap'
         "</text>"
     )
@@ -177,7 +177,7 @@ def _tooth(x: float, y: float, r: float, angle: float) -> str:
 def _errors(moved: Motion, top: float) -> str:
     """Tracking error over the sweep, with a cursor that runs along."""
     left, right, base, height = 40.0, 420.0, 315.0, 50.0
-    error = moved.command - moved.user
+    error = moved.command - moved.output
     x = np.linspace(left, right, len(error))
     y = base - height * error / top
     line = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))

@@ -78,13 +78,14 @@ def _actuator(report: Report, demo: LifeDemo) -> None:
     section = report.section(
         "The actuator at work",
         "A brushless motor drives a flap over a gear of 1:124. The gear wears: between the pin "
-        "that drives (orange) and the fork that is driven (blue) the play grows. When the motion "
-        "or the load turns round, the motor first crosses the play, and the flap waits.",
+        "that drives (orange) and the fork that is driven (blue) the backlash grows. When the "
+        "motion "
+        "or the load turns round, the motor first crosses the backlash, and the flap waits.",
     )
     section.markup(
         moving_picture(demo),
         "One sweep of the mission, from the simulation of this very unit. The flap's angle is "
-        "drawn three times, the play 26 times as large; the motor turns ten times slower "
+        "drawn three times, the backlash 26 times as large; the motor turns ten times slower "
         "than it does.",
     )
 
@@ -110,7 +111,8 @@ def _signals(report: Report, demo: LifeDemo) -> None:
     section.figure(
         signals_figure(healthy, worn, ratio, last.usage),
         "Two logs of the no-load test. Above: the motor's position over the gear ratio less the "
-        "user's; its jump at each turn of the motion is the play. Below: the current, whose steps "
+        "output's; its jump at each turn of the motion is the backlash. Below: the current, whose "
+        "steps "
         "are the friction.",
     )
 

@@ -47,10 +47,10 @@ def demo_mission() -> Mission:
 
 
 def hidden_unit(base: Actuator, seed: int) -> Actuator:
-    """Draw the unit: as on the bench with hidden values, with a gear of ordinary play."""
+    """Draw the unit: as on the bench with hidden values, with a gear of ordinary backlash."""
     rng = np.random.default_rng([seed, 8])
-    play = base.parameters.value("play.total") + math.radians(rng.uniform(0.0, 0.1))
-    values: dict[str, str | float] = {"play.total": play}
+    backlash = base.parameters.value("backlash.total") + math.radians(rng.uniform(0.0, 0.1))
+    values: dict[str, str | float] = {"backlash.total": backlash}
     return hidden_actuator(base, seed).with_values(values, source="hidden from everybody")
 
 

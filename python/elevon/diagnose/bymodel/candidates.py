@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from elevon.diagnose.bymodel.declined import declined
+from elevon.diagnose.bymodel.not_modelled import not_modelled
 from elevon.errors import InputError, unknown
 
 __all__ = ["CANDIDATES", "Candidate", "chosen"]
@@ -65,9 +65,9 @@ class Candidate:
 
 # Reference: T3 Table 1.1, per hour: bearings 1.78e-5 (friction), position sensor 1.70e-5, motor
 # 1.03e-5, power connector 6.64e-7. An item's rate is shared evenly by its kinds (ASSUMED). The
-# table has no gear, no drive, no current sensor and no unbalance: play like the bearings, unbalance
-# and worn teeth a tenth of them, drift of a gain like the position sensor, and a current sensor
-# like that, too, shared by gain, offset and failure (ASSUMED).
+# table has no gear, no drive, no current sensor and no unbalance: backlash like the bearings,
+# unbalance and worn teeth a tenth of them, drift of a gain like the position sensor, and a current
+# sensor like that, too, shared by gain, offset and failure (ASSUMED).
 _BEARING, _SENSOR, _MOTOR, _CONNECTOR = 1.78e-5, 1.70e-5, 1.03e-5, 6.64e-7
 _PHASES = tuple(f"motor.phase_{p}" for p in "abc")
 _RINGS = tuple(f"bearing.{p}" for p in ("outer", "inner", "ball"))
@@ -75,8 +75,8 @@ _CURRENTS = tuple(f"sensor.current_{p}" for p in "abc")
 _VOLTAGES = ("voltage_per_speed", "voltage_order_1", "voltage_order_2", "voltage_sideband")
 
 # How well the low model knows what a fault does, ASSUMED from benches with another friction law,
-# elastic play and a PWM drive: positions and gains are geometry and arithmetic, ripples depend on
-# what the current loop makes of them, friction on its law.
+# elastic backlash and a PWM drive: positions and gains are geometry and arithmetic, ripples depend
+# on what the current loop makes of them, friction on its law.
 #
 # A current sensor's gain leaves the motor as it is, so its EMF stays balanced; the low model puts
 # the wrong current into the motor's constants and moves the voltage as a short would.
@@ -88,7 +88,7 @@ _VOLTAGES = ("voltage_per_speed", "voltage_order_1", "voltage_order_2", "voltage
 # resolver's. Whether it reaches the position loop depends on where the drive closes it, which no
 # healthy log tells.
 CANDIDATES: tuple[Candidate, ...] = (
-    Candidate("play", "transmission", "rad", 0.0, 0.03, _BEARING, 0.01),
+    Candidate("backlash", "transmission", "rad", 0.0, 0.03, _BEARING, 0.01),
     Candidate("friction", "transmission", "1", 0.0, 2.0, _BEARING / 3, 0.08),
     Candidate("lubrication", "transmission", "1", -0.7, 5.0, _BEARING / 3, 0.10),
     Candidate("short", _PHASES[0], "1", 0.0, 0.6, _MOTOR / 4, 0.10, _PHASES[1:]),
@@ -123,7 +123,7 @@ def chosen(texts: Sequence[str] | None) -> tuple[Candidate, ...]:
         return CANDIDATES
     out: list[Candidate] = []
     names = [f"{c.kind}@{p}" for c in CANDIDATES for p in (c.place, *c.same)]
-    reasons = {f"{item['kind']}@{item['place']}": item["reason"] for item in declined()}
+    reasons = {f"{item['kind']}@{item['place']}": item["reason"] for item in not_modelled()}
     for text in texts:
         key = text.strip()
         if key in reasons:

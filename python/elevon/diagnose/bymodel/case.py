@@ -115,8 +115,9 @@ def case_of(
     _lost(item, same, findings)
     if shown.floats:
         findings.append(
-            f"{item.name}: the user is not dragged through its play but flies in it on its own; "
-            "the play is read from the width of the two positions' difference"
+            f"{item.name}: the output is not carried through its backlash by friction but flies in "
+            "it on its own; "
+            "the backlash is read from the width of the two positions' difference"
         )
     unit = healthy(model, names, sound, elsewhere, held=item.held)
     return Case(item.name, shown.only(names), unit, model)
@@ -144,8 +145,8 @@ def _same_test(a: TestLog, b: TestLog) -> bool:
         return all(_near(first[n], second[n], _NOTED) for n in first.keys() & second.keys())
     pairs = []
     for item in (a, b):
-        assert item.log.user is not None
-        pairs.append((float(np.std(item.log.user)), float(np.sqrt(np.mean(item.log.speed**2)))))
+        assert item.log.output is not None
+        pairs.append((float(np.std(item.log.output)), float(np.sqrt(np.mean(item.log.speed**2)))))
     return all(_near(x, y, _SAME) for x, y in zip(*pairs, strict=True))
 
 

@@ -3,7 +3,7 @@
 A sine of about the noted frequency, or a chirp of the noted sweep that began at an instant nobody
 noted: one unknown enters nonlinearly, everything else is a linear regression
 
-    user = a sin(phase) + b cos(phase) + c - speed_ref / gain.
+    output = a sin(phase) + b cos(phase) + c - speed_ref / gain.
 """
 
 from __future__ import annotations
@@ -63,15 +63,15 @@ def noted_command(log: BenchLog, limit: float) -> NotedCommand | None:
     Parameters
     ----------
     log : BenchLog
-        With the user's position.
+        With the output's position.
     limit : float
         Of the speed set point [rad/s]; what stands at it is left out.
     """
-    if log.note is None or log.user is None or log.note.waveform not in ("sine", "chirp"):
+    if log.note is None or log.output is None or log.note.waveform not in ("sine", "chirp"):
         return None
     # A sample beside one at the limit may be the mean of both.
     cut = np.pad(np.abs(log.speed_ref) >= 0.999 * limit, 1)
-    inside = log.good & ~(cut[:-2] | cut[1:-1] | cut[2:]) & np.isfinite(log.user)
+    inside = log.good & ~(cut[:-2] | cut[1:-1] | cut[2:]) & np.isfinite(log.output)
     known = log.note.parameters
     if inside.sum() < _LEAST:
         return None
@@ -107,10 +107,10 @@ def _columns(log: BenchLog, turn: Floats, at: npt.NDArray[np.intp]) -> list[Floa
 
 def _scanned(log: BenchLog, inside: Bools, phase: Phase) -> float:
     """Coarse search of the chirp's start, on samples behind the latest one allowed."""
-    assert log.user is not None
+    assert log.output is not None
     at = np.flatnonzero(inside & (log.time > _LATEST * log.duration))
     at = at[:: max(1, len(at) // _THIN)]
-    target, costs = log.user[at], []
+    target, costs = log.output[at], []
     starts = np.arange(0.0, _LATEST * log.duration, _SCAN)
     for start in starts:
         rows = np.stack(_columns(log, phase(float(start), log.time[at])[0], at))
@@ -122,7 +122,7 @@ def _scanned(log: BenchLog, inside: Bools, phase: Phase) -> float:
 
 def _solved(log: BenchLog, inside: Bools, first: float, phase: Phase) -> NotedCommand | None:
     """Gauss and Newton in the one unknown, first on the late half, then on all it explains."""
-    assert log.user is not None
+    assert log.output is not None
     value = first
     at = np.flatnonzero(inside & (log.time > 0.5 * log.duration))
     for final in (False, True):
@@ -132,7 +132,7 @@ def _solved(log: BenchLog, inside: Bools, first: float, phase: Phase) -> NotedCo
         if not final:
             spread = 1.4826 * float(np.median(np.abs(rest - np.median(rest))))
             at = _explained(log, np.flatnonzero(inside), phase(value, log.time)[0], beta, spread)
-    if len(at) < _LEAST or float(rest.std()) > _SMALL * float(np.std(log.user)):
+    if len(at) < _LEAST or float(rest.std()) > _SMALL * float(np.std(log.output)):
         return None
     if not beta[3] > 0.0:
         return None
@@ -147,13 +147,13 @@ def _step(
     log: BenchLog, at: npt.NDArray[np.intp], value: float, phase: Phase
 ) -> tuple[Floats, Floats, Floats, float]:
     """Regression at one value of the unknown, and the step that its slope asks for."""
-    assert log.user is not None
+    assert log.output is not None
     turn, slope = phase(value, log.time[at])
     columns = _columns(log, turn, at)
-    beta, _ = regress(columns, log.user[at])
+    beta, _ = regress(columns, log.output[at])
     bend = slope * (beta[0] * columns[1] - beta[1] * columns[0])
-    both, covariance = regress([*columns, bend], log.user[at])
-    rest = log.user[at] - both @ np.stack([*columns, bend])
+    both, covariance = regress([*columns, bend], log.output[at])
+    rest = log.output[at] - both @ np.stack([*columns, bend])
     return beta, covariance, rest, float(both[-1])
 
 
@@ -161,7 +161,7 @@ def _explained(
     log: BenchLog, at: npt.NDArray[np.intp], turn: Floats, beta: Floats, spread: float
 ) -> npt.NDArray[np.intp]:
     """Samples behind the last one that the fit of the late half does not explain."""
-    assert log.user is not None
-    off = log.user[at] - beta @ np.stack(_columns(log, turn[at], at))
+    assert log.output is not None
+    off = log.output[at] - beta @ np.stack(_columns(log, turn[at], at))
     strays = np.flatnonzero(np.abs(off[: len(off) // 2]) > max(_OUTLIER * spread, 1e-9))
     return at[strays[-1] + 1 :] if strays.size else at

@@ -19,7 +19,6 @@ from elevon.diagnose.bymodel.case import (
     joined,
     shift_of,
 )
-from elevon.diagnose.bymodel.declined import declined
 from elevon.diagnose.bymodel.explain import (
     NOTHING_WEIGHED,
     alternatives,
@@ -30,6 +29,7 @@ from elevon.diagnose.bymodel.explain import (
     unexplained,
 )
 from elevon.diagnose.bymodel.log import TestLog, prepared
+from elevon.diagnose.bymodel.not_modelled import not_modelled
 from elevon.diagnose.bymodel.posterior import Posterior, posterior
 from elevon.diagnose.bymodel.weigh import Hypothesis
 from elevon.errors import InputError
@@ -84,7 +84,7 @@ def diagnose(
     result = answer_of(cases, candidates, false_alarm, findings, other=True)
     blind = result.unobservable
     if not faults:
-        blind += declined()
+        blind += not_modelled()
     return replace(result, unobservable=blind, seconds=clock.perf_counter() - begin)
 
 

@@ -34,7 +34,7 @@ Fit = tuple[Floats, Floats]  # weights, shape (k,), and their covariance, shape 
 #: Name to unit and text.
 UNITS: dict[str, tuple[str, str]] = {
     "lost_motion": ("rad", "difference of the two positions between the directions"),
-    "position_scale": ("1", "motor's position over the user's, by the gear ratio, less one"),
+    "position_scale": ("1", "motor's position over the output's, by the gear ratio, less one"),
     "dry_current": ("A", "current that changes sign with the motion"),
     "viscous_current": ("A s/rad", "current by speed"),
     "inertia_current": ("A s2/rad", "current by acceleration"),
@@ -102,7 +102,7 @@ class Signals:
     """
 
     time: Floats
-    user: Floats
+    output: Floats
     motor: Floats
     speed_ref: Floats
     speed: Floats
@@ -126,8 +126,8 @@ class Evidence:
     values, std : ndarray, shape (k,)
         With the deviation that the noise within the log gives them.
     floats : bool
-        Whether the user flies in its play on its own: its lost motion is then the width in which
-        the two positions' difference lies.
+        Whether the output flies in its backlash on its own: its lost motion is then the width in
+        which the two positions' difference lies.
     """
 
     names: tuple[str, ...]
@@ -262,18 +262,18 @@ def _root(variance: float) -> float:
 def _positions(
     signals: Signals, moving: Bools, ratio: float, deviations: bool
 ) -> tuple[dict[str, tuple[float, float]], bool]:
-    """Lost motion and scale, and whether the user flies in its play on its own."""
-    gap = signals.motor / ratio - signals.user
+    """Lost motion and scale, and whether the output flies in its backlash on its own."""
+    gap = signals.motor / ratio - signals.output
     use = moving & dragged(signals.motor / ratio, float(np.ptp(gap[moving])))
     if use.sum() < _LEAST:
         use = moving
-    centred = signals.user - float(np.mean(signals.user[use]))
+    centred = signals.output - float(np.mean(signals.output[use]))
     columns = [np.sign(signals.speed), centred, np.ones_like(gap)]
     fit = _fit(columns, gap, use, deviations)
     lost, scale = _one(fit, 0, 2.0), _one(fit, 1)
     flies = floats((gap - scale[0] * centred)[use], columns[0][use])
     if flies:
-        lost, scale = spanned(gap[use], signals.user[use])
+        lost, scale = spanned(gap[use], signals.output[use])
     return {"lost_motion": lost, "position_scale": scale}, flies
 
 
@@ -359,5 +359,5 @@ def _control(signals: Signals, width: float, deviations: bool) -> dict[str, tupl
         rows["following_gain"] = (1.0 / gain, std / gain**2)
     elif signals.command is not None:
         columns = [signals.speed_ref, signals.command, np.ones_like(error)]
-        rows["following_gain"] = _one(_fit(columns, signals.user, inside, deviations), 0, -1.0)
+        rows["following_gain"] = _one(_fit(columns, signals.output, inside, deviations), 0, -1.0)
     return rows

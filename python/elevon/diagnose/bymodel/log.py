@@ -118,11 +118,11 @@ def prepared(item: TestLog, actuator: Actuator) -> TestLog:
     log = item.log
     if item.good is not None:
         return item
-    if log.user is None or log.motor is None:
+    if log.output is None or log.motor is None:
         raise InputError(f"{log.name}: diagnosis by the model needs both positions (r4820, r4821)")
     if log.duration < _LEAST_TIME:
         raise InputError(f"{log.name}: lasts {log.duration:.3g} s; {_LEAST_TIME:g} s are needed")
-    good = log.good & (log.time >= RUN_IN) & np.isfinite(log.motor) & np.isfinite(log.user)
+    good = log.good & (log.time >= RUN_IN) & np.isfinite(log.motor) & np.isfinite(log.output)
     left = float(good.mean()) * log.duration
     if left < _LEAST_LEFT:
         raise InputError(
@@ -132,7 +132,7 @@ def prepared(item: TestLog, actuator: Actuator) -> TestLog:
     _check_motion(log, good, actuator)
     value = actuator.parameters.value
     gain, limit = value("control.position_gain"), value("control.speed_limit")
-    trace = reconstruct(log.time, log.speed_ref, log.user, gain=gain, limit=limit)
+    trace = reconstruct(log.time, log.speed_ref, log.output, gain=gain, limit=limit)
     if trace.coverage < 0.05:
         raise InputError(f"{log.name}: the speed set point is at its limit; no command is seen")
     rebuilt = np.interp(log.time, log.time[trace.valid], trace.position[trace.valid])
@@ -161,7 +161,7 @@ def _joined(
 
 def _check_motion(log: BenchLog, good: npt.NDArray[np.bool_], actuator: Actuator) -> None:
     assert log.motor is not None
-    assert log.user is not None
+    assert log.output is not None
     top = float(np.abs(log.speed[good]).max()) if good.any() else 0.0
     count = actuator.parameters.value("gear.ratio") * 1e-3
     if top < 1.0 or float(np.ptp(log.motor[good])) < count:
@@ -171,18 +171,20 @@ def _check_motion(log: BenchLog, good: npt.NDArray[np.bool_], actuator: Actuator
         )
     for way, text in ((1.0, "forwards"), (-1.0, "backwards")):
         if (good & (way * log.speed > _MOVING * top)).sum() < 100:
-            raise InputError(f"{log.name}: hardly any motion {text}; friction and play need both")
+            raise InputError(
+                f"{log.name}: hardly any motion {text}; friction and backlash need both"
+            )
     ratio = actuator.parameters.value("gear.ratio")
     moving = good & (np.abs(log.speed) > _MOVING * top)
-    # Past the play only, and with the direction beside the position: play would tilt the line of a
-    # short motion.
-    gap = log.motor / ratio - log.user
+    # Past the backlash only, and with the direction beside the position: backlash would tilt the
+    # line of a short motion.
+    gap = log.motor / ratio - log.output
     past = moving & dragged(log.motor / ratio, float(np.ptp(gap[moving])))
     moving = past if past.sum() > 100 else moving
-    columns = [log.user[moving], np.sign(log.speed[moving]), np.ones(int(moving.sum()))]
+    columns = [log.output[moving], np.sign(log.speed[moving]), np.ones(int(moving.sum()))]
     slope = float(regress(columns, log.motor[moving])[0][0])
     if not abs(slope / ratio - 1.0) < _RATIO:
         raise InputError(
-            f"{log.name}: the motor turns {slope:.4g} times as far as the user, {actuator.name} "
+            f"{log.name}: the motor turns {slope:.4g} times as far as the output, {actuator.name} "
             f"has a gear ratio of {ratio:.4g}: a log of another actuator, or another shaft"
         )

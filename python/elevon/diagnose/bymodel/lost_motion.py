@@ -1,4 +1,4 @@
-"""Lost motion from the difference of the two positions: of a user that is dragged, or flies."""
+"""Lost motion from the difference of the two positions: of an output that is dragged, or flies."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ def dragged(driver: Floats, width: float) -> Bools:
 
 
 def floats(gap: Floats, way: Floats) -> bool:
-    """Return whether the user flies in its play on its own instead of being dragged through it.
+    """Return whether the output flies freely in its backlash, no friction holding it.
 
     Parameters
     ----------
     gap : ndarray, shape (n,)
-        Difference of the two positions [rad], where a dragged user lies at one end of the play.
+        Difference of the two positions [rad], where an output held by friction lies at one end.
     way : ndarray, shape (n,)
         Direction of the motion.
     """
@@ -43,27 +43,27 @@ def floats(gap: Floats, way: Floats) -> bool:
     return scatter > _LEAST and scatter > _AFLOAT * _width(gap)
 
 
-def spanned(gap: Floats, user: Floats) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return lost motion and scale of such a user, each with its deviation.
+def spanned(gap: Floats, output: Floats) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return lost motion and scale of such an output, each with its deviation.
 
-    The difference piles up at both ends of the play: which end is nearer, and not the direction,
-    stands beside the user's position. The lost motion is the width of what is left; one sample in
+    The difference piles up at both ends of the backlash: which end is nearer, not the direction,
+    stands beside the output's position. The lost motion is the width of what is left; one sample in
     ten is on the way or presses a contact. The quarters of the log give the deviations.
 
     Parameters
     ----------
-    gap, user : ndarray, shape (n,)
-        Difference of the two positions and the user's position [rad].
+    gap, output : ndarray, shape (n,)
+        Difference of the two positions and the output's position [rad].
     """
-    width, slope = _ends(gap, user)
-    parts = zip(np.array_split(gap, 4), np.array_split(user, 4), strict=True)
+    width, slope = _ends(gap, output)
+    parts = zip(np.array_split(gap, 4), np.array_split(output, 4), strict=True)
     widths, slopes = np.array([_ends(*part) for part in parts]).T
     return (width, 0.5 * float(widths.std(ddof=1))), (slope, 0.5 * float(slopes.std(ddof=1)))
 
 
-def _ends(gap: Floats, user: Floats) -> tuple[float, float]:
-    """Width of the difference, and its slope over the user's position at either end."""
-    centred, slope = user - float(np.mean(user)), 0.0
+def _ends(gap: Floats, output: Floats) -> tuple[float, float]:
+    """Width of the difference, and its slope over the output's position at either end."""
+    centred, slope = output - float(np.mean(output)), 0.0
     for _ in range(_ROUNDS):
         rest = gap - slope * centred
         low, high = np.percentile(rest, [5.0, 95.0])

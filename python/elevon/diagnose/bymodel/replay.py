@@ -102,12 +102,12 @@ def logged_evidence(item: TestLog, actuator: Actuator) -> Evidence:
 def signals_of(item: TestLog) -> Signals:
     """Return what a prepared log shows."""
     log = item.log
-    assert log.user is not None
+    assert log.output is not None
     assert log.motor is not None
     assert item.good is not None
     brake = np.interp(log.time, log.brake.time, log.brake.level) if item.braked else None
     return Signals(
-        log.time, log.user, log.motor, log.speed_ref, log.speed, log.current_target,
+        log.time, log.output, log.motor, log.speed_ref, log.speed, log.current_target,
         log.current, item.voltage, brake, None, item.gain, item.good,
     )  # fmt: skip
 
@@ -175,10 +175,10 @@ def _remembered(item: TestLog, actuator: Actuator, candidates: Sequence[Candidat
 def _digest(item: TestLog) -> bytes:
     """Of all in a log that its model runs depend on."""
     log = item.log
-    assert log.user is not None
+    assert log.output is not None
     assert item.replay is not None
     assert item.good is not None
-    state = (item.braked, log.duration, log.user[0], log.speed[0], item.voltage is None)
+    state = (item.braked, log.duration, log.output[0], log.speed[0], item.voltage is None)
     out = hashlib.sha256(f"{state!r} {log.current_signal}".encode())
     brake = (log.brake.time, log.brake.level) if item.braked else ()
     for array in (log.time, item.replay, item.good, *brake):
@@ -286,7 +286,7 @@ def runs(item: TestLog, units: Sequence[Unit]) -> Iterator[Signals]:
     from elevon.simulate.batch import simulate_prepared
     from elevon.simulate.prepare import prepare
 
-    start = {"motor_position": 0.0, "motor_speed": 0.0, "user_position": 0.0}
+    start = {"motor_position": 0.0, "motor_speed": 0.0, "output_position": 0.0}
     empty = Scenario.from_dict(
         {
             "duration": item.log.duration,
@@ -308,18 +308,18 @@ def runs(item: TestLog, units: Sequence[Unit]) -> Iterator[Signals]:
 
 def _with_arrays(core: Mapping[str, Any], item: TestLog, unit: Unit) -> dict[str, Any]:
     log = item.log
-    assert log.user is not None
+    assert log.output is not None
     assert item.replay is not None
     inputs = dict(core["inputs"])
     inputs["command"] = [_table(inputs["command"][0], log.time, item.replay)]
     if item.braked:
         level = unit.brake * log.brake.level
         inputs["brake"] = [_table(inputs["brake"][0], log.brake.time, level)]
-    user = float(log.user[0])
+    output = float(log.output[0])
     initial = {
-        "motor_position": user * unit.actuator.parameters.value("gear.ratio") + unit.turn,
+        "motor_position": output * unit.actuator.parameters.value("gear.ratio") + unit.turn,
         "motor_speed": float(log.speed[0]),
-        "user_position": user,
+        "output_position": output,
     }
     return {**core, "inputs": inputs, "initial": {**core["initial"], **initial}}
 
@@ -348,9 +348,9 @@ def _drawn(actuator: Actuator, rng: np.random.Generator) -> Unit:
                 still = actuator.parameters.value("friction.static")
                 values["friction.static"] = still * max(1.0 + step, 0.05)
     value = actuator.parameters.value
-    # Within the play: further off the user would not be where the motor holds it.
+    # Within the backlash: further off the output would not be where the motor holds it.
     most = min(
-        0.45 * value("play.total") * value("gear.ratio"), math.pi / value("motor.pole_pairs")
+        0.45 * value("backlash.total") * value("gear.ratio"), math.pi / value("motor.pole_pairs")
     )
     turn = float(rng.uniform(-most, most))
     unit = actuator.with_values(values, source="run-to-run spread")

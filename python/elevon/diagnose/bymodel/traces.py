@@ -55,7 +55,7 @@ def _traces(item: TestLog, actuator: Actuator, units: Sequence[Unit]) -> Traces:
 
 
 def _gap(signals: Signals, ratio: float) -> Floats:
-    """Motor less user [deg] about the middle of its ends: where the zeros are does not matter."""
-    gap = np.degrees(signals.motor / ratio - signals.user)
+    """Motor less output [deg] about the middle of its ends: where the zeros are does not matter."""
+    gap = np.degrees(signals.motor / ratio - signals.output)
     low, high = np.percentile(gap[signals.good], [1.0, 99.0])
     return np.asarray(gap - 0.5 * (low + high))

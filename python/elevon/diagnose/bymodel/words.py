@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["UNEXPLAINED", "by_reason", "sentence", "severity_text"]
 
 _NAMES = {
-    "play@transmission": "Play has grown by",
+    "backlash@transmission": "Backlash has grown by",
     "friction@transmission": "Dry friction has changed by",
     "lubrication@transmission": "Viscous friction has changed by",
     "short@motor.phase_a": "One phase has lost turns to a short:",
@@ -26,7 +26,7 @@ _NAMES = {
     "gain@sensor.encoder": "The encoder's gain is off by",
     "gain@sensor.current_a": "The gain of one current sensor is off by",
     "eccentricity_dynamic@motor": "The rotor turns out of centre (dynamic) by",
-    "tooth_wear@gear": "Worn teeth have added a play of",
+    "tooth_wear@gear": "Worn teeth have added a backlash of",
     "sag@supply": "The supply has lost",
     "bearing@bearing.outer": "A bearing has a defect of",
     "bearing_wear@motor.bearing": "The motor's bearing rubs with",

@@ -125,13 +125,13 @@ def _initial(actuator: Actuator, shown: Mapping[str, Floats]) -> dict[str, float
     known = actuator.parameters
     lead = known.value("screw.lead") if "screw.lead" in known else 1.0
     ratio = known.value("gear.ratio") / lead
-    half = 0.45 * known.value("play.total") * ratio
+    half = 0.45 * known.value("backlash.total") * ratio
     motor = start.get("motor_position", position * ratio)
-    # Within the play: a log's zeros need not be the model's.
+    # Within the backlash: a log's zeros need not be the model's.
     motor = min(max(motor, position * ratio - half), position * ratio + half)
     return {
         "motor_position": motor,
-        "user_position": position,
+        "output_position": position,
         "motor_speed": start.get("motor_speed", 0.0),
     }
 

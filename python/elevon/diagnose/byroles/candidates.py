@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.faults import FaultRecord
 
-__all__ = ["candidates_of", "counted_of", "declined_of", "switched_of"]
+__all__ = ["candidates_of", "counted_of", "not_modelled_of", "switched_of"]
 
 #: Largest severity considered where the catalogue's own is larger or none, by unit. ASSUMED: what a
 #: unit of this size runs with at all; shares and counts are given by the catalogue.
@@ -60,7 +60,7 @@ def candidates_of(actuator: Actuator, texts: Sequence[str] | None = None) -> tup
     return tuple(c for c in out if id(c) in wanted)
 
 
-def declined_of(actuator: Actuator) -> list[dict[str, str]]:
+def not_modelled_of(actuator: Actuator) -> list[dict[str, str]]:
     """Return the faults that the low model has not, with its reason."""
     from elevon.faults import catalogue
 
@@ -69,7 +69,7 @@ def declined_of(actuator: Actuator) -> list[dict[str, str]]:
         for record in catalogue(actuator.wiring)
         if "low" not in record.fidelities
         for place in record.places
-        for reason in [record.declined.get("low", "does not have it")]
+        for reason in [record.not_modelled.get("low", "does not have it")]
     ]
 
 

@@ -16,7 +16,7 @@ from elevon.diagnose.bymodel.diagnosis import answer_of
 from elevon.diagnose.bymodel.evidence import Evidence
 from elevon.diagnose.byroles.alike import with_alike
 from elevon.diagnose.byroles.asked import same_test
-from elevon.diagnose.byroles.candidates import candidates_of, declined_of
+from elevon.diagnose.byroles.candidates import candidates_of, not_modelled_of
 from elevon.diagnose.byroles.healthy import healthy_of
 from elevon.diagnose.byroles.log import RoleLog, role_log
 from elevon.diagnose.byroles.noise import noise_of
@@ -98,7 +98,7 @@ def diagnose_by_roles(
     ]
     result = answer_of(cases, candidates, false_alarm, findings, most=PAIRS)
     result = with_alike(result, cases, candidates)
-    blind = (*result.unobservable, *(declined_of(actuator) if not faults else ()))
+    blind = (*result.unobservable, *(not_modelled_of(actuator) if not faults else ()))
     return replace(result, unobservable=blind, seconds=clock.perf_counter() - begin)
 
 
@@ -125,7 +125,8 @@ def _case(
     if driven(item, actuator):
         findings.append(
             f"{item.name}: the load drives the output part of the time and holds it at one end of "
-            "its play, where the low model has it dragged: play may be named as something else, "
+            "its backlash, where the low model has it carried by friction: backlash may be named "
+            "as something else, "
             "and its limit does not hold"
         )
     if not same:

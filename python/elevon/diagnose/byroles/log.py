@@ -108,7 +108,7 @@ def _channels(
     roles = recording.roles
     if "command" not in roles:
         raise InputError(
-            f"{name}: no channel plays the role 'command': the test cannot be run on the model; "
+            f"{name}: no channel has the role 'command': the test cannot be run on the model; "
             f"roles: {', '.join(roles) or 'none'}"
         )
     time = np.asarray(recording.role("command").clock.time, dtype=np.float64)

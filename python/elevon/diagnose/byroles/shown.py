@@ -30,7 +30,7 @@ __all__ = [
 Floats = npt.NDArray[np.float64]
 _CHUNK = 64  # runs held at once
 _OVER = 4  # samples of the model to one of the log, which are averaged: loggers filter, too
-_ELASTIC = 1.0  # play.model: a contact that gives
+_ELASTIC = 1.0  # backlash.model: a contact that gives
 _PUSHED = 0.1  # of the greatest load, of the fastest motion, and share of the time
 _SET_POINT = "_ref"  # end of roles that a drive knows as numbers: nothing filters them
 
@@ -121,7 +121,7 @@ def channels_by(
 
 
 def driven(item: RoleLog, ready: Actuator) -> bool:
-    """Whether a load drives the output of an elastic play for more than a tenth of the motion."""
+    """Whether a load drives the output of an elastic backlash over a tenth of the motion."""
     give = give_under(item, ready)
     if give is None:
         return False
@@ -134,13 +134,17 @@ def driven(item: RoleLog, ready: Actuator) -> bool:
 def give_under(item: RoleLog, ready: Actuator) -> Floats | None:
     """Return how far the output stands back under the log's load, shape (n,): force by stiffness.
 
-    The low model's play is rigid. None without a load, or of a unit whose contact is rigid, too.
+    The low model's backlash is rigid. None without a load, or where the unit's contact is rigid.
     """
     known = ready.parameters
-    if item.test.load is None or "play.model" not in known or known.value("play.model") != _ELASTIC:
+    if (
+        item.test.load is None
+        or "backlash.model" not in known
+        or known.value("backlash.model") != _ELASTIC
+    ):
         return None
     return np.asarray(
-        np.interp(item.time, *item.test.load) / known.value("play.stiffness"), dtype=np.float64
+        np.interp(item.time, *item.test.load) / known.value("backlash.stiffness"), dtype=np.float64
     )
 
 
@@ -226,7 +230,7 @@ def _scenario(item: RoleLog, actuator: Actuator) -> Any:
         "command": command,
     }
     if item.test.load is not None:
-        document["load"] = {"user": {"terms": [_EMPTY]}}
+        document["load"] = {"output": {"terms": [_EMPTY]}}
     if item.test.initial:
         document["initial"] = dict(item.test.initial)
     return Scenario.from_dict(document)
@@ -246,7 +250,7 @@ def _with_arrays(core: Mapping[str, Any], item: RoleLog, actuator: Actuator) -> 
     if not action_numbers(actuator.wiring):
         inputs["command"] = [_table(inputs["command"][0], item.test.command)]
     if item.test.load is not None:
-        inputs["user"] = [_table(inputs["user"][0], item.test.load)]
+        inputs["output"] = [_table(inputs["output"][0], item.test.load)]
     return {**core, "inputs": inputs}
 
 

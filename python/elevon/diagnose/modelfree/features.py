@@ -1,7 +1,7 @@
 """Features of trapezoidal motions under a load, from position, reference and current alone.
 
 The strokes are named by what the load does to them, not by their sign: the assisted one needs the
-smaller current, the opposed one the larger. What friction, play and ripple do to the assisted
+smaller current, the opposed one the larger. What friction, backlash and ripple do to the assisted
 stroke is then the same at a load that pushes and at one that pulls.
 """
 

@@ -29,7 +29,7 @@ _LEAST = 400  # samples of a window that may be used
 _MOVING = 0.1  # of the highest speed
 #: Signals of a stream, by the names they have everywhere, and the field of a log each fills.
 CHANNELS: Mapping[str, str] = {
-    "encoder_position": "user",
+    "encoder_position": "output",
     "resolver_position": "motor",
     "speed_ref": "speed_ref",
     "motor_speed": "speed",
@@ -116,7 +116,7 @@ def stretch(item: TestLog, first: float, last: float) -> TestLog:
         current=log.current[at],
         current_target=log.current_target[at],
         motor=None if log.motor is None else log.motor[at],
-        user=None if log.user is None else log.user[at],
+        output=None if log.output is None else log.output[at],
         brake=brake,
         good=log.good[at],
     )
@@ -126,9 +126,9 @@ def stretch(item: TestLog, first: float, last: float) -> TestLog:
 def window_evidence(item: TestLog, actuator: Actuator) -> Evidence | None:
     """Return the evidence of a window; None where it does not move both ways or lacks samples."""
     log = item.log
-    if log.user is None or log.motor is None:
+    if log.output is None or log.motor is None:
         raise InputError(f"{item.name}: watching needs both positions")
-    good = log.good & np.isfinite(log.motor) & np.isfinite(log.user)
+    good = log.good & np.isfinite(log.motor) & np.isfinite(log.output)
     top = float(np.abs(log.speed[good]).max()) if good.any() else 0.0
     ways = [int((good & (way * log.speed > _MOVING * top)).sum()) for way in (1.0, -1.0)]
     if good.sum() < _LEAST or top < 1.0 or min(ways) < _LEAST // 4:
@@ -141,10 +141,10 @@ def window_evidence(item: TestLog, actuator: Actuator) -> Evidence | None:
 def motion(item: TestLog) -> tuple[float, float, float]:
     """Return what tells one motion from another: spread of position, RMS speed, brake's mean."""
     log = item.log
-    assert log.user is not None
+    assert log.output is not None
     brake = float(np.mean(log.brake.level)) if item.braked and len(log.brake.level) else 0.0
     speed = float(np.sqrt(np.nanmean(log.speed**2)))
-    return float(np.nanstd(log.user)), speed, brake
+    return float(np.nanstd(log.output)), speed, brake
 
 
 def of_samples(samples: Mapping[str, Floats], note: CommandNote | None, name: str) -> TestLog:

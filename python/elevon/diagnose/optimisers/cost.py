@@ -1,9 +1,10 @@
 """What the population searches make small: the misfit of a monitor to a log.
 
-The vector is that of the literature on these actuators: dry friction, play, shorted turns of each
-phase, size and phase of the static eccentricity, drift of the position gain, each from 0 to 1 over
-its range. The misfit is the mean square difference of the torque current, as there; the gap
-between the two positions and the user's position stand beside it, since play and gain hardly show
+The vector is that of the literature on these actuators: dry friction, backlash, shorted turns of
+each phase, size and phase of the static eccentricity, drift of the position gain, each from 0 to 1
+over its range. The misfit is the mean square difference of the torque current, as there; the gap
+between the two positions and the output's position stand beside it, since backlash and gain hardly
+show
 in the current without load. Weights and ranges are ASSUMED: no paper at hand prints them.
 """
 
@@ -29,14 +30,14 @@ Floats = npt.NDArray[np.float64]
 #: The faults of the vector, by key; the short stands for that of any phase.
 CAUSES = (
     "friction@transmission",
-    "play@transmission",
+    "backlash@transmission",
     "short@motor.phase_a",
     "eccentricity_static@motor",
     "gain_drift@control.position",
 )
 _SLOTS = (
     "friction@transmission",
-    "play@transmission",
+    "backlash@transmission",
     "short@motor.phase_a",
     "short@motor.phase_b",
     "short@motor.phase_c",
@@ -86,11 +87,11 @@ class Monitor:
 
     def _of(self, log: TestLog, setup: Setup) -> tuple[Floats, Floats]:
         bench = log.log
-        assert bench.user is not None
+        assert bench.output is not None
         assert bench.motor is not None
         clock = np.arange(0.0, bench.duration + 1e-9, 1.0 / _RATE)
         self._keep = clock >= _FROM
-        columns = (bench.current, bench.user, bench.motor / self._ratio - bench.user)
+        columns = (bench.current, bench.output, bench.motor / self._ratio - bench.output)
         shown = np.column_stack([np.interp(clock, bench.time, c) for c in columns])
         gain = setup.actuator.parameters.value("control.position_gain")
         followed = float(np.sqrt(np.mean(bench.speed_ref**2))) / gain
@@ -133,8 +134,8 @@ class Monitor:
         samples = result["clocks"][self._ready.plan[0].name]["values"][: len(self._keep)]
         if result["status"] != "ok" or len(samples) < len(self._keep):
             return 1e6
-        current, user, motor = samples.T[:3]
-        shown = np.column_stack((current, user, motor / self._ratio - user))[self._keep]
+        current, output, motor = samples.T[:3]
+        shown = np.column_stack((current, output, motor / self._ratio - output))[self._keep]
         rest = (shown - self._shown) / self._scale
         return float(np.mean(rest**2)) if np.isfinite(rest).all() else 1e6
 

@@ -38,14 +38,14 @@ if TYPE_CHECKING:
 __all__ = ["ASKED", "HEALTHY_DAYS", "TESTS", "Table", "gathered"]
 
 Floats = npt.NDArray[np.float64]
-#: Procedures of the bench that are learned; the first trace of each, with the unit's own play.
+#: Procedures of the bench that are learned; the first trace of each, with the unit's own backlash.
 TESTS = ("backlash", "loaded")
 HEALTHY_DAYS = 3
 FAULTY_DAYS = 7
 #: Severities at which a fault on its own is to be told, by test; SI. What units are judged at.
 ASKED: Mapping[str, Mapping[str, float]] = {
     test: {
-        "play@transmission": math.radians(0.13),
+        "backlash@transmission": math.radians(0.13),
         "friction@transmission": 0.25,
         "short@motor.phase_a": 0.10 if test == "loaded" else 0.20,
         "eccentricity_static@motor": 0.05 if test == "loaded" else 0.10,

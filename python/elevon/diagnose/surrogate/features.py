@@ -65,7 +65,7 @@ class LogFeatures:
     braked : bool
         Whether a brake of measured torque acted.
     travel, speed : float
-        Deviation of the user's position [rad], RMS speed of the motor [rad/s].
+        Deviation of the output's position [rad], RMS speed of the motor [rad/s].
     """
 
     name: str
@@ -91,17 +91,17 @@ def log_features(item: TestLog, actuator: Actuator) -> LogFeatures:
         A position or the measured torque current is missing, or nothing moves.
     """
     log = item.log
-    if log.user is None or log.motor is None:
+    if log.output is None or log.motor is None:
         raise InputError(f"{log.name}: the surrogate needs both positions (r4820, r4821)")
     if log.current_signal != "current_q_meas":
         raise InputError(f"{log.name}: the surrogate needs the measured torque current (r78)")
-    good = log.good & (log.time >= RUN_IN) & np.isfinite(log.motor) & np.isfinite(log.user)
+    good = log.good & (log.time >= RUN_IN) & np.isfinite(log.motor) & np.isfinite(log.output)
     top = float(np.abs(log.speed[good]).max()) if good.any() else 0.0
     if top < 1.0:
         raise InputError(f"{log.name}: nothing moves (motor up to {top:.3g} rad/s)")
     brake = np.interp(log.time, log.brake.time, log.brake.level) if item.braked else None
     signals = Signals(
-        log.time, log.user, log.motor, log.speed_ref, log.speed, log.current_target,
+        log.time, log.output, log.motor, log.speed_ref, log.speed, log.current_target,
         log.current, item.voltage, brake, None, None, good,
     )  # fmt: skip
     value = actuator.parameters.value
@@ -118,7 +118,7 @@ def log_features(item: TestLog, actuator: Actuator) -> LogFeatures:
         log.name,
         np.array([rows.get(name, math.nan) for name in NAMES]),
         item.braked,
-        float(np.std(log.user)),
+        float(np.std(log.output)),
         float(np.sqrt(np.mean(log.speed**2))),
     )
 
@@ -141,34 +141,34 @@ def changes(values: Floats, healthy: Floats, floor: Floats) -> Floats:
 def _following(log: BenchLog, good: npt.NDArray[np.bool_]) -> float:
     """Following error over speed set point [s], of a noted sine; NaN without one.
 
-    The command is a sine of nearly the noted frequency: user + following x set point = a sin + b
+    The command is a sine of nearly the noted frequency: output + following x set point = a sin + b
     cos + c, the frequency by one step of Gauss-Newton. What lies far off (the command's start) is
     left out.
     """
     note = log.note
     frequency = note.parameters.get("frequency") if note and note.waveform == "sine" else None
-    if not frequency or log.user is None:
+    if not frequency or log.output is None:
         return math.nan
     reference = np.abs(log.speed_ref)
     keep = good & (reference < 0.999 * reference.max()) & (log.time > _SETTLED)
     if keep.sum() < _LEAST:
         return math.nan
     centre = log.time[keep] - 0.5 * log.duration
-    return _gain(centre, log.user[keep], log.speed_ref[keep], 2.0 * math.pi * frequency)
+    return _gain(centre, log.output[keep], log.speed_ref[keep], 2.0 * math.pi * frequency)
 
 
-def _gain(centre: Floats, user: Floats, set_point: Floats, rate: float) -> float:
+def _gain(centre: Floats, output: Floats, set_point: Floats, rate: float) -> float:
     scale = float(np.std(set_point)) or 1.0
     rows = np.empty((6, len(centre)))
     rows[0] = set_point / -scale
     np.sin(rate * centre, out=rows[1])
     np.cos(rate * centre, out=rows[2])
-    rows[3], rows[4], rows[5] = 1.0, 0.0, user
+    rows[3], rows[4], rows[5] = 1.0, 0.0, output
     gram = rows @ rows.T
     first = _solved(gram, 4)
     rows[4] = centre * (first[1] * rows[2] - first[2] * rows[1])  # by the rate
     gram[4] = gram[:, 4] = rows @ rows[4]
-    rest = np.abs(user - _solved(gram, 5) @ rows[:5])
+    rest = np.abs(output - _solved(gram, 5) @ rows[:5])
     far = rows[:, rest >= _FAR * median(rest) + 1e-12]
     return float(_solved(gram - far @ far.T, 5)[0]) / scale
 

@@ -28,7 +28,7 @@ __all__ = [
 
 #: What the surrogate knows, in the order of its answers.
 FAULTS = (
-    "play@transmission",
+    "backlash@transmission",
     "friction@transmission",
     "lubrication@transmission",
     "short@motor.phase_a",
@@ -50,8 +50,8 @@ _FACTORS: Mapping[str, tuple[float, float]] = {
     "motor.emf_constant": (0.94, 1.06),
     "motor.winding_resistance": (0.85, 1.15),
     "motor.winding_inductance": (0.85, 1.15),
-    "play.total": (0.5, 2.2),
-    "play.stiffness": (0.5, 2.5),
+    "backlash.total": (0.5, 2.2),
+    "backlash.stiffness": (0.5, 2.5),
     "control.position_gain": (0.8, 1.25),
     "control.speed_gain": (0.7, 1.5),
     "control.integral_time": (0.6, 1.7),
@@ -70,15 +70,18 @@ _VALUES: Mapping[str, tuple[float, float]] = {
     "friction.reverse_scale": (0.9, 1.1),
 }
 _STATIC = (1.0, 1.6)  # over the dynamic friction
-_USER_FRICTION = (0.1, 1.0)  # N m behind an elastic play: without any the user swings freely
+_OUTPUT_FRICTION = (
+    0.1,
+    1.0,
+)  # N m behind an elastic backlash: without any the output swings freely
 #: Greatest deviation of a unit's noise on the log. ASSUMED.
 NOISE: Mapping[str, float] = {"motor_speed": 0.1, "current_q_meas": 0.05, "voltage_q_ref": 1.0}
 #: How units are built, and how often. ASSUMED.
 _SHARES: Mapping[str, tuple[tuple[str, ...], tuple[float, ...]]] = {
     "drive.kind": (("pwm", "hysteresis"), (0.6, 0.4)),
-    "play.model": (("operator", "elastic"), (0.5, 0.5)),
+    "backlash.model": (("operator", "elastic"), (0.5, 0.5)),
     "friction.law": (("borello", "stribeck", "lugre"), (0.7, 0.15, 0.15)),
-    "control.position_feedback": (("user", "encoder"), (0.5, 0.5)),
+    "control.position_feedback": (("output", "encoder"), (0.5, 0.5)),
 }
 _SAMPLED = (0.0, 125e-6, 1e-3)  # s; of the controller, 0: continuous. ASSUMED, equally often
 _STRIBECK, _BRISTLES = (0.5, 3.0), (100.0, 300.0)  # rad/s; N m/rad. ASSUMED
@@ -114,7 +117,7 @@ def learned() -> list[Candidate]:
 
 
 def build_of(rng: np.random.Generator) -> dict[str, float | str]:
-    """Return how units are built: drive, play, friction's law, controller.
+    """Return how units are built: drive, backlash, friction's law, controller.
 
     Units that are built alike run side by side in lanes.
     """
@@ -141,8 +144,8 @@ def unit_of(
     values["friction.static"] = float(values["friction.dynamic"]) * rng.uniform(*_STATIC)
     values["friction.stribeck_speed"] = float(rng.uniform(*_STRIBECK))
     values["friction.bristle_stiffness"] = float(rng.uniform(*_BRISTLES))
-    if values["play.model"] == "elastic":
-        values["load.friction"] = float(rng.uniform(*_USER_FRICTION))
+    if values["backlash.model"] == "elastic":
+        values["load.friction"] = float(rng.uniform(*_OUTPUT_FRICTION))
     return _stable(actuator.with_values(values, source="drawn unit"))
 
 

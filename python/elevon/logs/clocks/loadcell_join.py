@@ -162,9 +162,9 @@ def _shared(
 ) -> list[FloatArray]:
     """Return the sets of signals that may show what the load cell saw.
 
-    A brake acts on the fast shaft, weights and springs on the user: these show in what they wind up
-    between the two positions. Where the operator says whether the brake was on, only one of them is
-    meant.
+    A brake acts on the motor shaft, weights and springs on the output: these show in what they
+    wind up between the two positions. Where the operator says whether the brake was on, only one
+    of them is meant.
     """
     brake = _braked(recording)
     wound = []
@@ -177,7 +177,7 @@ def _shared(
 
 
 def _braked(recording: Recording) -> list[FloatArray]:
-    """Return the sets of signals that tell a brake's torque on the fast shaft.
+    """Return the sets of signals that tell a brake's torque on the motor shaft.
 
     What is left of the motor's torque when friction and inertia took their share: torque current,
     direction of motion, speed and acceleration. Without the last two a brake that turns its sign
@@ -227,6 +227,6 @@ def _channels(
         return values, units
     factor = note.load_cell_arm / (note.chain_ratio or 1.0)
     values["load_cell_torque"], units["load_cell_torque"] = value * factor, "N m"
-    shaft = "the fast shaft" if note.chain_ratio else "the shaft the arm belongs to"
+    shaft = "the motor shaft" if note.chain_ratio else "the shaft the arm belongs to"
     report.note("load_cell_torque", "torque", f"force x {factor:.6g} m, on {shaft}")
     return values, units

@@ -134,7 +134,7 @@ def stuck_spans(
     travel : ndarray, shape (n,)
         Position of what drives it, in the same unit.
     allowed : float
-        Travel that may leave it still (play, resolution).
+        Travel that may leave it still (backlash, resolution).
 
     Returns
     -------

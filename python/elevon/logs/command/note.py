@@ -1,6 +1,6 @@
 """What the operator knows, beside a log: the command, the brake, the load cell's arm.
 
-The command stands in one of two forms. The short one is a single waveform at the user side; its
+The command stands in one of two forms. The short one is a single waveform at the output side; its
 values are in Hz, s and m, angles need their unit. Its keys are accepted in several spellings (other
 software writes these files), and keys that mean nothing are reported, not refused. The full one is
 a table ``[command]`` with ``terms`` or ``steps`` by the grammar of scenario files: sums, tables,

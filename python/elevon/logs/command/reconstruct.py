@@ -1,7 +1,7 @@
 """The command that drove a log, which the drive does not record.
 
-The position loop is proportional: w_ref = sat(G (command - user position)). So wherever the speed
-set point is inside its limit, command = w_ref / G + measured user position (test-bench thesis,
+The position loop is proportional: w_ref = sat(G (command - output position)). So wherever the speed
+set point is inside its limit, command = w_ref / G + measured output position (test-bench thesis,
 "Results"; G = (1000/60) 124 1/s). A waveform is then fitted to that trace (`fit_command`).
 """
 
@@ -25,7 +25,7 @@ __all__ = [
 ]
 
 FloatArray = npt.NDArray[np.float64]
-POSITION_GAIN = 1000.0 / 60.0 * 124.0  # 1/s, user rad to fast-shaft rad/s
+POSITION_GAIN = 1000.0 / 60.0 * 124.0  # 1/s, output rad to motor-shaft rad/s
 SPEED_LIMIT = 500.0 * math.pi / 30.0  # rad/s
 _MARGIN = 1e-3  # of the limit: a saturated set point comes back rounded or filtered
 
@@ -39,7 +39,7 @@ class CommandTrace:
     time : ndarray, shape (n,)
         Seconds on the log's clock.
     position : ndarray, shape (n,)
-        Command [rad at the user]; meaningless where `valid` is false.
+        Command [rad at the output]; meaningless where `valid` is false.
     valid : ndarray of bool, shape (n,)
         True where the speed set point was inside its limit and both signals are present.
     """
@@ -57,21 +57,21 @@ class CommandTrace:
 def reconstruct(
     time: npt.ArrayLike,
     speed_ref: npt.ArrayLike,
-    user_position: npt.ArrayLike,
+    output_position: npt.ArrayLike,
     *,
     gain: float = POSITION_GAIN,
     limit: float = SPEED_LIMIT,
 ) -> CommandTrace:
-    """Rebuild the position command from the speed set point and the measured user position.
+    """Rebuild the position command from the speed set point and the measured output position.
 
     Parameters
     ----------
     time : array_like, shape (n,)
         Seconds.
     speed_ref : array_like, shape (n,)
-        Speed set point of the fast shaft [rad/s]; NaN where missing.
-    user_position : array_like, shape (n,)
-        Measured user position [rad]; NaN where missing.
+        Speed set point of the motor shaft [rad/s]; NaN where missing.
+    output_position : array_like, shape (n,)
+        Measured output position [rad]; NaN where missing.
     gain : float
         Position gain [1/s].
     limit : float
@@ -89,16 +89,16 @@ def reconstruct(
     RangeError
         A gain or limit that is not positive.
     """
-    t, speed, user = (np.asarray(a, dtype=np.float64) for a in (time, speed_ref, user_position))
-    if not t.shape == speed.shape == user.shape or t.ndim != 1:
+    t, speed, output = (np.asarray(a, dtype=np.float64) for a in (time, speed_ref, output_position))
+    if not t.shape == speed.shape == output.shape or t.ndim != 1:
         raise InputError(
             f"command: time, set point and position have shapes {t.shape}, {speed.shape}, "
-            f"{user.shape}"
+            f"{output.shape}"
         )
     for name, value in (("gain", gain), ("limit", limit)):
         if not (math.isfinite(value) and value > 0.0):
             raise RangeError(f"command: {name} = {value!r} must be above 0")
-    position = speed / gain + user
+    position = speed / gain + output
     valid = np.isfinite(position) & (np.abs(speed) < limit * (1.0 - _MARGIN))
     return CommandTrace(t, position, valid)
 
@@ -115,10 +115,10 @@ def reconstruct_from(
     InputError
         They are on different clocks.
     """
-    speed, user = recording["speed_ref"], recording["encoder_position"]
-    if speed.clock.name != user.clock.name:
+    speed, output = recording["speed_ref"], recording["encoder_position"]
+    if speed.clock.name != output.clock.name:
         raise InputError(
             f"command: speed_ref is on clock {speed.clock.name!r}, encoder_position on "
-            f"{user.clock.name!r}; they must share one"
+            f"{output.clock.name!r}; they must share one"
         )
-    return reconstruct(speed.time, speed.values, user.values, gain=gain, limit=limit)
+    return reconstruct(speed.time, speed.values, output.values, gain=gain, limit=limit)

@@ -34,7 +34,7 @@ class DriveFormat:
     encoder_shaft : str
         ``fast`` (test-bench thesis) or ``slow`` (transmission thesis).
     gear_ratio : float
-        Fast over slow, for the encoder on the fast shaft.
+        Fast over slow, for the encoder on the motor shaft.
     current_convention : str
         ``rms`` (ASSUMED, as catalogue currents are) or ``peak``: r76, r77, r78 and r1733.
     delimiter : str
@@ -87,7 +87,7 @@ def write_drive_csv(
         The CSV file.
     signals : mapping of str to array_like, shape (samples,)
         By recording name: ``time`` [s] and any of the drive's signals: positions [rad] each on its
-        own shaft (``encoder_position`` at the user, ``resolver_position`` at the motor),
+        own shaft (``encoder_position`` at the output, ``resolver_position`` at the motor),
         ``speed_ref``, ``motor_speed`` [rad/s], currents and ``voltage_q_ref`` [A, V peak],
         ``trigger``. Columns that are not given are left out. A simulation's ``motor_position`` and
         ``resolver_speed`` stand in for ``resolver_position`` and ``motor_speed`` where those lack.

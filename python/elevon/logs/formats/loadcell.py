@@ -56,7 +56,7 @@ class LoadCellLog:
 
 
 def brake_torque(force: npt.ArrayLike, arm: float, chain_ratio: float) -> FloatArray:
-    """Brake torque on the fast shaft [N m] from the force [N] at an arm [m] of the brake shaft.
+    """Brake torque on the motor shaft [N m] from the force [N] at an arm [m] of the brake shaft.
 
     The chain divides it: the brake shaft turns `chain_ratio` times slower than the motor.
     """

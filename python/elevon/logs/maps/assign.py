@@ -28,7 +28,8 @@ __all__ = ["Assignment", "assign_columns", "playing", "rms_to_peak", "settle_pos
 class Assignment:
     """A signal: its column, its factor from the file to SI (offset for temperatures), its unit.
 
-    `role` is empty where it plays none; `subtract_from` names the column it is subtracted from.
+    `role` is empty where it backlashes none; `subtract_from` names the column it is subtracted
+    from.
     """
 
     signal: str
@@ -46,7 +47,7 @@ class Assignment:
 
 
 def playing(assigned: Mapping[str, Assignment], role: str) -> Assignment | None:
-    """Return the signal that plays a role, if any."""
+    """Return the signal that has a role, if any."""
     return next((item for item in assigned.values() if item.role == role), None)
 
 

@@ -85,7 +85,7 @@ class ColumnEntry(BaseModel):
 
     @property
     def played(self) -> str:
-        """The role; empty where it plays none."""
+        """The role; empty where it backlashes none."""
         if self.role is not None:
             return self.role
         known = known_signals().get(self.signal or "")

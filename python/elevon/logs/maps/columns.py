@@ -84,6 +84,6 @@ def _check_columns(table: RawTable, recognised: Collection[str]) -> None:
         )
     if "r4820" not in recognised and "r4821" not in recognised:
         raise FormatError(
-            f"{table.source}: neither the motor's position (r4820) nor the user's (r4821); "
+            f"{table.source}: neither the motor's position (r4820) nor the output's (r4821); "
             f"columns: {names}"
         )

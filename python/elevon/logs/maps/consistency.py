@@ -2,8 +2,8 @@
 
 The drive's trace does not state in what unit the positions are written, nor on which shaft the
 encoder's is (the two theses disagree). Three facts settle it where the motor moves: the motor's
-position is the integral of its speed, the user's is the motor's over the gear ratio but for the
-play, and the possible units lie far apart.
+position is the integral of its speed, the output's is the motor's over the gear ratio but for the
+backlash, and the possible units lie far apart.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ __all__ = [
     "encoder_candidates",
     "match",
     "motor_candidates",
-    "slope_with_play",
+    "slope_with_backlash",
 ]
 
 MOTOR_COUNTS = 2.0**24  # absolute encoder of the motor, counts a turn (test-bench thesis)
 ENCODER_COUNTS = 20_000.0  # 5000 pulses, four edges each, a turn of the encoder's own wheel
-ENCODER_WHEEL = 88.0 / 22.0  # turns of the encoder's wheel per turn of the user
+ENCODER_WHEEL = 88.0 / 22.0  # turns of the encoder's wheel per turn of the output
 _TOLERANCE = 0.15
 _ENOUGH = 8.0  # travel over noise below which nothing is said
 
@@ -48,7 +48,7 @@ class Fit:
     ----------
     slope : float
         File units per rad of the reference.
-    play : float
+    backlash : float
         Width of the dead zone, in rad of the reference; 0 when not fitted.
     error : float
         RMS of the residual over RMS of the fitted motion.
@@ -57,7 +57,7 @@ class Fit:
     """
 
     slope: float
-    play: float
+    backlash: float
     error: float
     travel: float
 
@@ -78,7 +78,7 @@ def motor_candidates() -> tuple[UnitCandidate, ...]:
 
 
 def encoder_candidates(ratio: float) -> tuple[UnitCandidate, ...]:
-    """Ways the user encoder's position may be written, per rad of the motor."""
+    """Ways the output encoder's position may be written, per rad of the motor."""
     shafts = (("fast", 1.0), ("slow", 1.0 / ratio), ("wheel", ENCODER_WHEEL / ratio))
     units = (("rad", 1.0), ("deg", 180.0 / math.pi), ("rev", 0.5 / math.pi))
     angles = [UnitCandidate(unit, shaft, u * s) for shaft, s in shafts for unit, u in units]
@@ -92,7 +92,7 @@ def match(slope: float, candidates: tuple[UnitCandidate, ...]) -> UnitCandidate 
     return min(good, key=lambda c: abs(math.log(abs(slope) / c.scale))) if good else None
 
 
-def slope_with_play(reference: FloatArray, position: FloatArray) -> Fit:
+def slope_with_backlash(reference: FloatArray, position: FloatArray) -> Fit:
     """Fit a position as slope x (reference passed through a dead zone) + offset.
 
     Parameters
@@ -105,7 +105,7 @@ def slope_with_play(reference: FloatArray, position: FloatArray) -> Fit:
     Returns
     -------
     Fit
-        The best of a scan over the width of the play, refined by golden section.
+        The best of a scan over the width of the backlash, refined by golden section.
     """
     travel = float(np.ptp(reference)) if reference.size else 0.0
     if travel == 0.0 or np.ptp(position) == 0.0:
@@ -113,13 +113,13 @@ def slope_with_play(reference: FloatArray, position: FloatArray) -> Fit:
     step = max(1, len(reference) // 4000)
     x, y = reference[::step], position[::step]
     widths = travel * np.linspace(0.0, 0.6, 13)
-    errors = [_line(_through_play(x, width), y)[1] for width in widths]
+    errors = [_line(_through_backlash(x, width), y)[1] for width in widths]
     best = int(np.argmin(errors))
     low, high = widths[max(best - 1, 0)], widths[min(best + 1, len(widths) - 1)]
     width = _golden(x, y, float(low), float(high))
-    if errors[0] <= _line(_through_play(x, width), y)[1]:
+    if errors[0] <= _line(_through_backlash(x, width), y)[1]:
         width = 0.0
-    slope, error = _line(_through_play(x, width), y)
+    slope, error = _line(_through_backlash(x, width), y)
     return Fit(slope, width, error, travel)
 
 
@@ -127,15 +127,15 @@ def _golden(x: FloatArray, y: FloatArray, low: float, high: float) -> float:
     ratio = (math.sqrt(5.0) - 1.0) / 2.0
     for _ in range(12):
         a, b = high - ratio * (high - low), low + ratio * (high - low)
-        if _line(_through_play(x, a), y)[1] <= _line(_through_play(x, b), y)[1]:
+        if _line(_through_backlash(x, a), y)[1] <= _line(_through_backlash(x, b), y)[1]:
             high = b
         else:
             low = a
     return 0.5 * (low + high)
 
 
-def _through_play(x: FloatArray, width: float) -> FloatArray:
-    """Pass a motion through a dead zone of a total width (Prandtl's play operator)."""
+def _through_backlash(x: FloatArray, width: float) -> FloatArray:
+    """Pass a motion through a dead zone of a total width (Prandtl's backlash operator)."""
     if width == 0.0:
         return x
     half = 0.5 * width

@@ -16,7 +16,7 @@ from elevon.logs.maps.consistency import (
     encoder_candidates,
     match,
     motor_candidates,
-    slope_with_play,
+    slope_with_backlash,
 )
 from elevon.logs.report import ImportReport
 
@@ -29,7 +29,7 @@ _LEAST_TRAVEL = 0.5  # rad of the motor: less than that says nothing about a uni
 class PositionStatement:
     """What is said about a position column: file units per rad of the signal's own shaft, signed.
 
-    None where nothing is said. The own shaft is the motor's for the motor's position and the user's
+    None where nothing is given. The own shaft is the motor's for the motor's position, the output's
     for the encoder's, whatever shaft the file refers it to.
     """
 
@@ -115,7 +115,7 @@ def settle_encoder(
     trusted: bool = True,
     name: str = "encoder_position",
 ) -> tuple[float, bool]:
-    """Return the factor from the file's encoder position to rad at the user, and if confirmed.
+    """Return the factor from the file's encoder position to rad at the output, and if confirmed.
 
     Parameters
     ----------
@@ -138,11 +138,11 @@ def settle_encoder(
         Wrong sign, wrong shaft, or a scale that fits no unit.
     """
     good = np.isfinite(reference) & np.isfinite(position)
-    fit = slope_with_play(reference[good], position[good])
+    fit = slope_with_backlash(reference[good], position[good])
     if not (trusted and fit.usable and fit.travel > _LEAST_TRAVEL):
         why = "the motor's own unit is not confirmed" if not trusted else _why([fit])
         return _unconfirmed(statement, name, why, report, ratio), False
-    play = math.degrees(fit.play / ratio)
+    backlash = math.degrees(fit.backlash / ratio)
     if statement.per_rad is not None:
         against = "the motor's position over the gear ratio"
         _check_stated(statement, fit.slope * ratio, against, ratio)
@@ -163,13 +163,13 @@ def settle_encoder(
         name,
         "shaft-confirmed",
         f"{statement.column} is on the {candidate.shaft} shaft in {candidate.unit}: {follows}; "
-        f"play about {play:.3f} deg at the user",
+        f"backlash about {backlash:.3f} deg at the output",
     )
     return 1.0 / (candidate.scale * ratio), True
 
 
 def _against(reference: FloatArray, position: FloatArray) -> Fit:
-    """Fit without play; a slow drift of the integrated speed is taken out where it can be seen."""
+    """Fit without backlash; a slow drift of the integrated speed is removed where it is seen."""
     good = np.isfinite(reference) & np.isfinite(position)
     x, y = reference[good], position[good]
     travel = float(np.ptp(x)) if x.size else 0.0
@@ -203,7 +203,7 @@ def _refuse_shaft(
     if candidate.shaft == "wheel":
         raise InputError(
             f"{report.source}: {statement.column} (encoder) is on the wrong shaft: it turns "
-            f"{fit.slope / candidate.scale:.3f} x 4 times the user shaft, as the encoder's own "
+            f"{fit.slope / candidate.scale:.3f} x 4 times the output shaft, as the encoder's own "
             f"22-tooth wheel does; give shaft = 'slow', scale = 0.25, "
             f"unit = '{candidate.unit}' in a column map"
         )
@@ -235,7 +235,7 @@ def _unconfirmed(
     if statement.per_rad is not None:
         report.warn(name, "unit-unconfirmed", f"{statement.column}: unit as stated, {why}")
         return 1.0 / statement.per_rad
-    shaft = ", on the fast shaft" if ratio > 1.0 else ""
+    shaft = ", on the motor shaft" if ratio > 1.0 else ""
     report.warn(
         name,
         "unit-unconfirmed",

@@ -17,7 +17,7 @@ __all__ = ["LogSignal", "known_roles", "known_signals", "safe_name", "unit_among
 class LogSignal:
     """A signal's SI units, its own shaft (``fast``, ``slow`` or none) and what it is.
 
-    `scaled` says how a value on the fast shaft becomes one on the slow shaft: ``angle`` divides by
+    `scaled` says how a value on the motor shaft becomes one on the slow shaft: ``angle`` divides by
     the gear ratio, ``torque`` multiplies. `drive_current`: the drive may log it as rms.
     """
 
@@ -36,7 +36,7 @@ _SHAFTS = {
     "motor_speed": ("fast", "angle"),
     "speed_ref": ("fast", "angle"),
 }
-_TORQUES = ("motor_torque", "brake_torque", "load_torque")  # on the fast shaft
+_TORQUES = ("motor_torque", "brake_torque", "load_torque")  # on the motor shaft
 _OF_THE_DRIVE = ("current_ref", "torque_current", "direct_current", "torque_voltage")
 _OF_LOGS = {  # channels that only logs have
     "position_ref": "command",

@@ -1,4 +1,4 @@
-"""The no-load campaign of the Torino bench, simulated at all fifteen measured plays."""
+"""The no-load campaign of the Torino bench, simulated at all fifteen measured backlashes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from elevon.errors import SimulationError
 from elevon.report.checks import Check, verdict
-from elevon.reproduce.backlash.estimate import flat_lengths, lost_motion, play_from_encoder
+from elevon.reproduce.backlash.estimate import backlash_from_encoder, flat_lengths, lost_motion
 from elevon.reproduce.backlash.table import (
     BacklashRow,
     centre_distance,
@@ -28,7 +28,7 @@ FREQUENCY = 0.2
 DURATION = 35.0
 START = 10.0
 """What came before is transient and left out, as on the bench [s]."""
-RECORD = "encoder_position,user_position,motor_position,command@400 Hz"
+RECORD = "encoder_position,output_position,motor_position,command@400 Hz"
 RELATIVE_LIMIT = 0.02
 PRINT_LIMIT_DEG = 0.0025
 """Half of the spacing's last printed digit, 0.01 mm, carried through the formula."""
@@ -36,12 +36,12 @@ PRINT_LIMIT_DEG = 0.0025
 
 @dataclass(frozen=True, slots=True)
 class RowResult:
-    """One row: measured, calculated, put in, recovered. Angles in degrees at the user side."""
+    """One row: measured, calculated, put in, recovered. Angles in degrees at the output side."""
 
     measured: BacklashRow
     formula_deg: float
-    play_in_deg: float
-    play_out_deg: float
+    backlash_in_deg: float
+    backlash_out_deg: float
     spread_deg: float
     lost_motion_deg: float
     flat_s: float
@@ -49,13 +49,13 @@ class RowResult:
 
     @property
     def limit_deg(self) -> float:
-        """One encoder count and 2 % of the play put in."""
-        return self.count_deg + RELATIVE_LIMIT * self.play_in_deg
+        """One encoder count and 2 % of the backlash put in."""
+        return self.count_deg + RELATIVE_LIMIT * self.backlash_in_deg
 
     @property
     def error_deg(self) -> float:
         """Recovered less put in."""
-        return self.play_out_deg - self.play_in_deg
+        return self.backlash_out_deg - self.backlash_in_deg
 
     def to_dict(self) -> dict[str, Any]:
         """Return one row of the command's JSON object."""
@@ -65,11 +65,11 @@ class RowResult:
             "spacing_mm": self.measured.spacing_mm,
             "measured_total_deg": self.measured.measured_total_deg,
             "formula_deg": self.formula_deg,
-            "play_in_deg": self.play_in_deg,
-            "play_out_deg": self.play_out_deg,
+            "backlash_in_deg": self.backlash_in_deg,
+            "backlash_out_deg": self.backlash_out_deg,
             "error_deg": self.error_deg,
             "limit_deg": self.limit_deg,
-            "play_out_spread_deg": self.spread_deg,
+            "backlash_out_spread_deg": self.spread_deg,
             "lost_motion_deg": self.lost_motion_deg,
             "flat_s": self.flat_s,
         }
@@ -108,7 +108,7 @@ def no_load_scenario() -> dict[str, Any]:
 
 
 def reproduce_backlash(*, seed: int = 0, progress: Progress | None = None) -> BacklashResult:
-    """Simulate the campaign at every measured play and recover each from its encoder.
+    """Simulate the campaign at every measured backlash and recover each from its encoder.
 
     Parameters
     ----------
@@ -133,10 +133,15 @@ def reproduce_backlash(*, seed: int = 0, progress: Progress | None = None) -> Ba
     actuator = Actuator.load(ACTUATOR)
     scenario = Scenario.from_dict(no_load_scenario())
     table = measured_rows()
-    plays = [0.0, *(row.measured_total_deg for row in table)]
+    backlashes = [0.0, *(row.measured_total_deg for row in table)]
     runs = [
-        Run(actuator.with_values({"play.total": math.radians(play)}), scenario, seed, f"{play} deg")
-        for play in plays
+        Run(
+            actuator.with_values({"backlash.total": math.radians(backlash)}),
+            scenario,
+            seed,
+            f"{backlash} deg",
+        )
+        for backlash in backlashes
     ]
     blank, *recordings = simulate_batch(runs, fidelity="high", record=RECORD, progress=progress)
     _require_complete([blank, *recordings])
@@ -156,7 +161,7 @@ def _require_complete(recordings: Sequence[Recording]) -> None:
     for recording in recordings:
         if recording.status != "ok":
             raise SimulationError(
-                f"play {recording.meta['label']}: {recording.meta['message']}", recording.status
+                f"backlash {recording.meta['label']}: {recording.meta['message']}", recording.status
             )
 
 
@@ -170,7 +175,7 @@ def _row(
     count: float,
 ) -> RowResult:
     encoder = recording["encoder_position"]
-    estimate = play_from_encoder(
+    estimate = backlash_from_encoder(
         encoder.time,
         encoder.values,
         blank["encoder_position"].values,
@@ -183,8 +188,8 @@ def _row(
     return RowResult(
         measured=measured,
         formula_deg=formula_deg(measured.spacing_mm),
-        play_in_deg=measured.measured_total_deg,
-        play_out_deg=math.degrees(estimate.total),
+        backlash_in_deg=measured.measured_total_deg,
+        backlash_out_deg=math.degrees(estimate.total),
         spread_deg=math.degrees(estimate.spread),
         lost_motion_deg=math.degrees(lost_motion(encoder.time, motor, encoder.values, START)),
         flat_s=float(flats.mean()),
@@ -198,7 +203,7 @@ def _checks(rows: Sequence[RowResult], count: float) -> list[Check]:
               row.limit_deg, "deg")
         for row in rows
     ]  # fmt: skip
-    lost = max(abs(row.lost_motion_deg - row.play_in_deg) for row in rows)
+    lost = max(abs(row.lost_motion_deg - row.backlash_in_deg) for row in rows)
     distance = [
         abs(centre_distance(row.measured.micrometer_mm) - row.measured.centre_distance_mm)
         for row in rows
@@ -218,5 +223,5 @@ def _checks(rows: Sequence[RowResult], count: float) -> list[Check]:
 def _rank_correlation(rows: Sequence[RowResult]) -> float:
     from scipy.stats import spearmanr
 
-    correlation = spearmanr([row.play_in_deg for row in rows], [row.flat_s for row in rows])
+    correlation = spearmanr([row.backlash_in_deg for row in rows], [row.flat_s for row in rows])
     return float(correlation.statistic)

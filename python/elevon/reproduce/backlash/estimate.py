@@ -1,14 +1,14 @@
-"""Play from an encoder signal alone, under a position loop that is closed on the encoder.
+"""Backlash from an encoder signal alone, under a position loop that is closed on the encoder.
 
-The play is crossed while the encoder stands still, where the encoder says nothing of the motor.
+The backlash is crossed while the encoder stands still, where the encoder says nothing of the motor.
 How long the flat lasts depends on how the loop drives the motor through the gap, on friction, and
 on the relays' chance. One thing does not: the loop's integral action. Over half a period, from
 shortly before one reversal to shortly before the next, the motor turns the encoder's own travel
-plus the play. The speed reference is G (command - encoder), and a speed loop with integral action
-follows it up to what it needs to turn the friction round, the same with and without play. So, for
-two runs of one command, with play B and without (a blank),
+plus the backlash. The speed reference is G (command - encoder), and a speed loop with integral
+action follows it up to what it needs to turn the friction round, the same with and without
+backlash. So, for two runs of one command, with backlash B and without (a blank),
 
-    B = +- G * integral over half a period of (encoder with play - encoder of the blank) dt,
+    B = +- G * integral over half a period of (encoder with backlash - encoder of the blank) dt,
 
 plus at a top, minus at a bottom. No inertia, friction, gain of the speed loop or timing enters.
 With a speed loop that has no integral action, or one frozen by an anti-windup scheme, the equality
@@ -24,27 +24,27 @@ import numpy.typing as npt
 
 from elevon.errors import InputError
 
-__all__ = ["PlayEstimate", "flat_lengths", "lost_motion", "play_from_encoder"]
+__all__ = ["BacklashEstimate", "backlash_from_encoder", "flat_lengths", "lost_motion"]
 
 Array = npt.NDArray[np.float64]
 
 LEAD = 0.1
 """How long before the encoder's extremes the half periods are cut, in periods: the loop has had
-four tenths of a period to settle, and neither friction nor play has begun to turn round."""
+four tenths of a period to settle, and neither friction nor backlash has begun to turn round."""
 
 
 @dataclass(frozen=True, slots=True)
-class PlayEstimate:
-    """Play recovered from an encoder signal.
+class BacklashEstimate:
+    """Backlash recovered from an encoder signal.
 
     Attributes
     ----------
     total : float
-        Total play at the user side, mean over the reversals [rad].
+        Total backlash at the output side, mean over the reversals [rad].
     spread : float
         Standard deviation over the reversals [rad]; 0 when there is only one.
     each : ndarray, shape (n,)
-        Play of each reversal [rad].
+        Backlash of each reversal [rad].
     """
 
     total: float
@@ -52,28 +52,28 @@ class PlayEstimate:
     each: Array
 
 
-def play_from_encoder(
+def backlash_from_encoder(
     time: Array, encoder: Array, blank: Array, *, frequency: float, loop_gain: float, start: float
-) -> PlayEstimate:
-    """Recover the total play from two encoder signals of one sine command.
+) -> BacklashEstimate:
+    """Recover the total backlash from two encoder signals of one sine command.
 
     Parameters
     ----------
     time : ndarray, shape (n,)
         Common time of both signals [s], strictly increasing.
     encoder, blank : ndarray, shape (n,)
-        Encoder positions at the user side with and without play [rad].
+        Encoder positions at the output side with and without backlash [rad].
     frequency : float
         Frequency of the commanded sine [Hz].
     loop_gain : float
-        Speed of the user side that the position loop asks for a unit of error [1/s]: the
+        Speed of the output side that the position loop asks for a unit of error [1/s]: the
         position gain over the gear ratio.
     start : float
         Samples before this time are left out [s].
 
     Returns
     -------
-    PlayEstimate
+    BacklashEstimate
 
     Raises
     ------
@@ -82,20 +82,20 @@ def play_from_encoder(
     """
     if not time.shape == encoder.shape == blank.shape:
         raise InputError(
-            f"play: time, encoder and blank have {time.size}, {encoder.size} and {blank.size} "
+            f"backlash: time, encoder and blank have {time.size}, {encoder.size} and {blank.size} "
             "samples"
         )
     if not (np.isfinite(encoder).all() and np.isfinite(blank).all()):
-        raise InputError("play: the encoder signals must be finite")
+        raise InputError("backlash: the encoder signals must be finite")
     cuts, signs = _half_periods(time, encoder, frequency, start)
     area = _integral(time, encoder - blank)
     ends = np.interp(cuts + 0.5 / frequency, time, area)
     each = signs * loop_gain * (ends - np.interp(cuts, time, area))
-    return PlayEstimate(float(each.mean()), float(each.std()), each)
+    return BacklashEstimate(float(each.mean()), float(each.std()), each)
 
 
 def lost_motion(time: Array, motor: Array, encoder: Array, start: float) -> float:
-    """Return the range of motor position (at the user) less encoder after `start` [rad]."""
+    """Return the range of motor position (at the output) less encoder after `start` [rad]."""
     return float(np.ptp((motor - encoder)[time >= start]))
 
 
@@ -118,7 +118,7 @@ def _half_periods(
     used = time >= start
     angle = 2.0 * np.pi * frequency * time[used]
     if not angle.size:
-        raise InputError(f"play: no samples at or after {start:g} s")
+        raise InputError(f"backlash: no samples at or after {start:g} s")
     design = np.column_stack([np.ones_like(angle), np.sin(angle), np.cos(angle)])
     _, sine, cosine = np.linalg.lstsq(design, encoder[used], rcond=None)[0]
     phase = float(np.arctan2(cosine, sine))
@@ -127,7 +127,9 @@ def _half_periods(
     cuts = extremes - LEAD / frequency
     whole = (cuts >= start) & (cuts + 0.5 / frequency <= time[-1])
     if not whole.any():
-        raise InputError(f"play: no whole half period of {0.5 / frequency:g} s after {start:g} s")
+        raise InputError(
+            f"backlash: no whole half period of {0.5 / frequency:g} s after {start:g} s"
+        )
     signs = np.where(turns % 2 == 0, 1.0, -1.0)
     return cuts[whole], signs[whole]
 

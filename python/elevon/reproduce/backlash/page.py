@@ -29,15 +29,16 @@ def backlash_report(result: BacklashResult, *, date: str | None = None) -> Repor
     worst = max(result.rows, key=lambda row: abs(row.error_deg) / row.limit_deg)
     report = Report(
         "Backlash of the Torino bench",
-        "Fifteen measured plays, put into the simulated actuator and recovered from its encoder "
+        "Fifteen measured backlashes, put into the simulated actuator and recovered from its "
+        "encoder "
         f"alone. Largest error against its limit: row {worst.measured.row}, "
         f"{abs(worst.error_deg):.4f} of {worst.limit_deg:.4f} deg.",
         date=date,
     )
     errors = np.array([row.error_deg for row in result.rows])
-    gaps = np.array([row.formula_deg - row.play_in_deg for row in result.rows])
+    gaps = np.array([row.formula_deg - row.backlash_in_deg for row in result.rows])
     report.fact("Error of recovery", f"{np.sqrt(np.mean(errors**2)):.4f} deg", "RMS, fifteen rows")
-    report.fact("Encoder count", f"{result.encoder_count_deg:.4f} deg", "at the user side")
+    report.fact("Encoder count", f"{result.encoder_count_deg:.4f} deg", "at the output side")
     report.fact("Formula less measured", f"{gaps.min():+.2f} deg", "largest, at the widest spacing")
     values = result.to_dict()
     report.fact("Simulated", f"{values['sim_s']:.0f} s", f"{len(result.rows) + 1} runs, 1 us steps")
@@ -49,7 +50,7 @@ def backlash_report(result: BacklashResult, *, date: str | None = None) -> Repor
         provenance(
             "elevon reproduce torino-backlash --out DIR",
             **{
-                "Parameter hash (no play)": values["parameter_hash"],
+                "Parameter hash (no backlash)": values["parameter_hash"],
                 "Seed": values["seed"],
                 "Core": values["version"],
             },
@@ -59,14 +60,14 @@ def backlash_report(result: BacklashResult, *, date: str | None = None) -> Repor
 
 
 def summary_figure(rows: Sequence[RowResult]) -> Figure:
-    """Draw measured, calculated and recovered play over the spacing."""
+    """Draw measured, calculated and recovered backlash over the spacing."""
     spacing = np.array([row.measured.spacing_mm for row in rows])
     with new_figure(width=8.0, height=3.8) as (figure, axes):
         axes.plot(
             spacing,
             [row.formula_deg for row in rows],
             color=COLOURS["grey"],
-            label="geometric formula, with the intrinsic play",
+            label="geometric formula, with the intrinsic backlash",
         )
         axes.plot(
             spacing,
@@ -79,13 +80,13 @@ def summary_figure(rows: Sequence[RowResult]) -> Figure:
         )
         axes.plot(
             spacing,
-            [row.play_out_deg for row in rows],
+            [row.backlash_out_deg for row in rows],
             "x",
             color=COLOURS["orange"],
             label="recovered from the simulated encoder",
         )
         axes.set(
-            xlabel="Radial spacing of the gears [mm]", ylabel="Total play [deg]", ylim=(0, 2.8)
+            xlabel="Radial spacing of the gears [mm]", ylabel="Total backlash [deg]", ylim=(0, 2.8)
         )
         axes.legend(loc="upper left")
     return figure
@@ -95,9 +96,9 @@ def _comparison(report: Report, result: BacklashResult) -> None:
     section = report.section(
         "Measured, calculated, simulated",
         "The formula is that of ideal teeth. Above some 2 mm of spacing the printed gears' flanks "
-        "are no involutes any more and the bench shows more play than the formula.",
+        "are no involutes any more and the bench shows more backlash than the formula.",
     )
-    section.figure(summary_figure(result.rows), "Total play against the spacing of the gears.")
+    section.figure(summary_figure(result.rows), "Total backlash against the spacing of the gears.")
     columns = [
         "Row", "Micrometer [mm]", "Measured [deg]", "Formula [deg]", "Put in [deg]",
         "Recovered [deg]", "Error [deg]", "Limit [deg]", "Motor less encoder [deg]", "Flat [s]",
@@ -108,8 +109,8 @@ def _comparison(report: Report, result: BacklashResult) -> None:
             row.measured.micrometer_mm,
             row.measured.measured_total_deg,
             row.formula_deg,
-            row.play_in_deg,
-            row.play_out_deg,
+            row.backlash_in_deg,
+            row.backlash_out_deg,
             row.error_deg,
             row.limit_deg,
             row.lost_motion_deg,
@@ -118,9 +119,10 @@ def _comparison(report: Report, result: BacklashResult) -> None:
         for row in result.rows
     ]
     formats = ["d", ".2f", ".4f", ".4f", ".4f", ".4f", "+.4f", ".4f", ".4f", ".3f"]
-    section.table(Table(columns, rows, "Total play at the user side.", formats=formats))
+    section.table(Table(columns, rows, "Total backlash at the output side.", formats=formats))
     section.figure(
-        _errors(result), "Error of the recovered play; the band is one count and 2 % of the play."
+        _errors(result),
+        "Error of the recovered backlash; the band is one count and 2 % of the backlash.",
     )
 
 
@@ -128,7 +130,7 @@ def _traces(report: Report, result: BacklashResult) -> None:
     section = report.section(
         "What the encoder sees",
         "While the gap is crossed the encoder stands still. The loop, closed on the encoder, "
-        "drives the motor on: it overshoots by the play and the flat ends with a step in speed.",
+        "drives the motor on: it overshoots by the backlash; the flat ends with a step in speed.",
     )
     section.figure(
         _trace_figure(result),
@@ -140,12 +142,15 @@ def _traces(report: Report, result: BacklashResult) -> None:
 def _method(report: Report, result: BacklashResult) -> None:
     edges = f"{result.encoder_count_deg:g} deg"
     report.section(
-        "How the play is recovered",
+        "How the backlash is recovered",
         "From encoder signals only. Over half a period, from before one reversal to before the "
-        "next, the motor turns the encoder's own travel plus the play. The loop's integral action "
+        "next, the motor turns the encoder's own travel plus the backlash. The loop's integral "
+        "action "
         "makes the time integral of command less encoder, times the position gain, equal to that "
-        "travel, up to what friction takes to turn round. The same command without play (a blank "
-        "run) takes the same for friction. So the play is the position gain times the area between "
+        "travel, up to what friction takes to turn round. The same command without backlash (a "
+        "blank "
+        "run) takes the same for friction. So the backlash is the position gain times the area "
+        "between "
         "the two encoder signals over half a period: no inertia, friction or timing enters. The "
         f"areas of the reversals after {START:g} s are averaged; a count is {edges}.",
         "Second estimate, for comparison: the range of motor position less encoder, which a bench "
@@ -155,12 +160,12 @@ def _method(report: Report, result: BacklashResult) -> None:
 
 def _errors(result: BacklashResult) -> Figure:
     with new_figure(width=8.0, height=2.6) as (figure, axes):
-        play = np.array([row.play_in_deg for row in result.rows])
+        backlash = np.array([row.backlash_in_deg for row in result.rows])
         limit = np.array([row.limit_deg for row in result.rows])
-        axes.fill_between(play, -limit, limit, color=COLOURS["green"], alpha=0.15, lw=0)
+        axes.fill_between(backlash, -limit, limit, color=COLOURS["green"], alpha=0.15, lw=0)
         axes.axhline(0.0, color=COLOURS["grey"], lw=0.8)
         axes.errorbar(
-            play,
+            backlash,
             [row.error_deg for row in result.rows],
             [row.spread_deg for row in result.rows],
             fmt="o",
@@ -168,7 +173,7 @@ def _errors(result: BacklashResult) -> Figure:
             lw=1,
             color=COLOURS["orange"],
         )
-        axes.set(xlabel="Play put in [deg]", ylabel="Error [deg]")
+        axes.set(xlabel="Backlash put in [deg]", ylabel="Error [deg]")
     return figure
 
 
@@ -179,11 +184,11 @@ def _trace_figure(result: BacklashResult) -> Figure:
             period = 1.0 / FREQUENCY
             _draw_trace(whole, result, number, (START, START + period))
             _draw_trace(top, result, number, (START + 0.2 * period, START + 0.42 * period))
-            play = result.rows[number - 1].play_in_deg
-            whole.set(title=f"Row {number}: {play:.2f} deg", ylim=(1.0, 19.0))
+            backlash = result.rows[number - 1].backlash_in_deg
+            whole.set(title=f"Row {number}: {backlash:.2f} deg", ylim=(1.0, 19.0))
             top.set(xlabel="Time [s]", ylim=(14.2, 18.8))
         for axis in axes[:, 0]:
-            axis.set_ylabel("Position at the user [deg]")
+            axis.set_ylabel("Position at the output [deg]")
         axes[0, 0].legend(loc="lower left")
     return figure
 

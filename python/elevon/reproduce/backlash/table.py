@@ -10,7 +10,7 @@ from elevon.data import read_table
 __all__ = ["INTRINSIC_DEG", "BacklashRow", "centre_distance", "formula_deg", "measured_rows"]
 
 INTRINSIC_DEG = 0.365568
-"""Play of the bench itself at zero spacing, total, at the user side (thesis) [deg]."""
+"""Backlash of the bench itself at zero spacing, total, at the output side (thesis) [deg]."""
 PRESSURE_ANGLE = math.radians(20.0)
 PITCH_RADIUS_MM = 88.0
 """Module 2 times 88 teeth, halved."""
@@ -27,9 +27,9 @@ class BacklashRow:
     micrometer_mm, centre_distance_mm, spacing_mm : float
         Reading, distance of the two gears' centres, and that less the distance of row 1.
     calculated_deg : float
-        Net play of the formula as printed.
+        Net backlash of the formula as printed.
     measured_total_deg : float
-        Measured total play: the printed radians in degrees.
+        Measured total backlash: the printed radians in degrees.
     """
 
     row: int
@@ -61,10 +61,10 @@ def centre_distance(micrometer_mm: float) -> float:
 
 
 def formula_deg(spacing_mm: float) -> float:
-    """Return the total play [deg] that a radial spacing gives between ideal teeth.
+    """Return the total backlash [deg] that a radial spacing gives between ideal teeth.
 
     Two flanks, each opening by spacing * tan(pressure angle), over the pitch radius, and the
-    bench's intrinsic play. The published form divides by z instead of the pitch radius m z / 2
+    bench's intrinsic backlash. The published form divides by z instead of the pitch radius m z / 2
     and is right only because m = 2.
     """
     opened = 2.0 * spacing_mm * math.tan(PRESSURE_ANGLE) / PITCH_RADIUS_MM

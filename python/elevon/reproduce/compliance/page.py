@@ -30,7 +30,7 @@ def compliance_report(
     stiffness = result.robust.stiffness * NM_PER_RAD
     report = Report(
         "Stiffness of the Torino transmission",
-        f"Forty drops of a weight give {stiffness:.0f} N m/rad at the user shaft, 95 % interval "
+        f"Forty drops of a weight give {stiffness:.0f} N m/rad at the output shaft, 95 % interval "
         f"{low:.0f} to {high:.0f}. The published {PUBLISHED_N_PER_DEG} is the other regression.",
         date=date,
     )
@@ -110,7 +110,7 @@ def _answer(report: Report, result: ComplianceResult) -> None:
         f"rows give {fit.stiffness:.1f} N/deg, that is {per_degree:.1f} N m/deg or "
         f"{fit.stiffness * NM_PER_RAD:.0f} N m/rad. Drawing whole weights with replacement gives "
         f"{low * NM_PER_RAD:.0f} to {high * NM_PER_RAD:.0f} N m/rad (95 %). "
-        f"{fit.offset:.3f} deg are lost already at no load: play and friction.",
+        f"{fit.offset:.3f} deg are lost already at no load: backlash and friction.",
         f"A straight line is not the whole truth: a quadratic term is significant "
         f"(p = {result.curvature_p:.1g}), the transmission stiffens with load.",
     ).points(

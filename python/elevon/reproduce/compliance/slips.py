@@ -32,7 +32,7 @@ class Drop:
     load_n : float
         Printed load [N].
     motor_deg, encoder_deg : float
-        End positions at the user shaft [deg].
+        End positions at the output shaft [deg].
     loss_deg : float
         Angle lost between them [deg].
     """

@@ -50,7 +50,8 @@ def _sentence(result: CranfieldResult) -> str:
     if mean is None or worst is None:
         return "This folder does not hold what the comparison at a load left out needs."
     return (
-        f"At a load that was never trained, healthy, play and lost lubrication are told apart with "
+        "At a load that was never trained, healthy, backlash and lost lubrication are "
+        f"distinguished with "
         f"a macro-F1 of {mean:.3f} (worst load {worst:.3f}); which of it is the fault and which "
         "the session of its recording, these data cannot tell."
     )

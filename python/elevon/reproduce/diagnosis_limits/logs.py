@@ -31,7 +31,7 @@ _CHIRP = {
 _RAMP = {"kind": "ramp", "initial": "0.2 N m", "slope": "0.09 N m/s", "start": "0 s", "end": "20 s"}
 _BRAKE = {"kind": "brake", "terms": [_RAMP]}
 
-#: The bench's own no-load, chirp and loaded tests, each unit with its own play.
+#: The bench's own no-load, chirp and loaded tests, each unit with its own backlash.
 TESTS: dict[str, tuple[dict[str, Any], ...]] = {
     "noload": ({"kind": "trace", "command": {"terms": [_SINE]}},),
     "chirp": ({"kind": "trace", "command": {"terms": [_CHIRP]}},),

@@ -28,7 +28,7 @@ def limits_report(result: DiagnosisLimits, *, date: str | None = None) -> Report
     report = Report(
         "How small a fault the diagnosis sees",
         f"{values['units']} units of a bench that is unlike the model (two masses with elastic "
-        "play, carrier PWM, another friction law, imperfect sensors), each calibrated on one "
+        "backlash, carrier PWM, another friction law, imperfect sensors), each calibrated on one "
         f"healthy log a test; {values['healthy_logs']} healthy and {values['faulty_logs']} faulty "
         "logs of other days, those three as baselines.",
         date=date,

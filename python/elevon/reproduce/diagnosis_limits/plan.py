@@ -49,7 +49,9 @@ class Fault:
 
 _PHASES = tuple(f"motor.phase_{p}" for p in "abc")
 FAULTS: tuple[Fault, ...] = (
-    Fault("play", ("transmission",), math.radians(0.13), math.radians(0.13), math.radians(0.26)),
+    Fault(
+        "backlash", ("transmission",), math.radians(0.13), math.radians(0.13), math.radians(0.26)
+    ),
     Fault("friction", ("transmission",), 0.25, 0.25, 1.0),
     Fault("short", _PHASES, 0.20, 0.10, 0.40),
     Fault("eccentricity_static", ("motor",), 0.10, 0.05, 0.20),

@@ -19,13 +19,13 @@ __all__ = ["BASE", "DAILY", "Unit", "draw_unit", "of_the_day"]
 
 BASE = "torino-rotary"
 
-#: Built alike in all units, unlike the set: elastic play between two masses, a carrier PWM with
+#: Built alike in all units, unlike the set: elastic backlash between two masses, a carrier PWM with
 #: real switches, a sampled controller on encoder counts with a filtered derivative, imperfect
 #: current sensors. The step is the set's, 1 us: edges of the PWM fall on whole steps, and at 5 us
 #: that shifts the mean voltage by up to a third of what depends on the speed.
 _BUILT: dict[str, float | str] = {
     "drive.kind": "pwm",
-    "play.model": "elastic",
+    "backlash.model": "elastic",
     "control.position_feedback": "encoder",
     "control.sample_time": 125e-6,
     "control.derivative_filter": 10.0,
@@ -42,9 +42,9 @@ _BETWEEN = {
     "motor.winding_inductance": 0.05,
     "motor.emf_constant": 0.02,
     "friction.viscous": 0.25,
-    "play.total": 0.15,
-    "play.stiffness": 0.20,
-    "play.damping": 0.30,
+    "backlash.total": 0.15,
+    "backlash.stiffness": 0.20,
+    "backlash.damping": 0.30,
     "load.inertia": 0.20,
     "control.position_gain": 0.03,
     "control.speed_gain": 0.08,

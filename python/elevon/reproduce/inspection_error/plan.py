@@ -40,7 +40,7 @@ class Growing:
 
 
 FAULTS: tuple[Growing, ...] = (
-    Growing("gear_wear", "play@transmission", (3e-4, 2e-3, 0.01, 0.025), faint=1.5e-4),
+    Growing("gear_wear", "backlash@transmission", (3e-4, 2e-3, 0.01, 0.025), faint=1.5e-4),
     Growing("lubricant_loss", "friction@transmission", (0.2, 0.6, 1.1, 1.5), 0.1, 2.3),
     Growing("insulation", "short@motor.phase_a", (0.05, 0.1, 0.2, 0.4), faint=0.025),
 )

@@ -59,7 +59,7 @@ HISTORY = 30.0
 DRIFT = 4.0
 """The laboratory warms by so much during a block [K] (ASSUMED): random order keeps it out of the
 effects."""
-RECORD = "command,user_position,current_a,current_b,current_c,winding_temperature,limited@1 kHz"
+RECORD = "command,output_position,current_a,current_b,current_c,winding_temperature,limited@1 kHz"
 SOLVER = {"solver.step": 5e-6}
 BATCH = 16
 FACTORS = (
@@ -263,7 +263,7 @@ def _measures(recording: Recording, period: float) -> list[float]:
             f"{label}: ended at {meta['sim_s']:g} s, before the statistics begin at {SETTLE:g} s"
         )
     currents = np.stack([recording[f"current_{phase}"].values[late] for phase in "abc"])
-    error = recording["command"].values[late] - recording["user_position"].values[late]
+    error = recording["command"].values[late] - recording["output_position"].values[late]
     winding = recording["winding_temperature"].values
     read = min(int(np.searchsorted(time, HISTORY - 1e-6)), time.size - 1)
     return [

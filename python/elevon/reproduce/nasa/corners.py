@@ -44,7 +44,7 @@ def corner_rows(actuator: Actuator, progress: Progress | None = None) -> list[di
         )
         for shape, load, acceleration in cases
     ]
-    record = "command,user_position,current_ref@2 kHz"
+    record = "command,output_position,current_ref@2 kHz"
     rows = []
     recordings = simulate_batch(runs, fidelity="high", record=record, progress=progress)
     for (shape, load, acceleration), recording in zip(cases, recordings, strict=True):
@@ -52,7 +52,7 @@ def corner_rows(actuator: Actuator, progress: Progress | None = None) -> list[di
             raise SimulationError(f"{recording.meta['label']}: {recording.meta['message']}")
         late = recording["command"].time >= SETTLE
         current = recording["current_ref"].values[late]
-        error = (recording["command"].values - recording["user_position"].values)[late]
+        error = (recording["command"].values - recording["output_position"].values)[late]
         rows.append(
             {
                 "profile": shape,

@@ -235,7 +235,7 @@ def _predicted(
         {
             "duration": float(time[-1]),
             "command": {"mode": "position", "terms": [_table(time, command.values)]},
-            "load": {"user": {"terms": [_table(time, force.values)]}},
+            "load": {"output": {"terms": [_table(time, force.values)]}},
         }
     )
     if state == "jam":

@@ -141,7 +141,7 @@ def _hours(nominal: Actuator, values: Sequence[Array], progress: Progress | None
         for i, (before, after) in enumerate(pairwise(LOADS))
     ]
     terms = [{"kind": "constant", "value": LOADS[0]}, *steps]
-    data["load"] = {"user": {"terms": terms}}
+    data["load"] = {"output": {"terms": terms}}
     scenario = Scenario.from_dict(data)
     runs = [Run(nominal.with_values(_named(v)), scenario, label="thermal hour") for v in values]
     recordings = simulate_batch(runs, fidelity="low", record=RECORD, progress=progress)

@@ -24,7 +24,7 @@ __all__ = ["History", "time_histories"]
 Array = npt.NDArray[np.float64]
 
 RECORD = (
-    "command,user_position,joint_force,current_ref,winding_temperature,surface_temperature@200 Hz"
+    "command,output_position,joint_force,current_ref,winding_temperature,surface_temperature@200 Hz"
 )
 POUND_FORCE = float(to_si(1.0, "lbf"))
 
@@ -51,7 +51,7 @@ def _conditions() -> list[tuple[int, str, dict[str, Any]]]:
     sine = Profile("sinusoidal", 0.05, 0.06, 40.0)
     stepped = profile_scenario(sine)
     step = {"kind": "step", "initial": 500.0, "final": 4500.0, "time": 20.0}
-    stepped["load"] = {"user": {"terms": [step]}}
+    stepped["load"] = {"output": {"terms": [step]}}
     short = Profile("sinusoidal", 0.05, 0.06, 20.0)
     opposed = profile_scenario(short, opposing=900.0 * POUND_FORCE)
     triangle = Profile("triangular", 0.05, 0.06, 20.0)

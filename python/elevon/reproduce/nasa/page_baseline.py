@@ -114,7 +114,7 @@ def _history_figure(history: History) -> Figure:
     with new_figure(2, 2, width=8.0, height=4.4, sharex=True) as (figure, grid):
         position, load, current, warm = grid.flat
         position.plot(history.time, 1e3 * curve["command"], color=COLOURS["grey"], label="command")
-        position.plot(history.time, 1e3 * curve["user_position"], color=COLOURS["blue"],
+        position.plot(history.time, 1e3 * curve["output_position"], color=COLOURS["blue"],
                       label="position", lw=1)  # fmt: skip
         position.set_ylabel("Position [mm]")
         _legend_above(position)

@@ -71,7 +71,7 @@ SPREADS = (
            "makers hold the torque of a preload to 10 to 30 %"),
     Spread(FRICTION_COEFFICIENT, (), "factor", 0.05, "grease, finish and run-in of the raceways"),
     Spread("friction of the load side", ("load.friction",), "factor", 0.10, "guides and seals"),
-    Spread("play of the fixture", ("play.total",), "factor", 0.20, "pins are fitted anew"),
+    Spread("backlash of the fixture", ("backlash.total",), "factor", 0.20, "pins are fitted anew"),
     Spread("EMF constant", ("motor.emf_constant",), "factor", 0.01, "magnets of another article"),
     Spread("gain of each current sensor",
            ("sensor.current.gain_a",), "added", 0.005, "adjusted to 0.5 %"),

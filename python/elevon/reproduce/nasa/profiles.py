@@ -165,9 +165,9 @@ def profile_scenario(
         data["parameters"] = {"load.stiffness": abs(load) / profile.amplitude}
     elif kind == "step":
         step = {"kind": "step", "final": load, "time": 0.5 * profile.duration}
-        loads["user"] = {"terms": [step]}
+        loads["output"] = {"terms": [step]}
     elif load != 0.0:
-        loads["user"] = {"terms": [{"kind": "constant", "value": load}]}
+        loads["output"] = {"terms": [{"kind": "constant", "value": load}]}
     if opposing:
         loads["brake"] = {"terms": [{"kind": "constant", "value": opposing}]}
     return {**data, "load": loads} if loads else data

@@ -211,7 +211,7 @@ def _hour(actuator: Actuator, seed: int, progress: Progress | None) -> Recording
     data = profile_scenario(PROFILE)
     low, high = LOADS
     step = {"kind": "step", "initial": low, "final": high, "time": STEP_TIME}
-    data["load"] = {"user": {"terms": [step]}}
+    data["load"] = {"output": {"terms": [step]}}
     return _simulate(actuator, data, "10 Hz", seed, progress)
 
 

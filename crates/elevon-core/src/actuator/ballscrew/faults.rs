@@ -53,8 +53,8 @@ pub fn catalogue() -> Vec<FaultKind> {
         },
         FaultKind {
             kind: "adapter_gap", unit: "m", range: Range::Between(0.0, 5e-3), attributes: &[],
-            places: places!("adapter": "play.extra" Add),
-            effect: "gap of the backlash adapter between load cell and ram, the stand's way to seed play: impacts at each reversal; `play` is the same lost motion of worn parts",
+            places: places!("adapter": "backlash.extra" Add),
+            effect: "gap of the backlash adapter between load cell and ram, the stand's way to seed backlash: impacts at each reversal; `backlash` is the same lost motion of worn parts",
             source: "N 4.1",
         },
     ]);
@@ -64,9 +64,9 @@ pub fn catalogue() -> Vec<FaultKind> {
 /// Sentences for kinds of the common catalogue that have a namesake among the screw's own.
 fn told_apart(kind: &str) -> Option<&'static str> {
     match kind {
-        "jam" => Some("torque on the fast shaft at which the whole mechanism seizes; a blocked return channel of the nut is `return_jam`"),
+        "jam" => Some("torque on the motor shaft at which the whole mechanism seizes; a blocked return channel of the nut is `return_jam`"),
         "lubrication" => Some("fraction added to the viscous drag (negative: thinner lubricant); a screw that loses its lubricant is `lubrication_loss`"),
-        "play" => Some("total play added between ram and load by worn parts: lost motion and impacts; the gap that the stand sets on purpose is `adapter_gap`"),
+        "backlash" => Some("total backlash added between ram and load by worn parts: lost motion and impacts; the gap that the stand sets on purpose is `adapter_gap`"),
         _ => None,
     }
 }

@@ -6,9 +6,9 @@ use crate::actuator::{Finding, Port};
 use crate::control::position_speed::{ControlParameter as C, CONTROL};
 use crate::groups;
 use crate::sensor::encoder::{EncoderParameter as E, ENCODER};
+use crate::transmission::backlash::{BacklashParameter as P, BACKLASH};
 use crate::transmission::friction::{FrictionParameter as F, FRICTION};
 use crate::transmission::gear::{GearParameter, LoadParameter as D, StopParameter as T, GEAR, LOAD, STOP};
-use crate::transmission::play::{PlayParameter as P, PLAY};
 use crate::transmission::screw::{RatingParameter, ScrewParameter, RATING, SCREW};
 use crate::transmission::tooth::{ToothParameter as W, TOOTH};
 use crate::transmission::vibration::{VibrationParameter, VIBRATION};
@@ -23,10 +23,10 @@ const fn unit(index: usize, unit: &'static str) -> Relabel {
 
 const RAM_GEAR: [Variable; GEAR.len()] = relabelled(GEAR, &[change(GearParameter::Ratio as usize, "", "", "motor speed over screw speed")]);
 const RAM_FRICTION: [Variable; FRICTION.len()] = relabelled(FRICTION, &[unit(F::JamPosition as usize, "m")]);
-const RAM_PLAY: [Variable; PLAY.len()] = relabelled(
-    PLAY,
+const RAM_BACKLASH: [Variable; BACKLASH.len()] = relabelled(
+    BACKLASH,
     &[
-        change(P::Total as usize, "", "m", "total play between ram and load"),
+        change(P::Total as usize, "", "m", "total backlash between ram and load"),
         unit(P::Extra as usize, "m"),
         change(P::Stiffness as usize, "", "N/m", "contact stiffness between ram and load (elastic model)"),
         change(P::Damping as usize, "", "N s/m", "contact damping between ram and load (elastic model)"),
@@ -65,8 +65,8 @@ const RAM_ENCODER: [Variable; ENCODER.len()] = relabelled(
 const RAM_TOOTH: [Variable; TOOTH.len()] = relabelled(
     TOOTH,
     &[
-        change(W::ToothWear as usize, "", "m", "healthy 0; total play added where worn flanks slide most, measured at the ram"),
-        change(W::ToothChip as usize, "", "m", "healthy 0; total play added while the chipped tooth carries, measured at the ram"),
+        change(W::ToothWear as usize, "", "m", "healthy 0; total backlash added where worn flanks slide most, measured at the ram"),
+        change(W::ToothChip as usize, "", "m", "healthy 0; total backlash added while the chipped tooth carries, measured at the ram"),
     ],
 );
 
@@ -74,7 +74,7 @@ groups! {
     over layout {
         gear: &RAM_GEAR;
         friction: &RAM_FRICTION;
-        play: &RAM_PLAY;
+        backlash: &RAM_BACKLASH;
         stop: &RAM_STOP;
         load: &RAM_LOAD;
         control: &RAM_CONTROL;
@@ -94,8 +94,8 @@ pub const PORTS: &[Port] = &[
         parameter: "",
     },
     Port { name: "brake", unit: "N", text: "resistive force on the load side: opposes motion of either direction", parameter: "" },
-    Port { name: "shaft", unit: "N m", text: "signed torque on the fast shaft, positive opposes positive motion", parameter: "" },
-    Port { name: "user", unit: "N", text: "signed force on the load side, positive (compressive) opposes extension", parameter: "" },
+    Port { name: "shaft", unit: "N m", text: "signed torque on the motor shaft, positive opposes positive motion", parameter: "" },
+    Port { name: "output", unit: "N", text: "signed force on the load side, positive (compressive) opposes extension", parameter: "" },
     Port { name: "supply", unit: "V", text: "DC link voltage", parameter: "inverter.supply_voltage" },
 ];
 
@@ -108,10 +108,10 @@ const NUT: [Signal; 2] = [
     signal("heat_nut", "W", "friction heat that stays in the nut, mean of the network's last tick"),
 ];
 const HIGH_OWN: &[Signal] = &[
-    signal("ram_position", "m", "ram position, on the nut's side of the play"),
-    signal("ram_speed", "m/s", "ram speed, on the nut's side of the play"),
+    signal("ram_position", "m", "ram position, on the nut's side of the backlash"),
+    signal("ram_speed", "m/s", "ram speed, on the nut's side of the backlash"),
     signal("load_friction_force", "N", "friction and damping of the load side, the brake's force included"),
-    signal("screw_torque", "N m", "force through the nut, referred to the fast shaft without losses"),
+    signal("screw_torque", "N m", "force through the nut, referred to the motor shaft without losses"),
     signal("spall_torque", "N m", "torque of balls falling into spalls, positive drives forwards"),
     signal("screw_efficiency", "1", "applied efficiency under a load that opposes motion"),
     signal("screw_efficiency_aiding", "1", "applied efficiency under a load that aids motion"),
@@ -123,9 +123,9 @@ const HIGH_OWN: &[Signal] = &[
     },
 ];
 const LOW_OWN: &[Signal] = &[
-    signal("ram_position", "m", "ram position, on the nut's side of the play"),
-    signal("ram_speed", "m/s", "ram speed, on the nut's side of the play"),
-    signal("screw_torque", "N m", "force through the nut, referred to the fast shaft without losses"),
+    signal("ram_position", "m", "ram position, on the nut's side of the backlash"),
+    signal("ram_speed", "m/s", "ram speed, on the nut's side of the backlash"),
+    signal("screw_torque", "N m", "force through the nut, referred to the motor shaft without losses"),
     signal("screw_efficiency", "1", "applied efficiency under a load that opposes motion"),
     signal("screw_efficiency_aiding", "1", "applied efficiency under a load that aids motion"),
     signal("circuit_current", "A", "current of the printed L-R circuit, sqrt(3/2) i_q: its I^2 R is the heat of all phases"),
@@ -138,10 +138,10 @@ pub const HIGH: &[Signal] = &extended::<{ signals::HIGH.len() + HIGH_OWN.len() }
     signals::HIGH,
     &[
         change(H::Command as usize, "", "m", "command with its noise (m at the ram, rad/s or N m by the control mode)"),
-        change(H::UserPosition as usize, "", "m", "position of the load side"),
-        change(H::UserSpeed as usize, "", "m/s", "speed of the load side"),
+        change(H::OutputPosition as usize, "", "m", "position of the load side"),
+        change(H::OutputSpeed as usize, "", "m/s", "speed of the load side"),
         change(H::BrakeTorque as usize, "brake_force", "N", "force the brake can oppose on the load side"),
-        change(H::UserTorque as usize, "load_force", "N", "signed load on the load side, spring included"),
+        change(H::OutputTorque as usize, "load_force", "N", "signed load on the load side, spring included"),
         change(
             H::TransmissionTorque as usize,
             "joint_force",
@@ -156,8 +156,8 @@ pub const LOW: &[Signal] = &extended::<{ signals::LOW.len() + LOW_OWN.len() }>(
     signals::LOW,
     &[
         change(L::Command as usize, "", "m", "command (m at the ram, rad/s or N m by the control mode)"),
-        change(L::UserPosition as usize, "", "m", "position of the load side"),
-        change(L::UserSpeed as usize, "", "m/s", "speed of the load side"),
+        change(L::OutputPosition as usize, "", "m", "position of the load side"),
+        change(L::OutputSpeed as usize, "", "m/s", "speed of the load side"),
         change(L::BrakeTorque as usize, "brake_force", "N", "force the brake can oppose on the load side"),
         change(L::EncoderPosition as usize, "", "m", "load position the encoder shows"),
     ],

@@ -200,13 +200,13 @@ impl<S: Scalar> Constants<S> {
             };
             s.units[lane].tick(&self.raw[lane], &shown);
         }
-        self.obey(s, inputs[USER].at(t), noise);
+        self.obey(s, inputs[OUTPUT].at(t), noise);
     }
 
     /// What the unit's answer sets, and what is read anew once a tick.
-    fn obey(&self, s: &mut Body<S>, user: S, noise: &mut dyn FnMut(u64) -> S) {
+    fn obey(&self, s: &mut Body<S>, output: S, noise: &mut dyn FnMut(u64) -> S) {
         s.charge = S::zero();
-        s.lock_use = s.motion.locked * self.mechanics.end_load(user).abs() * self.mechanics.lock.per_strength;
+        s.lock_use = s.motion.locked * self.mechanics.end_load(output).abs() * self.mechanics.lock.per_strength;
         s.obey(self.cable);
         if S::any(S::zero().lt(self.cell_noise)) {
             s.cell_noise = self.cell_noise * noise(0);
@@ -239,7 +239,7 @@ impl<S: Scalar> Constants<S> {
 
     #[inline(always)]
     pub fn acting(&self, s: &Body<S>, inputs: &Inputs<S>, motor_torque: S, t: S) -> Acting<S> {
-        Acting { motor_torque, user: inputs[USER].at(t), brake_free: s.brake_free, released: s.released, rig_speed: inputs[RIG].at(t) }
+        Acting { motor_torque, output: inputs[OUTPUT].at(t), brake_free: s.brake_free, released: s.released, rig_speed: inputs[RIG].at(t) }
     }
 
     /// The link after a step in which the bridge drew `bus` from it.
@@ -277,7 +277,7 @@ impl<S: Scalar> Constants<S> {
         out[Q::MotorTorque as usize] = torque;
         s.show_units(out);
         self.show_electric(s, out);
-        self.show_motion(structure, s, inputs[USER].at(t), out);
+        self.show_motion(structure, s, inputs[OUTPUT].at(t), out);
         for (i, x) in s.energy.iter().enumerate() {
             out[Q::EnergySupply as usize + i] = *x;
         }
@@ -305,25 +305,25 @@ impl<S: Scalar> Constants<S> {
         set(Q::LoadCell, s.motion.rig_force + s.cell_noise);
     }
 
-    /// Motor, nut, ram and lever under the force `user` on the ram.
-    fn show_motion(&self, structure: &Structure, s: &Body<S>, user: S, out: &mut [S]) {
+    /// Motor, nut, ram and lever under the force `output` on the ram.
+    fn show_motion(&self, structure: &Structure, s: &Body<S>, output: S, out: &mut [S]) {
         let mut set = |q: Q, x: S| out[q as usize] = x;
         let m = &self.mechanics;
         set(Q::MotorPosition, s.motion.motor_position);
         set(Q::MotorSpeed, s.motion.motor_speed);
         set(Q::NutPosition, s.motion.nut_position);
-        let ram = m.ram(&s.motion, user);
-        set(Q::UserPosition, ram);
+        let ram = m.ram(&s.motion, output);
+        set(Q::OutputPosition, ram);
         let moving = S::splat(0.5).lt(s.motion.carrying);
-        set(Q::UserSpeed, S::select(moving, s.motion.nut_speed, S::zero()));
+        set(Q::OutputSpeed, S::select(moving, s.motion.nut_speed, S::zero()));
         set(Q::DetentTorque, m.detent_torque(s.motion.motor_position));
         set(Q::BrakeTorque, m.brake_torque(s.brake_free));
         set(Q::BrakeReleased, m.brake_open(s.brake_free));
-        let forces = m.forces(&s.motion, user, structure.rig);
+        let forces = m.forces(&s.motion, output, structure.rig);
         set(Q::FrictionForce, m.friction_force(&s.motion, s.released));
         let locked = S::splat(0.5).lt(s.motion.locked);
-        set(Q::LoadForce, S::select(locked, m.end_load(user), forces.load));
-        set(Q::LockForce, S::select(locked, m.end_load(user), forces.spring));
+        set(Q::LoadForce, S::select(locked, m.end_load(output), forces.load));
+        set(Q::LockForce, S::select(locked, m.end_load(output), forces.spring));
         set(Q::Efficiency, m.efficiency(&forces, s.released));
         set(Q::Locked, s.motion.locked);
         set(Q::Released, s.released);

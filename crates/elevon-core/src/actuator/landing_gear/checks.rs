@@ -37,7 +37,7 @@ fn lever(out: &mut Vec<Finding>, raw: &[f64]) {
             at(LeverParameter::LengthRetracted) + x,
         );
         let message = format!(
-            "lever.arm: the triangle of actuator, lever and airframe does not close at user_position = {:.1} mm: the actuator is {l:.4} m long there and must lie between |D - g_a| = {:.4} m and D + g_a = {:.4} m (D = {d:.4} m, g_a = {g:.4} m)",
+            "lever.arm: the triangle of actuator, lever and airframe does not close at output_position = {:.1} mm: the actuator is {l:.4} m long there and must lie between |D - g_a| = {:.4} m and D + g_a = {:.4} m (D = {d:.4} m, g_a = {g:.4} m)",
             1e3 * x, (d - g).abs(), d + g
         );
         out.push(finding("lever.arm", g, (d - l).abs(), message));

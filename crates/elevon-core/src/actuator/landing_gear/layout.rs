@@ -148,14 +148,14 @@ pub const PORTS: &[Port] = &[
         text: "0 stop, 1 extend, 2 retract, 3 free fall, held until the next one; 4 more repeats the one before",
         parameter: "",
     },
-    Port { name: "user", unit: "N", text: "signed load on the ram besides the leg's, positive opposes extension", parameter: "" },
+    Port { name: "output", unit: "N", text: "signed load on the ram besides the leg's, positive opposes extension", parameter: "" },
     Port { name: "supply", unit: "V", text: "voltage of the source", parameter: "inverter.supply_voltage" },
     Port { name: "weight_on_wheels", unit: "1", text: "1: the aircraft stands on its wheels", parameter: "" },
     Port { name: "rig_speed", unit: "m/s", text: "speed that the friction rig imposes on the ram, in place of the leg", parameter: "" },
 ];
 
 pub const COMMAND: usize = 0;
-pub const USER: usize = 1;
+pub const OUTPUT: usize = 1;
 pub const SUPPLY: usize = 2;
 pub const WHEELS: usize = 3;
 pub const RIG: usize = 4;

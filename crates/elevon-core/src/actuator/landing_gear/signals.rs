@@ -10,8 +10,8 @@ signals! {
         CommandRefused => "command_refused", "-", "1", "why the last command was refused: 1 released, 2 fault, 3 undervoltage, 4 overvoltage, 5 weight on wheels, 6 locked, 7 repeated; 0 accepted";
         FaultCode => "fault_code", "-", "1", "1 motion, 2 lock not released, 3 lock not engaged, 4 stalled, 5 overspeed, 6 overcurrent, 7 hall, 8 proximity, 9 drive tripped, 10 uncommanded motion; 0 none", FaultCode;
         WarningCode => "warning_code", "-", "1", "1 drag: the current is above what any healthy load needs; 0 none";
-        UserPosition => "user_position", "x_a", "m", "position of the ram", OutputPosition;
-        UserSpeed => "user_speed", "v_a", "m/s", "speed of the ram", OutputSpeed;
+        OutputPosition => "output_position", "x_a", "m", "position of the ram", OutputPosition;
+        OutputSpeed => "output_speed", "v_a", "m/s", "speed of the ram", OutputSpeed;
         NutPosition => "nut_position", "x_n", "m", "position of the nut, from retracted; beyond the stroke it works the lock";
         MotorPosition => "motor_position", "theta_m", "rad", "motor angle", MotorPosition;
         MotorSpeed => "motor_speed", "omega_m", "rad/s", "motor speed", MotorSpeed;

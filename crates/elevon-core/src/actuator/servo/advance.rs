@@ -1,6 +1,6 @@
 //! The inner loop of the servos: inputs some steps ahead, chunks of lanes side by side.
 
-use super::layout::{BRAKE, COMMAND, SHAFT, SUPPLY, USER};
+use super::layout::{BRAKE, COMMAND, OUTPUT, SHAFT, SUPPLY};
 use crate::actuator::{Inputs, MAX_CHUNKS};
 use crate::scalar::{Kernel, Scalar};
 use crate::time::Steps;
@@ -16,7 +16,7 @@ pub(super) struct Instant<S> {
     /// A brake cannot push: negative values count as zero.
     pub brake: S,
     pub shaft: S,
-    pub user: S,
+    pub output: S,
     pub supply: S,
 }
 
@@ -33,7 +33,7 @@ impl<S: Scalar> Instant<S> {
     fn load(&mut self, inputs: &Inputs<S>, t: S) {
         self.brake = inputs[BRAKE].at(t).maximum(S::zero());
         self.shaft = inputs[SHAFT].at(t);
-        self.user = inputs[USER].at(t);
+        self.output = inputs[OUTPUT].at(t);
         self.supply = inputs[SUPPLY].at(t);
     }
 
@@ -50,7 +50,7 @@ impl<S: Scalar> Instant<S> {
     #[inline(always)]
     fn none() -> Self {
         let zero = S::zero();
-        Self { t: zero, command: zero, brake: zero, shaft: zero, user: zero, supply: zero }
+        Self { t: zero, command: zero, brake: zero, shaft: zero, output: zero, supply: zero }
     }
 }
 

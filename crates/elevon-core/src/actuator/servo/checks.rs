@@ -13,9 +13,9 @@ use crate::motor::thermal::{ThermalModel, ThermalParameter as Thermal};
 use crate::motor::unbalance::UnbalanceParameter;
 use crate::sensor::current::CurrentSensorParameter;
 use crate::sensor::resolver::ResolverParameter as Resolver;
+use crate::transmission::backlash::{BacklashModel, BacklashParameter};
 use crate::transmission::friction::FrictionParameter;
 use crate::transmission::gear::{GearParameter, LoadParameter, StopParameter};
-use crate::transmission::play::{PlayModel, PlayParameter};
 
 pub fn finding(path: &str, value: f64, limit: f64, message: String) -> Finding {
     Finding::error(path, value, limit, message)
@@ -243,10 +243,10 @@ fn inertia<F: Form>(raw: &[f64]) -> (f64, f64) {
         + raw[GearParameter::Inertia.at()]
         + F::screw_inertia(raw)
         + raw[UnbalanceParameter::UnbalanceInertia.at()];
-    let elastic = PlayModel::read(raw[PlayParameter::Model.at()]) == PlayModel::Elastic;
+    let elastic = BacklashModel::read(raw[BacklashParameter::Model.at()]) == BacklashModel::Elastic;
     let ratio = F::ratio(raw);
-    let user = raw[LoadParameter::Inertia.at()] / (ratio * ratio);
-    (rotor, if elastic { rotor } else { rotor + user })
+    let output = raw[LoadParameter::Inertia.at()] / (ratio * ratio);
+    (rotor, if elastic { rotor } else { rotor + output })
 }
 
 /// The solver's step against every pole of the plant.
@@ -267,7 +267,7 @@ fn steps<F: Form>(out: &mut Vec<Finding>, raw: &[f64]) {
     if viscous > 0.0 {
         step_limit(out, dt, inertia / viscous, "viscous pole C / J of friction.viscous");
     }
-    if PlayModel::read(raw[PlayParameter::Model.at()]) == PlayModel::Elastic {
+    if BacklashModel::read(raw[BacklashParameter::Model.at()]) == BacklashModel::Elastic {
         let ratio = F::ratio(raw);
         contact::<F>(out, raw, dt, rotor * ratio * ratio, raw[LoadParameter::Inertia.at()]);
     }
@@ -314,19 +314,19 @@ fn relay_band(out: &mut Vec<Finding>, raw: &[f64], dt: f64, slope: f64) {
 }
 
 /// Two masses on the contact spring: semi-implicit needs dt below 2 / omega, explicit Euler below C / K.
-fn contact<F: Form>(out: &mut Vec<Finding>, raw: &[f64], dt: f64, motor: f64, user: f64) {
-    if user <= 0.0 {
+fn contact<F: Form>(out: &mut Vec<Finding>, raw: &[f64], dt: f64, motor: f64, output: f64) {
+    if output <= 0.0 {
         let (path, unit) = if F::LINEAR { ("load.mass", "kg") } else { ("load.inertia", "kg m2") };
-        out.push(finding(path, user, 0.0, format!("{path}: the elastic play needs a second mass, above 0 {unit}")));
+        out.push(finding(path, output, 0.0, format!("{path}: the elastic backlash needs a second mass, above 0 {unit}")));
         return;
     }
-    let (k, c) = (raw[PlayParameter::Stiffness.at()], raw[PlayParameter::Damping.at()]);
-    let per_mass = 1.0 / motor + 1.0 / user;
+    let (k, c) = (raw[BacklashParameter::Stiffness.at()], raw[BacklashParameter::Damping.at()]);
+    let per_mass = 1.0 / motor + 1.0 / output;
     let omega = (k * per_mass).sqrt();
     let damped = if c > 0.0 { 1.0 / (c * per_mass) } else { f64::INFINITY };
     let semi = Method::read(raw[SolverParameter::Method.at()]) == Method::SemiImplicit;
     let limit = if semi { 1.0 / omega } else { c / k };
-    step_limit(out, dt, limit.min(damped), "contact stiffness play.stiffness and damping play.damping");
+    step_limit(out, dt, limit.min(damped), "contact stiffness backlash.stiffness and damping backlash.damping");
 }
 
 pub fn low<F: Form>(raw: &[f64]) -> Vec<Finding> {

@@ -12,15 +12,15 @@ use crate::variable::Signal;
 /// The groups begin with those of `layout::GROUPS`, in their order and of their lengths (units and names may differ), so
 /// that a parameter of a shared component stands at one place in every form.
 pub trait Form: Machine {
-    /// The user's side travels: its coordinate is in metres, and the brake acts there.
+    /// The output's side travels: its coordinate is in metres, and the brake acts there.
     const LINEAR: bool;
     /// Signals begin with those of `signals::HIGH` and `signals::LOW`, in their order.
     const HIGH: &'static [Signal];
     const LOW: &'static [Signal];
 
-    /// Motor angle over user coordinate.
+    /// Motor angle over output coordinate.
     fn ratio<S: Scalar>(raw: &[S]) -> S;
-    /// Inertia on the fast shaft besides the motor's and the gear's.
+    /// Inertia on the motor shaft besides the motor's and the gear's.
     fn screw_inertia<S: Scalar>(raw: &[S]) -> S;
     fn screw<S: Scalar>(raw: &[S]) -> Screw<S>;
     /// The nut of a screw as a node of heat on a tick of `period` seconds.

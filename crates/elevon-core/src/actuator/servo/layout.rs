@@ -19,11 +19,11 @@ use crate::motor::unbalance::{UnbalanceParameter, UNBALANCE};
 use crate::sensor::current::{CurrentSensorParameter, CURRENT_SENSOR};
 use crate::sensor::encoder::{EncoderParameter, ENCODER};
 use crate::sensor::resolver::{ResolverParameter, RESOLVER};
+use crate::transmission::backlash::{BacklashParameter, BACKLASH};
 use crate::transmission::bearing::{BearingParameter, BEARING};
 use crate::transmission::friction::{FrictionParameter, FRICTION};
 use crate::transmission::friction_law::{FrictionLawParameter, FRICTION_LAW};
 use crate::transmission::gear::{GearParameter, LoadParameter, StopParameter, GEAR, LOAD, STOP};
-use crate::transmission::play::{PlayParameter, PLAY};
 use crate::transmission::tooth::{ToothParameter, TOOTH};
 use crate::{choices, groups, variables};
 
@@ -71,7 +71,7 @@ groups! {
     motor: "motor", MOTOR, MotorParameter;
     gear: "gear", GEAR, GearParameter;
     friction: "friction", FRICTION, FrictionParameter;
-    play: "play", PLAY, PlayParameter;
+    backlash: "backlash", BACKLASH, BacklashParameter;
     stop: "stop", STOP, StopParameter;
     load: "load", LOAD, LoadParameter;
     drive: "drive", DRIVE, DriveParameter;
@@ -104,17 +104,17 @@ pub const PORTS: &[Port] = &[
     Port {
         name: "command",
         unit: "rad",
-        text: "position, speed or torque command (rad at the user, rad/s or N m at the fast shaft)",
+        text: "position, speed or torque command (rad at the output, rad/s or N m at the motor shaft)",
         parameter: "",
     },
-    Port { name: "brake", unit: "N m", text: "resistive torque on the fast shaft", parameter: "" },
-    Port { name: "shaft", unit: "N m", text: "signed torque on the fast shaft, positive opposes positive motion", parameter: "" },
-    Port { name: "user", unit: "N m", text: "signed torque on the user side, positive opposes positive motion", parameter: "" },
+    Port { name: "brake", unit: "N m", text: "resistive torque on the motor shaft", parameter: "" },
+    Port { name: "shaft", unit: "N m", text: "signed torque on the motor shaft, positive opposes positive motion", parameter: "" },
+    Port { name: "output", unit: "N m", text: "signed torque on the output side, positive opposes positive motion", parameter: "" },
     Port { name: "supply", unit: "V", text: "DC link voltage", parameter: "inverter.supply_voltage" },
 ];
 
 pub const COMMAND: usize = 0;
 pub const BRAKE: usize = 1;
 pub const SHAFT: usize = 2;
-pub const USER: usize = 3;
+pub const OUTPUT: usize = 3;
 pub const SUPPLY: usize = 4;

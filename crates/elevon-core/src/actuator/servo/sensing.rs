@@ -20,7 +20,7 @@ details! {
     }
     full {
         resolver = Resolver::<f64>::needed(&parts.resolver());
-        shown = feedback != Feedback::User;
+        shown = feedback != Feedback::Output;
         noisy = Resolver::<f64>::noisy(&parts.resolver());
         /// The encoder loses counts, or stands still: it has a counter to follow.
         counting = Encoder::<f64>::loses(&parts.encoder());
@@ -70,7 +70,7 @@ impl<S: Scalar> Sensing<S> {
 
     pub(super) fn start(&self, s: &ShaftState<S>) -> Sensed<S> {
         let resolver = ResolverState { angle: s.motor_position, speed: s.motor_speed };
-        Sensed { resolver, noise: [S::zero(); 2], encoder: self.encoder.start(s.user_position) }
+        Sensed { resolver, noise: [S::zero(); 2], encoder: self.encoder.start(s.output_position) }
     }
 
     /// The resolver has no power or no signal.
@@ -109,16 +109,16 @@ impl<S: Scalar> Sensing<S> {
     #[inline(always)]
     pub(super) fn count<const FULL: bool>(&self, d: &SensingDetails, s: &ShaftState<S>, sensed: &mut Sensed<S>) -> S {
         if FULL && d.counting {
-            self.encoder.advance(s.user_position, &mut sensed.encoder);
+            self.encoder.advance(s.output_position, &mut sensed.encoder);
             sensed.encoder.shown
         } else {
-            self.encoder.read(s.user_position)
+            self.encoder.read(s.output_position)
         }
     }
 
     /// What closes the position loop.
     #[inline(always)]
-    pub(super) fn user<const FULL: bool>(
+    pub(super) fn output<const FULL: bool>(
         &self,
         d: &SensingDetails,
         s: &ShaftState<S>,
@@ -129,7 +129,7 @@ impl<S: Scalar> Sensing<S> {
         match d.feedback {
             Feedback::Encoder if FULL => self.count::<true>(d, s, sensed),
             Feedback::Resolver if FULL => reading.position * per_ratio,
-            _ => s.user_position,
+            _ => s.output_position,
         }
     }
 

@@ -8,9 +8,9 @@ use crate::variable::{extended, Signal};
 signals! {
     /// Signals of the high fidelity.
     HighSignal, HIGH_OWN {
-        Command => "command", "-", "rad", "command with its noise (rad at the user, rad/s or N m by the control mode)", Command;
-        UserPosition => "user_position", "theta_u", "rad", "user position", OutputPosition;
-        UserSpeed => "user_speed", "omega_u", "rad/s", "user speed", OutputSpeed;
+        Command => "command", "-", "rad", "command with its noise (rad at the output, rad/s or N m by the control mode)", Command;
+        OutputPosition => "output_position", "theta_u", "rad", "output position", OutputPosition;
+        OutputSpeed => "output_speed", "omega_u", "rad/s", "output speed", OutputSpeed;
         MotorPosition => "motor_position", "theta_m", "rad", "motor angle", MotorPosition;
         MotorSpeed => "motor_speed", "omega_m", "rad/s", "motor speed", MotorSpeed;
         SpeedRef => "speed_ref", "omega_ref", "rad/s", "speed reference", SpeedRef;
@@ -39,11 +39,11 @@ signals! {
         PhaseShortCurrentCa => "phase_short_current_ca", "-", "A", "current from winding c to winding a through a contact";
         GroundCurrent => "ground_current", "-", "A", "current from the windings to ground";
         MotorTorque => "motor_torque", "T_m", "N m", "electromagnetic torque after the flux's saturation";
-        FrictionTorque => "friction_torque", "T_fric", "N m", "dry and viscous friction on the fast shaft, the brake's included";
+        FrictionTorque => "friction_torque", "T_fric", "N m", "dry and viscous friction on the motor shaft, the brake's included";
         BrakeTorque => "brake_torque", "T_b", "N m", "torque the brake can oppose", Brake;
-        LoadTorque => "load_torque", "T_load", "N m", "signed load referred to the fast shaft";
-        UserTorque => "user_torque", "T_u", "N m", "load on the user side, spring included", Load;
-        TransmissionTorque => "transmission_torque", "T_t", "N m", "torque through the play at the user (elastic model)", LoadCell;
+        LoadTorque => "load_torque", "T_load", "N m", "signed load referred to the motor shaft";
+        OutputTorque => "output_torque", "T_u", "N m", "load on the output side, spring included", Load;
+        TransmissionTorque => "transmission_torque", "T_t", "N m", "torque through the backlash at the output (elastic model)", LoadCell;
         SupplyVoltage => "supply_voltage", "V_dc", "V", "DC link voltage", SupplyVoltage;
         WindingTemperature => "winding_temperature", "T_w", "K", "winding temperature", Temperature;
         SurfaceTemperature => "surface_temperature", "T_s", "K", "temperature of the motor's surface", SurfaceTemperature;
@@ -60,7 +60,7 @@ signals! {
         TapCurrentB => "tap_current_b", "-", "A", "current from terminal b to the centre tap";
         TapCurrentC => "tap_current_c", "-", "A", "current from terminal c to the centre tap";
         UnbalanceTorque => "unbalance_torque", "T_u", "N m", "gravity torque of the rotor's excess mass";
-        EncoderPosition => "encoder_position", "-", "rad", "user position the encoder shows", OutputPosition;
+        EncoderPosition => "encoder_position", "-", "rad", "output position the encoder shows", OutputPosition;
         ResolverPosition => "resolver_position", "-", "rad", "motor angle the resolver shows", MotorPosition;
         ResolverSpeed => "resolver_speed", "-", "rad/s", "motor speed the resolver shows", MotorSpeed;
         ResolverSignal => "resolver_signal", "-", "1", "size of the resolver's sine and cosine over the healthy one";
@@ -83,16 +83,16 @@ signals! {
         EnergyLink => "energy_link", "-", "J", "energy of the link's capacitor above that of the start";
         DriveTemperature => "drive_temperature", "T_d", "K", "temperature of the drive, warmed by the inverter's losses (thermal network)", DriveTemperature;
         HeatDrive => "heat_drive", "-", "W", "losses of the inverter, mean of the network's last tick";
-        StopTorque => "stop_torque", "-", "N m", "torque on the fast shaft that the end stop's reaction cancels";
+        StopTorque => "stop_torque", "-", "N m", "torque on the motor shaft that the end stop's reaction cancels";
     }
 }
 
 signals! {
     /// Signals of the low fidelity: the same names where they mean the same.
     LowSignal, LOW_OWN {
-        Command => "command", "-", "rad", "command (rad at the user, rad/s or N m by the control mode)", Command;
-        UserPosition => "user_position", "theta_u", "rad", "user position", OutputPosition;
-        UserSpeed => "user_speed", "omega_u", "rad/s", "user speed", OutputSpeed;
+        Command => "command", "-", "rad", "command (rad at the output, rad/s or N m by the control mode)", Command;
+        OutputPosition => "output_position", "theta_u", "rad", "output position", OutputPosition;
+        OutputSpeed => "output_speed", "omega_u", "rad/s", "output speed", OutputSpeed;
         MotorPosition => "motor_position", "theta_m", "rad", "motor angle", MotorPosition;
         MotorSpeed => "motor_speed", "omega_m", "rad/s", "motor speed", MotorSpeed;
         SpeedRef => "speed_ref", "omega_ref", "rad/s", "speed reference", SpeedRef;
@@ -103,9 +103,9 @@ signals! {
         VoltageQRef => "voltage_q_ref", "v_q", "V", "quadrature voltage of the equivalent phase", TorqueVoltage;
         VoltageQMeas => "voltage_q_meas", "v_q_meas", "V", "quadrature voltage, filtered", TorqueVoltage;
         MotorTorque => "motor_torque", "T_m", "N m", "electromagnetic torque";
-        FrictionTorque => "friction_torque", "T_fric", "N m", "dry and viscous friction on the fast shaft, the brake's included";
+        FrictionTorque => "friction_torque", "T_fric", "N m", "dry and viscous friction on the motor shaft, the brake's included";
         BrakeTorque => "brake_torque", "T_b", "N m", "torque the brake can oppose", Brake;
-        LoadTorque => "load_torque", "T_load", "N m", "signed load referred to the fast shaft";
+        LoadTorque => "load_torque", "T_load", "N m", "signed load referred to the motor shaft";
         SupplyVoltage => "supply_voltage", "V_dc", "V", "DC link voltage", SupplyVoltage;
         WindingTemperature => "winding_temperature", "T_w", "K", "winding temperature", Temperature;
         SurfaceTemperature => "surface_temperature", "T_s", "K", "temperature of the motor's surface", SurfaceTemperature;
@@ -113,7 +113,7 @@ signals! {
         HeatAir => "heat_air", "-", "W", "heat given to the air, mean of the network's last tick";
         ThermalWarning => "thermal_warning", "-", "1", "1 while the winding is above its warning temperature";
         Limited => "limited", "-", "1", "1 while the speed or the torque reference stands at its limit";
-        EncoderPosition => "encoder_position", "-", "rad", "user position the encoder shows", OutputPosition;
+        EncoderPosition => "encoder_position", "-", "rad", "output position the encoder shows", OutputPosition;
         ResolverPosition => "resolver_position", "-", "rad", "motor angle the resolver shows", MotorPosition;
         ResolverSpeed => "resolver_speed", "-", "rad/s", "motor speed the resolver shows", MotorSpeed;
         ResolverSignal => "resolver_signal", "-", "1", "size of the resolver's sine and cosine over the healthy one";
@@ -121,7 +121,7 @@ signals! {
         EnergyCopper => "energy_copper", "-", "J", "copper losses, counted with a thermal network";
         EnergyHeatStored => "energy_heat_stored", "-", "J", "heat in winding and housing above that of the start";
         EnergyAir => "energy_air", "-", "J", "heat given to the air";
-        StopTorque => "stop_torque", "-", "N m", "torque on the fast shaft that the end stop's reaction cancels";
+        StopTorque => "stop_torque", "-", "N m", "torque on the motor shaft that the end stop's reaction cancels";
     }
 }
 

@@ -1,4 +1,4 @@
-//! Laws of the dry friction of the fast shaft, chosen by `friction.law` (docs/theory/friction.md).
+//! Laws of the dry friction of the motor shaft, chosen by `friction.law` (docs/theory/friction.md).
 //!
 //! A law says how much dry friction there is: the limit at rest and the value when moving (`limits`). Laws without a state
 //! stick as Borello's does; a law with bristles moves shaft and bristles together (`lugre`).
@@ -21,7 +21,7 @@ choices! {
 }
 
 variables! {
-    /// The law of the dry friction and its coefficients, referred to the fast shaft.
+    /// The law of the dry friction and its coefficients, referred to the motor shaft.
     FrictionLawParameter, FRICTION_LAW {
         Law => "law", "-", "1", Choice(FrictionLaw::NAMES), Plant, Some(0.0), "dry friction: Borello's two values, Stribeck's fall from static to dynamic, LuGre's bristles with the same fall, or the load-dependent form (extended servo friction models m1 to m6)";
         StribeckSpeed => "stribeck_speed", "v_s", "rad/s", Positive, Plant, Some(1.0), "speed over which the friction falls from static to dynamic (all laws but borello); ASSUMED: about 0.5 % of a 200 rad/s motor",
@@ -89,7 +89,7 @@ impl<S: Scalar> Law<S> {
     }
 
     /// Limit at rest and friction when moving at `speed`, from Borello's two values. `torque` is the motor's, `load` the
-    /// signed load that opposes it, both on the fast shaft.
+    /// signed load that opposes it, both on the motor shaft.
     #[inline(always)]
     pub fn limits(&self, law: FrictionLaw, [fixed, moving]: [S; 2], speed: S, torque: S, load: S) -> [S; 2] {
         match law {

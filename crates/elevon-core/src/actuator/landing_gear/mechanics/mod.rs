@@ -68,8 +68,8 @@ pub struct Motion<S> {
 #[derive(Clone, Copy, Debug)]
 pub struct Acting<S> {
     pub motor_torque: S,
-    /// User load, positive opposes extension.
-    pub user: S,
+    /// Output load, positive opposes extension.
+    pub output: S,
     /// 1 while the brake's coil holds it open.
     pub brake_free: S,
     /// 1 once the stages are apart.
@@ -91,7 +91,7 @@ pub const E_IMPACT: usize = 8;
 /// Forces on the screw at the present position.
 #[derive(Clone, Copy, Debug)]
 pub struct Forces<S> {
-    /// Of the leg and the user, while the ram moves.
+    /// Of the leg and the output, while the ram moves.
     pub load: S,
     pub spring: S,
     pub efficiency: S,
@@ -176,23 +176,23 @@ impl<S: Scalar> Mechanics<S> {
 
     /// Position of the ram: held by the housing while the nut works the lock, by the segments once locked.
     #[inline(always)]
-    pub fn ram(&self, s: &Motion<S>, user: S) -> S {
+    pub fn ram(&self, s: &Motion<S>, output: S) -> S {
         let inside = s.nut_position.clamp(S::zero(), self.lever.stroke);
-        let seated = self.lever.stroke + self.end_load(user) * self.lock.per_stiffness;
+        let seated = self.lever.stroke + self.end_load(output) * self.lock.per_stiffness;
         S::select(S::splat(0.5).lt(s.locked), seated, inside)
     }
 
     /// Load on the ram at the extended end.
     #[inline(always)]
-    pub fn end_load(&self, user: S) -> S {
+    pub fn end_load(&self, output: S) -> S {
         let reach = self.load_knots.reach(self.lever.stroke);
-        self.factor * self.load_curve.at(&reach) - user
+        self.factor * self.load_curve.at(&reach) - output
     }
 
     #[inline(always)]
-    pub fn forces(&self, s: &Motion<S>, user: S, rig: bool) -> Forces<S> {
+    pub fn forces(&self, s: &Motion<S>, output: S, rig: bool) -> Forces<S> {
         let ram = s.nut_position.clamp(S::zero(), self.lever.stroke);
-        let outside = self.factor * self.load_curve.at(&self.load_knots.reach(ram)) - user;
+        let outside = self.factor * self.load_curve.at(&self.load_knots.reach(ram)) - output;
         let load = if rig { S::zero() } else { S::select(S::splat(0.5).lt(s.carrying), outside, S::zero()) };
         let spring = self.lock.spring(s.nut_position - self.lever.stroke);
         Forces { load, spring, efficiency: self.screw.efficiency(load + spring), arm: self.lever.at(ram) }
@@ -253,7 +253,7 @@ impl<S: Scalar> Mechanics<S> {
         let half = S::splat(0.5);
         let apart = half.lt(a.released);
         self.pick_up(s, a.released, rig);
-        let forces = self.forces(s, a.user, rig);
+        let forces = self.forces(s, a.output, rig);
         if rig {
             return self.imposed(s, a, &forces);
         }

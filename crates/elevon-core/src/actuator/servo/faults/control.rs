@@ -62,7 +62,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             range: Range::Any,
             attributes: &[],
             places: places!("sensor.encoder": "sensor.encoder.offset" Add),
-            effect: "offset of the shown user position; the position loop feels it where control.position_feedback = encoder",
+            effect: "offset of the shown output position; the position loop feels it where control.position_feedback = encoder",
             source: "T3 Table 1.1 (position sensor)",
         },
         FaultKind {
@@ -93,7 +93,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             source: "N 4.5 (sectors of the disc)",
         },
         FaultKind {
-            kind: "winding_short",
+            kind: "resolver_short",
             unit: "1",
             range: Range::Between(0.0, 0.99),
             attributes: &[],
@@ -105,7 +105,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             source: "N 4.5 (windings of the resolver; amplitude alone, no phase shift: ASSUMED)",
         },
         FaultKind {
-            kind: "winding_open",
+            kind: "resolver_open",
             unit: "1",
             range: Range::Unit,
             attributes: &[],
@@ -114,7 +114,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             source: "N 4.5 (windings of the resolver)",
         },
         FaultKind {
-            kind: "winding_open",
+            kind: "resolver_open",
             unit: "1",
             range: Range::Unit,
             attributes: &[],

@@ -5,7 +5,7 @@ use crate::fault::{Attribute, FaultKind};
 use crate::places;
 use crate::variable::Range;
 
-/// Faults of a transmission with friction and play.
+/// Faults of a transmission with friction and backlash.
 pub fn mechanical(side: Side) -> Vec<FaultKind> {
     const DEPTH: &[Attribute] = &[Attribute {
         default: Some(2e-4),
@@ -35,12 +35,12 @@ pub fn mechanical(side: Side) -> Vec<FaultKind> {
             source: "N 6.1 (insufficient lubrication)",
         },
         FaultKind {
-            kind: "play",
+            kind: "backlash",
             unit: side.coordinate,
-            range: Range::Between(0.0, side.play),
+            range: Range::Between(0.0, side.backlash),
             attributes: &[],
-            places: places!("transmission": "play.extra" Add),
-            effect: "total play added at the output: flat tops of the user position widen",
+            places: places!("transmission": "backlash.extra" Add),
+            effect: "total backlash added at the output: flat tops of the output position widen",
             source: "T1 eq. 3",
         },
         FaultKind {
@@ -62,15 +62,15 @@ pub fn mechanical(side: Side) -> Vec<FaultKind> {
             source: "T3 Table 1.1 (bearings: wear and galling); law ASSUMED",
         },
         FaultKind {
-            kind: "tooth_wear", unit: side.coordinate, range: Range::Between(0.0, side.play), attributes: &[],
+            kind: "tooth_wear", unit: side.coordinate, range: Range::Between(0.0, side.backlash), attributes: &[],
             places: places!("gear": "gear.tooth_wear" Add),
-            effect: "total play added at the output where worn flanks slide most: lost motion and torque ripple at the order of the mesh",
+            effect: "total backlash added at the output where worn flanks slide most: lost motion and torque ripple at the order of the mesh",
             source: "ASSUMED: wear follows the sliding speed of the flanks",
         },
         FaultKind {
-            kind: "chipped_tooth", unit: side.coordinate, range: Range::Between(0.0, side.play), attributes: CHIP,
+            kind: "chipped_tooth", unit: side.coordinate, range: Range::Between(0.0, side.backlash), attributes: CHIP,
             places: places!("gear": "gear.tooth_chip" Add),
-            effect: "total play added at the output while one tooth carries: a jerk once a turn of its wheel",
+            effect: "total backlash added at the output while one tooth carries: a jerk once a turn of its wheel",
             source: "ASSUMED: cos^2 over one mesh",
         },
         FaultKind {
@@ -79,8 +79,8 @@ pub fn mechanical(side: Side) -> Vec<FaultKind> {
             range: Range::NonNegative,
             attributes: side.jam,
             places: places!("transmission": "friction.jam_torque" Add),
-            effect: "seizure torque on the fast shaft, resistive",
-            source: "N 4.2 and 5.3 (jam; as a torque on the fast shaft ASSUMED)",
+            effect: "seizure torque on the motor shaft, resistive",
+            source: "N 4.2 and 5.3 (jam; as a torque on the motor shaft ASSUMED)",
         },
     ]
 }

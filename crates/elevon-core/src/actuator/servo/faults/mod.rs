@@ -29,8 +29,8 @@ pub const fn attribute(name: &'static str, unit: &'static str, path: &'static st
 #[derive(Clone, Copy, Debug)]
 pub struct Side {
     coordinate: &'static str,
-    /// Largest play that a fault may add.
-    play: f64,
+    /// Largest backlash that a fault may add.
+    backlash: f64,
     jam: &'static [Attribute],
 }
 
@@ -41,12 +41,12 @@ const fn jam_position(unit: &'static str) -> Attribute {
         default: None,
         path: "friction.jam_position",
         flag: "friction.jam_anywhere",
-        text: "user position at which it seizes when first reached; not given: at once",
+        text: "output position at which it seizes when first reached; not given: at once",
     }
 }
 
-pub const ROTARY: Side = Side { coordinate: "rad", play: 1.0, jam: &[jam_position("rad")] };
-pub const LINEAR: Side = Side { coordinate: "m", play: 5e-3, jam: &[jam_position("m")] };
+pub const ROTARY: Side = Side { coordinate: "rad", backlash: 1.0, jam: &[jam_position("rad")] };
+pub const LINEAR: Side = Side { coordinate: "m", backlash: 5e-3, jam: &[jam_position("m")] };
 
 /// The whole catalogue.
 pub fn catalogue(side: Side) -> Vec<FaultKind> {

@@ -46,7 +46,7 @@ impl<S: Scalar> Kernel for Observation<'_, S> {
 #[inline(always)]
 fn states<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, out: &mut [S]) {
     let mut set = |q: Q, x: S| out[q as usize] = x;
-    set(Q::UserPosition, s.shaft.user_position);
+    set(Q::OutputPosition, s.shaft.output_position);
     set(Q::MotorPosition, s.shaft.motor_position);
     set(Q::MotorSpeed, s.shaft.motor_speed);
     set(Q::SpeedRef, s.control.speed_ref);
@@ -138,14 +138,14 @@ fn mechanical<S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s:
     let torque = motor_torque(m, s, &c);
     let shown = m.shaft.show(&structure.shaft, x, &s.shaft, torque);
     let mut set = |q: Q, x: S| out[q as usize] = x;
-    set(Q::UserSpeed, shown.user_speed);
+    set(Q::OutputSpeed, shown.output_speed);
     set(Q::MotorTorque, torque);
     set(Q::UnbalanceTorque, shown.unbalance);
     set(Q::FrictionTorque, shown.friction);
     set(Q::BrakeTorque, shown.brake);
     set(Q::LoadTorque, shown.load);
     set(Q::StopTorque, shown.stop);
-    set(Q::UserTorque, shown.user_torque);
+    set(Q::OutputTorque, shown.output_torque);
     set(Q::TransmissionTorque, shown.through);
     shared(HIGH_OWN, shown.added.signals(), out);
     shown

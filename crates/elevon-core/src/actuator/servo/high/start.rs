@@ -17,8 +17,8 @@ use crate::three;
 pub(crate) const INITIAL: &[&str] = &[
     "motor_position",
     "motor_speed",
-    "user_position",
-    "user_speed",
+    "output_position",
+    "output_speed",
     "current_a",
     "current_b",
     "current_c",

@@ -29,7 +29,7 @@ pub(crate) fn control_step<S: Scalar, const FULL: bool>(
     s: &mut State<S>,
     reading: &Reading<S>,
 ) {
-    let position = m.sensing.user::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed, reading, m.shaft.gear.per_ratio);
+    let position = m.sensing.output::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed, reading, m.shaft.gear.per_ratio);
     let command = command + s.command_noise;
     s.current_ref = m.control.step(&structure.control, &mut s.control, command, position, reading.speed);
 }

@@ -43,7 +43,7 @@ impl<F: Form> Wiring for Low<F> {
 
     type Machine = F;
     const INITIAL: &'static [&'static str] =
-        &["motor_position", "motor_speed", "user_position", "winding_temperature", "surface_temperature"];
+        &["motor_position", "motor_speed", "output_position", "winding_temperature", "surface_temperature"];
 
     fn signals() -> &'static [Signal] {
         F::LOW
@@ -157,7 +157,7 @@ impl<F: Form> Wiring for Low<F> {
         [
             Watch { name: "motor_speed", value: s.shaft.motor_speed, limit: 1e6 },
             Watch { name: "current_q", value: s.current, limit: 1e7 },
-            Watch { name: "user_position", value: s.shaft.user_position, limit: 1e9 },
+            Watch { name: "output_position", value: s.shaft.output_position, limit: 1e9 },
             Watch { name: "torque_ref", value: s.integral, limit: 1e12 },
         ]
     }

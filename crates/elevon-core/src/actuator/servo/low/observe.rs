@@ -8,8 +8,9 @@ use crate::actuator::{Inputs, Signals};
 use crate::scalar::{Kernel, Scalar};
 
 /// What the loads on the shaft decide; what stands behind the own signals is theirs, too.
-const OF_SHAFT: Signals = Signals::of(&[Q::UserSpeed as usize, Q::FrictionTorque as usize, Q::LoadTorque as usize, Q::StopTorque as usize])
-    .and_from(LOW_OWN.len());
+const OF_SHAFT: Signals =
+    Signals::of(&[Q::OutputSpeed as usize, Q::FrictionTorque as usize, Q::LoadTorque as usize, Q::StopTorque as usize])
+        .and_from(LOW_OWN.len());
 const OF_INPUTS: Signals = Signals::of(&[Q::BrakeTorque as usize, Q::SupplyVoltage as usize]);
 const SENSORS: [Q; 4] = [Q::EncoderPosition, Q::ResolverPosition, Q::ResolverSpeed, Q::ResolverSignal];
 const OF_SENSORS: Signals = Signals::of(&[SENSORS[0] as usize, SENSORS[1] as usize, SENSORS[2] as usize, SENSORS[3] as usize]);
@@ -53,7 +54,7 @@ impl<S: Scalar> Kernel for Observation<'_, S> {
 fn states<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, out: &mut [S]) {
     let limited = m.control.speed_limit.le(s.speed_ref.abs()) | m.control.torque_limit.le(s.torque_ref.abs());
     for (q, value) in [
-        (Q::UserPosition, s.shaft.user_position),
+        (Q::OutputPosition, s.shaft.output_position),
         (Q::MotorPosition, s.shaft.motor_position),
         (Q::MotorSpeed, s.shaft.motor_speed),
         (Q::SpeedRef, s.speed_ref),
@@ -85,7 +86,7 @@ fn loaded<S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s: &St
     let shown = m.shaft.show(&structure.shaft, x, &s.shaft, s.motor_torque);
     let source = x.supply * m.drive.supply_scale;
     for (q, value) in [
-        (Q::UserSpeed, shown.user_speed),
+        (Q::OutputSpeed, shown.output_speed),
         (Q::FrictionTorque, shown.friction),
         (Q::BrakeTorque, x.brake),
         (Q::LoadTorque, shown.load),

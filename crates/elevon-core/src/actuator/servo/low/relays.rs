@@ -94,13 +94,13 @@ pub(super) fn aligned<S: Scalar>(m: &Model<S>, structure: &Structure, position: 
 
 /// Mean legs of the relays: each gives what brings its phase to the edge of its mean band, within the rails, on the side to
 /// which the current decays between the pushes. An error that all phases share, as of unlike sensors, stays up to that mean
-/// error; what is left of it drives the legs to one rail. With an interrupted phase the edges are those of a play: a leg keeps its voltage until the error has left the
+/// error; what is left of it drives the legs to one rail. With an interrupted phase the edges are those of a backlash: a leg keeps its voltage until the error has left the
 /// mean band.
 pub(super) struct Relays<S> {
     gain: [S; 3],
     weight: [S; 3],
     edge: S,
-    play: S,
+    backlash: S,
     shared: S,
     six_step: bool,
 }
@@ -119,7 +119,7 @@ impl<S: Scalar> Relays<S> {
             gain: m.drive.gain,
             weight: m.drive.weight,
             edge: S::select(open, zero, edge),
-            play: S::select(open, kept, zero),
+            backlash: S::select(open, kept, zero),
             shared: S::select(open, zero, band),
             six_step: structure.six_step,
         }
@@ -157,7 +157,7 @@ impl<S: Scalar> Relays<S> {
                 let reach = part.per_volt[j] * others / S::select(total.equals(zero), one, total) * self.gain[j];
                 let error = aims[j] - self.gain[j] * after[j];
                 let none = reach.equals(zero);
-                let beyond = error - error.clamp_abs(self.play);
+                let beyond = error - error.clamp_abs(self.backlash);
                 let change = S::select(none, zero, beyond / S::select(none, one, reach));
                 memory.legs[j] = (memory.legs[j] + change).clamp_abs(part.half_supply);
                 after = settled(part, memory.legs);
@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn the_emf_holds_every_current_at_the_edge_of_its_band() {
-        let relays = Relays { gain: [1.0; 3], weight: [1.0; 3], edge: 0.1, play: 0.0, shared: 0.0, six_step: false };
+        let relays = Relays { gain: [1.0; 3], weight: [1.0; 3], edge: 0.1, backlash: 0.0, shared: 0.0, six_step: false };
         let (mut i, mut memory, wanted) = ([0.0; 3], DrivenState::rest(), 3.0);
         let turns = 400;
         let (mut mean, mut worst) = (0.0, 0.0_f64);
@@ -194,7 +194,7 @@ mod tests {
 
     #[test]
     fn unlike_sensors_leave_all_phases_one_error() {
-        let relays = Relays { gain: [0.5, 1.0, 1.0], weight: [2.0, 1.0, 1.0], edge: 0.0, play: 0.0, shared: 0.3, six_step: false };
+        let relays = Relays { gain: [0.5, 1.0, 1.0], weight: [2.0, 1.0, 1.0], edge: 0.0, backlash: 0.0, shared: 0.3, six_step: false };
         let (mut i, mut memory) = ([0.0; 3], DrivenState::rest());
         for _ in 0..50 {
             i = relays.step(&part(i, [false; 3], 1.2), &mut memory, 1.0);
@@ -208,8 +208,8 @@ mod tests {
     }
 
     #[test]
-    fn a_leg_in_its_play_keeps_its_voltage() {
-        let relays = Relays { gain: [1.0; 3], weight: [1.0; 3], edge: 0.0, play: 0.5, shared: 0.0, six_step: false };
+    fn a_leg_in_its_backlash_keeps_its_voltage() {
+        let relays = Relays { gain: [1.0; 3], weight: [1.0; 3], edge: 0.0, backlash: 0.5, shared: 0.0, six_step: false };
         let mut memory = DrivenState::rest();
         relays.step(&part([0.0; 3], [false, false, true], 0.3), &mut memory, 0.4);
         assert_eq!(memory.legs, [0.0; 3]);
@@ -217,7 +217,7 @@ mod tests {
 
     #[test]
     fn relays_out_of_reach_are_six_step() {
-        let relays = Relays { gain: [1.0; 3], weight: [1.0; 3], edge: 0.1, play: 0.0, shared: 0.0, six_step: false };
+        let relays = Relays { gain: [1.0; 3], weight: [1.0; 3], edge: 0.1, backlash: 0.0, shared: 0.0, six_step: false };
         let mut memory = DrivenState::rest();
         let x = part([0.0; 3], [false; 3], 0.3);
         relays.step(&x, &mut memory, 1e3);
@@ -228,7 +228,7 @@ mod tests {
 
     #[test]
     fn relays_of_an_open_phase_carry_half_the_difference_of_the_references() {
-        let relays = Relays { gain: [1.0; 3], weight: [1.0; 3], edge: 0.0, play: 0.0, shared: 0.0, six_step: false };
+        let relays = Relays { gain: [1.0; 3], weight: [1.0; 3], edge: 0.0, backlash: 0.0, shared: 0.0, six_step: false };
         let (mut i, mut memory) = ([0.0; 3], DrivenState::rest());
         // Between the two references: whose leg has room left decides.
         let x = |i| part(i, [false, false, true], 0.5 * std::f64::consts::PI - std::f64::consts::PI / 3.0);

@@ -145,7 +145,7 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
     if FULL && structure.sensing.counting {
         m.sensing.count::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed);
     }
-    let position = m.sensing.user::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed, &reading, m.shaft.gear.per_ratio);
+    let position = m.sensing.output::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed, &reading, m.shaft.gear.per_ratio);
     let asked = demand::<S, FULL>(m, structure, s, [x.command + s.command_noise, x.supply], position, &reading);
 
     // Loads, and the acceleration that the derivative of the speed takes part in.

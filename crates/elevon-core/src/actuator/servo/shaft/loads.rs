@@ -1,18 +1,18 @@
-//! What acts on the fast shaft.
+//! What acts on the motor shaft.
 
 use super::{Shaft, ShaftDetails, ShaftState};
 use crate::actuator::servo::advance::Instant;
 use crate::scalar::Scalar;
 
-/// What acts on the fast shaft.
+/// What acts on the motor shaft.
 #[derive(Clone, Copy)]
 pub(in crate::actuator::servo) struct Loads<S> {
     pub(super) brake: S,
-    pub user_torque: S,
-    /// Signed torque on the fast shaft, and the part of it that is not the contact of the elastic play.
+    pub output_torque: S,
+    /// Signed torque on the motor shaft, and the part of it that is not the contact of the elastic backlash.
     pub load: S,
     pub(super) own: S,
-    /// Torque between gear and user, at the user.
+    /// Torque between gear and output, at the output.
     pub(super) through: S,
     pub static_limit: S,
     pub dynamic: S,
@@ -33,9 +33,9 @@ impl<S: Scalar> Shaft<S> {
         s: &ShaftState<S>,
         torque: S,
     ) -> Loads<S> {
-        let user_torque = self.user_torque(d, x, s);
+        let output_torque = self.output_torque(d, x, s);
         let elastic = FULL && d.elastic;
-        let through = if elastic { self.contact(d, s) } else { user_torque };
+        let through = if elastic { self.contact(d, s) } else { output_torque };
         let mut load = through.fma(self.gear.per_ratio, x.shaft);
         let mut own = if elastic { x.shaft } else { load };
         let mut added = x.brake;
@@ -45,7 +45,7 @@ impl<S: Scalar> Shaft<S> {
                 added = S::zero();
             }
             if d.load_side && !elastic {
-                // Rigid: the load side's friction is felt on the fast shaft.
+                // Rigid: the load side's friction is felt on the motor shaft.
                 added = added + self.load_side_friction(d, x) * self.gear.per_ratio;
             }
             let (torque, friction, spalled) = self.disturbance(d, s, through);
@@ -97,7 +97,7 @@ impl<S: Scalar> Shaft<S> {
         let speed = s.motor_speed;
         let viscous = self.viscous::<FULL, EXTRA>(d, speed);
         let resist = load + speed.signed(dynamic) + viscous;
-        Loads { brake, user_torque, load, own, through, static_limit, dynamic, viscous, nut, resist }
+        Loads { brake, output_torque, load, own, through, static_limit, dynamic, viscous, nut, resist }
     }
 
     #[inline(always)]
@@ -109,7 +109,7 @@ impl<S: Scalar> Shaft<S> {
         viscous
     }
 
-    /// What gear and screw carry in the `direction` of motion, at the user: the signed load and, behind a rigid joint, the
+    /// What gear and screw carry in the `direction` of motion, at the output: the signed load and, behind a rigid joint, the
     /// load side's friction and damping. All of it passes their efficiency.
     #[inline(always)]
     fn through_gear<const EXTRA: bool>(&self, d: &ShaftDetails, x: &Instant<S>, s: &ShaftState<S>, through: S, direction: S) -> S {
@@ -121,12 +121,12 @@ impl<S: Scalar> Shaft<S> {
     }
 
     #[inline(always)]
-    pub(super) fn user_torque(&self, d: &ShaftDetails, x: &Instant<S>, s: &ShaftState<S>) -> S {
-        let load = if d.weight { x.user + self.gear.constant } else { x.user };
-        self.gear.stiffness.fma(s.user_position - self.gear.spring_zero, load)
+    pub(super) fn output_torque(&self, d: &ShaftDetails, x: &Instant<S>, s: &ShaftState<S>) -> S {
+        let load = if d.weight { x.output + self.gear.constant } else { x.output };
+        self.gear.stiffness.fma(s.output_position - self.gear.spring_zero, load)
     }
 
-    /// Dry friction of the load side, at the user.
+    /// Dry friction of the load side, at the output.
     #[inline(always)]
     pub(super) fn load_side_friction(&self, d: &ShaftDetails, x: &Instant<S>) -> S {
         if d.linear {
@@ -136,7 +136,7 @@ impl<S: Scalar> Shaft<S> {
         }
     }
 
-    /// Torque of unbalance, spalls and drive train on the fast shaft, positive where it drives forwards, their
+    /// Torque of unbalance, spalls and drive train on the motor shaft, positive where it drives forwards, their
     /// friction, and that of the spalls alone.
     #[inline(always)]
     pub(super) fn disturbance(&self, d: &ShaftDetails, s: &ShaftState<S>, through: S) -> (S, S, S) {
@@ -156,12 +156,12 @@ impl<S: Scalar> Shaft<S> {
         (torque, friction, spalled)
     }
 
-    /// Torque on the user through the elastic play.
+    /// Torque on the output through the elastic backlash.
     #[inline(always)]
     pub(super) fn contact(&self, d: &ShaftDetails, s: &ShaftState<S>) -> S {
-        let displacement = s.motor_position * self.gear.per_ratio - s.user_position;
-        let rate = s.motor_speed * self.gear.per_ratio - s.user_speed;
+        let displacement = s.motor_position * self.gear.per_ratio - s.output_position;
+        let rate = s.motor_speed * self.gear.per_ratio - s.output_speed;
         let lag = if d.train.teeth { self.train.lag(s.motor_position) } else { S::zero() };
-        self.play.contact(displacement, rate, lag)
+        self.backlash.contact(displacement, rate, lag)
     }
 }

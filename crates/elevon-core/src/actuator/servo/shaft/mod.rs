@@ -1,5 +1,5 @@
-//! The fast shaft with all that turns or loads it, and the load side: one component of both fidelities. It knows the
-//! loads, the friction (dry, viscous, of a preloaded or worn screw, of the load side), unbalance, seizure, stops and play,
+//! The motor shaft with all that turns or loads it, and the load side: one component of both fidelities. It knows the
+//! loads, the friction (dry, viscous, of a preloaded or worn screw, of the load side), unbalance, seizure, stops and backlash,
 //! and it keeps the accounts of their work.
 
 mod loads;
@@ -20,10 +20,10 @@ use crate::motor::star::MotorParameter;
 use crate::motor::thermal::Network;
 use crate::motor::unbalance::Unbalance;
 use crate::scalar::Scalar;
+use crate::transmission::backlash::{Backlash, BacklashModel, BacklashParameter};
 use crate::transmission::friction::Friction;
 use crate::transmission::gear::{Gear, GearParameter, LoadParameter};
 use crate::transmission::nut_heat::{NutHeat, NutState};
-use crate::transmission::play::{Play, PlayModel, PlayParameter};
 use crate::transmission::screw::Screw;
 use crate::transmission::tooth::Teeth;
 use crate::transmission::vibration::{Vibration, VibrationState};
@@ -32,7 +32,7 @@ details! {
     /// What of the shaft a run needs.
     ShaftDetails, read<F>(x: &ShaftNeeds)
     always {
-        /// The user's side travels, and the brake acts there.
+        /// The output's side travels, and the brake acts there.
         linear: bool = F::LINEAR;
         /// Positions move with the new speed.
         semi_implicit: bool = x.semi_implicit;
@@ -69,7 +69,7 @@ details! {
     }
 }
 
-/// What a run says of its shaft; the low fidelity neither has the elastic play nor sums work.
+/// What a run says of its shaft; the low fidelity neither has the elastic backlash nor sums work.
 pub(super) struct ShaftNeeds<'a> {
     pub parts: Parts<'a>,
     pub semi_implicit: bool,
@@ -79,10 +79,10 @@ pub(super) struct ShaftNeeds<'a> {
 }
 
 impl<'a> ShaftNeeds<'a> {
-    /// The second mass behind an elastic play, where the set has one.
+    /// The second mass behind an elastic backlash, where the set has one.
     pub(super) fn high(parts: Parts<'a>, accounts: bool) -> Self {
         let semi_implicit = Method::read(parts.solver().value(SolverParameter::Method)) == Method::SemiImplicit;
-        let elastic = PlayModel::read(parts.play().value(PlayParameter::Model)) == PlayModel::Elastic;
+        let elastic = BacklashModel::read(parts.backlash().value(BacklashParameter::Model)) == BacklashModel::Elastic;
         Self { parts, semi_implicit, elastic, accounts, low: false }
     }
 
@@ -97,7 +97,7 @@ pub struct Shaft<S> {
     dt: S,
     pub friction: Friction<S>,
     pub gear: Gear<S>,
-    pub play: Play<S>,
+    pub backlash: Backlash<S>,
     pub screw: Screw<S>,
     /// Static over dynamic friction of the screw.
     stick: S,
@@ -105,14 +105,14 @@ pub struct Shaft<S> {
     vibration: Vibration<S>,
     pub unbalance: Unbalance<S>,
     train: Train<S>,
-    /// Of the fast shaft; with a rigid transmission the user's included.
+    /// Of the motor shaft; with a rigid transmission the output's included.
     pub inertia: S,
-    /// Of the whole train, at the fast shaft.
+    /// Of the whole train, at the motor shaft.
     pub whole_inertia: S,
     dt_per_inertia: S,
     /// Of the second mass; none with a rigid transmission.
-    pub user_inertia: S,
-    per_user_inertia: S,
+    pub output_inertia: S,
+    per_output_inertia: S,
     /// Dry friction and damping of the load side.
     load_friction: S,
     load_damping: S,
@@ -122,8 +122,8 @@ pub struct Shaft<S> {
 pub struct ShaftState<S> {
     pub motor_position: S,
     pub motor_speed: S,
-    pub user_position: S,
-    pub user_speed: S,
+    pub output_position: S,
+    pub output_speed: S,
     jam_side: S,
     jammed: S,
     /// Factor on the dry friction of a screw with debris in it.
@@ -151,8 +151,8 @@ impl<S: Scalar> Shaft<S> {
         let at = |i: usize| raw[i];
         let screw = F::screw(raw);
         let gear = Gear::derive(F::ratio(raw), view.gear(), view.stop(), view.load(), [screw.efficiency, screw.efficiency_aiding]);
-        let user_inertia = at(LoadParameter::Inertia.at());
-        let reflected = user_inertia * gear.per_ratio * gear.per_ratio;
+        let output_inertia = at(LoadParameter::Inertia.at());
+        let reflected = output_inertia * gear.per_ratio * gear.per_ratio;
         let unbalance = Unbalance::derive(view.unbalance());
         let rotor = at(MotorParameter::Inertia.at()) + at(GearParameter::Inertia.at());
         let rotor = rotor + F::screw_inertia(raw) + unbalance.inertia;
@@ -163,7 +163,7 @@ impl<S: Scalar> Shaft<S> {
             dt,
             friction,
             gear,
-            play: Play::derive(view.play()),
+            backlash: Backlash::derive(view.backlash()),
             screw,
             train: Train::derive(raw, unbalance.eccentricity(rotor + reflected)),
             stick: Friction::stick(view.friction()),
@@ -173,27 +173,27 @@ impl<S: Scalar> Shaft<S> {
             inertia,
             whole_inertia: rotor + reflected,
             dt_per_inertia: dt / inertia,
-            user_inertia: if d.elastic { user_inertia } else { S::zero() },
-            per_user_inertia: S::one() / S::select(S::zero().lt(user_inertia), user_inertia, S::one()),
+            output_inertia: if d.elastic { output_inertia } else { S::zero() },
+            per_output_inertia: S::one() / S::select(S::zero().lt(output_inertia), output_inertia, S::one()),
             load_friction: at(LoadParameter::Friction.at()),
             load_damping: at(LoadParameter::Damping.at()),
         }
     }
 
     /// At rest or moving as given; NaN where nothing is given.
-    /// From positions and speeds; NaN where not given. A user's position alone takes the motor with it, mid-play.
-    pub(super) fn start(&self, motor: [S; 2], user: [S; 2]) -> ShaftState<S> {
+    /// From positions and speeds; NaN where not given. An output's position alone takes the motor with it, mid-backlash.
+    pub(super) fn start(&self, motor: [S; 2], output: [S; 2]) -> ShaftState<S> {
         let or = |given: S, other: S| S::select(given.equals(given), given, other);
         let zero = S::zero();
-        let motor_position = or(motor[0], or(user[0] * self.gear.ratio, zero));
+        let motor_position = or(motor[0], or(output[0] * self.gear.ratio, zero));
         let driver = motor_position * self.gear.per_ratio;
-        let user_position = self.play.drag(driver, or(user[0], driver));
+        let output_position = self.backlash.follow(driver, or(output[0], driver));
         ShaftState {
             motor_position,
             motor_speed: or(motor[1], zero),
-            user_position,
-            user_speed: or(user[1], zero),
-            jam_side: (user_position - self.friction.jam_position).sign(),
+            output_position,
+            output_speed: or(output[1], zero),
+            jam_side: (output_position - self.friction.jam_position).sign(),
             jammed: S::select(S::splat(0.5).le(self.friction.jam_anywhere), S::one(), zero),
             scatter: S::one(),
             bristle: zero,
@@ -204,18 +204,18 @@ impl<S: Scalar> Shaft<S> {
     }
 }
 
-/// Why no shaft stands so: motor and user further apart than the play lets them. `at` holds both positions, NaN where not
+/// Why no shaft stands so: motor and output further apart than the backlash lets them. `at` holds both positions, NaN where not
 /// given.
 pub(super) fn refuses_start<F: Form>(raw: &[f64], at: [f64; 2]) -> Option<String> {
-    let ([motor, user], half) = (at, Play::derive(Raw(raw).play()).half);
+    let ([motor, output], half) = (at, Backlash::derive(Raw(raw).backlash()).half);
     let driver = motor / F::ratio(raw);
-    // What an elastic play is wound up by is for the caller to say.
-    let elastic = PlayModel::read(Raw(raw).play()[PlayParameter::Model as usize]) == PlayModel::Elastic;
-    let apart = (user - driver).abs();
+    // What an elastic backlash is wound up by is for the caller to say.
+    let elastic = BacklashModel::read(Raw(raw).backlash()[BacklashParameter::Model as usize]) == BacklashModel::Elastic;
+    let apart = (output - driver).abs();
     (!elastic && apart > half * (1.0 + 1e-9) + 1e-12).then(|| {
         format!(
-            "initial: user_position = {user} and motor_position = {motor}: the user is {apart} away from where the motor holds it, more \
-             than half the play, {half}; leave one of them out"
+            "initial: output_position = {output} and motor_position = {motor}: the output is {apart} away from where the motor holds it, more \
+             than half the backlash, {half}; leave one of them out"
         )
     })
 }

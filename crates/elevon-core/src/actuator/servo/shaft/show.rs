@@ -9,15 +9,15 @@ use crate::transmission::friction::Friction;
 
 /// What the shaft shows to an observer.
 pub(in crate::actuator::servo) struct Shown<S> {
-    pub user_speed: S,
+    pub output_speed: S,
     pub friction: S,
     pub brake: S,
     pub load: S,
-    pub user_torque: S,
+    pub output_torque: S,
     pub through: S,
     pub unbalance: S,
     pub added: Added<S>,
-    /// Torque on the fast shaft that an end stop cancels.
+    /// Torque on the motor shaft that an end stop cancels.
     pub stop: S,
 }
 
@@ -28,11 +28,11 @@ impl<S: Scalar> Shaft<S> {
         let loads = self.loads::<true, true>(d, x, s, torque);
         let dry = self.dry(d, s, &loads, torque);
         Shown {
-            user_speed: self.user_speed(d, s),
+            output_speed: self.output_speed(d, s),
             friction: dry + loads.viscous,
             brake: x.brake,
             load: loads.load,
-            user_torque: loads.user_torque,
+            output_torque: loads.output_torque,
             through: loads.through,
             unbalance: if d.unbalance { self.unbalance.torque(s.motor_position) } else { S::zero() },
             added: self.train.added(&d.train, s.motor_position, loads.through, self.gear.per_ratio),
@@ -50,34 +50,34 @@ impl<S: Scalar> Shaft<S> {
         }
     }
 
-    /// What a stop cancels, on the fast shaft: of the torque `net` there, or of what pushes the second mass.
+    /// What a stop cancels, on the motor shaft: of the torque `net` there, or of what pushes the second mass.
     #[inline(always)]
     fn stopped(&self, d: &ShaftDetails, x: &Instant<S>, s: &ShaftState<S>, loads: &Loads<S>, net: S) -> S {
         let zero = S::zero();
         if d.elastic {
-            let active = loads.through - loads.user_torque;
+            let active = loads.through - loads.output_torque;
             let limit = if d.load_side { self.load_side_friction(d, x) } else { zero };
             let net = active - active.clamp_abs(limit);
-            let held = s.user_speed.equals(zero) & self.gear.user_stop.outwards(s.user_position, net);
+            let held = s.output_speed.equals(zero) & self.gear.output_stop.outwards(s.output_position, net);
             return S::select(held, net * self.gear.per_ratio, zero);
         }
         let held = s.motor_speed.equals(zero) & self.gear.motor_stop.outwards(s.motor_position, net);
         S::select(held, net, zero)
     }
 
-    /// In the operator model the user moves with the motor while the play is taken up, else it rests.
+    /// In the operator model the output moves with the motor while the backlash is taken up, else it rests.
     #[inline(always)]
-    fn user_speed(&self, d: &ShaftDetails, s: &ShaftState<S>) -> S {
+    fn output_speed(&self, d: &ShaftDetails, s: &ShaftState<S>) -> S {
         if d.elastic {
-            return s.user_speed;
+            return s.output_speed;
         }
-        let lag = s.motor_position * self.gear.per_ratio - s.user_position;
-        let edge = self.play.half * S::splat(1.0 - 1e-9);
+        let lag = s.motor_position * self.gear.per_ratio - s.output_position;
+        let edge = self.backlash.half * S::splat(1.0 - 1e-9);
         let pushing = edge.le(lag.abs()) & S::zero().le(lag * s.motor_speed);
         S::select(pushing, s.motor_speed * self.gear.per_ratio, S::zero())
     }
 
-    /// Ram position and speed, the screw's torque at the fast shaft, its efficiencies.
+    /// Ram position and speed, the screw's torque at the motor shaft, its efficiencies.
     #[inline(always)]
     pub(in crate::actuator::servo) fn show_screw(&self, s: &ShaftState<S>, shown: &Shown<S>) -> [S; 5] {
         let per_ratio = self.gear.per_ratio;
@@ -95,15 +95,15 @@ impl<S: Scalar> Shaft<S> {
         shown: &Shown<S>,
     ) -> [S; 2] {
         let limit = self.load_side_friction(d, x);
-        let dry = Friction::dry_torque(shown.through - shown.user_torque, shown.user_speed, limit, limit);
+        let dry = Friction::dry_torque(shown.through - shown.output_torque, shown.output_speed, limit, limit);
         let spall =
             if d.spall { self.screw.spall(s.motor_position, shown.through, s.motor_position * self.gear.per_ratio).0 } else { S::zero() };
-        [dry + self.load_damping * shown.user_speed, spall]
+        [dry + self.load_damping * shown.output_speed, spall]
     }
 
     #[inline(always)]
     pub(in crate::actuator::servo) fn kinetic(&self, s: &ShaftState<S>) -> S {
         let half = S::splat(0.5);
-        half * self.inertia * s.motor_speed * s.motor_speed + half * self.user_inertia * s.user_speed * s.user_speed
+        half * self.inertia * s.motor_speed * s.motor_speed + half * self.output_inertia * s.output_speed * s.output_speed
     }
 }

@@ -91,12 +91,12 @@ impl<S: Scalar> Shaft<S> {
             self.vibration.step(&mut s.vibration, force, self.dt);
         }
         if FULL && d.elastic {
-            self.user_step::<EXTRA>(d, x, s, loads);
+            self.output_step::<EXTRA>(d, x, s, loads);
         } else {
-            s.user_position = self.drag::<EXTRA>(d, position, s.user_position);
+            s.output_position = self.drag::<EXTRA>(d, position, s.output_position);
         }
         if FULL && d.jams {
-            self.friction.seize(s.user_position, &mut s.jam_side, &mut s.jammed);
+            self.friction.seize(s.output_position, &mut s.jam_side, &mut s.jammed);
         }
         s.motor_position = position;
         s.motor_speed = held_speed;
@@ -123,45 +123,45 @@ impl<S: Scalar> Shaft<S> {
         missing + turning + self.vibration.mesh(angle, torque)
     }
 
-    /// The user as the play operator leaves it.
+    /// The output as the backlash operator leaves it.
     #[inline(always)]
-    fn drag<const EXTRA: bool>(&self, d: &ShaftDetails, position: S, user: S) -> S {
+    fn drag<const EXTRA: bool>(&self, d: &ShaftDetails, position: S, output: S) -> S {
         let driver = position * self.gear.per_ratio;
         if EXTRA && d.train.teeth {
-            self.play.drag_worn(driver, user, self.train.lag(position))
+            self.backlash.follow_worn(driver, output, self.train.lag(position))
         } else {
-            self.play.drag(driver, user)
+            self.backlash.follow(driver, output)
         }
     }
 
-    /// The second mass of the elastic play; its end stop is where the user stands.
+    /// The second mass of the elastic backlash; its end stop is where the output stands.
     #[inline(always)]
-    fn user_step<const EXTRA: bool>(&self, d: &ShaftDetails, x: &Instant<S>, s: &mut ShaftState<S>, loads: &Loads<S>) {
-        let speed = s.user_speed;
-        let active = loads.through - loads.user_torque;
+    fn output_step<const EXTRA: bool>(&self, d: &ShaftDetails, x: &Instant<S>, s: &mut ShaftState<S>, loads: &Loads<S>) {
+        let speed = s.output_speed;
+        let active = loads.through - loads.output_torque;
         let new_speed = if EXTRA && d.load_side {
             let dry = self.load_side_friction(d, x);
             let net = Friction::net_torque(active, S::zero(), (self.load_damping).fma(speed, speed.signed(dry)), speed, dry);
-            let net = self.gear.user_stop.react(s.user_position, speed, net);
-            Friction::stop_at_reversal(speed, speed + self.dt * (self.per_user_inertia * net))
+            let net = self.gear.output_stop.react(s.output_position, speed, net);
+            Friction::stop_at_reversal(speed, speed + self.dt * (self.per_output_inertia * net))
         } else {
-            let net = self.gear.user_stop.react(s.user_position, speed, active);
-            speed + self.dt * (self.per_user_inertia * net)
+            let net = self.gear.output_stop.react(s.output_position, speed, active);
+            speed + self.dt * (self.per_output_inertia * net)
         };
-        let moved = s.user_position + self.dt * if d.semi_implicit { new_speed } else { speed };
-        let (position, held) = self.gear.user_stop.hold(moved, new_speed);
+        let moved = s.output_position + self.dt * if d.semi_implicit { new_speed } else { speed };
+        let (position, held) = self.gear.output_stop.hold(moved, new_speed);
         if d.accounts {
             let middle = S::splat(0.5) * (speed + new_speed);
-            s.work.load = s.work.load + self.dt * loads.user_torque * middle;
+            s.work.load = s.work.load + self.dt * loads.output_torque * middle;
             if EXTRA && d.load_side {
                 self.account_load_side(d, x, s, active, middle);
             }
             let motor = s.motor_speed * self.gear.per_ratio;
-            let stopped = S::splat(0.5) * self.user_inertia * (new_speed * new_speed - held * held);
+            let stopped = S::splat(0.5) * self.output_inertia * (new_speed * new_speed - held * held);
             s.work.impact = s.work.impact + self.dt * loads.through * (motor - middle) + stopped;
         }
-        s.user_position = position;
-        s.user_speed = held;
+        s.output_position = position;
+        s.output_speed = held;
     }
 
     /// Work of a step at its middle; `speeds` before, after and as the stops leave it.
@@ -180,9 +180,9 @@ impl<S: Scalar> Shaft<S> {
     #[inline(always)]
     fn account_load_side(&self, d: &ShaftDetails, x: &Instant<S>, s: &mut ShaftState<S>, active: S, middle: S) {
         let limit = self.load_side_friction(d, x);
-        let dry = Friction::dry_torque(active, s.user_speed, limit, limit);
+        let dry = Friction::dry_torque(active, s.output_speed, limit, limit);
         let braked = if d.linear { dry * (x.brake / limit.maximum(S::splat(1e-300))) } else { S::zero() };
         s.work.brake = s.work.brake + self.dt * braked * middle;
-        s.work.friction = s.work.friction + self.dt * (dry - braked + self.load_damping * s.user_speed) * middle;
+        s.work.friction = s.work.friction + self.dt * (dry - braked + self.load_damping * s.output_speed) * middle;
     }
 }

@@ -1,4 +1,4 @@
-//! What acts on the fast shaft beside the plain friction: the law of the dry friction, cogging, a bearing with a defect or a
+//! What acts on the motor shaft beside the plain friction: the law of the dry friction, cogging, a bearing with a defect or a
 //! magnetic pull on it, worn teeth.
 
 use crate::actuator::servo::form::Form;
@@ -59,7 +59,7 @@ signals! {
     }
 }
 
-/// What it adds on the fast shaft: torques positive where they drive forwards, and dry friction.
+/// What it adds on the motor shaft: torques positive where they drive forwards, and dry friction.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::actuator::servo) struct Added<S> {
     pub cogging: S,
@@ -108,7 +108,7 @@ impl<S: Scalar> Train<S> {
         }
     }
 
-    /// At a motor angle; `through` is the torque through the gear at the user, `per_ratio` the gear's.
+    /// At a motor angle; `through` is the torque through the gear at the output, `per_ratio` the gear's.
     #[inline(always)]
     pub(super) fn added(&self, d: &TrainDetails, angle: S, through: S, per_ratio: S) -> Added<S> {
         let zero = S::zero();
@@ -139,7 +139,7 @@ impl<S: Scalar> Train<S> {
         }
     }
 
-    /// What worn teeth add to half the play at a motor angle.
+    /// What worn teeth add to half the backlash at a motor angle.
     #[inline(always)]
     pub(super) fn lag(&self, angle: S) -> S {
         self.teeth.lag(angle).half

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["declined"]
+__all__ = ["not_modelled"]
 
 _PHASES = tuple(f"motor.phase_{p}" for p in "abc")
 _CURRENTS = tuple(f"sensor.current_{p}" for p in "abc")
@@ -51,13 +51,13 @@ _DECLINED: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("jam", ("transmission",), f"{_DRY}, or not explained where it is more than a motor still "
      "moves with"),
     ("chipped_tooth", ("gear",), "a step once a turn of a wheel, which no number of the evidence "
-     "follows: not seen, or named tooth_wear@gear or play@transmission"),
+     "follows: not seen, or named tooth_wear@gear or backlash@transmission"),
     ("offset", ("sensor.encoder",), "no test looks at absolute positions"),
     ("offset", ("sensor.resolver",), _ANGLE),
     ("mismatch", ("sensor.resolver",), _ANGLE),
-    ("winding_short", ("sensor.resolver.sine", "sensor.resolver.cosine",
+    ("resolver_short", ("sensor.resolver.sine", "sensor.resolver.cosine",
                        "sensor.resolver.excitation"), _ANGLE),
-    ("winding_open", ("sensor.resolver.sine", "sensor.resolver.cosine",
+    ("resolver_open", ("sensor.resolver.sine", "sensor.resolver.cosine",
                       "sensor.resolver.excitation"), _GONE),
     ("dropout", ("sensor.resolver",), "the motor's position and speed disagree: reading the log "
      "refuses it, or no number of the evidence follows"),
@@ -68,7 +68,7 @@ _DECLINED: tuple[tuple[str, tuple[str, ...], str], ...] = (
 )  # fmt: skip
 
 
-def declined() -> tuple[dict[str, str], ...]:
+def not_modelled() -> tuple[dict[str, str], ...]:
     """Return kind, place and reason of each fault that is not weighed."""
     return tuple(
         {"kind": kind, "place": place, "reason": reason}

@@ -1,4 +1,4 @@
-"""Play of each log, where a campaign changed it between its logs."""
+"""Backlash of each log, where a campaign changed it between its logs."""
 
 from __future__ import annotations
 
@@ -6,20 +6,22 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from elevon.calibrate.backlash import BacklashFit, fit_backlash, median_width
 from elevon.calibrate.log import BenchLog
-from elevon.calibrate.play import PlayFit, fit_play, median_width
 
-__all__ = ["PER_LOG", "differing_plays", "plays_differ", "pooled_play"]
+__all__ = ["PER_LOG", "backlashes_differ", "differing_backlashes", "pooled_backlash"]
 
 #: What may be estimated for each log on its own.
-PER_LOG = ("play.total",)
-_APART = 0.05  # relative difference of two plays that is one
+PER_LOG = ("backlash.total",)
+_APART = 0.05  # relative difference of two backlashes that is one
 _COUNTS = 3.0  # counts of the encoder that it also exceeds
 _SIGMAS = 4.0  # deviations that it also exceeds
 
 
-def differing_plays(logs: Sequence[BenchLog], ratio: float, count: float) -> dict[str, PlayFit]:
-    """Return each log's own fit where the logs' plays differ, else nothing.
+def differing_backlashes(
+    logs: Sequence[BenchLog], ratio: float, count: float
+) -> dict[str, BacklashFit]:
+    """Return each log's own fit where the logs' backlashes differ, else nothing.
 
     Parameters
     ----------
@@ -28,28 +30,28 @@ def differing_plays(logs: Sequence[BenchLog], ratio: float, count: float) -> dic
     ratio : float
         Gear ratio.
     count : float
-        One count of the encoder at the user [rad].
+        One count of the encoder at the output [rad].
     """
     widths = [median_width(log, ratio, count) for log in logs]
     known = [width for width in widths if width is not None]
     if len(known) < 2 or not _apart(min(known), max(known), count, 0.0):
         return {}
-    fits = {log.name: fit_play([log], ratio, count) for log in logs}
-    plays = {name: fit for name, fit in fits.items() if fit is not None}
-    least = min(plays.values(), key=lambda fit: fit.play[0])
-    most = max(plays.values(), key=lambda fit: fit.play[0])
-    std = math.hypot(least.play[1], most.play[1])
-    return plays if _apart(least.play[0], most.play[0], count, std) else {}
+    fits = {log.name: fit_backlash([log], ratio, count) for log in logs}
+    backlashes = {name: fit for name, fit in fits.items() if fit is not None}
+    least = min(backlashes.values(), key=lambda fit: fit.backlash[0])
+    most = max(backlashes.values(), key=lambda fit: fit.backlash[0])
+    std = math.hypot(least.backlash[1], most.backlash[1])
+    return backlashes if _apart(least.backlash[0], most.backlash[0], count, std) else {}
 
 
 def _apart(least: float, most: float, count: float, std: float) -> bool:
     return most - least > max(_COUNTS * count, _APART * most, _SIGMAS * std)
 
 
-def pooled_play(plays: dict[str, PlayFit]) -> PlayFit:
-    """Offset, gain and delay of the encoder over all logs; the play is the widest log's."""
-    fits = list(plays.values())
-    best = max(fits, key=lambda fit: fit.play[0])
+def pooled_backlash(backlashes: dict[str, BacklashFit]) -> BacklashFit:
+    """Offset, gain and delay of the encoder over all logs; the backlash is the widest log's."""
+    fits = list(backlashes.values())
+    best = max(fits, key=lambda fit: fit.backlash[0])
     if any(fit.floats for fit in fits):
         return best
     return replace(
@@ -57,7 +59,7 @@ def pooled_play(plays: dict[str, PlayFit]) -> PlayFit:
         offset=_mean([fit.offset for fit in fits]),
         gain=_mean([fit.gain for fit in fits]),
         delay=_mean([fit.delay for fit in fits]),
-        logs=tuple(plays),
+        logs=tuple(backlashes),
     )
 
 
@@ -70,12 +72,14 @@ def _mean(pairs: Sequence[tuple[float, float]]) -> tuple[float, float]:
     return mean, math.sqrt(max(1.0, chi / max(len(pairs) - 1, 1)) / total)
 
 
-def plays_differ(plays: dict[str, PlayFit], extra: float) -> str:
-    """Say that the plays differ, with each log's, in degrees."""
+def backlashes_differ(backlashes: dict[str, BacklashFit], extra: float) -> str:
+    """Say that the backlashes differ, with each log's, in degrees."""
     each = ", ".join(
-        f"{name} {math.degrees(fit.play[0] - extra):.2f} deg" for name, fit in plays.items()
+        f"{name} {math.degrees(fit.backlash[0] - extra):.2f} deg"
+        for name, fit in backlashes.items()
     )
     return (
-        f"plays differ: {each}; play.total is left as it was (--per-log play.total lists each "
+        f"backlashes differ: {each}; backlash.total is left as it was "
+        "(--per-log backlash.total lists each "
         "log's with its interval)"
     )

@@ -16,7 +16,7 @@ from elevon import _core
 
 def shipped() -> dict[str, str | None]:
     """Wiring of every shipped set by its name, from the package's own folder; None: its base's."""
-    folder = resources.files("elevon.parameters") / "sets"
+    folder = resources.files("elevon") / "actuators"
     files = [entry for entry in folder.iterdir() if entry.name.endswith(".toml")]
     return {
         entry.name.removesuffix(".toml"): tomllib.loads(entry.read_text(encoding="utf-8")).get(
@@ -73,7 +73,7 @@ def scenario(name: str, fault: dict[str, Any] | None = None) -> Any:
 def motion(name: str) -> dict[str, Any]:
     """A short run in which everything moves, as data.
 
-    A position swing, 0.03 in SI at 4 Hz, that takes up any play; a gear retracts from its
+    A position swing, 0.03 in SI at 4 Hz, that takes up any backlash; a gear retracts from its
     down-lock and extends into it again.
     """
     data: dict[str, Any] = {

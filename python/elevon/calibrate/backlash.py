@@ -1,6 +1,6 @@
-"""Play, encoder gain and offset from the two positions alone.
+"""Backlash, encoder gain and offset from the two positions alone.
 
-The encoder shows the motor's angle over the ratio, dragged through the play: one equation, no
+The encoder shows the motor's angle over the ratio, dragged through the backlash: one equation, no
 friction, inertia or controller in it. All samples count, those inside the gap too.
 """
 
@@ -16,36 +16,36 @@ from elevon.calibrate.blocks import block_covariance, stroke_blocks
 from elevon.calibrate.estimate import quantile
 from elevon.calibrate.log import BenchLog
 
-__all__ = ["PlayFit", "fit_play", "median_width", "through_play"]
+__all__ = ["BacklashFit", "fit_backlash", "median_width", "through_backlash"]
 
 Floats = npt.NDArray[np.float64]
-_TRAVEL = 3.0  # plays (or counts) of travel both ways that a log must have
-_FLOATS = 3.0  # counts of residual that no rounding leaves: the user is not dragged
+_TRAVEL = 3.0  # backlashes (or counts) of travel both ways that a log must have
+_FLOATS = 3.0  # counts of residual that no rounding leaves: the output is not dragged
 
 
 @dataclass(frozen=True)
-class PlayFit:
+class BacklashFit:
     """What the two positions say, pooled over logs.
 
     Attributes
     ----------
-    play, offset, gain, delay : (float, float)
-        Value and standard deviation: total play [rad at the user]; encoder less motor over ratio
-        [rad]; encoder's gain over the motor's; encoder's lag behind the motor's sensor [s].
+    backlash, offset, gain, delay : (float, float)
+        Value and standard deviation: total backlash [rad at the output]; encoder less motor over
+        ratio [rad]; encoder's gain over the motor's; encoder's lag behind the motor's sensor [s].
     degrees : float
         Degrees of freedom of the deviations.
     rms : float
         Of the residual [rad].
     reach : float
-        Greatest half range of motion in a log [rad at the user].
+        Greatest half range of motion in a log [rad at the output].
     logs : tuple of str
         Logs used.
     floats : bool
-        The user is not dragged: it moves on its own within the play. Only the span of the two
+        The output is not dragged: it moves on its own within the backlash. Only the span of the two
         positions' difference is known then; gain and delay are not.
     """
 
-    play: tuple[float, float]
+    backlash: tuple[float, float]
     offset: tuple[float, float]
     gain: tuple[float, float]
     delay: tuple[float, float]
@@ -56,8 +56,8 @@ class PlayFit:
     floats: bool = False
 
 
-def through_play(driver: Floats, width: float) -> Floats:
-    """Drag a follower through a total play; it starts in the middle. Shape as `driver`."""
+def through_backlash(driver: Floats, width: float) -> Floats:
+    """Drag a follower through a total backlash; it starts in the middle. Shape as `driver`."""
     half = 0.5 * width
     out = np.empty_like(driver)
     state = float(driver[0])
@@ -67,8 +67,8 @@ def through_play(driver: Floats, width: float) -> Floats:
     return out
 
 
-def fit_play(logs: Sequence[BenchLog], ratio: float, count: float) -> PlayFit | None:
-    """Fit play, offset, gain and delay to every log that moves both ways.
+def fit_backlash(logs: Sequence[BenchLog], ratio: float, count: float) -> BacklashFit | None:
+    """Fit backlash, offset, gain and delay to every log that moves both ways.
 
     Parameters
     ----------
@@ -77,11 +77,11 @@ def fit_play(logs: Sequence[BenchLog], ratio: float, count: float) -> PlayFit | 
     ratio : float
         Gear ratio.
     count : float
-        One count of the encoder at the user [rad].
+        One count of the encoder at the output [rad].
 
     Returns
     -------
-    PlayFit or None
+    BacklashFit or None
         None where no log has both positions and a reversal.
     """
     used = [log for log in logs if _usable(log, ratio, count)]
@@ -90,7 +90,7 @@ def fit_play(logs: Sequence[BenchLog], ratio: float, count: float) -> PlayFit | 
     from scipy.optimize import least_squares
 
     drivers = [log.motor / ratio for log in used if log.motor is not None]
-    users = [log.user for log in used if log.user is not None]
+    users = [log.output for log in used if log.output is not None]
     width, centre = _start(used, drivers, users)
     keeps = [_after_reversal(x, width) for x in drivers]
     speeds = [log.speed / ratio for log in used]
@@ -99,7 +99,7 @@ def fit_play(logs: Sequence[BenchLog], ratio: float, count: float) -> PlayFit | 
     def residual(p: Floats) -> Floats:
         parts = []
         for x, y, v, keep in zip(drivers, users, speeds, keeps, strict=True):
-            dragged = through_play(x, abs(float(p[0])))
+            dragged = through_backlash(x, abs(float(p[0])))
             moving = np.gradient(dragged) / np.maximum(np.abs(np.gradient(x)), 1e-15)
             follows = v * np.clip(np.abs(moving), 0.0, 1.0)
             parts.append(((p[2] * dragged + p[1] - p[3] * follows) - y)[keep])
@@ -125,8 +125,8 @@ def fit_play(logs: Sequence[BenchLog], ratio: float, count: float) -> PlayFit | 
     if rms > _FLOATS * count:
         return _spanned(used, drivers, users, keeps, count=count, rms=rms)
     pairs = [(float(v), float(s)) for v, s in zip(value, std, strict=True)]
-    return PlayFit(
-        play=pairs[0],
+    return BacklashFit(
+        backlash=pairs[0],
         offset=pairs[1],
         gain=pairs[2],
         delay=pairs[3],
@@ -145,12 +145,13 @@ def _spanned(
     *,
     count: float,
     rms: float,
-) -> PlayFit:
-    """Play of a user that flies from one end of the gap to the other.
+) -> BacklashFit:
+    """Backlash of an output that flies from one end of the gap to the other.
 
     The difference of the two positions piles up at both ends. What it leaves out at either side
     within twenty to one is on the way or not yet in contact; what lies beyond two hundred to one
-    is the give of the contacts: the play is between the two spans, less the count of the rounding.
+    is the give of the contacts: the backlash is between the two spans, less the count of the
+    rounding.
     """
     inner, outer, middles = [], [], []
     for x, y, keep in zip(drivers, users, keeps, strict=True):
@@ -160,8 +161,8 @@ def _spanned(
         middles.append(0.5 * (edges[3] + edges[0]))
     low, high = max(min(inner) - count, 0.0), max(outer) - count
     half = 0.5 * (high - low) / quantile(np.inf)
-    return PlayFit(
-        play=(0.5 * (low + high), half),
+    return BacklashFit(
+        backlash=(0.5 * (low + high), half),
         offset=(float(np.mean(middles)), half),
         gain=(1.0, np.inf),
         delay=(0.0, np.inf),
@@ -174,7 +175,7 @@ def _spanned(
 
 
 def _jacobian(residual: object, p: Floats, scale: Floats) -> Floats:
-    """Central differences over steps of the size that matters: the play's kinks average out."""
+    """Central differences over steps of the size that matters: the backlash's kinks average out."""
     columns = []
     for k, step in enumerate(0.5 * scale):
         shift = np.zeros_like(p)
@@ -184,7 +185,7 @@ def _jacobian(residual: object, p: Floats, scale: Floats) -> Floats:
 
 
 def _usable(log: BenchLog, ratio: float, count: float) -> bool:
-    if log.motor is None or log.user is None:
+    if log.motor is None or log.output is None:
         return False
     speed = np.abs(log.speed).max()
     both = min(float((log.speed > 0.1 * speed).mean()), float((log.speed < -0.1 * speed).mean()))
@@ -192,16 +193,16 @@ def _usable(log: BenchLog, ratio: float, count: float) -> bool:
 
 
 def median_width(log: BenchLog, ratio: float, count: float) -> float | None:
-    """Play of one log [rad at the user] by the medians of each direction; None without reversal."""
-    if not _usable(log, ratio, count) or log.motor is None or log.user is None:
+    """Backlash of one log [rad at the output] by the medians of each direction, or None."""
+    if not _usable(log, ratio, count) or log.motor is None or log.output is None:
         return None
-    return _start([log], [log.motor / ratio], [log.user])[0]
+    return _start([log], [log.motor / ratio], [log.output])[0]
 
 
 def _start(
     logs: Sequence[BenchLog], drivers: Sequence[Floats], users: Sequence[Floats]
 ) -> tuple[float, float]:
-    """Median lag of each direction, well away from reversals: half a play either side of centre."""
+    """Median lag of each direction, away from reversals: half a backlash either side of centre."""
     ahead, behind = [], []
     for log, x, y in zip(logs, drivers, users, strict=True):
         fast = 0.3 * np.abs(log.speed).max()
@@ -213,7 +214,7 @@ def _start(
 
 
 def _after_reversal(x: Floats, width: float) -> npt.NDArray[np.bool_]:
-    """Samples after the gap has surely been crossed once: before, the start decides the user."""
+    """Samples after the gap has surely been crossed once: before, the start decides the output."""
     reach = np.maximum.accumulate(x) - np.minimum.accumulate(x)
     return np.asarray(reach > 1.5 * width, dtype=np.bool_)
 
