@@ -7,16 +7,14 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.session import Session, SessionState
 from elevon.simulate.arguments import ActuatorLike
 from elevon.units import parse_quantity
 
 __all__ = ["ActuatorEnv"]
-
-Floats = npt.NDArray[np.float64]
 
 
 class ActuatorEnv(gymnasium.Env[Floats, Floats]):

@@ -10,7 +10,7 @@ PACKAGE = Path(__file__).resolve().parents[2] / "python" / "elevon"
 # From left to right; rooms in one row do not import each other. A new room is added here with
 # thought: what it may know of is everything left of it, and nothing else.
 ROWS = [
-    ["errors", "extras", "_core"],
+    ["errors", "extras", "arrays", "_core"],
     ["units", "files", "progress", "memory", "data", "threads"],
     ["documents", "series", "number_text", "report", "worklog", "containers"],
     ["recording"],

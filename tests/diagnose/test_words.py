@@ -27,7 +27,9 @@ def named(kind, place, unit="1", severity=0.2):
 
 def test_a_fault_without_words_of_its_own_is_said_by_kind_and_place():
     said = sentence(named("resolver_short", "sensor.resolver.sine"))
-    assert said.startswith("There is resolver short at the sensor resolver sine: 20 % (10 to 30 %);")
+    assert said.startswith(
+        "There is resolver short at the sensor resolver sine: 20 % (10 to 30 %);"
+    )
     assert sentence(named("brake_dragging", "brake", "N m")).startswith(
         "The brake drags with 0.2 N m (0.1 to 0.3 N m);"
     )

@@ -10,11 +10,11 @@ import numpy.typing as npt
 
 from elevon.analysis.response import Response
 from elevon.analysis.terms import Column, blocks_matrix, further_contrasts, separate
+from elevon.arrays import Floats
 from elevon.errors import InputError
 
 __all__ = ["Effects", "Term", "effects_of"]
 
-Floats = npt.NDArray[np.float64]
 EQUAL_REPEATS = (
     "the repeats of each point are equal: nothing random was simulated (sensor noise, spread of "
     "units); they count as one run"

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
+
+from elevon.arrays import Floats
 
 __all__ = ["CoKriging", "Kriging", "Surrogate"]
-
-Floats = npt.NDArray[np.float64]
 
 
 class Surrogate(Protocol):

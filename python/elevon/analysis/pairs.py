@@ -9,14 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.analysis.response import Factor, Response, read_response
+from elevon.arrays import Floats
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
     from elevon.campaign import Dataset
 
 __all__ = ["Pairs", "Samples", "pair", "samples_of"]
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

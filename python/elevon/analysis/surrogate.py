@@ -11,11 +11,11 @@ import numpy.typing as npt
 
 from elevon.analysis.kriging import CoKriging, Kriging, Surrogate
 from elevon.analysis.pairs import Pairs, Samples
+from elevon.arrays import Floats
 from elevon.errors import InputError, Interrupted
 
 __all__ = ["Study", "Variant", "study"]
 
-Floats = npt.NDArray[np.float64]
 
 #: Part of the high points that is held out, and of the budget that co-kriging spends on high runs.
 _HELD_OUT, _HIGH_SHARE = 0.3, 0.5

@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
+
 __all__ = ["Column", "blocks_matrix", "further_contrasts", "separate"]
 
-Floats = npt.NDArray[np.float64]
 
 #: Columns whose correlation differs from 0 or 1 by less than this are not, or wholly, aliased.
 _EQUAL = 1e-9

@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.units import parse_quantity
 
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = ["LOAD_CHANNEL", "acquire", "acquired_signals", "internal_steps"]
 
-Floats = npt.NDArray[np.float64]
 LOAD_CHANNEL = "rig_force"
 """Channel of the role ``load``: force of the stand on the rod, positive opposes positive motion."""
 _LEAST = 25e3  # Hz of the simulated channels before the filter, so that relays' ripple is filtered

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.bench.converter import Hx711
 from elevon.errors import InputError, RangeError
 from elevon.scenario.scenario import Term
@@ -24,8 +24,6 @@ from elevon.units import parse_quantity
 from elevon.waveforms import TABLE, evaluate, unit_of, wave_records
 
 __all__ = ["BrakeRig", "BrakeRun", "CellState", "brake_loop", "set_point"]
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.units import parse_quantity
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 __all__ = ["ForceLoop", "asked_force"]
 
-Floats = npt.NDArray[np.float64]
 _AT_REST = 1e-3  # m/s below which a direction fades: rest has none
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.bench.acquisition import acquire, acquired_signals, internal_steps
 from elevon.bench.force_control import ForceLoop, asked_force
 from elevon.bench.procedure import ForceStep, Procedure, RigStep, SettingsStep, TraceStep
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 __all__ = ["LoadedSetup", "loaded_setups", "run_loaded", "run_loaded_batch", "write_loaded"]
 
-Floats = npt.NDArray[np.float64]
 _GRID = 1e-3  # s of the force table
 _FINE = 0.25  # of it between two samples of the motion
 _PASSES = 2  # runs of the low model from which the force is computed

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.bench.converter import Hx711
 from elevon.bench.rig import RATE, Setup
 from elevon.files import write_text
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = ["cell_signals", "drive_signals", "recorded", "trace_files", "write_traces"]
 
-Floats = npt.NDArray[np.float64]
 
 _LOGGED = {
     "encoder_position": "encoder_position",

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.benchmark.make import ACTUATORS, BENCHMARK
 from elevon.errors import InputError
 from elevon.files import write_text
 
 __all__ = ["SCORES", "Score", "score_benchmark"]
 
-Floats = npt.NDArray[np.float64]
 SCORES = "scores.json"
 
 #: A fault counts as present from this part of its severity at the end of life on.

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.blocks import block_covariance, stroke_blocks
 from elevon.calibrate.estimate import quantile
 from elevon.calibrate.log import BenchLog
 
 __all__ = ["BacklashFit", "fit_backlash", "median_width", "through_backlash"]
 
-Floats = npt.NDArray[np.float64]
 _TRAVEL = 3.0  # backlashes (or counts) of travel both ways that a log must have
 _FLOATS = 3.0  # counts of residual that no rounding leaves: the output is not dragged
 

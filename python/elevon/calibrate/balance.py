@@ -15,13 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.log import BenchLog
 from elevon.calibrate.motion import Motion, delayed, dilated, lagged, motion_of, smoothed
 from elevon.calibrate.regression import Regression, robust_cost, robust_regression, with_deviations
 
 __all__ = ["torque_balance"]
 
-Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 _SLOW = 0.05  # of the highest speed: below it friction may stick
 _CLEARER = 0.2  # of the highest speed: the same, asked more strictly

@@ -6,13 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.blocks import stroke_blocks
 
 __all__ = ["Balanced", "Sought", "fit_balance"]
 
-Floats = npt.NDArray[np.float64]
 _ROUNDS = 25
 _STEP = 0.3  # of the first value, in one round
 _SMALL = 1e-6  # of the first value, for differences

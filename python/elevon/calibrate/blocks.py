@@ -14,9 +14,10 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
+
 __all__ = ["block_covariance", "block_length", "memory", "stroke_blocks"]
 
-Floats = npt.NDArray[np.float64]
 _SHORTEST = 0.25  # s
 _MEMORY = 4.0  # correlation times a block is at least
 _FEWEST = 8  # blocks a log

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import numpy.typing as npt
+
+from elevon.arrays import Floats
 
 if TYPE_CHECKING:
     from elevon.logs.command.note import CommandNote
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Brake", "brake_of"]
 
-Floats = npt.NDArray[np.float64]
 Known = Literal["torque", "force", "on", "off"]
 _MOVING = 0.1  # of the highest speed: slower than that a resistive torque is not at its level
 _SMOOTHING = 0.25  # s: the brake's level changes slowly, the cell's noise does not

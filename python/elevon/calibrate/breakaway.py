@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.log import BenchLog
 
 __all__ = ["Breakaways", "breakaway_torque", "breakaways", "stuck_stretches"]
 
-Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 _FEWEST = 4  # breakaways
 _MEDIAN = 1.2533  # deviation of a median over that of a mean

@@ -15,14 +15,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.blocks import block_covariance
 from elevon.calibrate.estimate import Estimate, quantile
 from elevon.calibrate.regression import robust_regression
 from elevon.errors import InputError, RangeError
 
 __all__ = ["ComplianceCalibration", "calibrate_compliance"]
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

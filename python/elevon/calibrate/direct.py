@@ -10,13 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.log import BenchLog
 
 __all__ = ["DirectEstimate", "direct_estimate", "robust_lines", "saturated_speed"]
 
-Floats = npt.NDArray[np.float64]
 _SLOW = 0.05  # of the highest speed: below it the direction of friction is not sure
 _WINDOW = 0.03  # s of the local parabolas that give acceleration
 _TURNS = 30

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.blocks import block_covariance, block_length
 from elevon.calibrate.candidates import Candidate
 from elevon.calibrate.problem import Problem, values_of
@@ -16,7 +17,6 @@ from elevon.parameters.relations import TORQUE_PER_FLUX
 
 __all__ = ["DynamicFit", "blocks_of", "fit_dynamic", "refresh_scales", "step_sizes"]
 
-Floats = npt.NDArray[np.float64]
 _SOFT = 3.0  # deviations beyond which residuals weigh less
 _AGREE = 0.1  # relative difference up to which exact derivatives hold
 _CLOUD = 32  # starts tried where the first values explain too little

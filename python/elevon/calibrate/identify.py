@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.blocks import block_covariance
 from elevon.calibrate.candidates import Candidate
 from elevon.errors import InputError
 
 __all__ = ["Identifiability", "choose", "rank"]
 
-Floats = npt.NDArray[np.float64]
 _CORRELATED = 0.95
 _LOOSEST = 0.25  # relative deviation (or of the size of an offset's meaning) still worth freeing
 _HOPELESS = 1.0  # the same, above which a parameter asked for is refused

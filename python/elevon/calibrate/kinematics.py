@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.blocks import block_covariance
 from elevon.calibrate.direct import saturated_speed
 from elevon.calibrate.log import BenchLog
@@ -27,7 +27,6 @@ from elevon.waveforms import evaluate
 
 __all__ = ["KINEMATIC", "CommandFit", "command_fit", "speed_limit", "speed_sensor"]
 
-Floats = npt.NDArray[np.float64]
 
 #: Paths that come from positions alone, not from the dynamic fit.
 KINEMATIC = (

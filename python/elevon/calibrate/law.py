@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.direct import saturated_speed
 from elevon.calibrate.log import BenchLog
 from elevon.calibrate.motion import acceleration_of, dilated, integral, kernel, lagged, smoothed
@@ -25,7 +26,6 @@ from elevon.calibrate.regression import Regression, robust_regression, with_devi
 
 __all__ = ["controller_law"]
 
-Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 _SETTLED = 0.25  # s around a saturated set point in which anti-windup may act
 _LEAST = 200  # samples

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.brake_level import Brake, brake_of
 from elevon.calibrate.thin import thinned
 from elevon.errors import InputError
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["BenchLog", "bench_log", "read_logs"]
 
-Floats = npt.NDArray[np.float64]
 _LEAST_SAMPLES = 200
 _NEEDED = ("speed_ref", "motor_speed")
 #: Roles of the torque current, the measured one first, and the signal a model shows for each.

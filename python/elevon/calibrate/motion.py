@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.log import BenchLog
 
 __all__ = [
@@ -26,7 +27,6 @@ __all__ = [
     "smoothed",
 ]
 
-Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 _NOISE = 0.01  # of the acceleration's RMS that its noise may be
 _WIDEST = 0.02  # s, deviation of the smoothing kernel at most

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.estimate import Estimate, quantile
 from elevon.calibrate.regression import Regression
 from elevon.parameters.records import record_of
@@ -26,7 +26,6 @@ __all__ = [
     "torque_scale",
 ]
 
-Floats = npt.NDArray[np.float64]
 _TIED = 0.01  # relative: closer than this the controller is taken to know the motor
 _SEEN = 3.0  # deviations a controller branch must stand off zero to exist
 _GIVEN = ("motor.emf_constant",)

@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.blocks import block_covariance
 from elevon.calibrate.log import BenchLog
 from elevon.calibrate.motion import acceleration_of, delayed, kernel, lagged, motion_of, smoothed
@@ -27,7 +28,6 @@ from elevon.calibrate.regression import Regression
 
 __all__ = ["Presliding", "presliding_friction", "reversals", "usable_logs"]
 
-Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 _FEWEST = 4  # reversals
 _MOST = 48  # reversals that are followed

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.candidates import Candidate
 from elevon.calibrate.log import BenchLog
 from elevon.errors import InputError, Interrupted
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Problem", "Simulated"]
 
-Floats = npt.NDArray[np.float64]
 _STEP = 1e-4  # s: the low model's own 0.25 ms costs half a per cent of damping
 _BIG = 1e3  # residual of a run that left the finite numbers, in deviations
 

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.blocks import block_covariance, stroke_blocks
 
 __all__ = ["Regression", "robust_cost", "robust_regression", "with_deviations"]
 
-Floats = npt.NDArray[np.float64]
 _HUBER = 1.345
 
 

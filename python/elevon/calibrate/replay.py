@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.validation import SignalError, Trace, Validation
 from elevon.errors import InputError, SimulationError, unknown
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = ["as_recorded", "replay_scenario", "validate_replay"]
 
-Floats = npt.NDArray[np.float64]
 _INPUTS = ("command", "load")
 _SMOOTH = 0.5  # s over which the ram's imposed speed is taken from its position
 

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.level import Level
 from elevon.calibrate.regression import Regression, with_deviations
 
 __all__ = ["Stretch", "gain_and_zero", "speed_loop", "stretches"]
 
-Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 _COLUMNS = ("gain", "integral", "set_point", "ramp")
 _FEWEST = 100  # samples of a stretch

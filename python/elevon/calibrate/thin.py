@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
+
 if TYPE_CHECKING:
     from elevon.calibrate.log import BenchLog
 
 __all__ = ["RATE", "group_means", "groups_of", "thinned"]
 
-Floats = npt.NDArray[np.float64]
 #: Hz, the least that is left. ASSUMED: ten times the lag of the bench's current filter, more than
 #: twice the bench's own rate; time and memory of calibration grow with the samples.
 RATE = 1000.0

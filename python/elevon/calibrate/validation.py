@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.kinematics import command_fit
 from elevon.calibrate.log import BenchLog
 from elevon.errors import InputError, Interrupted, unknown
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["SIGNALS", "SignalError", "Validation", "validate"]
 
-Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
 #: Signals compared: name, unit.

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.campaign.draw import ranged, read_values, sample
 from elevon.campaign.grammar import Design, Factor, Target
 from elevon.campaign.power import power_rows
@@ -30,7 +31,7 @@ from elevon.errors import InputError
 __all__ = ["Points", "design_points"]
 
 Ints = npt.NDArray[np.int64]
-Floats = npt.NDArray[np.float64]
+
 _ROMAN = {3: "III", 4: "IV", 5: "V", 6: "VI", 7: "VII", 8: "VIII"}
 _TWO_LEVEL = {"fractional_factorial", "plackett_burman"}
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.campaign.grammar import Axis, Draw, Growth, Random, Spread, Target
 from elevon.errors import InputError
 from elevon.faults import find_record
@@ -20,7 +21,6 @@ __all__ = ["Column", "axis_values", "column_of", "random_values", "ranged", "rea
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.S)
 
-Floats = npt.NDArray[np.float64]
 Values = npt.NDArray[Any]
 Ranged = Axis | Draw | Spread | Growth
 

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.actuator import Actuator
+from elevon.arrays import Floats
 from elevon.campaign.draw import ranged
 from elevon.campaign.grammar import Growth, Population, Spread, Target
 from elevon.errors import InputError
@@ -16,8 +17,6 @@ from elevon.parameters.records import record_of
 from elevon.units import parse_quantity
 
 __all__ = ["Units", "units_of"]
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.campaign.grammar import Power
 from elevon.errors import unknown
 
 __all__ = ["power_rows"]
-
-Floats = npt.NDArray[np.float64]
 
 
 def power_rows(

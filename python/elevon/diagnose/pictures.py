@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
+
+from elevon.arrays import Floats
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Panel", "Traces", "evidence_figure", "named_faults", "traces_figure"]
 
-Floats = npt.NDArray[np.float64]
 _POINTS = 800  # means drawn of a signal
 _MOST = 12  # numbers drawn of the evidence, those off the most
 

@@ -8,13 +8,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.prognose.future import Future
 
 __all__ = ["Known", "Prognosis", "survival"]
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.prognose.laws import LAWS
 from elevon.prognose.requirement import Shown
 
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = ["exposure", "recorded_signals", "shown"]
 
-Floats = npt.NDArray[np.float64]
 _RATE = 400.0  # Hz
 _ROLES = (
     "command",

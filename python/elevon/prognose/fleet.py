@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import InputError, RangeError
 
 if TYPE_CHECKING:
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Costs", "FleetPlan", "Visit", "fleet_figure", "plan_fleet"]
 
-Floats = npt.NDArray[np.float64]
 _INSTANTS = 400  # at which a visit may be, of each unit's remaining life
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.prognose.measured import governing
 from elevon.prognose.mission import Usage
 from elevon.prognose.process import Population, Process
@@ -14,7 +15,6 @@ from elevon.prognose.requirement import SEVERITY
 
 __all__ = ["LASTING", "MODEL_ERROR", "Future", "crossing", "look_ahead"]
 
-Floats = npt.NDArray[np.float64]
 MODEL_ERROR = 0.008
 """Deviation of what the calibrated model says of a requirement, over its threshold. Measured on
 units of other values, calibrated to about 1 %, against the high-fidelity model at the true end of

@@ -7,13 +7,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import RangeError, unknown
 
 __all__ = ["DRIVERS", "Coefficient", "Law"]
 
-Floats = npt.NDArray[np.float64]
 Rate = Callable[[Floats, Mapping[str, Floats], Mapping[str, Any]], Floats]
 
 #: What one repetition of a mission does to the actuator: name to unit and text.

@@ -10,14 +10,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import unknown
 from elevon.prognose.law import Coefficient, Law
 
 __all__ = ["LAWS", "find_law"]
 
-Floats = npt.NDArray[np.float64]
 Drivers = Mapping[str, Floats]
 Values = Mapping[str, float | Floats]
 _DORMANT = 0.3  # ASSUMED: in as many units a fault does not grow to be seen

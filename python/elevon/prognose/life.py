@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.prognose.future import crossing
 from elevon.prognose.process import Population, Process
 
 __all__ = ["Life", "run_to_failure"]
 
-Floats = npt.NDArray[np.float64]
 _STEPS = 400  # a life, about
 _MOST = 4000
 

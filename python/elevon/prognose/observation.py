@@ -8,8 +8,8 @@ from math import erfc, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import InputError, quoted
 
 if TYPE_CHECKING:
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = ["COMMON", "SIGMAS", "Inspection", "Seen", "inspection"]
 
-Floats = npt.NDArray[np.float64]
 SIGMAS = 1.6449  # of a 90 % interval's half width
 _DETECTED = 3.0  # deviations at which a severity counts as seen
 _AT_EDGE = 0.98

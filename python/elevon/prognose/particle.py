@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.prognose.future import LASTING, MODEL_ERROR
 from elevon.prognose.measured import Measured, governing
 from elevon.prognose.observation import Inspection, Seen
@@ -16,7 +17,6 @@ from elevon.prognose.process import Population, Process
 
 __all__ = ["COUNT", "ParticleFilter", "resampled"]
 
-Floats = npt.NDArray[np.float64]
 COUNT = 2000
 SURPRISE = 4.0
 _KERNEL = 0.08  # variance of what is drawn that is drawn anew, a lost share of the particles

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.prognose.law import Law
 from elevon.prognose.response import Response
 
 __all__ = ["DRIFT", "Population", "Process"]
 
-Floats = npt.NDArray[np.float64]
 
 DRIFT = 0.05
 """Deviation by which the logarithm of a unit's growth factor wanders while its use grows e-fold.

@@ -11,13 +11,13 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, StrictFloat, StrictInt, StrictStr, model_validator
 
+from elevon.arrays import Floats
 from elevon.errors import InputError, UnitError, did_you_mean
 from elevon.scenario import Scenario
 from elevon.units import parse_quantity
 
 __all__ = ["MEASURES", "SEVERITY", "Measure", "Requirement", "Shown"]
 
-Floats = npt.NDArray[np.float64]
 Quantity = StrictInt | StrictFloat | StrictStr
 SEVERITY = "severity"
 FAR = 2.0

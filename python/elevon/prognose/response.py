@@ -6,16 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.prognose.grid import Grid
 from elevon.prognose.law import Law
 from elevon.prognose.requirement import SEVERITY, Requirement
 from elevon.units import shown_unit, to_display
 
 __all__ = ["Response", "check_start"]
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.prognose.response import Response
 from elevon.prognose.tabulate import severity_grid, tabulate
 from elevon.progress import Progress
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Correction", "correction"]
 
-Floats = npt.NDArray[np.float64]
 _POINTS = 5  # severities of each axis
 
 

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.errors import InputError, Interrupted, NotActingWarning
 from elevon.prognose.exposure import exposure, recorded_signals, shown
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = ["severity_grid", "tabulate"]
 
-Floats = npt.NDArray[np.float64]
 _CHUNK = 128  # runs held in memory at once
 _LOADS = (0.5, 1.0, 2.0)  # factors on the mission's loads where the future may differ
 

@@ -7,15 +7,14 @@ the filter is some forty lines and needs no library.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.prognose.observation import Inspection
 from elevon.prognose.process import Population, Process
 
 __all__ = ["UnscentedFilter"]
 
-Floats = npt.NDArray[np.float64]
 _ALPHA, _BETA, _KAPPA = 0.5, 2.0, 0.0
 
 

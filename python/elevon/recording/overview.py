@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.recording.states import code_names
 from elevon.units import format_quantity, shown_unit, to_display
 
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from elevon.recording.recording import Recording
 
 __all__ = ["Band", "Panel", "bands", "overlaid", "overview", "spectra"]
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,12 @@ from html import escape
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
+
 __all__ = ["Html", "badge", "card", "sparkline", "table"]
 
 _GOOD, _BAD, _GREY, _LINE = "#1a7f37", "#b42318", "#777777", "#2066a8"
-Floats = npt.NDArray[np.float64]
+
 _WIDTH, _HEIGHT = 140, 26
 
 

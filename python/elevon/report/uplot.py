@@ -15,9 +15,10 @@ from importlib.resources import files
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
+
 __all__ = ["assets", "chart", "page", "thinned"]
 
-Floats = npt.NDArray[np.float64]
 
 COLOURS = ("#2f7fd1", "#e0782f", "#2f9e6e", "#d1483c", "#8a6fd0", "#8a929d", "#b8860b", "#0f8b8d")
 """Of middle lightness, legible on white and near-black, distinct to the colour-blind."""

@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.replay import _RECENT
 from elevon.diagnose.optimisers import CAUSES, METHODS, Monitor, search
 from elevon.diagnose.optimisers.cost import limits
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 
 __all__ = ["CASES", "OURS", "OptimisersResult", "reproduce_optimisers"]
 
-Floats = npt.NDArray[np.float64]
 #: Faults that are diagnosed, on the no-load run of the bench: those the project must see there.
 CASES: Mapping[str, Mapping[str, float]] = {
     "backlash 0.13 deg": {"backlash@transmission": math.radians(0.13)},

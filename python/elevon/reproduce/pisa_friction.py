@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import SimulationError
 from elevon.report.checks import Check, verdict
 from elevon.reproduce.pisa_gear import ACTUATOR, Stroke, run_strokes
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 __all__ = ["FrictionResult", "FrictionRow", "Trace", "reproduce_friction"]
 
-Floats = npt.NDArray[np.float64]
 
 GRAVITY = 9.80665
 SPEEDS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)

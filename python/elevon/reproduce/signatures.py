@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.actuator import Actuator
+from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.faults import FaultRecord, catalogue
 from elevon.progress import Progress
@@ -23,7 +23,6 @@ from elevon.simulate import Run, simulate_batch
 
 __all__ = ["ACTUATORS", "Signature", "SignaturesResult", "reproduce_signatures"]
 
-Floats = npt.NDArray[np.float64]
 ACTUATORS = ("torino-rotary", "nasa-ballscrew", "pisa-landing-gear")
 RATE = 2000.0
 

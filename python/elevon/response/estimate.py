@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["FrequencyResponse", "estimate"]
 
-Floats = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.session import Session
 from elevon.simulate.arguments import ActuatorLike
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["LinearModel", "linearise"]
 
-Floats = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 _SMALLEST = 1e-4  # of the largest singular value: below it stands what is not linear
 

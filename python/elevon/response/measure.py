@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import InputError, unknown
 from elevon.progress import Progress
 from elevon.recording import Recording
@@ -19,7 +19,6 @@ from elevon.units import parse_quantity, shown_unit
 
 __all__ = ["METHODS", "frequency_response"]
 
-Floats = npt.NDArray[np.float64]
 METHODS = ("multisine", "sweep")
 _MOST = 24  # lines of a multisine: about ten in a decade are read well from a plot
 _PERIODS = 2  # measured, after one in which the transient dies

@@ -7,13 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.scenario.compile import compile_term
 from elevon.scenario.scenario import Term
 from elevon.waveforms import TABLE
 
 __all__ = ["evaluate_terms"]
-
-Floats = npt.NDArray[np.float64]
 
 
 def evaluate_terms(

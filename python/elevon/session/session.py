@@ -8,9 +8,9 @@ from contextlib import contextmanager, nullcontext
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.actuator import Actuator
+from elevon.arrays import Floats
 from elevon.documents import Document, validated
 from elevon.errors import ArgumentTypeError, InputError, unknown
 from elevon.faults import Fault, find_record
@@ -27,7 +27,6 @@ from elevon.units import parse_quantity, shown_unit
 
 __all__ = ["Session", "Value"]
 
-Floats = npt.NDArray[np.float64]
 Value = float | str | Sequence[float] | Floats
 _FOREVER = 4.0e15  # solver steps: a session has no end of its own
 

@@ -6,10 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
 from elevon.actuator import Actuator
+from elevon.arrays import Floats
 from elevon.errors import InputError, Interrupted, RangeError
 from elevon.parameters.records import record_of
 from elevon.recording import Recording
@@ -19,8 +17,6 @@ from elevon.simulate.prepare import Prepared, Record, Run, prepare
 from elevon.simulate.result import build_recording
 
 __all__ = ["Sensitivities", "sensitivities"]
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.closed_loop.fit import DECIDED, Fitted
 from elevon.calibrate.closed_loop.free import outer
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 __all__ = ["exchanged"]
 
-Floats = npt.NDArray[np.float64]
 GAIN, TIME = "control.position_gain", "control.integral_time"
 _WHOLE = 0.02  # of one: a feed-forward that is nearer counts as one
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.closed_loop.free import Free, asked_for, free_list, inner, outer
 from elevon.calibrate.closed_loop.log import LoopLog
 from elevon.calibrate.closed_loop.model import LoopModel
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["DECIDED", "Fitted", "Searched", "as_given", "choose", "final_fit", "search"]
 
-Floats = npt.NDArray[np.float64]
 Check = Callable[[], bool]
 _STARTS = 32
 _KEEP = 3

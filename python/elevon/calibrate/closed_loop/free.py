@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.closed_loop.log import LoopLog
 from elevon.errors import unknown
 
@@ -28,7 +28,6 @@ __all__ = [
     "outer",
 ]
 
-Floats = npt.NDArray[np.float64]
 
 STRUCTURES = ("cascade", "pid")
 _LATEST = 2e-2  # s, lag of a current loop

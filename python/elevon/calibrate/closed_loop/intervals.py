@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.blocks import block_length
 from elevon.calibrate.closed_loop.fit import Fitted
 from elevon.calibrate.closed_loop.free import CURRENT_GAIN, LOAD_SHARE, STICK, Free, outer
@@ -18,7 +18,6 @@ from elevon.calibrate.closed_loop.solve import Point, jacobian
 
 __all__ = ["SILENT", "Known", "known"]
 
-Floats = npt.NDArray[np.float64]
 _SHARE = 0.2  # of a logarithm: a deviation above which a number is not determined
 _TENTH = 0.5  # of its meaningful size, for an offset or a delay
 _SILENT = 1.0  # deviations of all residuals together that a whole spread moves

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.closed_loop.free import STICK
 from elevon.calibrate.closed_loop.log import LoopLog
 from elevon.errors import InputError, Interrupted
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = ["LoopModel", "Shown"]
 
-Floats = npt.NDArray[np.float64]
 #: Channels of one run on its log's clock; None where it left the finite numbers.
 Shown = dict[str, Floats] | None
 

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.blocks import memory
 from elevon.calibrate.closed_loop.free import Free, outer
 from elevon.calibrate.closed_loop.model import LoopModel, Shown
 
 __all__ = ["SOFT", "Objective", "robust"]
 
-Floats = npt.NDArray[np.float64]
 SOFT = 3.0  # deviations beyond which a residual weighs less
 _LEAST = 2e-4  # of a channel's spread: its deviation at least
 _BIG = 1e3  # residual of a run that left the finite numbers

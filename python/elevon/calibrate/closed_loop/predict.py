@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.closed_loop.log import LoopLog
 from elevon.errors import InputError
 
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
 __all__ = ["Agreement", "errors_of", "predict"]
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

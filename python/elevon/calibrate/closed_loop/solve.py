@@ -6,13 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.closed_loop.objective import Objective
 
 __all__ = ["Point", "jacobian", "solve"]
 
-Floats = npt.NDArray[np.float64]
 _LADDER = (0.03, 0.5, 10.0, 300.0)  # damping tried in each step, over the last one
 _STEP = 0.03  # of a logarithm, or of an offset's tenth of a spread: over the switching instants
 _SETTLED = 1e-4  # relative fall of the cost below which a start rests

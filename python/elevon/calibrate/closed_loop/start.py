@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.closed_loop.free import Free, inner
 from elevon.calibrate.closed_loop.log import LoopLog
 from elevon.calibrate.closed_loop.model import LoopModel
 
 __all__ = ["cloud", "first_values", "windows"]
 
-Floats = npt.NDArray[np.float64]
 _WINDOW = 6.0  # s
 _SETTLE = 0.4  # s
 _PLACES = (0.6, 0.95)  # quantiles of unrest at which windows of a log are taken

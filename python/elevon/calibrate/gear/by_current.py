@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.gear.log import GearLog, Move
 from elevon.calibrate.gear.motor import Motor
 from elevon.calibrate.level import Level
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 
 __all__ = ["GIVEN", "NEEDS", "PATHS", "gains_by_current"]
 
-Floats = npt.NDArray[np.float64]
 #: Roles that this way needs.
 NEEDS = ("torque_current", "motor_speed", "output_position")
 #: What the set point and the demand stand on.

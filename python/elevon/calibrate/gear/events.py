@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.gear.log import GearLog, Move
 from elevon.calibrate.gear.rig import RigTest
 from elevon.calibrate.gear.tables import GRAVITY, per_travel
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["brake_delays", "brake_torque", "lock_travels"]
 
-Floats = npt.NDArray[np.float64]
 _BEFORE = (0.02, 1.0)  # s between nut and ram, over which both are held together
 _DELAY = 0.5  # s: a change of the brake later than this is another one's
 

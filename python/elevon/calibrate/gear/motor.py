@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.gear.log import GearLog, Move
 from elevon.calibrate.gear.tables import per_travel
 from elevon.calibrate.gear.third_phase import ThirdPhase
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Driving", "Motor", "driving", "motor_constants"]
 
-Floats = npt.NDArray[np.float64]
 _START = 0.1  # s after the drive begins ...
 _END = 0.06  # ... and before it ends
 _SLOWEST = 100.0  # rad/s

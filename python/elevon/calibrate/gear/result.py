@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elevon.arrays import Floats
 from elevon.calibrate.by_parts import Parts, PartsCalibration, go
 from elevon.calibrate.gear import events, unit
 from elevon.calibrate.gear.by_current import GIVEN
@@ -36,8 +37,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
 __all__ = ["calibrate_gear"]
-
-Floats = np.ndarray[Any, np.dtype[np.float64]]
 #: What no log of these roles shows, whatever was done.
 _NEVER = {
     "motor.bearing_torque": "the rig shows it only within the whole train's friction (FFM)",

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.gear.log import GearLog
 from elevon.calibrate.regression import robust_regression
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["HARMONICS", "RigTest", "rig_tests"]
 
-Floats = npt.NDArray[np.float64]
 HARMONICS = 5
 _SETTLED = 0.3  # s left out: the rig's start
 _BAND = 0.25  # of the log's rate: a detent above it is damped by the recorder's filter

@@ -13,8 +13,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.gear.log import GearLog
 from elevon.calibrate.level import Level
 from elevon.calibrate.replay import as_recorded, replay_scenario
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = ["corrected", "run_again", "with_noise"]
 
-Floats = npt.NDArray[np.float64]
 _RATE = 25e3  # Hz at least of a run's channels, before the recorder's filter
 _SHARE = 0.1  # of a correction, as its deviation: ASSUMED, the model is not the machine
 _MOST = 0.3  # relative: a larger correction says that the run is another motion

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.gear.rig import HARMONICS, RigTest
 from elevon.calibrate.level import Level
 
@@ -25,7 +25,6 @@ __all__ = [
     "per_travel",
 ]
 
-Floats = npt.NDArray[np.float64]
 KNOTS = 8
 GRAVITY = 9.80665
 _SEEN = 0.98  # resolution from which a knot is determined by tests

@@ -13,11 +13,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
+
+from elevon.arrays import Floats
 
 __all__ = ["ThirdPhase"]
 
-Floats = npt.NDArray[np.float64]
 _ANGLES = (np.arange(32) + 0.5) / 32.0  # shares of half a sector
 
 

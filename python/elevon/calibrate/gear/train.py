@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.balance_fit import Balanced, Sought, fit_balance
 from elevon.calibrate.gear.motor import Driving, Motor
 from elevon.calibrate.gear.tables import KNOTS, hats, knots, per_travel
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Balance", "Known", "torque_balance"]
 
-Floats = npt.NDArray[np.float64]
 _INERTIA, _UNLOADED, _LOADED = (
     "motor.inertia", "screw.efficiency_unloaded", "screw.efficiency_loaded",
 )  # fmt: skip

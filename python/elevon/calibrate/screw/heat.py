@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.balance_fit import Balanced, Sought, fit_balance
 from elevon.calibrate.level import Level
 from elevon.calibrate.screw.log import ScrewLog
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = ["motor_heat", "nut_heat"]
 
-Floats = npt.NDArray[np.float64]
 _BIN = 2.0  # s over which channels are averaged
 _WINDOW = 20.0  # s of one reading of the resistance
 _SLOW = 0.2  # of the largest speed: a window reads the resistance in motion

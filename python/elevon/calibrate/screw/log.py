@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.role_log import RoleLog, role_channels
 from elevon.errors import InputError
 
@@ -28,7 +29,6 @@ __all__ = [
     "smoothed",
 ]
 
-Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 _NEEDED = ("torque_current",)
 #: What shows the motor's speed, the best first.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.level import Level
 from elevon.calibrate.regression import Regression, robust_regression, with_deviations
 from elevon.calibrate.screw.log import ScrewLog
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
 __all__ = ["position_loop", "speed_control"]
 
-Floats = npt.NDArray[np.float64]
 _LIMIT = 0.98  # of the largest value: the set point is limited
 _EDGE = 0.05  # s at both ends of a log
 _FEWEST = 200  # samples

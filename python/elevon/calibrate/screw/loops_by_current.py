@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.level import Level
 from elevon.calibrate.regression import Regression, robust_regression, with_deviations
 from elevon.calibrate.screw.log import ScrewLog, motor_ratio, slope, smoothed
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 
 __all__ = ["GIVEN", "PATHS", "loops_by_current"]
 
-Floats = npt.NDArray[np.float64]
 PATHS = ("control.speed_gain", "control.position_gain", "control.integral_time")
 #: What they stand on.
 GIVEN = ("control.torque_constant", "control.speed_feedforward")

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.level import Level
 from elevon.calibrate.regression import Regression, robust_regression, with_deviations
 from elevon.calibrate.screw.log import CORNERS, ScrewLog
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = ["load_side", "motor_constants"]
 
-Floats = npt.NDArray[np.float64]
 _SURE = 5e-4  # relative: what rates and clocks of a stand leave open
 _WARMTH = 1.0  # K of the winding over the surface that no log of seconds shows
 _FEWEST = 300  # samples

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.balance_fit import Balanced, Sought, fit_balance
 from elevon.calibrate.level import Level
 from elevon.calibrate.screw.log import CORNERS, ScrewLog
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 __all__ = ["TorqueBalance", "nut_force", "nut_loss", "relieved", "torque_balance"]
 
-Floats = npt.NDArray[np.float64]
 _NAMES = (
     "motor.inertia", "friction.viscous", "friction.dynamic", "screw.preload",
     "screw.efficiency", "screw.efficiency_aiding",

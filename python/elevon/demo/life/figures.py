@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.prognose.figures import severity_unit
 from elevon.report.figures import COLOURS, new_figure
 from elevon.units import to_display
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from elevon.diagnose.bymodel import TestLog
 
 __all__ = ["cone_figure", "diagnoses_figure", "remaining_figure", "signals_figure"]
-
-Floats = npt.NDArray[np.float64]
 
 
 def cone_figure(demo: LifeDemo) -> Figure:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
+
+from elevon.arrays import Floats
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Motion", "mechanism", "motion"]
 
-Floats = npt.NDArray[np.float64]
 _FRAMES = 100
 _SECONDS = 5.0  # one sweep of the mission
 _SWING = 3.0  # drawn degrees a degree of the flap

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.candidates import Candidate
 from elevon.diagnose.bymodel.detection import Detector
 from elevon.diagnose.bymodel.evidence import OWN_ERROR, SHARES, SIZES, Evidence
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Case", "case_of", "detector_of", "doubt_of", "joined", "shift_of"]
 
-Floats = npt.NDArray[np.float64]
 SUSPECT = 1e-3  # chance of a baseline below which it is called faulty
 _SAME = 0.2  # relative difference of two logs' motion up to which they are one test
 _NOTED = 0.02  # of two noted parameters

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.evidence import regress
 
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = ["NotedCommand", "noted_command"]
 
-Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 #: Unknown and instants to the phase [rad] and what the unknown does to it.
 Phase = Callable[[float, Floats], tuple[Floats, Floats]]

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
+
+from elevon.arrays import Floats
 
 __all__ = ["Detector"]
 
-Floats = npt.NDArray[np.float64]
 _DRAWS = 20_000
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.lost_motion import dragged, floats, spanned
 
 __all__ = [
@@ -27,7 +28,6 @@ __all__ = [
     "regress",
 ]
 
-Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 Fit = tuple[Floats, Floats]  # weights, shape (k,), and their covariance, shape (k, k)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.answer import SEEN, Alternative, Cause, Explanation, Moved
 from elevon.diagnose.bymodel.candidates import Candidate
 from elevon.diagnose.bymodel.case import Case, doubt_of, joined, shift_of
@@ -23,7 +23,6 @@ __all__ = [
     "unexplained",
 ]
 
-Floats = npt.NDArray[np.float64]
 LISTED = 0.02  # probability below which a cause is not listed
 POSSIBLE = 1e-3  # probability below which a set of faults is not listed
 UNLIKELY = 1e-3  # chance of what the named faults leave below which that is said

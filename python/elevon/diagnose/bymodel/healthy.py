@@ -6,14 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.evidence import Evidence
 from elevon.diagnose.bymodel.replay import Replay
 
 __all__ = ["DEGREES", "FLOOR", "MISMATCH", "POOLED", "Elsewhere", "Healthy", "healthy"]
 
-Floats = npt.NDArray[np.float64]
 _FAR = 2.0  # deviations
 DEGREES = 10.0  # ASSUMED: worth of the stated spread, in runs
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.calibrate.kinematics import command_fit
 from elevon.calibrate.log import BenchLog, bench_log
 from elevon.calibrate.thin import group_means, groups_of
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
 __all__ = ["TestLog", "prepared", "read_test_logs"]
 
-Floats = npt.NDArray[np.float64]
 RUN_IN = 1.0  # s left out: the start of the motion
 _RATIO = 0.05  # relative: a gear ratio seen in the log this far off is another actuator's
 _LEAST_TIME = 4.0  # s of log

@@ -7,9 +7,10 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
+
 __all__ = ["dragged", "floats", "spanned"]
 
-Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 _AFLOAT = 0.15  # of the difference's width: what it scatters in one direction if nothing drags it
 _LEAST = 3e-4  # rad of that scatter: four counts of the bench's encoder, more than rounding leaves

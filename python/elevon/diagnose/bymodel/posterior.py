@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.candidates import Candidate
 from elevon.diagnose.bymodel.weigh import (
     Frame,
@@ -28,7 +28,6 @@ from elevon.diagnose.bymodel.weigh import (
 
 __all__ = ["Posterior", "marginals", "posterior", "quantiles"]
 
-Floats = npt.NDArray[np.float64]
 Shift = Callable[[str, Floats], Floats]
 PRIOR_FAULTY = 0.5  # ASSUMED: a log is diagnosed since somebody doubts
 OTHER = 0.02  # ASSUMED: a faulty unit has a fault that is not weighed

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.candidates import Candidate
 from elevon.diagnose.bymodel.evidence import SIZES, Evidence, Signals, evidence
 from elevon.diagnose.bymodel.log import TestLog
@@ -22,7 +22,6 @@ __all__ = [
     "SPREAD", "Replay", "Unit", "logged_evidence", "modelled", "replay", "runs", "signals_of",
 ]  # fmt: skip
 
-Floats = npt.NDArray[np.float64]
 _SIGNALS = (
     "encoder_position,motor_position,speed_ref,motor_speed,current_ref,current_q_meas,voltage_q_ref"
 )

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.evidence import Signals
 from elevon.diagnose.bymodel.log import TestLog, prepared
 from elevon.diagnose.bymodel.replay import Unit, runs, signals_of
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from elevon.diagnose.bymodel.answer import Diagnosis
 
 __all__ = ["traces_of"]
-
-Floats = npt.NDArray[np.float64]
 
 
 def traces_of(logs: Sequence[TestLog], actuator: Actuator, result: Diagnosis) -> list[Traces]:

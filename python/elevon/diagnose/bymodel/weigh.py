@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.candidates import Candidate
 
 __all__ = [
@@ -26,7 +27,6 @@ __all__ = [
     "two_faults",
 ]
 
-Floats = npt.NDArray[np.float64]
 Shift = Callable[[str, Floats], Floats]
 SMALL = 0.05  # of the range: ASSUMED; severities below it are as frequent as each other
 _COARSE = 401

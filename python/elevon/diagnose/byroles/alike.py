@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.case import Case, joined, shift_of
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = ["with_alike"]
 
-Floats = npt.NDArray[np.float64]
 ALIKE = 2.0  # deviations between two faults' shifts, the model's error among them
 _POINTS = 101
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.byroles.load import OverStroke, load_alike, read_load
 from elevon.diagnose.byroles.series import lines
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = ["RoleTest", "action_numbers", "same_test", "test_of"]
 
-Floats = npt.NDArray[np.float64]
 _EXACT = 2e-4  # of the command's range: what straight lines may miss
 _ALIKE = 0.05  # of the command's range, RMS, up to which two commands are the same
 _SOONER = 1.3  # times the length of a log's baseline that the log may have

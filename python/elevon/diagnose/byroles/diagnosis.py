@@ -9,8 +9,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.case import SUSPECT, Case
 from elevon.diagnose.bymodel.diagnosis import answer_of
 from elevon.diagnose.bymodel.evidence import Evidence
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 __all__ = ["RoleCase", "diagnose_by_roles"]
 
-Floats = npt.NDArray[np.float64]
 PAIRS = 16  # of faults at once that are weighed
 OWN_ERROR = 0.15  # of what a fault does to one number: the low model shows sizes, not waveforms
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.evidence import Evidence
 from elevon.diagnose.bymodel.healthy import DEGREES, Healthy
 from elevon.diagnose.byroles.numbers import KINDS, floors
@@ -14,7 +14,6 @@ from elevon.diagnose.byroles.runs import RoleReplay
 
 __all__ = ["healthy_of"]
 
-Floats = npt.NDArray[np.float64]
 #: Of Student's distribution, nearly Gaussian. The least deviations are generous, so most numbers
 #: stand closer than stated; with few degrees that would count as a day of small spread, and what
 #: does vary would be called a fault.

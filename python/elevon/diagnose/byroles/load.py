@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.byroles.series import lines, noise_deviation, smoothed
 
 if TYPE_CHECKING:
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 __all__ = ["OverStroke", "load_alike", "read_load"]
 
-Floats = npt.NDArray[np.float64]
 _SMOOTH = 0.05  # s over which a load is averaged before it becomes straight lines
 _ROUGH = 0.01  # of the load's size: what straight lines may miss
 _NOISE = 5.0  # deviations of its noise that a load's RMS must reach to be one

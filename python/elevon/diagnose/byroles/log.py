@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.byroles.asked import RoleTest, action_numbers, test_of
 from elevon.errors import InputError
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = ["RoleLog", "role_log"]
 
-Floats = npt.NDArray[np.float64]
 #: What is put in, not shown.
 _INPUTS = frozenset(["command", "load"])
 _LEAST = 200  # samples

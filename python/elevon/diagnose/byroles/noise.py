@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.byroles.log import RoleLog
 from elevon.diagnose.byroles.series import noise_deviation
 from elevon.diagnose.byroles.shown import numbers_of_log
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = ["noise_of"]
 
-Floats = npt.NDArray[np.float64]
 _AGAIN = 8  # logs with noise added
 
 

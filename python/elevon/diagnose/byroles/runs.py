@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.answer import SEEN
 from elevon.diagnose.bymodel.candidates import Candidate
 from elevon.diagnose.bymodel.evidence import Evidence
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 __all__ = ["RoleReplay", "replay_by_roles"]
 
-Floats = npt.NDArray[np.float64]
 _DRAWS = 28
 #: Deviations of the days that are run over those stated: what sets in on a rare day is seen, and
 #: counts in full; what is linear counts as stated.

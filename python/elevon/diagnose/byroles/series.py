@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
+
+from elevon.arrays import Floats
 
 __all__ = ["averaged", "lines", "noise_deviation", "smoothed"]
 
-Floats = npt.NDArray[np.float64]
 _NORMAL = 1.4826  # deviation over the median of the size, of Gaussian noise
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.byroles.asked import RoleTest, action_numbers
 from elevon.diagnose.byroles.log import BEFORE, RoleLog
 from elevon.diagnose.byroles.numbers import Numbers, numbers_of
@@ -27,7 +27,6 @@ __all__ = [
     "shown_by",
 ]
 
-Floats = npt.NDArray[np.float64]
 _CHUNK = 64  # runs held at once
 _OVER = 4  # samples of the model to one of the log, which are averaged: loggers filter, too
 _ELASTIC = 1.0  # backlash.model: a contact that gives

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.byroles.log import RoleLog, role_log
 from elevon.diagnose.byroles.shown import Unit, channels_by
 from elevon.diagnose.pictures import Panel, Traces, named_faults
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["traces_by_roles"]
 
-Floats = npt.NDArray[np.float64]
 #: Roles that are drawn, the first three of a log; lengths in mm.
 _DRAWN = (
     "output_position", "torque_current", "motor_speed", "supply_current", "torque_voltage", "state",

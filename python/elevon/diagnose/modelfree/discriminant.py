@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import InputError
 
 __all__ = ["Discriminant"]
 
-Floats = npt.NDArray[np.float64]
 
 SHRINKAGES = (0.1, 0.2, 0.4, 0.6)
 _TEMPERATURES = np.geomspace(0.5, 30.0, 25)

@@ -11,15 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.modelfree.strokes import LEAST_HOLD, Stroke, find_strokes
 from elevon.errors import FormatError, InputError, unknown
 from elevon.recording import Recording
 
 __all__ = ["FRICTION", "FULL", "MARKER", "TRANSFER", "FeatureTable", "feature_table"]
 
-Floats = npt.NDArray[np.float64]
 
 _STARTS = {"breakaway": (0.12, 0.28), "recovery_1": (0.28, 0.52), "recovery_2": (0.52, 0.88),
            "recovery_3": (0.88, 1.44)}  # fmt: skip

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.answer import SEEN, Cause
 from elevon.diagnose.bymodel.candidates import Candidate
 from elevon.diagnose.bymodel.posterior import quantiles
@@ -16,7 +16,6 @@ from elevon.diagnose.monitor.reference import Reference
 
 __all__ = ["likely_causes"]
 
-Floats = npt.NDArray[np.float64]
 LISTED = 0.02
 _POINTS = 81
 _ZOOMS = 5

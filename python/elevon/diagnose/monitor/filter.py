@@ -17,11 +17,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
+
+from elevon.arrays import Floats
 
 __all__ = ["Change", "ChangeFilter", "Spread"]
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

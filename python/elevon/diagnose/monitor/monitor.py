@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.answer import Cause
 from elevon.diagnose.bymodel.candidates import chosen
 from elevon.diagnose.bymodel.log import TestLog
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Alarm", "Monitor", "Step"]
 
-Floats = npt.NDArray[np.float64]
 FALSE_ALARM_TIME = 3600.0  # s
 _WINDOWS = 40  # of a stream whose length is not said, and the most that are simulated of a day
 _DAYS = 10  # the most that are simulated

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.candidates import Candidate
 from elevon.diagnose.bymodel.case import Case
 from elevon.diagnose.bymodel.evidence import Evidence
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = ["MEMORY", "Reference", "reference"]
 
-Floats = npt.NDArray[np.float64]
 MEMORY = 3600.0  # s, ASSUMED: time in which a day's temperatures and friction become another day's
 _MODELLED = 20.0  # s of a baseline that the model runs
 _LEAST = 3  # windows of the baselines together

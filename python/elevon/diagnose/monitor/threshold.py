@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.healthy import DEGREES
 from elevon.diagnose.monitor.filter import ChangeFilter, Spread
 
 __all__ = ["Thresholds", "simulated"]
 
-Floats = npt.NDArray[np.float64]
 STREAMS = 2000
 _TAIL = 0.05  # share of the streams that gives the tail
 _LEAST = 10  # streams above a threshold that is read off; beyond, the tail is drawn on

@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.command import noted_command
 from elevon.diagnose.bymodel.evidence import Evidence
 from elevon.diagnose.bymodel.log import RUN_IN, TestLog
@@ -24,7 +24,6 @@ __all__ = [
     "window_evidence",
 ]  # fmt: skip
 
-Floats = npt.NDArray[np.float64]
 _LEAST = 400  # samples of a window that may be used
 _MOVING = 0.1  # of the highest speed
 #: Signals of a stream, by the names they have everywhere, and the field of a log each fills.

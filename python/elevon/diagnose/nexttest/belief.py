@@ -11,15 +11,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.candidates import CANDIDATES, Candidate
 from elevon.diagnose.bymodel.posterior import PRIOR_FAULTY, SECOND
 from elevon.errors import FormatError, InputError
 
 __all__ = ["Belief", "Possible", "read_result"]
 
-Floats = npt.NDArray[np.float64]
 _LEAST = 1e-4  # weight that all sets have together that a result does not list
 _SMALL = 0.1  # root of the least severity over the greatest, where nothing is known of it
 _NINETY = 3.29  # deviations in a Gaussian's interval of 90 %

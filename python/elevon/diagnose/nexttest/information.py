@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.candidates import CANDIDATES, Candidate
 from elevon.diagnose.bymodel.case import Case
 from elevon.diagnose.bymodel.healthy import healthy
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 __all__ = ["expected_information", "likelihoods", "planned", "updated"]
 
-Floats = npt.NDArray[np.float64]
 _DRAWS = 200  # outcomes of a test
 _SAMPLES = 64  # severities of a set of faults
 _KNOWN = {c.key: c for c in CANDIDATES}

@@ -16,8 +16,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.candidates import CANDIDATES
 
 if TYPE_CHECKING:
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 __all__ = ["CAUSES", "Monitor"]
 
-Floats = npt.NDArray[np.float64]
 #: The faults of the vector, by key; the short stands for that of any phase.
 CAUSES = (
     "friction@transmission",

@@ -11,13 +11,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import InputError, unknown
 
 __all__ = ["METHODS", "POPULATION", "Best", "search"]
 
-Floats = npt.NDArray[np.float64]
 Costs = Callable[[Floats], Floats]
 POPULATION = 40
 METHODS = ("genetic", "differential-evolution", "particle-swarm", "grey-wolf")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.bench.procedure import load_procedure
 from elevon.bench.rig import Setup, setups
 from elevon.bench.traces import recorded
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
 
 __all__ = ["ASKED", "HEALTHY_DAYS", "TESTS", "Table", "gathered"]
 
-Floats = npt.NDArray[np.float64]
 #: Procedures of the bench that are learned; the first trace of each, with the unit's own backlash.
 TESTS = ("backlash", "loaded")
 HEALTHY_DAYS = 3

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.evidence import Signals, evidence, median
 from elevon.diagnose.bymodel.log import RUN_IN, TestLog
 from elevon.errors import InputError
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["NAMES", "SCALES", "VOLTAGE", "LogFeatures", "changes", "log_features"]
 
-Floats = npt.NDArray[np.float64]
 
 #: Keys of `elevon.diagnose.bymodel.evidence.UNITS`, in the surrogate's order.
 NAMES = (

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.surrogate.campaign import Table
 from elevon.diagnose.surrogate.features import NAMES, SCALES, changes
 from elevon.diagnose.surrogate.model import Head, Surrogate, TestModel
@@ -28,7 +29,6 @@ from elevon.progress import Progress, part
 
 __all__ = ["Plan", "fitted", "scores"]
 
-Floats = npt.NDArray[np.float64]
 FALSE_ALARM = 0.05
 HIGH = 0.25  # of a batch at least are runs of the high model
 _KNOWN = 1000  # training runs kept to tell what is unlike them

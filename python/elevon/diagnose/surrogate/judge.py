@@ -17,7 +17,6 @@ from elevon.diagnose.surrogate.sampling import Rows, severities
 
 __all__ = ["judged", "judged_at"]
 
-Floats = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.surrogate.features import NAMES, LogFeatures
 from elevon.diagnose.surrogate.network import Ensemble, Opinion, either, honest
 from elevon.diagnose.surrogate.pack import packed, unpacked
@@ -24,7 +25,6 @@ from elevon.errors import FormatError
 
 __all__ = ["Head", "Said", "Surrogate", "TestModel", "shipped"]
 
-Floats = npt.NDArray[np.float64]
 _FORMAT, _VERSION = "elevon-surrogate", 2
 _MOST_BYTES = 50_000_000
 _TEST = 0.2  # relative difference of travel and speed up to which a log is of a test

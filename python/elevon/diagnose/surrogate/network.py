@@ -25,8 +25,8 @@ __all__ = [
     "train",
 ]
 
-Floats = npt.NDArray[Any]  # of double precision, but of single in training
-Weights = list[Floats]  # w1, b1, w2, b2, ...
+Numbers = npt.NDArray[Any]  # of double precision, but of single in training
+Weights = list[Numbers]  # w1, b1, w2, b2, ...
 HIDDEN = (44, 44)
 _LEAST_LOG, _MOST_LOG = -5.0, 1.5  # of a deviation
 _PART = 64  # rows of a product
@@ -46,8 +46,8 @@ class Batch:
         Of each fault, scaled to its range; zero where absent.
     """
 
-    inputs: Floats
-    size: Floats
+    inputs: Numbers
+    size: Numbers
 
 
 @dataclass(frozen=True)
@@ -66,11 +66,11 @@ class Opinion:
         Of every member: logit of each fault.
     """
 
-    presence: Floats
-    faulty: Floats
-    size: Floats
-    deviation: Floats
-    each: Floats
+    presence: Numbers
+    faulty: Numbers
+    size: Numbers
+    deviation: Numbers
+    each: Numbers
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Ensemble:
 
     weights: Weights
 
-    def says(self, inputs: Floats) -> Opinion:
+    def says(self, inputs: Numbers) -> Opinion:
         """Return the ensemble's opinion of inputs, shape (n, m): the members' means.
 
         How far the members disagree does not enter the deviation: it depends on their number, and
@@ -104,7 +104,7 @@ class Ensemble:
         )
 
 
-def _forward(weights: Sequence[Floats], inputs: Floats) -> list[Floats]:
+def _forward(weights: Sequence[Numbers], inputs: Numbers) -> list[Numbers]:
     layers = [inputs]
     last = len(weights) // 2 - 1
     for k in range(last + 1):
@@ -142,7 +142,7 @@ def loss_and_gradient(weights: Weights, batch: Batch) -> tuple[float, Weights]:
     return loss, _backward(weights, layers, _parts(slope / n))
 
 
-def _parts(rows: Floats) -> Floats:
+def _parts(rows: Numbers) -> Numbers:
     """Return rows in parts of 64, shape (p, 64, k), or as one where they do not divide.
 
     A product of this size stays on one thread: linear algebra that waits for a second one on a
@@ -151,11 +151,11 @@ def _parts(rows: Floats) -> Floats:
     return rows.reshape(-1, _PART if len(rows) % _PART == 0 else len(rows), rows.shape[1])
 
 
-def _entropy(logit: Floats, there: Floats) -> Floats:
+def _entropy(logit: Numbers, there: Numbers) -> Numbers:
     return np.asarray(np.logaddexp(0.0, logit) - there * logit)
 
 
-def honest(scaling: Floats, logit: Floats) -> Floats:
+def honest(scaling: Numbers, logit: Numbers) -> Numbers:
     """Return calibrated logits, shape (..., k): one slope for each side, and an offset.
 
     Parameters
@@ -170,17 +170,17 @@ def honest(scaling: Floats, logit: Floats) -> Floats:
     return np.asarray(scaling[:, 0] * rest + scaling[:, 1] * there + scaling[:, 2])
 
 
-def either(logit: Floats) -> Floats:
+def either(logit: Numbers) -> Numbers:
     """Return the logit, shape (...), that any of independent faults, shape (..., f), is there."""
     none = np.logaddexp(0.0, logit).sum(axis=-1)  # -log of the product of all absences
     return np.asarray(none + np.log(-np.expm1(-none)))
 
 
-def _logistic(logit: Floats) -> Floats:
+def _logistic(logit: Numbers) -> Numbers:
     return np.asarray(0.5 * (1.0 + np.tanh(0.5 * logit)))
 
 
-def _backward(weights: Weights, layers: list[Floats], slope: Floats) -> Weights:
+def _backward(weights: Weights, layers: list[Numbers], slope: Numbers) -> Weights:
     out: Weights = [np.zeros(0)] * len(weights)
     for k in range(len(weights) // 2 - 1, -1, -1):
         out[2 * k] = (layers[k].swapaxes(1, 2) @ slope).sum(axis=0)

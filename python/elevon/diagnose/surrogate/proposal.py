@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.answer import Moved
 from elevon.diagnose.bymodel.evidence import UNITS
 from elevon.diagnose.surrogate.features import NAMES, SCALES, LogFeatures, log_features
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Proposal", "proposed"]
 
-Floats = npt.NDArray[np.float64]
 PRESENT, FAULTY = 0.09, 0.63  # shares of trained runs: of each fault, and of any
 SUSPECT = 0.01  # chance of a baseline below which it is called faulty
 

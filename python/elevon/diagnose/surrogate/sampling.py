@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.healthy import FLOOR
 from elevon.diagnose.surrogate.campaign import Table
 from elevon.diagnose.surrogate.features import NAMES
@@ -15,8 +16,6 @@ from elevon.diagnose.surrogate.population import learned
 from elevon.diagnose.surrogate.view import View, hidden
 
 __all__ = ["Rows", "limits", "severities", "sizes"]
-
-Floats = npt.NDArray[np.float64]
 
 
 def limits() -> tuple[Floats, Floats]:

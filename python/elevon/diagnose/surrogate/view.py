@@ -10,13 +10,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.surrogate.features import NAMES, VOLTAGE, changes
 
 __all__ = ["VIEWS", "View"]
 
-Floats = npt.NDArray[np.float64]
 VIEWS = ("relative", "absolute")
 _VOLTAGE = np.array([name in VOLTAGE for name in NAMES])
 _FOLLOWING = np.array([name == "following_gain" for name in NAMES])

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.logs.command.note import CommandNote
 from elevon.logs.command.reconstruct import CommandTrace
@@ -14,7 +15,6 @@ from elevon.scenario.evaluate import evaluate_terms
 
 __all__ = ["NotedCommand", "align_noted", "noted_values"]
 
-Floats = npt.NDArray[np.float64]
 _MOST = 2000  # samples compared, and starts tried first
 _REFINED = 4  # searches, each five times finer than the one before
 

@@ -6,16 +6,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import stdtr
 
+from elevon.arrays import Floats
 from elevon.diagnose.modelfree import TRANSFER, HealthyBaseline
 from elevon.diagnose.modelfree.scores import share_interval
 from elevon.reproduce.cranfield.data import CONDITIONS, CranfieldData
 
 __all__ = ["DETECTION", "FALSE_ALARM", "Detection", "detect"]
 
-Floats = npt.NDArray[np.float64]
 
 DETECTION = (*TRANSFER, "current_assisted", "current_opposed")
 FALSE_ALARM = 0.05

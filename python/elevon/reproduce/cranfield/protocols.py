@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.modelfree import Discriminant
 from elevon.diagnose.modelfree.model import SHRINKAGE
 from elevon.reproduce.cranfield.data import CranfieldData
 
 __all__ = ["Answers", "chronological", "leave_load_out", "leave_run_out", "relative_to_healthy"]
 
-Floats = npt.NDArray[np.float64]
 Groups = npt.NDArray[np.float64] | npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
 

@@ -15,11 +15,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
+
+from elevon.arrays import Floats
 
 __all__ = ["Scatter", "fitted", "fitted_interval", "stated"]
 
-Floats = npt.NDArray[np.float64]
 Group = tuple[Floats, Floats]
 """True severities and errors of one unit's inspections, the errors less their level's mean."""
 

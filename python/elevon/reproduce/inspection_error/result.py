@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.modelfree.scores import share_interval
 from elevon.prognose.laws import LAWS
 from elevon.prognose.observation import SIGMAS
@@ -22,7 +22,6 @@ from elevon.reproduce.prognosis.truth import INSPECTIONS, InspectionError
 
 __all__ = ["InspectionErrors", "reproduce_inspection_error"]
 
-Floats = npt.NDArray[np.float64]
 _SEEN = 0.9  # share of inspections that see a fault from its least severity on
 _STATED = 1.25  # between the deviations stated and those that the histories state, either way
 

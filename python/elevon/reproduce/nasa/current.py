@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.report.checks import Check, verdict
 from elevon.units import to_si
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["PUBLISHED", "CurrentResult", "CurrentRow", "CurrentTrace", "reproduce_current"]
 
-Floats = npt.NDArray[np.float64]
 ACTUATOR = "nasa-ballscrew"
 POUND_FORCE = float(to_si(1.0, "lbf"))
 PUBLISHED = {"nominal": (7.12, 9.96, 5.82), "jam": (8.34, 9.88, 5.60)}

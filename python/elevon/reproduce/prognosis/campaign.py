@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.actuator import Actuator
+from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.prognose import (
     Inspection,
@@ -42,7 +42,6 @@ from elevon.worklog import finished
 
 __all__ = ["campaign_mission", "reproduce_prognosis"]
 
-Floats = npt.NDArray[np.float64]
 _BASE = "torino-rotary"
 _INTERVAL = 0.02  # of the life that the model expects, between inspections: some hundred flights
 _OF_THE_REST = 0.1  # of the least life that is left, after which the next inspection is due

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.diagnose.bymodel.candidates import CANDIDATES
 from elevon.prognose.law import Law
 from elevon.prognose.life import Life, run_to_failure
@@ -34,7 +34,6 @@ __all__ = [
     "true_unit",
 ]
 
-Floats = npt.NDArray[np.float64]
 FAULTS = ("gear_wear", "lubricant_loss", "insulation")
 
 #: Deviation from unit to unit (ASSUMED: series scatter) and of the calibration of one of them.

@@ -1,0 +1,9 @@
+"""The type of arrays of numbers that the package's functions take and return."""
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["Floats"]
+
+Floats = npt.NDArray[np.float64]
+"""Numbers of double precision, of any shape."""
