@@ -44,7 +44,7 @@ $(STAMPS)/extension: $(STAMPS)/packages pyproject.toml $(RUST_SOURCES)
 	VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop --release --quiet --locked
 	@touch $@
 
-demo: setup ## a unit's life, its diagnoses, its end as foreseen: out/demo/report.html
+demo: setup ## a unit's life, its diagnoses, its predicted end: out/demo/report.html
 	$(DEMO)
 
 test: setup lint test-rust test-python ## every check but the long ones
@@ -82,7 +82,7 @@ wheel: $(STAMPS)/packages ## the wheel for this system in dist/, checked where t
 bench: setup ## the timed comparisons
 	$(BIN)/python -m pytest -q -m bench
 
-format: setup ## rewrite the sources in the house's form
+format: setup ## rewrite the sources in the project's format
 	$(BIN)/ruff format
 	$(BIN)/ruff check --fix
 	cargo fmt --all
