@@ -101,19 +101,19 @@ def _met(
 def _moved(record: Any, value: float, neutral: str, size: float) -> float:
     """A number away from neutral: as it is if it is away already."""
     try:
-        rest = float(neutral)
+        neutral_value = float(neutral)
     except ValueError:
-        rest = value
-    if value != rest:
+        neutral_value = value
+    if value != neutral_value:
         return value
     top = record.maximum if math.isfinite(record.maximum) else math.inf
     for number in (
-        rest + size,
-        rest - size,
-        rest - 0.5 * size,
-        rest + min(size, 0.5 * (top - rest)),
+        neutral_value + size,
+        neutral_value - size,
+        neutral_value - 0.5 * size,
+        neutral_value + min(size, 0.5 * (top - neutral_value)),
     ):
-        if number != rest and inside(record, number):
+        if number != neutral_value and inside(record, number):
             return float(number)
     return value
 
@@ -121,7 +121,7 @@ def _moved(record: Any, value: float, neutral: str, size: float) -> float:
 def companies(cell: Cell, path: str) -> Iterator[Variant]:
     """Yield what a parameter is tried with, from what its record asks to wider circles.
 
-    First its conditions, met by values; then with each fault that moves what it asks for, coming
+    First its conditions, met by values; then with each fault that moves what it requests, coming
     in the middle of the run; then with each neighbour of its group moved.
     """
     plain = [Variant(values=one) for one in _accepted(cell, path)]
@@ -144,11 +144,11 @@ def _accepted(cell: Cell, path: str) -> Iterator[dict[str, Any]]:
 
 
 def _faults(cell: Cell, path: str) -> Iterator[Any]:
-    """Yield the faults that move what the parameter asks for; and one that grows smoothly."""
-    asked = " ".join(records(cell.actuator().wiring)[path].when)
+    """Yield the faults that move what the parameter requests; and one that grows smoothly."""
+    conditions = " ".join(records(cell.actuator().wiring)[path].when)
     half = 0.5 * cell.scenario().seconds
     for kind, place, record in cell.faults():
-        if any(target in asked for target in record["targets"][place]):
+        if any(target in conditions for target in record["targets"][place]):
             yield fault(kind, place, record, severe(record), {"kind": "step", "time": half})
     kind, place, record = cell.faults()[0]
     yield fault(kind, place, record, 0.5 * severe(record), {"kind": "ramp", "end": 2.0 * half})
@@ -213,17 +213,17 @@ def variants(cell: Cell, path: str, base: Variant) -> list[Variant]:
     """Other values of a parameter in some company, those that the cell accepts."""
     actuator = cell.actuator(base.values)
     record = records(actuator.wiring)[path]
-    asked = [
+    tried = [
         Variant(f"{path}={value}", {**base.values, path: value}, base.faults)
         for value in others(record, actuator.parameters[path].value)
     ]
-    refused = [bool(cell.refused(variant)) for variant in asked]
-    accepted = [variant for variant, no in zip(asked, refused, strict=True) if not no]
+    refused = [bool(cell.refused(variant)) for variant in tried]
+    accepted = [variant for variant, no in zip(tried, refused, strict=True) if not no]
     if base.values or base.faults:
         return accepted
     return accepted + [
         _nearest(cell, path, actuator.parameters[path].value, variant.values[path])
-        for variant, no in zip(asked[: len(FACTORS)], refused, strict=False)
+        for variant, no in zip(tried[: len(FACTORS)], refused, strict=False)
         if no and record.choices is None
     ]
 
@@ -248,7 +248,7 @@ def changed(cell: Cell, base: Variant, tried: Sequence[Variant]) -> dict[str, li
 
 
 def says(cell: Cell, path: str, variant: Variant) -> bool:
-    """Does the program say of this variant that the parameter does not act?"""
+    """Does the program say of this variant that the parameter has no effect?"""
     return any(text.startswith(f"{path} = ") for text in cell.resting(variant))
 
 
@@ -279,7 +279,7 @@ def shows(cell: Cell, path: str) -> bool:
 
 
 def _shows_over_the_whole(cell: Cell, path: str) -> bool:
-    """In the set's own run: under its supply and others, with each severe fault from the start."""
+    """In the actuator file's own run: under several supplies, with each severe fault."""
     if any(_shows(replace(cell, load=0.0, whole=supply), path, Variant()) for supply in WHOLE):
         return True
     whole = replace(cell, load=0.0, whole=1.0)

@@ -1,10 +1,11 @@
-"""Where the two models part: the features that they share, in means over the low model's band.
+"""Where the two models part: the features that they share, in means over the reduced-order model's
+band.
 
-The low model carries means; the high one shows the ripple of relays and carrier beside them, and a
-sample of it now and then shows the carrier's phase: read once a millisecond in step with its
-20 kHz carrier, the landing gear's torque has a mean of 0.040 N m; it is 0.055 over all instants
-(and at low). So both are read often, out of step with any carrier, and averaged over `BAND`
-before their size is asked for.
+The reduced-order model carries means; the switching one shows the ripple of relays and carrier
+beside them, and a sample of it now and then shows the carrier's phase: read once a millisecond in
+step with its 20 kHz carrier, the landing gear's torque has a mean of 0.040 N m; it is 0.055 over
+all instants (and at low). So both are read often, out of step with any carrier, and averaged over
+`BAND` before their size is requested.
 """
 
 from __future__ import annotations
@@ -23,14 +24,14 @@ from tests.contract.cells import Cell, Choices, Variant, fault, severe
 
 #: Agreement in sign and within this factor ...
 FACTOR = 1.5
-#: ... where the high model's change is this many of its own floors (healthy against healthy) and
-#: this part of the healthy value.
+#: ... where the switching model's change is this many of its own floors (healthy against healthy)
+#: and this part of the healthy value.
 FLOORS, SEEN = 5.0, 0.05
 #: A change that passes through none as the fault grows is no measure there: within this part of the
 #: severity a hair more or less of the fault is all of it. Both sides of the passage are compared.
-BESIDE = 0.05
-#: Healthy runs of the high model that differ in nothing that matters: half the step, and a winding
-#: a ten-thousandth warmer or colder, by which relays and stick fall into another phase.
+NEIGHBOUR = 0.05
+#: Healthy runs of the switching model that differ in nothing that matters: half the step, and a
+#: winding a ten-thousandth warmer or colder, by which relays and stick fall into another phase.
 ALIKE = 1e-4
 
 #: Mechanical signals, torque, and the current that makes it (of a servo, of a landing gear).
@@ -42,7 +43,7 @@ BATCH = 16
 
 
 @dataclass(frozen=True)
-class Shown:
+class Sizes:
     """How a run ended, and the mean size of each shared signal over it."""
 
     status: str
@@ -50,7 +51,7 @@ class Shown:
     sizes: Mapping[str, float]
 
 
-def shown(cell: Cell, variants: Sequence[Variant], duration: float | None = None) -> list[Shown]:
+def sizes_of(cell: Cell, variants: Sequence[Variant], duration: float | None = None) -> list[Sizes]:
     """What each variant shows, from batches of a few."""
     return [
         shows
@@ -59,7 +60,7 @@ def shown(cell: Cell, variants: Sequence[Variant], duration: float | None = None
     ]
 
 
-def _batch(cell: Cell, variants: Sequence[Variant], duration: float | None) -> list[Shown]:
+def _batch(cell: Cell, variants: Sequence[Variant], duration: float | None) -> list[Sizes]:
     signals = set(SIGNALS) & set(shipped.signals(cell.name, cell.fidelity))
     runs = [cell.of(variant, duration) for variant in variants]
     with warnings.catch_warnings():
@@ -70,7 +71,7 @@ def _batch(cell: Cell, variants: Sequence[Variant], duration: float | None) -> l
             record=",".join(sorted(signals)) + f"@{_rate(cell)} Hz",
             threads=1,
         )
-    return [_shown(recording, signals) for recording in recordings]
+    return [_sizes(recording, signals) for recording in recordings]
 
 
 def _rate(cell: Cell) -> str:
@@ -80,10 +81,10 @@ def _rate(cell: Cell) -> str:
     return repr(1.0 / (step * max(round(READ / step), 1)))
 
 
-def _shown(recording: elevon.Recording, signals: set[str]) -> Shown:
+def _sizes(recording: elevon.Recording, signals: set[str]) -> Sizes:
     channels = {item.name: item for item in recording.channels if item.name in signals}
     sizes = {name: _size(item.time, item.values) for name, item in channels.items()}
-    return Shown(recording.status, recording.meta["message"], sizes)
+    return Sizes(recording.status, recording.meta["message"], sizes)
 
 
 def _size(time: np.ndarray, values: np.ndarray) -> float:
@@ -104,17 +105,17 @@ def apart(
     """Faults that both models carry and in which they part: sign, or a factor of 1.5.
 
     All of them, or only some, over the motion or another duration (s); where they are few, healthy
-    runs are not compared among themselves: what is asked for stands far above their differences.
-    `planted` is an error of the low model's severities, to be seen.
+    runs are not compared among themselves: what is requested stands far above their differences.
+    `planted` is an error of the reduced-order model's severities, to be seen.
     """
     choices = (*choices, *_shared(name))
     pair = Pair(*(Cell(name, fidelity, choices, push) for fidelity in ("high", "low")),
                 duration, planted)  # fmt: skip
-    asked = [variant for variant in _carried(pair) if not only or variant.name in only]
-    (healthy, *broken), (healthy_low, *broken_low) = pair.shown([Variant(), *asked])
+    chosen = [variant for variant in _carried(pair) if not only or variant.name in only]
+    (healthy, *broken), (healthy_low, *broken_low) = pair.run([Variant(), *chosen])
     floors = dict.fromkeys(healthy.sizes, 0.0) if only else _floors(pair.high, healthy)
     before = Healthy(floors, healthy, healthy_low)
-    for variant, after, after_low in zip(asked, broken, broken_low, strict=True):
+    for variant, after, after_low in zip(chosen, broken, broken_low, strict=True):
         if after.status != after_low.status:
             yield f"{variant.name}: high ends as {after.status}, low as {after_low.status}"
         elif after.status == "ok":
@@ -133,10 +134,12 @@ class Pair:
     duration: float | None
     planted: float
 
-    def shown(self, variants: Sequence[Variant]) -> tuple[list[Shown], list[Shown]]:
+    def run(self, variants: Sequence[Variant]) -> tuple[list[Sizes], list[Sizes]]:
         """What the variants show in each model."""
         wrong = [_grown(variant, self.planted) for variant in variants]
-        return shown(self.high, variants, self.duration), shown(self.low, wrong, self.duration)
+        return sizes_of(self.high, variants, self.duration), sizes_of(
+            self.low, wrong, self.duration
+        )
 
 
 @dataclass(frozen=True)
@@ -144,11 +147,11 @@ class Healthy:
     """What healthy runs show, and what is no change of it."""
 
     floors: Mapping[str, float]
-    high: Shown
-    low: Shown
+    high: Sizes
+    low: Sizes
 
-    def parted(self, after: Shown, after_low: Shown) -> dict[str, str]:
-        """Features of a fault in which the low model is elsewhere, and what both show."""
+    def parted(self, after: Sizes, after_low: Sizes) -> dict[str, str]:
+        """Features of a fault in which the reduced-order model is elsewhere, and what both show."""
         texts = {}
         for key in sorted(self.high.sizes.keys() & self.low.sizes.keys()):
             change = self.change(key, after)
@@ -160,7 +163,7 @@ class Healthy:
                 texts[key] = f"{key} {change:+.3g} high, {change_low:+.3g} low ({ratio:.2f})"
         return texts
 
-    def change(self, key: str, after: Shown) -> float:
+    def change(self, key: str, after: Sizes) -> float:
         """Change of a feature at high fidelity."""
         return after.sizes[key] - self.high.sizes[key]
 
@@ -169,11 +172,11 @@ def _standing(
     pair: Pair, before: Healthy, variant: Variant, parted: Mapping[str, str]
 ) -> Iterator[str]:
     """What is left of the features that part: not those that agree on both sides of a passage."""
-    beside = [_grown(variant, 1.0 - BESIDE), _grown(variant, 1.0 + BESIDE)]
-    if not parted or any(pair.high.refused(one) for one in beside):
+    neighbours = [_grown(variant, 1.0 - NEIGHBOUR), _grown(variant, 1.0 + NEIGHBOUR)]
+    if not parted or any(pair.high.refused(one) for one in neighbours):
         yield from parted.values()
         return
-    high, low = pair.shown(beside)
+    high, low = pair.run(neighbours)
     whole = all(after.status == "ok" for after in (*high, *low))
     apart_too = [before.parted(*both) for both in zip(high, low, strict=True)]
     for key, text in parted.items():
@@ -192,27 +195,27 @@ def _carried(pair: Pair) -> list[Variant]:
     """Every fault that runs and acts at both fidelities, severe."""
     high, low = pair.high, pair.low
     lows = {(kind, place) for kind, place, _ in low.faults()}
-    asked = [
+    chosen = [
         Variant(f"{kind}@{place}", faults=(fault(kind, place, record, severe(record)),))
         for kind, place, record in high.faults()
         if (kind, place) in lows
     ]
     return [
         variant
-        for variant in asked
+        for variant in chosen
         if not any(cell.refused(variant) or cell.resting(variant) for cell in (high, low))
     ]
 
 
-def _floors(cell: Cell, healthy: Shown) -> dict[str, float]:
+def _floors(cell: Cell, healthy: Sizes) -> dict[str, float]:
     """Largest difference of each feature among healthy runs that differ in nothing of matter."""
     value = cell.actuator().parameters.value
     winding, step = "motor.winding_resistance", "solver.step"
     alike = [
-        *shown(
+        *sizes_of(
             cell, [Variant(values={winding: value(winding) * x}) for x in (1 + ALIKE, 1 - ALIKE)]
         ),
-        *shown(cell, [Variant(values={step: 0.5 * value(step)})]),
+        *sizes_of(cell, [Variant(values={step: 0.5 * value(step)})]),
     ]
     return {
         key: max(abs(one.sizes[key] - size) for one in alike) for key, size in healthy.sizes.items()
@@ -220,7 +223,7 @@ def _floors(cell: Cell, healthy: Shown) -> dict[str, float]:
 
 
 def _shared(name: str) -> Choices:
-    """Choices that the low model declines, at their defaults: both then have the same model."""
+    """Choices that the reduced-order model declines, at their defaults: both models then agree."""
     actuator = shipped.actuator(name)
     return tuple(
         (path, record.choices[int(record.default)])
@@ -231,4 +234,4 @@ def _shared(name: str) -> Choices:
     )  # fmt: skip
 
 
-__all__ = ["apart", "shown"]
+__all__ = ["apart", "sizes_of"]

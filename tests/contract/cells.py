@@ -1,8 +1,8 @@
 """Many runs of one actuator in one batch: the healthy one and every variant of it.
 
-A cell is a shipped set at one fidelity, with some choices made otherwise and a load on its output.
-Its variants go through the core together, in lanes, so that a suite over every fault and every
-parameter costs seconds; that lanes change no bit is the contract of `test_actuators`.
+A cell is a shipped actuator file at one fidelity, with some choices made otherwise and a load on
+its output. Its variants go through the core together, in batches, so that a suite over every fault
+and every parameter costs seconds; that a batch changes no bit is the contract of `test_actuators`.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Variant:
 
 @dataclass(frozen=True)
 class Outcome:
-    """One run: its status, every signal (severities apart), and what the labels said."""
+    """One run: its status, every signal (severities apart), and what the labels state."""
 
     status: str
     message: str
@@ -63,7 +63,7 @@ class Cell:
     """An actuator at one fidelity, in one drive, under one load (SI, at its output).
 
     It swings, or with `onwards` it moves in the positive direction only, up to its stops; with
-    `whole` it does what its set does by default, under a supply that is so many times the set's.
+    `whole` it does what its actuator file does by default, under a supply so many times its own.
     """
 
     name: str
@@ -82,7 +82,7 @@ class Cell:
 
     def actuator(self, values: Values | None = None) -> Any:
         """The actuator of this cell with some values changed."""
-        chosen = shipped.actuator(self.name).with_values(dict(self.choices), asked=False)
+        chosen = shipped.actuator(self.name).with_values(dict(self.choices), request=False)
         return chosen.with_values(values or {})
 
     def scenario(
@@ -93,13 +93,13 @@ class Cell:
     ) -> Any:
         """The short motion in which everything moves, under the cell's load.
 
-        What the motion itself sets of the parameters `given` gives way to theirs.
+        What the motion itself sets of the parameters `given` is left to theirs.
         """
         data = shipped.onwards(self.name) if self.onwards else shipped.motion(self.name)
         if self.whole:
             data = shipped.default(self.name, self.whole)
-        own = data.get("parameters", {})
-        data["parameters"] = {path: value for path, value in own.items() if path not in given}
+        initial = data.get("parameters", {})
+        data["parameters"] = {path: value for path, value in initial.items() if path not in given}
         if self.load:
             data["load"] = {"output": {"terms": [{"kind": "constant", "value": self.load}]}}
         if duration is not None:
@@ -112,7 +112,7 @@ class Cell:
         return elevon.Run(self.actuator(variant.values), scenario, 5, variant.name)
 
     def run(self, variants: Sequence[Variant], duration: float | None = None) -> list[Outcome]:
-        """Every variant's outcome, from one batch; what does not act is no matter here."""
+        """Every variant's outcome, from one batch; what has no effect is no matter here."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ElevonWarning)
             recordings = elevon.simulate_batch(
@@ -132,9 +132,9 @@ class Cell:
         return ""
 
     def resting(self, variant: Variant) -> list[str]:
-        """What the variant sets and the program says does not act."""
+        """What the variant sets and the program says has no effect."""
         prepared = prepare(self.of(variant), self.fidelity, f"all@{RATE}")
-        return [item.text for item in prepared.doubts if item.category is NotActingWarning]
+        return [item.text for item in prepared.notices if item.category is NotActingWarning]
 
     def faults(self) -> list[tuple[str, str, dict[str, Any]]]:
         """Kind, place and record of every fault that this fidelity carries."""
@@ -159,9 +159,9 @@ def fault(
     kind: str, place: str, record: Values, severity: float, profile: Values | None = None
 ) -> Values:
     """A fault with its obligatory attributes at zero."""
-    own = {a["name"]: 0.0 for a in record["attributes"] if a["default"] is None}
+    needed = {a["name"]: 0.0 for a in record["attributes"] if a["default"] is None}
     counted = math.ceil(severity) if record["whole"] and math.isfinite(severity) else severity
-    given = {"kind": kind, "place": place, "severity": counted, **own}
+    given = {"kind": kind, "place": place, "severity": counted, **needed}
     return given | {"profile": profile} if profile else dict(given)
 
 
@@ -175,7 +175,7 @@ def severe(record: Values) -> float:
 
 @cache
 def drives(name: str) -> list[Choices]:
-    """Own drive of a set, then each other choice of each choice of the group ``drive``.
+    """Own drive of an actuator file, then each other choice of each choice of the group ``drive``.
 
     A choice under which the set does not move (no drive) can show no fault.
     """
@@ -201,7 +201,8 @@ def _moves(name: str, choices: Choices) -> bool:
 
 @cache
 def load(name: str) -> float:
-    """A load at the output that the set feels and still moves, SI: searched by the low model.
+    """A load at the output that the set feels and still moves, SI: searched by the reduced-order
+    model.
 
     The largest power of two that leaves the way gone within 5 % of that without a load, so that
     no actuator's strength stands here by hand.

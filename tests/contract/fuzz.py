@@ -28,7 +28,7 @@ NO_NUMBERS = (math.nan, math.inf, -math.inf)
 
 @cache
 def loaded(name: str) -> elevon.Actuator:
-    """A shipped set, read once."""
+    """A shipped actuator file, read once."""
     return elevon.Actuator.load(name)
 
 
@@ -89,8 +89,8 @@ def outcome(case: Case, healthy: Sequence[elevon.Recording]) -> str:
         if not str(error).strip():
             raise AssertionError(f"{case}: refused without a word") from error
         return "refused"
-    beside, recording = batch
-    assert same(beside, healthy[0]), f"{case}: its neighbour is not what it is alone"
+    batch_record, recording = batch
+    assert same(batch_record, healthy[0]), f"{case}: its neighbour is not what it is alone"
     status = str(recording.meta["status"])
     message = str(recording.meta.get("message", ""))
     assert "panicked" not in message, f"{case}: {message}"
@@ -107,10 +107,10 @@ def outcome(case: Case, healthy: Sequence[elevon.Recording]) -> str:
 
 def simulate(runs: list[elevon.Run], case: Case, record: str) -> list[elevon.Recording]:
     """Run a batch; where a step is not the healthy one, each run for itself with its own rate."""
-    own = case.record()
-    if own == record:
+    single_record = case.record()
+    if single_record == record:
         return elevon.simulate_batch(runs, fidelity=case.fidelity, record=record)
-    single = [(runs[0], record), (runs[1], own)]
+    single = [(runs[0], record), (runs[1], single_record)]
     return [
         elevon.simulate_batch([run], fidelity=case.fidelity, record=rate)[0] for run, rate in single
     ]
@@ -211,18 +211,18 @@ def mixed_cases(count: int, seed: int) -> Iterator[Case]:
         kind, place, record = broken[pair][draw.integers(len(broken[pair]))]
         top = min(record["maximum"], 1e3)
         fault = {"kind": kind, "place": place, "severity": float(top * draw.random())}
-        shown = pair[1] in record["fidelities"] and draw.random() < 0.5
-        yield Case(*pair, parameters, (fault,) if shown else ())
+        faulty = pair[1] in record["fidelities"] and draw.random() < 0.5
+        yield Case(*pair, parameters, (fault,) if faulty else ())
 
 
 def drawn(record: dict[str, Any], name: str, draw: np.random.Generator) -> Any:
     """A value of a parameter: its own times ten to some power, mostly a small one."""
     if record["choices"]:
         return record["choices"][draw.integers(len(record["choices"]))]
-    own = loaded(name).parameters.value(record["path"]) or 1.0
-    return float(own * 10.0 ** (draw.normal() * draw.choice([0.3, 1.0, 4.0, 30.0])))
+    nominal = loaded(name).parameters.value(record["path"]) or 1.0
+    return float(nominal * 10.0 ** (draw.normal() * draw.choice([0.3, 1.0, 4.0, 30.0])))
 
 
 def actuators() -> list[tuple[str, str]]:
-    """Every shipped set in each of its fidelities."""
+    """Every shipped actuator file in each of its fidelities."""
     return [(name, fidelity) for name in shipped.names() for fidelity in shipped.fidelities(name)]

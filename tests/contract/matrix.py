@@ -51,7 +51,7 @@ class Row:
 @cache
 def rows(cell: Cell, parts: tuple[float, ...]) -> tuple[Outcome, tuple[Row, ...]]:
     """The healthy outcome, and every fault at each part of its severe severity."""
-    asked = [
+    tried = [
         [
             Variant(
                 f"{kind}@{place}={part}",
@@ -61,12 +61,12 @@ def rows(cell: Cell, parts: tuple[float, ...]) -> tuple[Outcome, tuple[Row, ...]
         ]
         for kind, place, record in cell.faults()
     ]
-    asked = [variants for variants in asked if not any(map(cell.refused, variants))]
+    tried = [variants for variants in tried if not any(map(cell.refused, variants))]
     counted = {
         f"{kind}@{place}": record["whole"] or "1: " in record["effect"]
         for kind, place, record in cell.faults()
     }
-    flat = [variant for variants in asked for variant in variants]
+    flat = [variant for variants in tried for variant in variants]
     healthy, *broken = cell.run([Variant(), *flat])
     size = len(parts)
     found = [
@@ -77,7 +77,7 @@ def rows(cell: Cell, parts: tuple[float, ...]) -> tuple[Outcome, tuple[Row, ...]
             bool(cell.resting(variants[-1])),
             counted[variants[0].name.rpartition("=")[0]],
         )
-        for i, variants in enumerate(asked)
+        for i, variants in enumerate(tried)
     ]
     return healthy, tuple(found)
 
@@ -96,7 +96,7 @@ def wrong(cell: Cell, parts: tuple[float, ...]) -> Iterator[str]:
             yield f"{row.name}: ended as {last.status}: {last.message}"
         if row.rests and last.differs(healthy):
             changed = ", ".join(last.differs(healthy)[:3])
-            yield f"{row.name}: is said not to act, yet changes {changed}"
+            yield f"{row.name}: is reported to have no effect, yet changes {changed}"
         yield from _labels(row)
 
 
@@ -105,15 +105,15 @@ def silent(cells: Sequence[Cell], parts: tuple[float, ...]) -> Iterator[str]:
 
     What shows only in an event (a lock, a stop) need not show where a load keeps that away.
     """
-    shown: dict[str, bool] = {}
+    effects: dict[str, bool] = {}
     for cell in cells:
         healthy, found = rows(cell, parts)
         for row in found:
             shows = row.rests or bool(row.outcomes[-1].differs(healthy))
-            shown[row.name] = shown.get(row.name, False) or shows
+            effects[row.name] = effects.get(row.name, False) or shows
     yield from (
         f"{name}: changes nothing, and nothing says so"
-        for name, shows in shown.items()
+        for name, shows in effects.items()
         if not shows
     )
 
@@ -160,14 +160,14 @@ def lasting(cell: Cell) -> Iterator[str]:
         "period": 100.0 * whole,
         "duty": 0.01 * (CLEARED - ONSET),
     }
-    asked = [
+    tried = [
         Variant(
             f"{kind}@{place}", faults=(fault(kind, place, record, 0.61 * severe(record), profile),)
         )
         for kind, place, record in cell.faults()
     ]
-    asked = [variant for variant in asked if not cell.refused(variant)]
-    for variant, outcome, healthy in _pairs(cell, asked, whole):
+    tried = [variant for variant in tried if not cell.refused(variant)]
+    for variant, outcome, healthy in _pairs(cell, tried, whole):
         if _distance(outcome, healthy) <= FORGOTTEN:
             continue
         stated = recovery(cell, outcome, healthy)
@@ -190,11 +190,11 @@ def _later(variant: Variant, time: float) -> Variant:
 
 
 def _pairs(
-    cell: Cell, asked: Sequence[Variant], duration: float
+    cell: Cell, variants: Sequence[Variant], duration: float
 ) -> Iterator[tuple[Variant, Outcome, Outcome]]:
     """Yield each variant that ended well and may move on, its outcome and the healthy one."""
-    healthy, *broken = cell.run([Variant(), *asked], duration)
-    for variant, outcome in zip(asked, broken, strict=True):
+    healthy, *broken = cell.run([Variant(), *variants], duration)
+    for variant, outcome in zip(variants, broken, strict=True):
         if outcome.status == "ok" and not _latched(outcome):
             yield variant, outcome, healthy
 

@@ -15,7 +15,7 @@ from elevon import _core
 
 
 def shipped() -> dict[str, str | None]:
-    """Wiring of every shipped set by its name, from the package's own folder; None: its base's."""
+    """Wiring of every shipped actuator file by its name of the package; None: its base's."""
     folder = resources.files("elevon") / "actuators"
     files = [entry for entry in folder.iterdir() if entry.name.endswith(".toml")]
     return {
@@ -33,7 +33,8 @@ def actuator(name: str) -> Any:
 
 
 def names() -> list[str]:
-    """Shipped sets whose wiring the core has; `test_every_shipped_set_loads` reports the others.
+    """Shipped actuator files whose wiring the core has; `test_every_shipped_set_loads` reports the
+    others.
 
     A set on a base has other numbers in the same wiring: what the suite asks of it, it asks of
     the base.
@@ -43,13 +44,13 @@ def names() -> list[str]:
 
 
 def fidelities(name: str) -> list[str]:
-    """Fidelities of the wiring behind a set."""
+    """Fidelities of the wiring behind an actuator file."""
     wiring = actuator(name).wiring
     return next(list(w["fidelities"]) for w in _core.wirings() if w["name"] == wiring)
 
 
 def signals(name: str, fidelity: str) -> list[str]:
-    """Signal names of a set in a fidelity."""
+    """Signal names of an actuator file in a fidelity."""
     return [record["name"] for record in _core.signals(actuator(name).wiring, fidelity)]
 
 
@@ -122,7 +123,7 @@ def step(time: float, action: str) -> dict[str, Any]:
     return {"time": time, "action": action}
 
 
-def still(name: str) -> Any:
+def standstill(name: str) -> Any:
     """Nothing asked, nothing on the shaft."""
     command = {} if takes_actions(name) else {"mode": "speed", "terms": []}
     return elevon.Scenario.from_dict({"duration": "0.1 s", "command": command})

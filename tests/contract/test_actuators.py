@@ -62,7 +62,7 @@ def test_an_actuator_left_alone_stays_at_rest(name: str, fidelity: str) -> None:
     """No command, no load: no motion. A drive that creeps by itself has a sign wrong."""
     rec = elevon.simulate(
         elevon.Actuator.load(name),
-        shipped.still(name),
+        shipped.standstill(name),
         fidelity=fidelity,
         record=["motor_speed,motor_position@1 kHz"],
     )

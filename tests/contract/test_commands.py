@@ -1,6 +1,7 @@
 """The same five commands on every actuator: bench run, import, calibrate, validate, compare.
 
-The procedure is made of the set's own scenario, so that no actuator is known here by name.
+The procedure is made of the actuator file's own scenario, so that no actuator is known here by
+name.
 """
 
 import json
@@ -35,7 +36,7 @@ def quoted(value):
 
 @pytest.fixture(scope="module", params=set_names())
 def bench(request, tmp_path_factory):
-    """Name, and the log of the set's own scenario on its stand."""
+    """Name, and the log of the actuator file's own scenario on its stand."""
     name = request.param
     folder = tmp_path_factory.mktemp(name)
     command = quoted(Actuator.load(name).default_scenario["command"])

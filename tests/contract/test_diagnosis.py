@@ -1,7 +1,7 @@
-"""Every fault of every actuator, injected into its stand's tests, is found or said to be unseen.
+"""Every fault of every actuator, injected into its stand's tests, is found or reported as unseen.
 
 The registry of actuators and their stands' procedures say what is run; none is known by name. Logs
-are the low model's, of another day than the baseline's.
+are the reduced-order model's, of another day than the baseline's.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ PARTS = (1.0, 0.25, 0.0625)
 
 
 def every(count: int | None, name: str) -> list[Any]:
-    """Faults that the low model has, or some of them, spread over the catalogue."""
+    """Faults that the reduced-order model has, or some of them, spread over the catalogue."""
     known = candidates_of(shipped.actuator(name))
     return list(known if count is None else known[:: max(1, len(known) // count)][:count])
 
@@ -39,16 +39,16 @@ def severities(name: str, fault: Any, parts: tuple[float, ...]) -> tuple[float, 
 def missed(
     name: str, test: StandardTest, faults: list[Any], parts: tuple[float, ...], limited: bool
 ) -> list[str]:
-    """Faults that are neither named, nor among equivalents, nor said to be unseen with a reason."""
+    """Faults that are neither named, nor ambiguous with a named one, nor reported as unseen."""
     actuator = shipped.actuator(name)
-    asked = [f.key for f in faults] if limited else None
+    chosen = [f.key for f in faults] if limited else None
     wanted = [(f, s) for f in faults for s in severities(name, f, parts)]
     days = [Day((f.text(s),), 10 + k) for k, (f, s) in enumerate(wanted)]
     baseline, *logs = day_logs(actuator, test, [Day((), 1), *days])
     out = []
     for (fault, severity), log in zip(wanted, logs, strict=True):
-        answer = diagnosed(actuator, log, [baseline], asked)
-        named = {n for c in answer.faults for n in ((c.kind, c.place), *c.equivalents)}
+        answer = diagnosed(actuator, log, [baseline], chosen)
+        named = {n for c in answer.faults for n in ((c.kind, c.place), *c.ambiguous_with)}
         if answer.status == "faulty" and (fault.kind, fault.place) in named:
             continue
         unseen = {(i["kind"], i["place"]): i["reason"] for i in answer.unobservable}
@@ -60,7 +60,7 @@ def missed(
 
 
 def halved(test: StandardTest) -> StandardTest:
-    """The test's first half: what it asks for is under way by then."""
+    """The test's first half: what it requests is under way by then."""
     *before, trace = test.procedure.step
     seconds = 0.5 * parse_quantity(trace.duration, "s", "duration")
     short = trace.model_copy(update={"duration": f"{seconds:g} s"})
@@ -72,13 +72,13 @@ def halved(test: StandardTest) -> StandardTest:
 def test_some_faults_are_found_or_said_to_be_unseen(name: str) -> None:
     """The largest severity of a few faults of the catalogue, in half of one test."""
     test = halved(standard_tests(shipped.actuator(name))[0])
-    able = [fault for fault in every(None, name) if weighed(name, fault.key)]
+    able = [fault for fault in every(None, name) if is_candidate(name, fault.key)]
     few = able[:: max(1, len(able) // 3)][:3]
     assert missed(name, test, few, PARTS[:1], limited=True) == []
 
 
-def weighed(name: str, key: str) -> bool:
-    """Whether a fault is a candidate of an actuator's diagnosis; the long test asks for all."""
+def is_candidate(name: str, key: str) -> bool:
+    """Whether a fault is a candidate of an actuator's diagnosis; the long test requests all."""
     by_model = stand_of(shipped.actuator(name).wiring).equipment == "rotary"
     return not by_model or key in {c.key for c in CANDIDATES}
 
@@ -93,22 +93,22 @@ def weighed(name: str, key: str) -> bool:
     ],
 )
 def test_every_fault_at_three_severities(name: str, test: StandardTest) -> None:
-    """Named, among equivalents, below its stated limit, or unseen with the reason."""
+    """Named, among those it is ambiguous with, below its stated limit, or unseen with reason."""
     assert missed(name, test, every(None, name), PARTS, limited=False) == []
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", TESTED)
-def test_every_fault_of_the_catalogue_is_weighed_or_said_to_be_unseen(name: str) -> None:
+def test_every_fault_of_the_catalogue_is_a_candidate_or_reported_as_unseen(name: str) -> None:
     """What the healthy log's answer says covers the catalogue, each with a limit or a reason."""
     actuator = shipped.actuator(name)
     test = standard_tests(actuator)[0]
     baseline, log = day_logs(actuator, test, [Day((), 1), Day((), 2)])
     answer = diagnosed(actuator, log, [baseline])
-    said = {(i["kind"], i["place"]) for i in answer.unobservable if i["reason"]}
+    covered = {(i["kind"], i["place"]) for i in answer.unobservable if i["reason"]}
     for key in answer.detectable:
         kind, _, place = key.partition("@")
         same = next(c.same for c in candidates_of(actuator) if c.key == key)
-        said |= {(kind, p) for p in (place, *same)}
+        covered |= {(kind, p) for p in (place, *same)}
     whole = {(r["kind"], p) for r in _core.faults(actuator.wiring) for p in r["places"]}
-    assert whole - said == set()
+    assert whole - covered == set()

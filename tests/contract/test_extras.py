@@ -86,9 +86,9 @@ def test_a_command_whose_extra_is_missing_says_which(tmp_path, monkeypatch, caps
         monkeypatch.delitem(sys.modules, name)
     out = ["--plot", str(tmp_path / "a.png")]
     assert main(["simulate", "torino-rotary", "--duration", "0.01", *out]) == 2
-    said = capsys.readouterr()
-    assert "pip install 'elevon[reports]'" in said.err
-    assert said.out == ""
+    streams = capsys.readouterr()
+    assert "pip install 'elevon[reports]'" in streams.err
+    assert streams.out == ""
 
 
 def _recording():
@@ -110,12 +110,12 @@ def test_csv_needs_no_package(writes, reads, tmp_path, monkeypatch):
     assert Recording.load(path).equals(recording)
 
 
-@pytest.mark.parametrize(("row", "said"), [("1,2", "columns"), ("0.5,x,1", "x")])
-def test_a_wrong_csv_is_refused_without_pyarrow(row, said, tmp_path, monkeypatch):
+@pytest.mark.parametrize(("row", "message"), [("1,2", "columns"), ("0.5,x,1", "x")])
+def test_a_wrong_csv_is_refused_without_pyarrow(row, message, tmp_path, monkeypatch):
     import elevon.recording.csv as module
 
     monkeypatch.setattr(module, "find_spec", lambda _: None)
     path = tmp_path / "a.csv"
     path.write_text(f"time [s],a [N],b [N]\n0,1,2\n{row}\n")
-    with pytest.raises(FormatError, match=said):
+    with pytest.raises(FormatError, match=message):
         Recording.load(path)

@@ -20,8 +20,8 @@ PLAIN = pytest.mark.parametrize("cell", cells(every=False), ids=lambda cell: cel
 
 @PLAIN
 def test_severity_zero_is_healthy_and_a_severe_fault_is_not(cell: Cell) -> None:
-    """To the bit at zero; a severe one changes some signal or is said not to act; two severities
-    that act differently have different labels.
+    """To the bit at zero; a severe one changes some signal or is reported to have no effect; two
+    severities that act differently have different labels.
     """
     assert [*wrong(cell, FEW), *silent([cell], FEW)] == []
 

@@ -1,4 +1,4 @@
-"""The low model shows what the high one does, or its record says that it does not carry it."""
+"""The reduced-order model shows what the switching one does, or its record states the reason."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ import pytest
 import elevon
 from tests.contract import fuzz
 
-#: What does not act is said elsewhere; here it may be anything.
+#: What has no effect is stated elsewhere; here it may be anything.
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
 
 #: Cases of each kind in the sample that always runs.

@@ -34,8 +34,8 @@ def test_recordings_and_units_load_no_heavy_library():
     )
     loaded = _python(code).split()
     assert not set(HEAVY) & {name.partition(".")[0] for name in loaded}
-    own = [name for name in loaded if name.partition(".")[0] == "elevon"]
-    assert len(own) < RECORDING, own
+    modules = [name for name in loaded if name.partition(".")[0] == "elevon"]
+    assert len(modules) < RECORDING, modules
 
 
 def test_names_resolve_and_submodules_do_not_hide_functions_of_their_name():

@@ -1,4 +1,4 @@
-"""Imports point only leftwards: data flows one way, and every room has one job."""
+"""Imports point only leftwards: data flows one way, and every package has one job."""
 
 import ast
 from pathlib import Path
@@ -7,7 +7,7 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parents[2] / "python" / "elevon"
 
-# From left to right; rooms in one row do not import each other. A new room is added here with
+# From left to right; packages in one row do not import each other. A new package is added here with
 # thought: what it may know of is everything left of it, and nothing else.
 ROWS = [
     ["errors", "extras", "arrays", "_core"],
@@ -30,16 +30,16 @@ ROWS = [
     ["cli"],
     ["__main__"],
 ]
-RANK = {room: rank for rank, row in enumerate(ROWS) for room in row}
+RANK = {package: rank for rank, row in enumerate(ROWS) for package in row}
 
 
-def _room(path):
+def _package(path):
     relative = path.relative_to(PACKAGE)
     return relative.parts[0].removesuffix(".py") if len(relative.parts) > 1 else relative.stem
 
 
 def _imported(tree):
-    """Yield the rooms of the package that a module imports at run time, also inside functions."""
+    """Yield the packages that a module imports at run time, also in functions."""
     for node in _at_run_time(tree):
         names = []
         if isinstance(node, ast.Import):
@@ -60,26 +60,28 @@ MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__
 
 
 def test_every_room_has_its_place():
-    rooms = {_room(path) for path in MODULES}
-    assert "recording" in rooms
-    assert rooms <= RANK.keys()
+    packages = {_package(path) for path in MODULES}
+    assert "recording" in packages
+    assert packages <= RANK.keys()
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_imports_point_left(path):
-    room = _room(path)
+    package = _package(path)
     for other, line in _imported(ast.parse(path.read_text(encoding="utf-8"))):
         place = f"{path.relative_to(PACKAGE)}:{line}"
-        assert other in RANK, f"{place}: {other} is no room"
-        assert other == room or RANK[other] < RANK.get(room, -1), f"{place}: {room} imports {other}"
+        assert other in RANK, f"{place}: {other} is no package of the list"
+        assert other == package or RANK[other] < RANK.get(package, -1), (
+            f"{place}: {package} imports {other}"
+        )
 
 
-@pytest.mark.parametrize("room", ["logs", "calibrate"])
-def test_logs_are_read_without_the_bench(room):
+@pytest.mark.parametrize("package", ["logs", "calibrate"])
+def test_logs_are_read_without_the_bench(package):
     """A real log has no bench of ours behind it: who reads logs knows of none."""
-    for path in (PACKAGE / room).rglob("*.py"):
-        rooms = [other for other, _ in _imported(ast.parse(path.read_text(encoding="utf-8")))]
-        assert "bench" not in rooms, path.relative_to(PACKAGE)
+    for path in (PACKAGE / package).rglob("*.py"):
+        packages = [other for other, _ in _imported(ast.parse(path.read_text(encoding="utf-8")))]
+        assert "bench" not in packages, path.relative_to(PACKAGE)
 
 
 def _module_names():

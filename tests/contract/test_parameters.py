@@ -1,7 +1,7 @@
-"""Every parameter of every actuator either changes something, or is said not to act.
+"""Every parameter of every actuator either changes something, or is reported to have no effect.
 
-Both ways: what is said not to act changes no bit. What a parameter needs to show itself comes from
-its record and, failing that, from its neighbours; nothing here is a list kept by hand.
+Both ways: what is reported to have no effect changes no bit. What a parameter needs to show itself
+comes from its record and, failing that, from its neighbours; nothing here is a list kept by hand.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ SHORT = pytest.mark.parametrize(
 
 
 def resting(cell: Cell) -> list[str]:
-    """Parameters that the core says do not act in a plain run of the cell."""
+    """Parameters that the core says have no effect in a plain run of the cell."""
     actuator = cell.actuator()
     rows = _core.not_acting(actuator.wiring, cell.fidelity, actuator.parameters.vector(), [])
     return [row["path"] for row in rows]
@@ -44,7 +44,7 @@ def idle(name: str, fidelity: str, paths: list[str]) -> list[str]:
 
 
 def false(name: str, fidelity: str, count: int | None) -> list[str]:
-    """Parameters that are said not to act, but change something; `count` values of each."""
+    """Parameters that are reported to have no effect, but change something; `count` values."""
     cell = Cell(name, fidelity)
     tried = [
         variant

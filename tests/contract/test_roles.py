@@ -1,4 +1,4 @@
-"""Every wiring says which of its signals backlash which role: whoever reads logs asks for roles."""
+"""Every wiring says which of its signals has which role: whoever reads logs requests roles."""
 
 import pytest
 

@@ -14,16 +14,16 @@ from elevon import _core
 PHYSICS = Path(__file__).resolve().parents[1] / "physics"
 
 
-def room(place: str) -> str:
+def owner(place: str) -> str:
     """`sensor.current_a` -> current, `inverter.a_high` -> inverter."""
     parts = place.split(".")
     return parts[1].split("_")[0] if parts[0] == "sensor" else parts[0]
 
 
-def asked(wiring: str) -> set[tuple[str, str]]:
+def signatures_of(wiring: str) -> set[tuple[str, str]]:
     """Kind and kind of place of every fault of a wiring."""
     return {
-        (record["kind"], room(place))
+        (record["kind"], owner(place))
         for record in _core.faults(wiring)
         for place in record["places"]
     }
@@ -36,9 +36,9 @@ def machines() -> list[str]:
 
 def files(wiring: str) -> list[Path]:
     """Physics tests that speak of a wiring."""
-    own = {path: name for name in machines() for path in PHYSICS.glob(f"test_{name}*.py")}
+    files = {path: name for name in machines() for path in PHYSICS.glob(f"test_{name}*.py")}
     wanted = wiring if wiring in machines() else None
-    return [path for path in sorted(PHYSICS.glob("test_*.py")) if own.get(path) == wanted]
+    return [path for path in sorted(PHYSICS.glob("test_*.py")) if files.get(path) == wanted]
 
 
 def marked(wiring: str) -> Iterator[tuple[str, ...]]:
@@ -58,13 +58,13 @@ def _signature(mark: ast.expr) -> tuple[str, ...]:
 @pytest.mark.parametrize("wiring", [each["name"] for each in _core.wirings()])
 def test_every_fault_has_a_signature_test(wiring: str) -> None:
     """A fault whose mark no test carries fails here."""
-    assert asked(wiring) - set(marked(wiring)) == set()
+    assert signatures_of(wiring) - set(marked(wiring)) == set()
 
 
 def test_every_signature_test_names_a_fault() -> None:
     """A mark that no catalogue knows is misspelt or left behind."""
     names = [each["name"] for each in _core.wirings()]
-    servos = {fault for name in names if name not in machines() for fault in asked(name)}
+    servos = {fault for name in names if name not in machines() for fault in signatures_of(name)}
     for name in names:
-        known = asked(name) if name in machines() else servos
+        known = signatures_of(name) if name in machines() else servos
         assert set(marked(name)) - known == set()

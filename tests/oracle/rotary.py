@@ -162,8 +162,8 @@ def switch(p: Numbers, mode: Mode, index: int, y: np.ndarray) -> None:
         mode.contact = 1 if y[4] / p.ratio > mode.output else -1
     else:
         torque = active_torque(p, y)
-        held = mode.slide != 0 and abs(torque) <= p.friction_static
-        mode.slide = 0 if held else (1 if torque > 0 else -1)
+        stuck = mode.slide != 0 and abs(torque) <= p.friction_static
+        mode.slide = 0 if stuck else (1 if torque > 0 else -1)
         y[3] = 0.0
         if mode.contact and mode.slide == -mode.contact:
             mode.output = y[4] / p.ratio - mode.contact * p.half_backlash
@@ -195,7 +195,7 @@ def simulate(
     scale of each state.
     """
     grid = np.arange(round(duration / sample) + 1) * sample
-    states, users = np.zeros((grid.size, 7)), np.zeros(grid.size)
+    states, outputs = np.zeros((grid.size, 7)), np.zeros(grid.size)
     mode, y, t, filled = Mode(), np.zeros(7), 0.0, 0
     while t < duration:
         out = solve_ivp(
@@ -217,11 +217,11 @@ def simulate(
         if stop > filled:
             states[filled:stop] = out.sol(grid[filled:stop]).T
             angle = states[filled:stop, 4] / p.ratio
-            users[filled:stop] = (
+            outputs[filled:stop] = (
                 mode.output if mode.contact == 0 else angle - mode.contact * p.half_backlash
             )
             filled = stop
         for index, hits in enumerate(out.t_events):
             if hits.size:
                 switch(p, mode, index, y)
-    return Trace(grid, states[:, :3], states[:, 3], states[:, 4], users, mode.transitions)
+    return Trace(grid, states[:, :3], states[:, 3], states[:, 4], outputs, mode.transitions)

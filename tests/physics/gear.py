@@ -44,5 +44,5 @@ def states(rec: Any) -> list[int]:
 
 
 def value(path: str) -> float:
-    """A number of the set, SI."""
+    """A number of the actuator file, SI."""
     return float(elevon.Actuator.load(NAME).parameters.value(path))

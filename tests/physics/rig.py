@@ -10,7 +10,7 @@ import numpy as np
 
 import elevon
 
-# One motor for every closed form, so that no test depends on what a parameter set chooses.
+# One motor for every closed form, so that no test depends on what an actuator file chooses.
 R, L, K, P = 2.75, 30.5e-3, 1.1 / 1.5, 4
 RATIO = 124.0
 MOTOR_INERTIA, GEAR_INERTIA = 7.7e-4, 1.905e-3
@@ -92,13 +92,13 @@ def actuator(values: dict[str, Any] | None = None, name: str = "torino-rotary") 
     is a test's wish, and must act.
     """
     wishes = values or {}
-    own = {
+    free = {
         path: value
         for path, value in wishes.items()
         if any(value == given.get(path) for given in (FREE_SHAFT, MOTOR, PWM))
     }
-    rest = {path: value for path, value in wishes.items() if path not in own}
-    return loaded(name).with_values(own, asked=False).with_values(rest)
+    others = {path: value for path, value in wishes.items() if path not in free}
+    return loaded(name).with_values(free, request=False).with_values(others)
 
 
 def run(

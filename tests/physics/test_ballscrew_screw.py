@@ -188,10 +188,10 @@ def test_the_accelerometer_shows_the_passes_through_its_resonance(
         scenario={"load": {"output": {"terms": [constant(4500.0)]}},
                   "initial": {"motor_speed": 20.0}},
     )  # fmt: skip
-    angle, shown = rec["motor_position"].values, rec["vibration"].values
+    angle, vibration = rec["motor_position"].values, rec["vibration"].values
     window = np.hanning(angle.size)
     lines = np.arange(4.0, 40.0, 0.05)
-    size = np.array([abs(np.mean(shown * window * np.exp(-1j * k * angle))) for k in lines])
+    size = np.array([abs(np.mean(vibration * window * np.exp(-1j * k * angle))) for k in lines])
     peak = lines[int(np.argmax(size))]
     assert abs(peak / passes - round(peak / passes)) < 0.03
 
@@ -208,10 +208,11 @@ def shaken(values: dict[str, Any], speed: float, **options: Any) -> Any:
 def lines(rec: Any, orders: list[float]) -> list[float]:
     """Amplitude of the accelerometer at orders of the shaft, from the fifth turn on."""
     late = rec["motor_position"].values > 5 * 2 * math.pi
-    angle, shown = rec["motor_position"].values[late], rec["vibration"].values[late]
+    angle, vibration = rec["motor_position"].values[late], rec["vibration"].values[late]
     window = np.hanning(angle.size)
     return [
-        2.0 * abs(np.sum(window * shown * np.exp(-1j * k * angle))) / window.sum() for k in orders
+        2.0 * abs(np.sum(window * vibration * np.exp(-1j * k * angle))) / window.sum()
+        for k in orders
     ]
 
 

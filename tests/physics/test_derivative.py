@@ -136,7 +136,8 @@ def test_relays_looked_at_every_step_bear_any_derivative_a_tick_does_not() -> No
     assert scatter(loop(HYSTERESIS, 1.5, **ticking)) > 2.0
 
 
-# What the low model does not carry of the high one's settings is beside the point here.
+# What the reduced-order model does not carry of the switching one's settings is beside the point
+# here.
 @pytest.mark.filterwarnings("ignore::elevon.errors.NotActingWarning")
 @pytest.mark.parametrize("drive", [HYSTERESIS, PWM])
 def test_the_low_model_bears_any_derivative_and_says_where_the_high_one_does_not(

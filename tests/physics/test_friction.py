@@ -77,7 +77,7 @@ def test_brake_resists_whichever_way_and_never_drives(sign: int) -> None:
     time, speed = rec["motor_speed"].time, rec["motor_speed"].values
     assert np.all(speed[time > stop + 1e-4] == 0.0)
     assert abs(speed[time < stop - 1e-4][-1]) > 0.0
-    held = run(
+    sticking = run(
         RUBBING,
         duration=1.0,
         record="motor_position@1 kHz",
@@ -88,7 +88,7 @@ def test_brake_resists_whichever_way_and_never_drives(sign: int) -> None:
             }
         },
     )
-    assert np.all(held["motor_position"].values == 0.0)
+    assert np.all(sticking["motor_position"].values == 0.0)
 
 
 @pytest.mark.parametrize("direction", [1, -1])

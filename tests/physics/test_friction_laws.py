@@ -74,7 +74,7 @@ def test_laws_without_bristles_stick_exactly(fidelity: str, law: str, sign: int)
 @pytest.mark.parametrize("fidelity", FIDELITIES)
 @pytest.mark.parametrize("load", [1.5, -1.5, 0.0])
 def test_load_dependent_friction_knows_motor_and_load(fidelity: str, load: float) -> None:
-    """At steady speed: F_d + |K_m T + K_e L|, T itself being what that friction asks for."""
+    """At steady speed: F_d + |K_m T + K_e L|, T itself being what that friction requests."""
     k_m, k_e = 0.05, 0.2
     rec = run(
         RUBBING

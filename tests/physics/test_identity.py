@@ -114,7 +114,7 @@ def test_order_in_the_batch_does_not_matter(alone: list[Any]) -> None:
 @pytest.mark.filterwarnings("ignore::elevon.errors.NotActingWarning")
 @pytest.mark.parametrize("fidelity", ["high", "low"])
 def test_batch_identity_in_both_fidelities(fidelity: str) -> None:
-    """The low model too, which carries a part of what differs."""
+    """The reduced-order model too, which carries a part of what differs."""
     runs = batch(5)
     record = ["output_position,motor_speed,current_q@400 Hz"]
     together = elevon.simulate_batch(runs, fidelity=fidelity, record=record)

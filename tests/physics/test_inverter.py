@@ -89,8 +89,8 @@ def test_open_phase_carries_nothing_and_leaves_the_neutral_to_the_others() -> No
     position, speed = values(rec, "motor_position", "motor_speed")
     e = emf(position, speed)
     _, v_b, v_c = values(rec, *VOLTAGES)
-    rest = (v_b - R * i_b - e[1]) + (v_c - R * i_c - e[2])
-    assert np.max(np.abs(rest)) < 1e-6 * SUPPLY + 1e-3 * np.max(np.abs(e))
+    voltage = (v_b - R * i_b - e[1]) + (v_c - R * i_c - e[2])
+    assert np.max(np.abs(voltage)) < 1e-6 * SUPPLY + 1e-3 * np.max(np.abs(e))
 
 
 def locked_pwm(command: float, rate: str = "40 kHz", **extra: object) -> object:
@@ -196,8 +196,8 @@ def test_a_track_of_its_own_keeps_the_carrier_drives_field(fault: dict) -> None:
             float(np.max(np.abs(rec["current_d"].values[late]))),
         )
 
-    healthy, own = quiet("resolver", []), quiet("separate", [fault])
-    assert own == healthy
+    healthy, separate = quiet("resolver", []), quiet("separate", [fault])
+    assert separate == healthy
     lost = quiet("resolver", [fault])
     assert lost[0] < 0.97 * healthy[0]
     assert lost[1] > 5 * healthy[1]

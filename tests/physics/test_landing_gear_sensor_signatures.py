@@ -97,10 +97,10 @@ def test_a_failed_switch_reads_its_level(
     fault = {"kind": kind, "place": f"sensor.proximity_{switch}", "severity": 1.0,
              "profile": {"kind": "step", "time": 0.1}}  # fmt: skip
     rec = gear(duration=0.2, start=start, fidelity=fidelity, faults=[fault])
-    shown, state = rec[f"proximity_{switch}"], rec["state"]
+    contact, state = rec[f"proximity_{switch}"], rec["state"]
     level = 1.0 if kind == "proximity_on" else 0.0
-    assert np.all(shown.values[shown.time > 0.105] == level)
-    assert np.any(shown.values[shown.time < 0.09] != level) is np.bool_(seen)
+    assert np.all(contact.values[contact.time > 0.105] == level)
+    assert np.any(contact.values[contact.time < 0.09] != level) is np.bool_(seen)
     assert (rec.final["state"] == FAULT) is seen
     if seen:
         first = state.time[state.values == FAULT][0] - 0.1

@@ -19,7 +19,7 @@ STEADY = 1.2  # s: the speed is reached
 RATE = 12_500.0  # samples a second
 LEGS = {(1, 0, 1): "ab", (1, 0, 0): "ac", (1, 1, 0): "bc", (0, 1, 0): "ba", (0, 1, 1): "ca",
         (0, 0, 1): "cb"}  # fmt: skip  # High and low leg of a positive demand by Hall code.
-SHOWN = ("motor_torque", "current_line", "motor_position", "motor_speed", "hall_a", "hall_b",
+RECORDED = ("motor_torque", "current_line", "motor_position", "motor_speed", "hall_a", "hall_b",
          "hall_c", "nut_position", "friction_force", "load_force", "efficiency", "energy_friction",
          "energy_efficiency", "energy_brake", "brake_torque")  # fmt: skip
 PHASES = ("current_a", "current_b", "current_c")
@@ -29,7 +29,7 @@ def retraction(
     fidelity: str, *faults: Any, factor: float = 2.5, chopping: str = "low_side"
 ) -> dict[str, np.ndarray]:
     """Signals of the steady part of a retraction."""
-    names = SHOWN + (PHASES if fidelity == "high" else ())
+    names = RECORDED + (PHASES if fidelity == "high" else ())
     rec = gear((0.0, "retract"), duration=1.4, start="200 mm", fidelity=fidelity,
                faults=list(faults), record=f"{','.join(names)}@{RATE} Hz",
                values={"load.factor": factor, "inverter.chopping": chopping})  # fmt: skip
@@ -40,8 +40,8 @@ def retraction(
 def of_the_pair(fidelity: str, *faults: Any) -> dict[str, np.ndarray]:
     """A retraction in which a sample may show the conducting pair alone.
 
-    The high model does between the pulses of the third phase; the low one has their mean in every
-    sample with low-side chopping, and none with the other.
+    The switching model does between the pulses of the third phase; the reduced-order one has their
+    mean in every sample with low-side chopping, and none with the other.
     """
     return retraction(fidelity, *faults, chopping="low_side" if fidelity == "high" else "both")
 
@@ -67,7 +67,8 @@ def per_ampere(run: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def settled(run: dict[str, np.ndarray], largest: float) -> np.ndarray:
-    """Samples of the low model in which the phase that left the pair has no current any more.
+    """Samples of the reduced-order model in which the phase that left the pair has no current any
+    more.
 
     With both legs chopped it dies within 3 L I/(V + e), the pair's EMF e with the current or none.
     """
@@ -164,15 +165,15 @@ def test_a_sag_is_the_share_of_the_link(fidelity: str) -> None:
     assert rec.final["supply_voltage"] == pytest.approx(0.6 * 28.0, rel=1e-3)
 
 
-def travel() -> float:
-    """Ram travel per motor radian, r; the lead is in metres per radian."""
+def ram_lead() -> float:
+    """Distance of the ram per motor radian, r; the lead is in metres per radian."""
     return value("screw.lead") / value("gear.ratio_first") / value("gear.ratio_second")
 
 
-def lost(run: dict[str, np.ndarray], account: str, own: np.ndarray) -> np.ndarray:
+def lost(run: dict[str, np.ndarray], account: str, expected: np.ndarray) -> np.ndarray:
     """Torque in an account beyond `own`, by tenths of the run: growth over angle."""
     angle = np.abs(run["motor_position"] - run["motor_position"][0])
-    mean = 0.5 * (own[1:] + own[:-1])
+    mean = 0.5 * (expected[1:] + expected[:-1])
     beyond = np.diff(run[f"energy_{account}"]) - mean * np.diff(angle)
     parts = zip(np.array_split(beyond, 10), np.array_split(np.diff(angle), 10), strict=True)
     return np.array([work.sum() / turned.sum() for work, turned in parts])
@@ -195,8 +196,8 @@ def test_a_rub_on_the_motor_shaft_costs_its_torque_at_every_angle(
 ) -> None:
     """dE = T dtheta, beyond the tables' r F_f dtheta."""
     run = retraction(fidelity, fault, factor=0.0)
-    own = travel() * run["friction_force"] * (account == "friction")
-    assert lost(run, account, own) == pytest.approx(torque, rel=1e-3)
+    expected = ram_lead() * run["friction_force"] * (account == "friction")
+    assert lost(run, account, expected) == pytest.approx(torque, rel=1e-3)
 
 
 @pytest.mark.signature("friction_growth", "screw")
@@ -204,17 +205,17 @@ def test_a_rub_on_the_motor_shaft_costs_its_torque_at_every_angle(
 def test_grown_friction_is_added_to_the_table(fidelity: str) -> None:
     """F_f = table(v) + growth within the harmonics' sum, and it is what the account pays."""
     run = retraction(fidelity, "friction_growth@screw=500")
-    speed = np.abs(run["motor_speed"]) * travel()
+    speed = np.abs(run["motor_speed"]) * ram_lead()
 
     def table(name: str) -> np.ndarray:
         knots = [[value(f"friction.{path}_{n}") for n in range(1, 9)] for path in ("speed", name)]
         return np.interp(speed, *knots)
 
-    own = table("ffm_retraction")
+    friction = table("ffm_retraction")
     ripple = sum(table(f"harmonic_{n}") for n in range(1, 6))
-    assert np.all(np.abs(run["friction_force"] - own - 500.0) < ripple + 1e-9)
-    paid = lost(run, "friction", 0.0 * own)
-    assert paid == pytest.approx(travel() * run["friction_force"].mean(), rel=0.03)
+    assert np.all(np.abs(run["friction_force"] - friction - 500.0) < ripple + 1e-9)
+    paid = lost(run, "friction", 0.0 * friction)
+    assert paid == pytest.approx(ram_lead() * run["friction_force"].mean(), rel=0.03)
 
 
 @pytest.mark.signature("jam", "screw")
@@ -224,8 +225,8 @@ def test_a_jam_resists_with_its_force_where_it_is(fidelity: str) -> None:
     jam = {"kind": "jam", "place": "screw", "severity": 3000.0, "position": "165 mm",
            "width": "4 mm"}  # fmt: skip
     run = retraction(fidelity, jam)
-    nut, rub = run["nut_position"], travel() * run["friction_force"]
-    for within, torque in ((True, 3000.0 * travel()), (False, 0.0)):
+    nut, rub = run["nut_position"], ram_lead() * run["friction_force"]
+    for within, torque in ((True, 3000.0 * ram_lead()), (False, 0.0)):
         there = (np.abs(nut - 0.165) < 1.9e-3) if within else (nut < 0.1625)
         part = {name: values[there] for name, values in run.items()}
         assert there.sum() > 400
@@ -245,8 +246,8 @@ def test_a_lost_efficiency_scales_the_train(place: str, fidelity: str) -> None:
     screw = loaded + (unloaded - loaded) * np.exp(-force / value("screw.efficiency_force"))
     healthy = value("gear.efficiency_first") * value("gear.efficiency_second") * screw
     assert run["efficiency"] == pytest.approx(0.95 * healthy, rel=1e-6)
-    own = travel() * force * (1.0 / (0.95 * healthy) - 1.0)
-    assert lost(run, "efficiency", own) == pytest.approx(0.0, abs=1e-3 * own.mean())
+    expected = ram_lead() * force * (1.0 / (0.95 * healthy) - 1.0)
+    assert lost(run, "efficiency", expected) == pytest.approx(0.0, abs=1e-3 * expected.mean())
 
 
 @pytest.mark.signature("brake_slipping", "brake")
@@ -255,9 +256,9 @@ def test_a_slipping_brake_holds_what_it_has_left(fidelity: str) -> None:
     """3.5 g at rest: the brake is needed for r F - r (1/eta - 1) F - the breakaway friction."""
     values = {"load.factor": 3.5, "motor.detent_torque": 0.0}
     options: dict[str, Any] = {"start": "100 mm", "fidelity": fidelity, "values": values}
-    rest = gear(duration=0.05, **options).final
-    aiding = (2.0 - 1.0 / rest["efficiency"]) * rest["load_force"]
-    needed = travel() * (aiding - value("friction.breakaway_ratio") * rest["friction_force"])
+    final = gear(duration=0.05, **options).final
+    aiding = (2.0 - 1.0 / final["efficiency"]) * final["load_force"]
+    needed = ram_lead() * (aiding - value("friction.breakaway_ratio") * final["friction_force"])
     assert 0.05 < needed < 0.5
     for margin in (0.02, -0.02):
         severity = 1.0 - needed * (1.0 + margin) / value("brake.torque")

@@ -202,7 +202,7 @@ def test_without_any_of_them_the_load_takes_the_motor_along() -> None:
 
 @pytest.mark.parametrize("fidelity", ["low", "high"])
 def test_the_software_brake_holds_the_overrun(fidelity: str) -> None:
-    """3.5 g extension: within 6 % of the set speed, 15 % and more by the brake's release alone."""
+    """3.5 g extension: within 6 % of the set speed, 15 % and more by the brake alone."""
     peaks = []
     for reading in ("software_brake", "release"):
         rec = gear((0.1, "extend"), duration=3.0, fidelity=fidelity,
@@ -232,10 +232,10 @@ def test_shorted_windings_brake_by_the_closed_form(fidelity: str) -> None:
 
 def test_a_drag_warns_in_extension_and_hides_in_retraction() -> None:
     """In extension the load aids, so current tells; in retraction a heavier leg needs as much."""
-    for action, told in (("extend", True), ("retract", False)):
+    for action, warned in (("extend", True), ("retract", False)):
         rec = gear((0.1, action), duration=4.0, faults=["brake_dragging@brake=0.5"],
                    start=EXTENDED if action == "retract" else None)  # fmt: skip
-        assert bool(rec.final["warning_code"]) is told
+        assert bool(rec.final["warning_code"]) is warned
 
 
 def test_a_faulted_unit_moves_again_after_stop_and_command() -> None:

@@ -172,7 +172,7 @@ def test_switching_losses_are_those_of_the_law_and_heat_the_drive() -> None:
 
 def test_a_stiff_link_and_ideal_switches_are_the_drive_without_them() -> None:
     """The neutral values give the same bits, whatever stands beside them."""
-    plain, beside = (
+    plain, neutral = (
         run(
             MOTOR | PWM | values,
             duration=0.05,
@@ -181,4 +181,4 @@ def test_a_stiff_link_and_ideal_switches_are_the_drive_without_them() -> None:
         )
         for values in ({}, {"inverter.link_capacitance": 0.0, "inverter.switching_time": 0.0})
     )
-    assert plain.final == beside.final
+    assert plain.final == neutral.final

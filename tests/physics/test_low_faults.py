@@ -1,4 +1,4 @@
-"""What the low fidelity shares with the high one: faults and options under load, closed forms."""
+"""What the reduced-order model shares with the switching one: faults, options, closed forms."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import elevon
 from tests.physics.rig import PWM, actuator, constant, make_scenario, run, term
 
 FIDELITIES = ("high", "low")
-#: EMF constant of the set, V s/rad.
+#: EMF constant of the actuator file, V s/rad.
 K = 0.9004
 LOADED = {"load": {"output": {"terms": [constant("50 N m")]}}}
 #: A flywheel that keeps its speed over the run, so that only the torque speaks.
@@ -272,7 +272,7 @@ def test_screw_current_against_the_closed_form(
 
 def test_damping_of_a_rigid_load_is_observed() -> None:
     """The friction shown contains c w / i^2 in both fidelities."""
-    shown = [
+    recordings = [
         run(
             FLYWHEEL | {"drive.kind": "off", "load.damping": 500.0},
             duration=0.01,
@@ -284,6 +284,6 @@ def test_damping_of_a_rigid_load_is_observed() -> None:
         )
         for fidelity in FIDELITIES
     ]
-    for rec in shown:
+    for rec in recordings:
         expected = 500.0 * rec.final["motor_speed"] / 124.0**2
         assert rec.final["friction_torque"] == pytest.approx(expected, rel=1e-9)

@@ -1,4 +1,4 @@
-"""The low model in the limits where it must equal closed forms or the high model."""
+"""The reduced-order model in the limits where it must equal closed forms or the switching model."""
 
 from __future__ import annotations
 

@@ -106,7 +106,7 @@ def test_mismatched_resolver_errs_at_twice_the_shaft_frequency() -> None:
 
 @pytest.mark.signature("offset", "resolver")
 def test_resolver_offset_costs_torque_by_the_cosine_of_the_electrical_error() -> None:
-    """A drive that commutates x off gives 1.5 k cos(p x) per ampere it asks for."""
+    """A drive that commutates x off gives 1.5 k cos(p x) per ampere it commands."""
     offset = math.radians(8.0)
 
     def per_ampere(faults: list[dict[str, Any]]) -> float:
@@ -136,11 +136,11 @@ def test_encoder_error_moves_the_output_the_other_way(kind: str, severity: float
     )
     expected = command - severity if kind == "offset" else command / (1 + severity)
     assert rec.final["output_position"] == pytest.approx(expected, abs=2e-3)
-    shown = rec.final["encoder_position"]
+    measured = rec.final["encoder_position"]
     true = rec.final["output_position"]
     count = 2 * math.pi / 80000
     wanted = true + severity if kind == "offset" else true * (1 + severity)
-    assert shown == pytest.approx(wanted, abs=1.01 * count)
+    assert measured == pytest.approx(wanted, abs=1.01 * count)
 
 
 @pytest.mark.signature("gain", "resolver")

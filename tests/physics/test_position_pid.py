@@ -60,9 +60,9 @@ def test_the_loop_is_that_of_the_textbook(fidelity: str, limit: float) -> None:
     """Within the current loop's own lag and the step; of the range."""
     free = actuator(fidelity)
     done = simulate(free, SCENARIO, fidelity=fidelity, record=RECORD)
-    shown = done["output_position"]
-    expected = linear(free, shown.time)
-    assert np.abs(shown.values - expected).max() < limit * np.ptp(expected)
+    position = done["output_position"]
+    expected = linear(free, position.time)
+    assert np.abs(position.values - expected).max() < limit * np.ptp(expected)
     assert np.ptp(expected) > 0.009  # it overshoots: the zeros are complex
 
 
@@ -79,9 +79,9 @@ def test_batches_have_the_bits_of_single_runs() -> None:
 def test_at_rest_the_error_is_the_load_over_the_gain(fidelity: str) -> None:
     """Under a constant load and without integral action."""
     changes = {"control.pid_integral_time": 0.0, "load.constant": 900.0, "load.damping": 3e4}
-    held = Scenario.from_dict({"duration": 0.6, "command": {"mode": "position", "terms": []}})
+    zero = Scenario.from_dict({"duration": 0.6, "command": {"mode": "position", "terms": []}})
     loaded = actuator(fidelity, changes)
-    done = simulate(loaded, held, fidelity=fidelity, record=RECORD)
+    done = simulate(loaded, zero, fidelity=fidelity, record=RECORD)
     expected = -900.0 * loaded.parameters.value("screw.lead") / GAIN
     assert done["output_position"].values[-1] == pytest.approx(expected, rel=0.02)
 

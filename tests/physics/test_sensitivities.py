@@ -1,4 +1,4 @@
-"""Dual-number derivatives of the low model against central differences, where nothing switches."""
+"""Dual-number derivatives (reduced-order) against central differences, without switching."""
 
 from __future__ import annotations
 
@@ -106,11 +106,11 @@ def test_coasting_to_rest_keeps_the_branch_derivative() -> None:
     friction, speed = 0.1, 20.0
     values = FREE_SHAFT | {"friction.dynamic": friction, "friction.static": friction}
     model = actuator(values)
-    still = make_scenario(
+    standstill = make_scenario(
         duration=1.5, mode="speed", command=[], extra={"initial": {"motor_speed": speed}}
     )
     found = sensitivities(
-        model, still, ["friction.dynamic"], record="motor_speed,motor_position@1 kHz"
+        model, standstill, ["friction.dynamic"], record="motor_speed,motor_position@1 kHz"
     ).derivatives["friction.dynamic"]
     inertia = float(
         model.parameters.value("motor.inertia") + model.parameters.value("gear.inertia")

@@ -10,7 +10,7 @@ import pytest
 
 from tests.physics.rig import FREE_SHAFT, HYSTERESIS, MOTOR, PWM, RATIO, P, constant, run, term
 
-SHOWN = "resolver_speed,output_position,encoder_position"
+SENSED = "resolver_speed,output_position,encoder_position"
 CURRENTS = "current_a,current_a_meas,current_b,current_b_meas"
 BOTH = pytest.mark.parametrize("fidelity", ["high", "low"])
 
@@ -22,15 +22,15 @@ def spun(fidelity: str, faults: list[dict[str, Any]], speed: float = 100.0, **mo
         duration=1.0,
         mode="speed",
         command=[constant(0.0)],
-        record=f"motor_position,resolver_position,{SHOWN}@1 kHz",
+        record=f"motor_position,resolver_position,{SENSED}@1 kHz",
         scenario={"initial": {"motor_speed": speed}, "fault": faults},
         fidelity=fidelity,
     )
 
 
-def fault(kind: str, place: str, severity: float, **rest: Any) -> dict[str, Any]:
+def fault(kind: str, place: str, severity: float, **attributes: Any) -> dict[str, Any]:
     """One fault as a scenario spells it."""
-    return {"kind": kind, "place": place, "severity": severity, **rest}
+    return {"kind": kind, "place": place, "severity": severity, **attributes}
 
 
 def there(start: float, end: float) -> dict[str, Any]:
@@ -67,10 +67,10 @@ def test_shorted_excitation_turns_no_angle_until_the_signal_is_lost(fidelity: st
 def test_open_resolver_winding_leaves_multiples_of_half_a_turn(place: str, zero: float) -> None:
     """One channel alone tells only on which side the shaft stands; 0.1 % stray coupling."""
     rec = spun("high", [fault("resolver_open", f"sensor.resolver.{place}", 1)])
-    theta, shown = rec["motor_position"].values, rec["resolver_position"].values
+    theta, measured = rec["motor_position"].values, rec["resolver_position"].values
     halves = zero + math.pi * np.round((theta - zero) / math.pi)
     away = np.abs(np.angle(np.exp(2j * (theta - zero - math.pi / 2)))) > 0.1
-    assert shown[away] == pytest.approx(halves[away], abs=0.021)
+    assert measured[away] == pytest.approx(halves[away], abs=0.021)
 
 
 @BOTH
@@ -89,12 +89,12 @@ def test_dark_sector_takes_its_share_of_the_disc(fidelity: str) -> None:
     speed = 3.0 / 4.0 * 2.0 * math.pi * 20.0
     dark = fault("dark_sectors", "sensor.encoder", 0.25, position="180 deg", sectors=1)
     rec = spun(fidelity, [dark], speed, **{"gear.ratio": 20.0})
-    output, shown = rec["output_position"].values, rec["encoder_position"].values
-    assert shown[-1] == pytest.approx(0.75 * output[-1], abs=2.0 * math.pi / 80e3 * 2)
+    output, measured = rec["output_position"].values, rec["encoder_position"].values
+    assert measured[-1] == pytest.approx(0.75 * output[-1], abs=2.0 * math.pi / 80e3 * 2)
     disc = np.mod(4.0 * output / (2.0 * math.pi), 1.0)
     inside = (disc[:-1] > 0.38) & (disc[:-1] < 0.62) & (disc[1:] < 0.62) & (disc[1:] > 0.38)
-    assert np.all(np.diff(shown)[inside] == 0.0)
-    assert np.all(np.diff(shown)[(disc[:-1] > 0.65) | (disc[1:] < 0.35)] > 0.0)
+    assert np.all(np.diff(measured)[inside] == 0.0)
+    assert np.all(np.diff(measured)[(disc[:-1] > 0.65) | (disc[1:] < 0.35)] > 0.0)
 
 
 @pytest.mark.signature("stuck", "encoder")
@@ -105,11 +105,11 @@ def test_encoder_that_stood_still_comes_back(fidelity: str, kind: str, lost: flo
     """A stuck reading is the true one again, a dead encoder has lost the counts of its time."""
     rec = spun(fidelity, [fault(kind, "sensor.encoder", 1, profile=there(0.3, 0.7))], RATIO)
     time, output = rec["output_position"].time, rec["output_position"].values
-    shown = rec["encoder_position"].values
+    measured = rec["encoder_position"].values
     gone = (time > 0.3) & (time < 0.699)
-    assert np.ptp(shown[gone]) == 0.0
-    assert shown[gone][0] == pytest.approx(0.3, abs=2e-3)
-    assert output[-1] - shown[-1] == pytest.approx(lost, abs=2e-3)
+    assert np.ptp(measured[gone]) == 0.0
+    assert measured[gone][0] == pytest.approx(0.3, abs=2e-3)
+    assert output[-1] - measured[-1] == pytest.approx(lost, abs=2e-3)
 
 
 @pytest.mark.signature("stuck", "resolver")
@@ -117,11 +117,11 @@ def test_encoder_that_stood_still_comes_back(fidelity: str, kind: str, lost: flo
 def test_stuck_resolver_holds_angle_and_speed(fidelity: str) -> None:
     """What it showed at the onset; the true reading afterwards."""
     rec = spun(fidelity, [fault("stuck", "sensor.resolver", 1, profile=there(0.3, 0.7))])
-    time, shown = rec["motor_position"].time, rec["resolver_position"].values
+    time, measured = rec["motor_position"].time, rec["resolver_position"].values
     gone = (time > 0.3) & (time < 0.699)
-    assert np.ptp(shown[gone]) == 0.0
+    assert np.ptp(measured[gone]) == 0.0
     assert rec["resolver_speed"].values == pytest.approx(100.0, rel=1e-12)
-    assert np.array_equal(shown[time > 0.71], rec["motor_position"].values[time > 0.71])
+    assert np.array_equal(measured[time > 0.71], rec["motor_position"].values[time > 0.71])
 
 
 @pytest.mark.signature("stuck", "current")
@@ -146,11 +146,11 @@ def test_current_sensor_that_stands_still_frees_its_leg(kind: str, drive: dict[s
         },
     )
     late = rec["current_a"].time > 0.2001
-    shown = rec["current_a_meas"].values[late]
-    assert np.ptp(shown) == 0.0
-    assert (shown[0] == 0.0) == (kind == "dead")
-    asked = rec["current_ref"].values * np.sin(P * rec["motor_position"].values)
-    error = np.abs(rec["current_a"].values - asked)
+    measured = rec["current_a_meas"].values[late]
+    assert np.ptp(measured) == 0.0
+    assert (measured[0] == 0.0) == (kind == "dead")
+    commanded = rec["current_ref"].values * np.sin(P * rec["motor_position"].values)
+    error = np.abs(rec["current_a"].values - commanded)
     settled = (rec["current_a"].time > 0.1) & ~late
     assert np.max(error[late]) > 2.0 * np.max(error[settled])
     assert np.array_equal(rec["current_b"].values, rec["current_b_meas"].values)
@@ -158,7 +158,7 @@ def test_current_sensor_that_stands_still_frees_its_leg(kind: str, drive: dict[s
 
 @BOTH
 def test_dark_sector_carries_a_loop_on_the_encoder_too_far(fidelity: str) -> None:
-    """The output must turn until as many counts have come as were asked for."""
+    """The output must turn until as many counts have come as were commanded."""
     dark = fault("dark_sectors", "sensor.encoder", 0.1, position="45 deg")
     rec = run(
         MOTOR | HYSTERESIS | {"control.position_feedback": "encoder"},

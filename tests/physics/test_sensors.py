@@ -22,12 +22,12 @@ def swinging(settings: dict[str, object], record: str) -> object:
 
 def test_encoder_shows_whole_counts_of_the_output_position() -> None:
     """80000 counts a turn; the shown position is never more than one count from the true one."""
-    shown, true = values(
+    measured, true = values(
         swinging({}, "encoder_position,output_position"), "encoder_position", "output_position"
     )
-    counts = shown / COUNT
+    counts = measured / COUNT
     assert counts == pytest.approx(np.round(counts), abs=1e-6)
-    assert np.max(np.abs(shown - true)) <= COUNT * (1 + 1e-9)
+    assert np.max(np.abs(measured - true)) <= COUNT * (1 + 1e-9)
     assert np.unique(np.round(counts)).size > 100
 
 
@@ -35,19 +35,19 @@ def test_encoder_shows_whole_counts_of_the_output_position() -> None:
 def test_resolver_mismatch_is_the_angle_of_unequal_channels(lost: float) -> None:
     """Shown angle = atan2(g sin, cos), unwrapped along the true one."""
     rec = swinging({"sensor.resolver.mismatch": lost}, "resolver_position,motor_position")
-    shown, true = values(rec, "resolver_position", "motor_position")
+    measured, true = values(rec, "resolver_position", "motor_position")
     angle = np.arctan2((1 - lost) * np.sin(true), np.cos(true))
-    difference = np.angle(np.exp(1j * (shown - angle)))
+    difference = np.angle(np.exp(1j * (measured - angle)))
     assert np.max(np.abs(difference)) < 1e-9
-    assert np.max(np.abs(shown - true)) > 0.4 * lost
-    assert np.max(np.abs(shown - true)) < math.pi / 2
+    assert np.max(np.abs(measured - true)) > 0.4 * lost
+    assert np.max(np.abs(measured - true)) < math.pi / 2
 
 
 def test_resolver_offset_shifts_what_is_shown() -> None:
     """By its value, everywhere."""
     rec = swinging({"sensor.resolver.offset": 0.1}, "resolver_position,motor_position")
-    shown, true = values(rec, "resolver_position", "motor_position")
-    assert shown - true == pytest.approx(0.1, abs=1e-12)
+    measured, true = values(rec, "resolver_position", "motor_position")
+    assert measured - true == pytest.approx(0.1, abs=1e-12)
 
 
 SENSED = FREE_SHAFT | HYSTERESIS | LOCKED | {"motor.electrical_offset": math.pi / 2}
@@ -80,10 +80,10 @@ def test_current_sensor_quantises_to_its_bits() -> None:
         {"sensor.current.bits": 8, "sensor.current.full_scale": 40.0},
         "current_a,current_a_meas@20 kHz",
     )
-    true, shown = values(rec, "current_a", "current_a_meas")
-    assert shown / step == pytest.approx(np.round(shown / step), abs=1e-9)
-    assert np.max(np.abs(shown - true)) <= step / 2 * (1 + 1e-9)
-    assert np.unique(shown).size > 4
+    true, measured = values(rec, "current_a", "current_a_meas")
+    assert measured / step == pytest.approx(np.round(measured / step), abs=1e-9)
+    assert np.max(np.abs(measured - true)) <= step / 2 * (1 + 1e-9)
+    assert np.unique(measured).size > 4
 
 
 def test_current_noise_has_its_deviation() -> None:
@@ -94,8 +94,8 @@ def test_current_noise_has_its_deviation() -> None:
         {"sensor.current.noise_deviation": 0.05, "sensor.current.noise_sample_time": 1e-5},
         "current_a,current_a_meas@100 kHz",
     )
-    true, shown = values(rec, "current_a", "current_a_meas")
-    noise = (shown - true)[10:]
+    true, measured = values(rec, "current_a", "current_a_meas")
+    noise = (measured - true)[10:]
     assert np.std(noise) == pytest.approx(0.05, rel=0.05)
     assert abs(np.mean(noise)) < 3 * 0.05 / math.sqrt(noise.size)
     assert abs(np.corrcoef(noise[1:], noise[:-1])[0, 1]) < 0.06
@@ -121,13 +121,13 @@ def test_acquisition_filter_is_first_order() -> None:
     """The filtered q current is the true one through 1 / (1 + s / (2 pi f)), done again by hand."""
     cutoff = 100.0
     rec = sensed({"sensor.filter_cutoff": cutoff}, "current_q,current_q_meas@1 MHz", duration=0.02)
-    true, shown = values(rec, "current_q", "current_q_meas")
+    true, measured = values(rec, "current_q", "current_q_meas")
     share = 1 - math.exp(-2 * math.pi * cutoff * 1e-6)
     expected, state = np.zeros_like(true), 0.0
     for k, x in enumerate(true):
         state += share * (x - state)
         expected[k] = state
-    assert shown == pytest.approx(expected, abs=2e-3 * np.max(true))
+    assert measured == pytest.approx(expected, abs=2e-3 * np.max(true))
 
 
 def test_controller_holds_its_output_between_its_ticks() -> None:

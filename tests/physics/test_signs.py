@@ -57,7 +57,7 @@ def test_brake_takes_speed_of_either_sign_and_never_gives_any(fidelity: str, spe
 
 @BOTH
 def test_error_is_command_less_measured(fidelity: str) -> None:
-    """A command above the output asks for positive speed."""
+    """A command above the output commands positive speed."""
     end = final("position", 1.0, fidelity)
     assert end["speed_ref"] > 0
     assert end["output_position"] > 0

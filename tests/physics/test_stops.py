@@ -55,15 +55,15 @@ def test_the_reaction_cancels_what_pushes_outwards(way: str, fidelity: str, sign
         scenario=shaft(constant(-sign * TORQUE)),
         fidelity=fidelity,
     )
-    position, speed, held, friction = values(
+    position, speed, reaction, friction = values(
         rec, "motor_position", "motor_speed", "stop_torque", "friction_torque"
     )
     late = rec["motor_position"].time > 0.5
     assert np.all(position[late] == sign * STOP * RATIO)
     assert np.all(speed[late] == 0.0)
-    assert held[late] == pytest.approx(sign * TORQUE - friction[late], rel=1e-12)
+    assert reaction[late] == pytest.approx(sign * TORQUE - friction[late], rel=1e-12)
     if way != "bristles":
-        assert held[late] == pytest.approx(sign * (TORQUE - STATIC), rel=1e-12)
+        assert reaction[late] == pytest.approx(sign * (TORQUE - STATIC), rel=1e-12)
 
 
 @pytest.mark.parametrize(("way", "fidelity"), CASES)
@@ -86,7 +86,7 @@ def test_the_shaft_leaves_as_soon_as_the_torque_turns_inwards(way: str, fidelity
 
 @pytest.mark.parametrize("way", list(WAYS))
 def test_anti_windup_at_rest_freezes_at_a_stop(way: str) -> None:
-    """Scheme 1 asks for a speed of exactly zero: the torque reference stays where it arrived."""
+    """Scheme 1 commands a speed of exactly zero: the torque reference stays where it arrived."""
     settings = (
         SHAFT
         | HYSTERESIS
@@ -130,7 +130,7 @@ def test_an_elastic_output_stops_where_the_stop_stands(method: str, sign: int) -
         ],
         scenario=shaft(constant(-sign * TORQUE)) | {"initial": start},
     )
-    motor, speed, output, output_speed, held, friction = values(
+    motor, speed, output, output_speed, reaction, friction = values(
         rec,
         "motor_position",
         "motor_speed",
@@ -145,7 +145,7 @@ def test_an_elastic_output_stops_where_the_stop_stands(method: str, sign: int) -
     assert np.all(output_speed[late] == 0.0)
     assert np.all(speed[late] == 0.0)
     through = (sign * TORQUE - friction[late]) * RATIO
-    assert held[late] * RATIO == pytest.approx(through, rel=1e-9)
+    assert reaction[late] * RATIO == pytest.approx(through, rel=1e-9)
     beyond = motor[late] / RATIO - output[late]
     assert beyond == pytest.approx(sign * math.radians(0.2) + through / STIFFNESS, rel=1e-9)
 

@@ -18,7 +18,7 @@ RECORD = "winding_temperature,surface_temperature,heat_copper,heat_air,energy_co
 RECORD += "energy_heat_stored,energy_air,current_q"
 
 
-def held(values: dict[str, Any], duration: float, torque: float = 15.0, **more: Any) -> Any:
+def under_torque(values: dict[str, Any], duration: float, torque: float = 15.0, **more: Any) -> Any:
     """A constant current on a locked shaft, low fidelity."""
     return elevon.simulate(
         elevon.Actuator.load(more.pop("name", NAME)).with_values(values),
@@ -36,7 +36,7 @@ def held(values: dict[str, Any], duration: float, torque: float = 15.0, **more: 
 
 def test_quasi_static_rise_is_one_exponential() -> None:
     """tau = m c (R_th + 1/(h A)), final rise P (R_th + 1/(h A))."""
-    rec = held(BARE | {"thermal.model": "quasi_static"}, 1500.0)
+    rec = under_torque(BARE | {"thermal.model": "quasi_static"}, 1500.0)
     whole = 0.2 + 1 / (12 * 0.17)
     power = 1.5 * 0.9 * rec["current_q"].values[-1] ** 2
     time = rec["winding_temperature"].time
@@ -48,8 +48,8 @@ def test_quasi_static_rise_is_one_exponential() -> None:
 
 def test_a_light_housing_is_the_printed_form() -> None:
     """C_h -> 0 gives the surface without capacity."""
-    printed = held(STIFF | {"thermal.model": "quasi_static"}, 300.0)
-    light = held(STIFF | {"thermal.housing_capacity": 1e-3}, 300.0)
+    printed = under_torque(STIFF | {"thermal.model": "quasi_static"}, 300.0)
+    light = under_torque(STIFF | {"thermal.housing_capacity": 1e-3}, 300.0)
     for name in ("winding_temperature", "surface_temperature"):
         assert light[name].values[1:] == pytest.approx(printed[name].values[1:], abs=1e-3)
 
@@ -58,7 +58,7 @@ def test_a_light_housing_is_the_printed_form() -> None:
 @pytest.mark.parametrize("tick", ["10 ms", "1 s"])
 def test_energy_closes_at_any_tick(model: str, tick: str) -> None:
     """What the copper gives is stored or gone, to rounding."""
-    rec = held(STIFF | {"thermal.model": model, "thermal.sample_time": tick}, 200.0)
+    rec = under_torque(STIFF | {"thermal.model": model, "thermal.sample_time": tick}, 200.0)
     given = rec["energy_copper"].values
     kept = rec["energy_heat_stored"].values + rec["energy_air"].values
     assert kept == pytest.approx(given, abs=1e-9 * given[-1])
@@ -66,7 +66,7 @@ def test_energy_closes_at_any_tick(model: str, tick: str) -> None:
 
 def test_resistance_follows_the_winding_and_flux_the_surface() -> None:
     """R (1 + alpha dT_w) in the heat, k (1 + alpha_k dT_s) in the torque."""
-    rec = held(STIFF, 900.0)
+    rec = under_torque(STIFF, 900.0)
     winding = rec["winding_temperature"].values
     cold = 1.5 * 0.9 * rec["current_q"].values ** 2
     expected = cold * (1 + 0.00393 * (winding - 293.15))
@@ -178,7 +178,7 @@ def test_it_serves_the_rotary_actuator_too() -> None:
         "thermal.emissivity": 0.0, "motor.temperature_coefficient": 0.0, "friction.static": 1e3,
         "friction.dynamic": 1e3, "inverter.hysteresis_band": 1e-9,
     }  # fmt: skip
-    rec = held(values, 600.0, 3.0, name="torino-rotary")
+    rec = under_torque(values, 600.0, 3.0, name="torino-rotary")
     resistance = elevon.Actuator.load("torino-rotary").parameters.value("motor.winding_resistance")
     power, whole = 1.5 * resistance * rec["current_q"].values[-1] ** 2, 1.5
     rise = power * whole * -math.expm1(-600.0 / (385 * whole))

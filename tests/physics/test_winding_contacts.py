@@ -367,14 +367,14 @@ def test_a_weak_pole_pair_dips_the_torque_once_a_turn(fidelity: str) -> None:
         },
         fidelity=fidelity,
     )
-    # The low model shows the torque that acted in the step before.
+    # The reduced-order model shows the torque that acted in the step before.
     before = 1 if fidelity == "low" else 0
     angle = rec["motor_position"].values[60 - before : -1 - before]
     shifts = 2 * math.pi / 3 * np.arange(3)[:, None]
     away = np.abs((angle - shifts + math.pi) % (2 * math.pi) - math.pi)
     window = np.where(away < 2 * math.pi / P, 0.5 * (1 + np.cos(P * away / 2)), 0.0)
     expected = K * ((1 - depth * window) * np.sin(P * angle - shifts) ** 2).sum(axis=0)
-    shown = rec["motor_torque"].values[60:-1] / rec["current_q"].values[60:-1]
+    torque_constant = rec["motor_torque"].values[60:-1] / rec["current_q"].values[60:-1]
     assert np.ptp(expected) > 0.2 * np.mean(expected)
     # The ripple of the carrier is not all in the quadrature axis.
-    assert np.max(np.abs(shown - expected)) < (0.03 if fidelity == "high" else 1e-3) * K
+    assert np.max(np.abs(torque_constant - expected)) < (0.03 if fidelity == "high" else 1e-3) * K

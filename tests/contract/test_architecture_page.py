@@ -1,4 +1,4 @@
-"""`docs/architecture.md` names every room of the package and every function of the seam."""
+"""`docs/architecture.md` names every part of the package and every function of the seam."""
 
 import re
 from pathlib import Path
@@ -9,7 +9,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 
 
-def test_every_room_is_in_the_table_and_every_row_is_a_room() -> None:
+def test_every_package_is_in_the_table_and_every_row_is_a_package() -> None:
     """Folders and modules of the package that do not begin with an underscore."""
     package = ROOT / "python" / "elevon"
     there = {path.stem for path in package.glob("[!_]*.py")} | {
@@ -29,5 +29,5 @@ def test_the_list_of_the_seam_is_the_seam() -> None:
     section = PAGE.partition("## The seam")[2].partition("One run (a dict)")[0]
     lines = [line for line in section.splitlines() if re.match(r" {4}\w", line)]
     listed = {name for line in lines for name in re.findall(r"(\w+)\([^)]*\)", line.split("#")[0])}
-    own = {name for name in dir(_core) if not name.startswith("_")}
-    assert listed == own
+    functions = {name for name in dir(_core) if not name.startswith("_")}
+    assert listed == functions
