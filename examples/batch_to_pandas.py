@@ -1,4 +1,4 @@
-"""Two hundred units with faults of drawn severity, in lanes and threads, into one table."""
+"""Two hundred units with faults of drawn severity, in batches and threads, into one table."""
 
 import numpy as np
 import pandas as pd

@@ -1,6 +1,5 @@
 #!/bin/sh
-# From the virtual bench to a calibrated set: three tests of a unit whose friction and backlash nobody
-# has told the model, calibrated together, validated on another log.
+# From the virtual bench to a calibrated actuator file: three tests of a unit whose friction and backlash the model does not know, calibrated together, validated on another log.
 set -e
 run() { elevon bench run "$@" --actuator torino-rotary --set drive.kind=pwm --set backlash.total=0.6deg \
     --set friction.dynamic=0.36N*m --set friction.static=0.45N*m; }

@@ -1,5 +1,5 @@
 #!/bin/sh
-# From a logger's CSV to a validated set: SQUARES.csv SWEEP.csv ANOTHER.csv, with drive.toml (the
+# From a logger's CSV to a validated actuator file: SQUARES.csv SWEEP.csv ANOTHER.csv, with drive.toml (the
 # numbers of the datasheets) beside them. Read map.toml before you trust it.
 set -e
 elevon import "$1" --guess map.toml
