@@ -1,4 +1,4 @@
-//! The wirings by name, and one entry for each thing a caller may ask of any of them.
+//! The wirings by name, and one entry for each thing a caller may request of any of them.
 
 use crate::actuator::{ballscrew, landing_gear, rotary, Finding, Machine, Port, Wiring};
 use crate::fault::{FaultKind, FaultSpec};

@@ -91,7 +91,7 @@ pub struct Variable {
     pub unit: &'static str,
     pub range: Range,
     pub register: Register,
-    /// Value of a healthy, plain component; `None` where a parameter set must say.
+    /// Value of a healthy, plain component; `None` where an actuator file must state it.
     pub default: Option<f64>,
     pub text: &'static str,
     /// In which fidelities, and under which values of others.
@@ -137,13 +137,13 @@ pub trait Parameter: Copy {
 
 /// The parameters of one component in a run, and which of them faults move.
 #[derive(Clone, Copy)]
-pub struct Own<'a, P> {
+pub struct View<'a, P> {
     pub raw: &'a [f64],
     touched: &'a [bool],
     table: PhantomData<P>,
 }
 
-impl<'a, P: Parameter> Own<'a, P> {
+impl<'a, P: Parameter> View<'a, P> {
     pub fn new(raw: &'a [f64], touched: &'a [bool]) -> Self {
         Self { raw, touched, table: PhantomData }
     }
@@ -233,7 +233,7 @@ pub struct Signal {
     pub symbol: &'static str,
     pub unit: &'static str,
     pub text: &'static str,
-    /// What it is to the actuator; `None` for what only a simulation can show.
+    /// What it is to the actuator; `None` for what only a simulation can report.
     pub role: Option<Role>,
 }
 

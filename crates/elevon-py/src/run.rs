@@ -12,15 +12,15 @@ use std::time::Duration;
 
 const POLL: Duration = Duration::from_millis(100);
 
-/// What the worker sends, if it lives to send it, and what `tell` raised, after which it is asked no more.
-fn awaited<T>(receiver: &Receiver<T>, monitor: &Monitor, tell: impl Fn(u64) -> PyResult<bool>) -> (Option<T>, Option<PyErr>) {
+/// What the worker sends, if it lives to send it, and what `report` raised, after which it is not called again.
+fn awaited<T>(receiver: &Receiver<T>, monitor: &Monitor, report: impl Fn(u64) -> PyResult<bool>) -> (Option<T>, Option<PyErr>) {
     let mut raised = None;
     loop {
         match receiver.recv_timeout(POLL) {
             Ok(outcome) => return (Some(outcome), raised),
             Err(RecvTimeoutError::Disconnected) => return (None, raised),
             Err(RecvTimeoutError::Timeout) if raised.is_some() => {}
-            Err(RecvTimeoutError::Timeout) => match tell(monitor.done()) {
+            Err(RecvTimeoutError::Timeout) => match report(monitor.done()) {
                 Ok(true) => {}
                 Ok(false) => monitor.cancel(),
                 Err(error) => {
@@ -114,8 +114,8 @@ impl<'py> Times<'py> {
     }
 }
 
-/// What was asked to be recorded: the clocks and their names, and the names of all signals.
-struct Asked {
+/// The recording that was requested: the clocks and their names, and the names of all signals.
+struct RecordPlan {
     clocks: Vec<Clock>,
     names: Vec<String>,
     signals: Vec<&'static str>,
@@ -125,7 +125,7 @@ struct Asked {
 fn result<'py>(
     py: Python<'py>,
     dt: f64,
-    asked: &Asked,
+    plan: &RecordPlan,
     width: usize,
     output: RunOutput,
     times: &mut Times<'py>,
@@ -136,13 +136,13 @@ fn result<'py>(
     d.set_item("steps", output.steps)?;
     d.set_item("wall_s", output.wall)?;
     let last = PyDict::new(py);
-    for (i, name) in asked.signals.iter().enumerate() {
+    for (i, name) in plan.signals.iter().enumerate() {
         last.set_item(name, output.last[i * width])?;
     }
     d.set_item("final", last)?;
     let (kept, summed) = (PyDict::new(py), PyDict::new(py));
     let results = output.clocks.into_iter().zip(output.columns).zip(output.features);
-    for ((clock, name), ((values, columns), features)) in asked.clocks.iter().zip(&asked.names).zip(results) {
+    for ((clock, name), ((values, columns), features)) in plan.clocks.iter().zip(&plan.names).zip(results) {
         if clock.features.is_some() {
             summed.set_item(name, PyArray1::from_vec(py, features))?;
             continue;
@@ -185,11 +185,11 @@ pub fn simulate<'py>(
     let steps: Vec<f64> = specs.iter().map(|r| model.step(&r.parameters)).collect();
     let total = specs.iter().zip(&steps).map(|(r, dt)| (r.duration / dt).round() as u64).sum();
     let outputs = polled(py, total, progress, |monitor| model.run_all(&specs, &clocks, threads, width, monitor))?;
-    let asked = Asked { clocks, names, signals: model.signals().iter().map(|s| s.name).collect() };
+    let plan = RecordPlan { clocks, names, signals: model.signals().iter().map(|s| s.name).collect() };
     let list = PyList::empty(py);
     let mut times = Times::default();
     for (output, dt) in outputs.into_iter().zip(steps) {
-        list.append(result(py, dt, &asked, 1, output, &mut times)?)?;
+        list.append(result(py, dt, &plan, 1, output, &mut times)?)?;
     }
     Ok(list)
 }
@@ -226,14 +226,14 @@ pub fn sensitivities<'py>(
     let total = (spec.duration / dt).round() as u64 * passes;
     let outputs = polled(py, total, progress, |monitor| model.sensitivities(&spec, &wanted, &faults, &clocks, monitor))?;
     let outputs = outputs.ok_or_else(|| {
-        bad("sensitivities need the low fidelity of an actuator without a state machine: switching has no useful derivative")
+        bad("sensitivities need the reduced-order model (fidelity low) of an actuator without a state machine: switching has no useful derivative")
     })?;
-    let asked = Asked { clocks, names, signals: model.signals().iter().map(|s| s.name).collect() };
+    let plan = RecordPlan { clocks, names, signals: model.signals().iter().map(|s| s.name).collect() };
     let list = PyList::empty(py);
     let mut times = Times::default();
     for (i, output) in outputs.into_iter().enumerate() {
         let width = 1 + (chosen - derivatives() * i).min(derivatives());
-        list.append(result(py, dt, &asked, width, output, &mut times)?)?;
+        list.append(result(py, dt, &plan, width, output, &mut times)?)?;
     }
     Ok(list)
 }

@@ -201,7 +201,7 @@ impl Resolver {
         })
     }
 
-    /// What the command asks for, where there is a choice.
+    /// What the command sets, where there is a choice.
     fn set_mode(&self, mode: &str, parameters: &mut [f64]) -> PyResult<()> {
         let modes = self.model.modes();
         let choice =
@@ -254,8 +254,8 @@ impl Resolver {
         }
         let most = scaled(low).severity;
         let digits = 10f64.powf(3.0 - most.abs().log10().floor());
-        let rest = if low > 0.0 { format!("; or a severity of at most {}", (most * digits).trunc() / digits) } else { String::new() };
-        Some(format!("{} at its whole severity: {}{rest}", names[alone], finding.message))
+        let hint = if low > 0.0 { format!("; or a severity of at most {}", (most * digits).trunc() / digits) } else { String::new() };
+        Some(format!("{} at its whole severity: {}{hint}", names[alone], finding.message))
     }
 
     /// Signals by their names.
@@ -277,8 +277,8 @@ impl Resolver {
                 None => SourcePlan::default(),
             };
             driven.push(!plan.terms.is_empty());
-            let rest = plan.terms.is_empty() && !port.parameter.is_empty();
-            ports.push(if rest { SourcePlan::constant(parameters[self.parameter(port.parameter)?]) } else { plan });
+            let constant = plan.terms.is_empty() && !port.parameter.is_empty();
+            ports.push(if constant { SourcePlan::constant(parameters[self.parameter(port.parameter)?]) } else { plan });
         }
         for name in inputs.keys() {
             let name: String = name.extract()?;

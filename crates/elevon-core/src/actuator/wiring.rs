@@ -1,4 +1,4 @@
-//! What the solver asks of a wiring. The model is constant, all of a run lives in its state.
+//! What the solver needs of a wiring. The model is constant, all of a run lives in its state.
 
 use crate::command::Source;
 use crate::control::position_speed::Mode;
@@ -56,7 +56,7 @@ impl Tick {
     }
 }
 
-/// Does a finding stop the run, or only say what to expect of it?
+/// Does a finding stop the run, or only state what to expect of it?
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {
     Error,
@@ -88,7 +88,7 @@ impl Finding {
         Self { severity: Severity::Error, path: path.to_string(), value, limit, message }
     }
 
-    /// The run can be; its user should know.
+    /// The run can be; its caller should know.
     pub fn warning(path: &str, value: f64, limit: f64, message: String) -> Self {
         Self { severity: Severity::Warning, ..Self::error(path, value, limit, message) }
     }
@@ -145,7 +145,7 @@ pub struct Overheat<S> {
 pub trait Machine: Clone + Send + Sync + 'static {
     const GROUPS: &'static [Group];
     const PORTS: &'static [Port];
-    /// What a command may ask for.
+    /// What a command may set.
     const MODES: &'static [&'static str] = Mode::NAMES;
     /// Units of the command in each mode; empty: the command port's own.
     const MODE_UNITS: &'static [&'static str] = &["", "rad/s", "N m"];
@@ -212,14 +212,14 @@ pub trait Wiring: Clone + Send + Sync + 'static {
         from: Steps,
         count: Steps,
     );
-    /// Signals in the order of `signals()`: those `asked` for, others where they cost nothing.
+    /// Signals in the order of `signals()`: those of `selection`, others where they cost nothing.
     fn observe<S: Scalar>(
         structure: &Self::Structure,
         model: &Self::Model<S>,
         inputs: &Inputs<S>,
         state: &Self::State<S>,
         t: S,
-        asked: Signals,
+        selection: Signals,
         out: &mut [S],
     );
     /// Quantities whose leaving of their limit means divergence.

@@ -165,13 +165,13 @@ impl Term {
 
     fn sine_line(&self, t: f64) -> Line {
         let p = &self.parameters;
-        let held = |time: f64| p[3] + p[0] * libm::sin(p[2] + TAU * p[1] * (time - p[4]));
+        let sine = |time: f64| p[3] + p[0] * libm::sin(p[2] + TAU * p[1] * (time - p[4]));
         if t < p[4] {
-            Line::constant(held(p[4]), p[4])
+            Line::constant(sine(p[4]), p[4])
         } else if t < p[5] {
             Line::constant(p[3], p[5])
         } else {
-            Line::constant(held(p[5]), NEVER)
+            Line::constant(sine(p[5]), NEVER)
         }
     }
 

@@ -128,7 +128,7 @@ impl<S: Scalar> CurrentControl<S> {
 }
 
 impl<S: Scalar> CurrentControlState<S> {
-    pub fn rest() -> Self {
+    pub fn initial() -> Self {
         let zero = S::zero();
         Self { integral_d: zero, integral_q: zero, voltage_d: zero, voltage_q: zero, modulation: [zero; 3], computed: [zero; 3] }
     }
@@ -154,7 +154,7 @@ mod tests {
         raw[PwmParameter::ProportionalGain as usize] = gain * inductance / PERIOD;
         raw[PwmParameter::ComputationDelay as usize] = delay;
         let control = CurrentControl::derive(&raw, 4.0);
-        let mut state = CurrentControlState::rest();
+        let mut state = CurrentControlState::initial();
         let mut current = 0.0;
         let mut errors = Vec::new();
         for _ in 0..samples {

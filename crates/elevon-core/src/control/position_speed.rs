@@ -8,7 +8,7 @@ use crate::variable::Switch;
 use crate::{choices, variables};
 
 choices! {
-    /// What a command asks for.
+    /// What a command sets.
     Mode { Position "position", Speed "speed", Torque "torque" }
     /// When the position error freezes the integrator.
     ErrorHold { Off "off", Below "below", Above "above" }
@@ -22,7 +22,7 @@ variables! {
     /// What the actuator control electronics believe and do.
     ControlParameter, CONTROL {
         Mode => "mode", "-", "1", Choice(Mode::NAMES), Controller, Some(0.0), "what the command is: a position, a speed (bypasses the position loop) or a torque (bypasses both loops)",
-            nowhere("the command of the scenario says what it is");
+            nowhere("the command of the scenario states what it is");
         PositionGain => "position_gain", "G", "1/s", NonNegative, Controller, None, "output position error to motor-shaft speed reference",
             when(&[Chosen("control.mode", &["position"]), Chosen("control.structure", &["cascade"])]);
         PositionGainScale => "position_gain_scale", "-", "1", NonNegative, Controller, Some(1.0), "healthy 1; drift of the position gain",
@@ -179,7 +179,7 @@ impl<S: Scalar> PositionSpeed<S> {
         }
     }
 
-    /// One tick: the quadrature current reference from the command and what the sensors say.
+    /// One tick: the quadrature current reference from the command and the sensors' readings.
     #[inline(always)]
     pub fn step(&self, structure: &ControlStructure, s: &mut PositionSpeedState<S>, command: S, position: S, speed: S) -> S {
         let position_error = command - position;
@@ -246,22 +246,22 @@ impl<S: Scalar> PositionSpeed<S> {
             change = change + self.back_step * (s.torque_ref - torque);
         }
         if structure.hold_at_rest {
-            let rest = speed.equals(S::zero());
-            let held = rest & S::zero().lt(s.rested);
-            change = S::select(held, S::zero(), change);
-            s.rested = S::indicator(rest);
+            let at_rest = speed.equals(S::zero());
+            let frozen = at_rest & S::zero().lt(s.rested);
+            change = S::select(frozen, S::zero(), change);
+            s.rested = S::indicator(at_rest);
         }
         if structure.hold_on_error != ErrorHold::Off {
             let below = position_error.abs().lt(self.threshold);
-            let held = if structure.hold_on_error == ErrorHold::Below { below } else { !below };
-            change = S::select(held, S::zero(), change);
+            let frozen = if structure.hold_on_error == ErrorHold::Below { below } else { !below };
+            change = S::select(frozen, S::zero(), change);
         }
         s.integral = s.integral + change;
     }
 }
 
 impl<S: Scalar> PositionSpeedState<S> {
-    pub fn rest() -> Self {
+    pub fn initial() -> Self {
         let zero = S::zero();
         Self { integral: zero, filtered_error: zero, rested: zero, speed_ref: zero, torque_ref: zero, command: S::splat(f64::NAN) }
     }
@@ -293,7 +293,7 @@ mod tests {
 
     /// Torque references for position errors of one tick after the other.
     fn torques(controller: &(PositionSpeed<f64>, ControlStructure), errors: impl Iterator<Item = f64>) -> Vec<f64> {
-        let mut state = PositionSpeedState::rest();
+        let mut state = PositionSpeedState::initial();
         errors.map(|e| controller.0.step(&controller.1, &mut state, e, 0.0, 7.0)).collect()
     }
 

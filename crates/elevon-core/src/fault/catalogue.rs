@@ -21,7 +21,7 @@ pub enum Op {
 }
 
 impl Op {
-    /// What acts of a severity: labels say this.
+    /// What acts of a severity: labels state this.
     pub fn acting(self, severity: f64) -> f64 {
         match self {
             Self::AddWhole => severity.floor(),

@@ -44,7 +44,7 @@ impl FaultSpec {
     }
 
     /// Held (label, profile factor, pulse state) at step `k` and the step of the next change.
-    fn at(&self, k: Steps, dt: f64, grid: Steps) -> (Held, Steps) {
+    fn at(&self, k: Steps, dt: f64, grid: Steps) -> (ProfileValue, Steps) {
         let t = (k as f64 + 0.5) * dt;
         let (factor, until) = self.profile.factor(t);
         let smooth = until <= t;
@@ -61,12 +61,12 @@ impl FaultSpec {
             let edge = if pulse { off } else { origin + self.period };
             next = next.min(step_at(edge, dt).max(k + 1));
         }
-        (Held { label, factor, pulse }, next)
+        (ProfileValue { label, factor, pulse }, next)
     }
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct Held {
+struct ProfileValue {
     label: f64,
     factor: f64,
     pulse: bool,
@@ -76,7 +76,7 @@ struct Held {
 #[derive(Clone, Debug)]
 pub struct FaultLanes {
     faults: Vec<Vec<FaultSpec>>,
-    held: Vec<Vec<Held>>,
+    values: Vec<Vec<ProfileValue>>,
     next: Vec<Steps>,
     soonest: Steps,
     grid: Steps,
@@ -84,10 +84,10 @@ pub struct FaultLanes {
 
 impl FaultLanes {
     pub fn new(faults: Vec<Vec<FaultSpec>>, grid: Steps) -> Self {
-        let held = faults.iter().map(|f| vec![Held::default(); f.len()]).collect();
+        let values = faults.iter().map(|f| vec![ProfileValue::default(); f.len()]).collect();
         let next: Vec<Steps> = faults.iter().map(|f| if f.is_empty() { Steps::MAX } else { 0 }).collect();
         let soonest = next.iter().copied().min().unwrap_or(Steps::MAX);
-        Self { faults, held, next, soonest, grid: grid.max(1) }
+        Self { faults, values, next, soonest, grid: grid.max(1) }
     }
 
     pub fn next(&self) -> Steps {
@@ -96,7 +96,7 @@ impl FaultLanes {
 
     /// The label of a fault of a lane; 0 where the lane has no such fault.
     pub fn label(&self, lane: usize, fault: usize) -> f64 {
-        self.held[lane].get(fault).map_or(0.0, |held| held.label)
+        self.values[lane].get(fault).map_or(0.0, |value| value.label)
     }
 
     pub fn severity(&self, lane: usize, fault: usize) -> f64 {
@@ -109,7 +109,7 @@ impl FaultLanes {
             self.faults[lane][fault] = spec;
         } else {
             self.faults[lane].push(spec);
-            self.held[lane].push(Held::default());
+            self.values[lane].push(ProfileValue::default());
         }
         (self.next[lane], self.soonest) = (0, 0);
     }
@@ -125,9 +125,9 @@ impl FaultLanes {
                 continue;
             }
             let mut next = Steps::MAX;
-            for (held, fault) in self.held[lane].iter_mut().zip(&self.faults[lane]) {
+            for (value, fault) in self.values[lane].iter_mut().zip(&self.faults[lane]) {
                 let (now, change) = fault.at(k, dt, self.grid);
-                *held = now;
+                *value = now;
                 next = next.min(change);
             }
             self.next[lane] = next;
@@ -146,10 +146,10 @@ impl FaultLanes {
                 for &(index, value) in &fault.settings {
                     raw[index] = S::select(mine, S::splat(value), raw[index]);
                 }
-                let held = self.held[lane][j];
-                let s = severity(lane, j) * S::splat(held.factor);
+                let value = self.values[lane][j];
+                let s = severity(lane, j) * S::splat(value.factor);
                 for write in &fault.writes {
-                    let changed = changed(raw[write.index], s, write.op, held);
+                    let changed = changed(raw[write.index], s, write.op, value);
                     raw[write.index] = S::select(mine, changed, raw[write.index]);
                 }
             }
@@ -167,23 +167,23 @@ pub fn whole(raw: &[f64], faults: &[FaultSpec]) -> Vec<f64> {
         // What is counted is checked as given: half a thing is refused, not rounded.
         let acting = |op: Op| if op == Op::AddWhole { fault.severity } else { op.acting(fault.severity) };
         let label = fault.writes.first().map_or(fault.severity, |w| acting(w.op));
-        let held = Held { label, factor: 1.0, pulse: fault.severity > 0.0 };
+        let value = ProfileValue { label, factor: 1.0, pulse: fault.severity > 0.0 };
         for write in &fault.writes {
-            all[write.index] = changed(all[write.index], fault.severity, write.op, held);
+            all[write.index] = changed(all[write.index], fault.severity, write.op, value);
         }
     }
     all
 }
 
-fn changed<S: Scalar>(x: S, s: S, op: Op, held: Held) -> S {
+fn changed<S: Scalar>(x: S, s: S, op: Op, value: ProfileValue) -> S {
     match op {
         Op::Lose => x * (S::one() - s),
         Op::Grow => x * (S::one() + s),
         Op::Add => x + s,
-        Op::AddWhole => x + S::splat(held.label),
-        Op::Set if held.label == 0.0 => x,
+        Op::AddWhole => x + S::splat(value.label),
+        Op::Set if value.label == 0.0 => x,
         Op::Set => S::one(),
-        Op::Pulse if held.pulse => S::one(),
+        Op::Pulse if value.pulse => S::one(),
         Op::Pulse => x,
     }
 }

@@ -79,7 +79,7 @@ impl Family {
         }
     }
 
-    /// Rate in Hz below which its output `index` says nothing.
+    /// Rate in Hz below which its output `index` bears no information.
     fn minimum_rate(self, index: usize) -> f64 {
         match self {
             Bands(_) => 2.0 * bands::EDGES[index + 1],

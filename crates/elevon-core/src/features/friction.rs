@@ -41,9 +41,9 @@ impl Friction {
         let speed = rows.get(Role::MotorSpeed);
         for i in 0..current.len() {
             if speed[i].abs() > self.moving {
-                let way = usize::from(speed[i] < 0.0);
-                self.count[way] += 1.0;
-                self.sum[way] += current[i];
+                let direction = usize::from(speed[i] < 0.0);
+                self.count[direction] += 1.0;
+                self.sum[direction] += current[i];
             }
             match self.last {
                 Some((c, a)) => self.area += 0.5 * (c + current[i]) * (angle[i] - a),
@@ -54,7 +54,8 @@ impl Friction {
     }
 
     pub fn finish(&self, out: &mut Vec<f64>) {
-        let mean = |way: usize| if self.count[way] >= LEAST_ROWS { self.sum[way] / self.count[way] } else { f64::NAN };
+        let mean =
+            |direction: usize| if self.count[direction] >= LEAST_ROWS { self.sum[direction] / self.count[direction] } else { f64::NAN };
         let (forward, backward) = (mean(0), mean(1));
         let load = 0.5 * (forward + backward);
         let travel = self.last.map_or(f64::NAN, |(_, angle)| angle - self.first);

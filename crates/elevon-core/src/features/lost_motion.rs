@@ -4,8 +4,9 @@
 //! directions (analysis of covariance) in five sums a direction. The lost motion is `2 h`: backlash, and what the elastic parts
 //! give way to a friction that changes its sign.
 //!
-//! A row weighs as the square of the angle travelled since the motion last turned back: rows on their way through the backlash,
-//! which show part of it, hardly count (a backlash `p` in strokes `d` reads low by less than `(p/d)^2` of itself), and no backlash need be known before.
+//! A row weighs as the square of the angle travelled since the motion last turned back: rows within the backlash,
+//! which contain part of it, hardly count (a backlash `p` in strokes `d` reads low by less than `(p/d)^2` of itself), and no backlash
+//! need be known before.
 
 use super::friction::LEAST_ROWS;
 use super::rows::{Columns, Role};
@@ -45,12 +46,12 @@ pub struct LostMotion {
     start: Option<(f64, f64)>,
     /// Direction of the stroke and angle at which it began.
     stroke: Option<(usize, f64)>,
-    ways: [Sums; 2],
+    directions: [Sums; 2],
 }
 
 impl LostMotion {
     pub fn new(moving: f64) -> Self {
-        Self { moving, start: None, stroke: None, ways: [Sums::default(); 2] }
+        Self { moving, start: None, stroke: None, directions: [Sums::default(); 2] }
     }
 
     #[inline(always)]
@@ -61,14 +62,14 @@ impl LostMotion {
             let (a, o) = *self.start.get_or_insert((angle[i], output[i]));
             if speed[i].abs() > self.moving {
                 let (x, y) = (angle[i] - a, output[i] - o);
-                let way = usize::from(speed[i] < 0.0);
+                let direction = usize::from(speed[i] < 0.0);
                 let begun = match self.stroke {
-                    Some((same, begun)) if same == way => begun,
+                    Some((same, begun)) if same == direction => begun,
                     _ => x,
                 };
-                self.stroke = Some((way, begun));
+                self.stroke = Some((direction, begun));
                 let w = (x - begun) * (x - begun);
-                let sums = &mut self.ways[way];
+                let sums = &mut self.directions[direction];
                 sums.rows += 1.0;
                 sums.w += w;
                 sums.x += w * x;
@@ -80,7 +81,7 @@ impl LostMotion {
     }
 
     pub fn finish(&self, out: &mut Vec<f64>) {
-        let [forward, backward] = &self.ways;
+        let [forward, backward] = &self.directions;
         if forward.rows < LEAST_ROWS || backward.rows < LEAST_ROWS {
             out.extend([f64::NAN; 2]);
             return;

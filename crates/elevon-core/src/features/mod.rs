@@ -1,6 +1,6 @@
 //! Features of a motion, summed up while its rows pass by: rows of a running simulation or of a log, by the same code.
 //!
-//! A [`Plan`] says which features, of which columns, at which rate; an [`Accumulator`] takes the rows, block by block,
+//! A [`Plan`] states which features, of which columns, at which rate; an [`Accumulator`] takes the rows, block by block,
 //! and holds sums of a fixed size. How the rows are cut into blocks changes no bit.
 
 mod bands;

@@ -94,7 +94,7 @@ impl Orders {
         let orders: [f64; COUNT] = std::array::from_fn(|i| self.order(i));
         for i in 0..angle.len() {
             let travelled = angle[i] - self.last.replace(angle[i]).unwrap_or(angle[i]);
-            let (way, w, x) = (usize::from(travelled < 0.0), travelled.abs(), values.at(i));
+            let (direction, w, x) = (usize::from(travelled < 0.0), travelled.abs(), values.at(i));
             let shaft = Scalar::sin_cos(angle[i]);
             let electrical = Scalar::sin_cos(self.pole_pairs * angle[i]);
             let second = doubled(electrical);
@@ -103,16 +103,16 @@ impl Orders {
             for k in 0..COUNT {
                 // Beyond half a period from row to row an order looks like another.
                 let seen = if w * orders[k] <= PI { w } else { 0.0 };
-                self.sums[k][way].push(seen, x, turned[k]);
+                self.sums[k][direction].push(seen, x, turned[k]);
             }
         }
     }
 
     pub fn finish(&self, out: &mut Vec<f64>) {
-        out.extend(self.sums.iter().enumerate().map(|(i, ways)| {
-            let (forward, backward) = (ways[0].locked(), ways[1].locked());
+        out.extend(self.sums.iter().enumerate().map(|(i, directions)| {
+            let (forward, backward) = (directions[0].locked(), directions[1].locked());
             let (c, s) = (forward.0 + backward.0, forward.1 + backward.1);
-            let travel = ways[0].w + ways[1].w;
+            let travel = directions[0].w + directions[1].w;
             if self.order(i) * travel >= 2.0 * TAU {
                 2.0 * (c * c + s * s).sqrt() / travel
             } else {

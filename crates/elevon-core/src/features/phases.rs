@@ -34,14 +34,14 @@ pub struct Phases {
     sum: [f64; 3],
     square: [f64; 3],
     residual: f64,
-    ways: [Systems; 2],
+    directions: [Systems; 2],
     last: Option<f64>,
 }
 
 impl Phases {
     pub fn new(pole_pairs: f64) -> Self {
-        let ways = [Systems::default(); 2];
-        Self { pole_pairs, count: 0.0, sum: [0.0; 3], square: [0.0; 3], residual: 0.0, ways, last: None }
+        let directions = [Systems::default(); 2];
+        Self { pole_pairs, count: 0.0, sum: [0.0; 3], square: [0.0; 3], residual: 0.0, directions, last: None }
     }
 
     #[inline(always)]
@@ -67,21 +67,21 @@ impl Phases {
         const ROOT: f64 = 0.577_350_269_189_625_8;
         let (alpha, beta) = ((2.0 * a - b - c) / 3.0, (b - c) * ROOT);
         let (sin, cos) = Scalar::sin_cos(self.pole_pairs * angle);
-        let (way, w) = (&mut self.ways[usize::from(travelled < 0.0)], travelled.abs());
-        way.w += w;
-        way.positive[0] += w * (alpha * cos + beta * sin);
-        way.positive[1] += w * (beta * cos - alpha * sin);
-        way.negative[0] += w * (alpha * cos - beta * sin);
-        way.negative[1] += w * (beta * cos + alpha * sin);
+        let (direction, w) = (&mut self.directions[usize::from(travelled < 0.0)], travelled.abs());
+        direction.w += w;
+        direction.positive[0] += w * (alpha * cos + beta * sin);
+        direction.positive[1] += w * (beta * cos - alpha * sin);
+        direction.negative[0] += w * (alpha * cos - beta * sin);
+        direction.negative[1] += w * (beta * cos + alpha * sin);
     }
 
     pub fn finish(&self, out: &mut Vec<f64>) {
-        let travel = self.ways[0].w + self.ways[1].w;
+        let travel = self.directions[0].w + self.directions[1].w;
         let length = |[x, y]: [f64; 2]| (x * x + y * y).sqrt();
         let turned = self.pole_pairs * travel >= std::f64::consts::TAU;
         let over = |sum: f64| if turned { sum / travel } else { f64::NAN };
-        out.push(over(self.ways.iter().map(|way| length(way.positive)).sum()));
-        out.push(over(self.ways.iter().map(|way| length(way.negative)).sum()));
+        out.push(over(self.directions.iter().map(|direction| length(direction.positive)).sum()));
+        out.push(over(self.directions.iter().map(|direction| length(direction.negative)).sum()));
         let rms = self.square.map(|x| (x / self.count).sqrt());
         let (largest, least) = (rms[0].max(rms[1]).max(rms[2]), rms[0].min(rms[1]).min(rms[2]));
         out.push((largest - least) * 3.0 / (rms[0] + rms[1] + rms[2]));
@@ -103,8 +103,8 @@ mod tests {
                 let turn = 4.0 * a - j * TAU / 3.0;
                 let back = -4.0 * a - j * TAU / 3.0;
                 // The torque changes its sign with the motion, and so does the positive system.
-                let way = if (i + 5000) % 20_000 < 10_000 { 1.0 } else { -1.0 };
-                5.0 * way * libm::cos(turn + 0.2) + 0.3 * way * libm::cos(back) + 0.1
+                let direction = if (i + 5000) % 20_000 < 10_000 { 1.0 } else { -1.0 };
+                5.0 * direction * libm::cos(turn + 0.2) + 0.3 * direction * libm::cos(back) + 0.1
             };
             angle.iter().enumerate().map(current).collect()
         };

@@ -30,7 +30,7 @@ pub struct Plan {
     roles: Vec<Role>,
     /// Families that are summed up, by their place.
     families: Vec<usize>,
-    /// Family among `families` and place in it of each feature, as asked for.
+    /// Family among `families` and place in it of each feature, as requested.
     outputs: Vec<(usize, usize)>,
     spectrum: Option<Arc<Spectrum>>,
 }
@@ -156,7 +156,7 @@ impl Accumulator {
         best(Push(&mut self.sums, rows));
     }
 
-    /// The features, in the order in which they were asked for; NaN where the rows do not give one.
+    /// The features, in the order in which they were requested; NaN where the rows do not give one.
     pub fn finish(&self) -> Vec<f64> {
         let mut values = vec![Vec::new(); self.sums.len()];
         for (sums, out) in self.sums.iter().zip(&mut values) {

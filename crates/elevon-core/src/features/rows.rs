@@ -50,8 +50,8 @@ impl Role {
 
     pub fn text(self) -> &'static str {
         match self {
-            Self::Command => "position asked of the output",
-            Self::OutputPosition => "position of the output, as its sensor shows it",
+            Self::Command => "position commanded of the output",
+            Self::OutputPosition => "position of the output, as its sensor reports it",
             Self::MotorPosition => "angle of the motor's shaft",
             Self::MotorSpeed => "speed of the motor's shaft",
             Self::TorqueCurrent => "current that makes torque, signed (a torque serves as well)",

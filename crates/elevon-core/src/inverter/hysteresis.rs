@@ -2,7 +2,7 @@
 
 use crate::scalar::Scalar;
 use crate::three;
-use crate::variable::Own;
+use crate::variable::View;
 use crate::{choices, variables};
 
 choices! {
@@ -18,8 +18,8 @@ variables! {
 }
 
 impl RelayCrossing {
-    pub fn located(own: &Own<RelayParameter>) -> bool {
-        Self::read(own.value(RelayParameter::RelayCrossing)) == Self::Located
+    pub fn located(view: &View<RelayParameter>) -> bool {
+        Self::read(view.value(RelayParameter::RelayCrossing)) == Self::Located
     }
 }
 

@@ -5,7 +5,7 @@
 //! the source on, E is a current i over the step and v goes exponentially to V_s - R_s i.
 
 use crate::scalar::Scalar;
-use crate::variable::Own;
+use crate::variable::View;
 use crate::{choices, variables};
 
 choices! {
@@ -52,8 +52,8 @@ pub struct DcLinkState<S> {
 }
 
 impl<S: Scalar> DcLink<S> {
-    pub fn needed(own: &Own<LinkParameter>) -> bool {
-        own.away(LinkParameter::LinkCapacitance)
+    pub fn needed(view: &View<LinkParameter>) -> bool {
+        view.away(LinkParameter::LinkCapacitance)
     }
 
     pub fn derive(raw: &[S], dt: S) -> Self {
@@ -109,7 +109,7 @@ impl<S: Scalar> DcLink<S> {
 }
 
 impl<S: Scalar> DcLinkState<S> {
-    pub fn rest() -> Self {
+    pub fn initial() -> Self {
         let nan = S::splat(f64::NAN);
         Self { voltage: nan, begin: nan, given: S::zero(), lost: S::zero() }
     }
@@ -129,7 +129,7 @@ mod tests {
 
     /// Voltage after `steps` steps at a power, which may depend on the voltage.
     fn run(link: &DcLink<f64>, steps: usize, dt: f64, power: impl Fn(f64) -> f64) -> (f64, DcLinkState<f64>, f64) {
-        let mut state = DcLinkState::rest();
+        let mut state = DcLinkState::initial();
         let mut drawn = 0.0;
         for _ in 0..steps {
             let energy = power(link.voltage(&state, SOURCE)) * dt;
@@ -162,7 +162,7 @@ mod tests {
         let exact = (SOURCE * SOURCE + 2.0 * 20.0 / CAPACITANCE).sqrt();
         assert!((v / exact - 1.0).abs() < 1e-9);
         let open = link(1e-6, 1.0, 0.0);
-        let mut state = DcLinkState::rest();
+        let mut state = DcLinkState::initial();
         open.step(&mut state, SOURCE, 1e3);
         assert_eq!(open.voltage(&state, SOURCE), EMPTY);
         for _ in 0..1000 {

@@ -7,7 +7,7 @@
 use crate::scalar::Scalar;
 use crate::three;
 use crate::variable::acts::When;
-use crate::variable::Own;
+use crate::variable::View;
 use crate::variables;
 
 variables! {
@@ -44,8 +44,8 @@ pub fn switching_loss<S: Scalar>(time: S, supply: S, current: [S; 3], old: [S; 3
 }
 
 /// Are there switching losses?
-pub fn switches(own: &Own<SwitchingParameter>) -> bool {
-    own.away(SwitchingParameter::SwitchingTime)
+pub fn switches(view: &View<SwitchingParameter>) -> bool {
+    view.away(SwitchingParameter::SwitchingTime)
 }
 
 #[derive(Clone, Copy, Debug)]

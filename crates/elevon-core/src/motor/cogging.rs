@@ -4,7 +4,7 @@
 //! T = -A (sin N a + r sin 2 N a), a = theta + phi: its mean is zero, and no work is done over a turn.
 
 use crate::scalar::Scalar;
-use crate::variable::Own;
+use crate::variable::View;
 use crate::variables;
 
 variables! {
@@ -30,8 +30,8 @@ pub struct Cogging<S> {
 
 impl<S: Scalar> Cogging<S> {
     /// Is there any?
-    pub fn needed(own: &Own<CoggingParameter>) -> bool {
-        own.away(CoggingParameter::CoggingTorque)
+    pub fn needed(view: &View<CoggingParameter>) -> bool {
+        view.away(CoggingParameter::CoggingTorque)
     }
 
     pub fn derive(raw: &[S]) -> Self {

@@ -1,4 +1,4 @@
-//! The single equivalent phase of the low fidelity (reference sheet 1.9): the quadrature current.
+//! The single equivalent phase of the reduced-order model (reference sheet 1.9): the quadrature current.
 //!
 //! A current-controlled drive imposes i_j = i_q sin a_j, so the three-phase model collapses to one phase
 //! whose coefficients depend on the rotor angle (derivation: docs/theory/low-fidelity.md):
@@ -9,9 +9,9 @@ use crate::three;
 use crate::variables;
 
 variables! {
-    /// The few numbers that only the low fidelity has.
+    /// The few numbers that only the reduced-order model has.
     LowParameter, LOW {
-        Step => "step", "dt", "s", Between(1e-12, 1.0), Solver, Some(5e-4), "solver step of the low fidelity",
+        Step => "step", "dt", "s", Between(1e-12, 1.0), Solver, Some(5e-4), "solver step of the reduced-order model",
             low_only("it has solver.step");
         VoltageRatio => "voltage_ratio", "-", "1", Positive, Plant, Some(std::f64::consts::FRAC_2_PI), "largest phase voltage, peak, over the DC link: 2/pi in six-step, 1/sqrt 3 for a linear PWM",
             low_only("it has the relays themselves").when(&[Chosen("drive.kind", &["hysteresis"])]);
@@ -20,7 +20,7 @@ variables! {
     }
 }
 
-/// What the equivalent phase shows at a rotor angle.
+/// The equivalent phase at a rotor angle.
 #[derive(Clone, Copy, Debug)]
 pub struct Equivalent<S> {
     pub torque_constant: S,

@@ -2,10 +2,10 @@
 //!
 //! With a field of peak B over the gap, the pressure B^2 / (2 mu_0) summed round the rotor gives, to first order in the
 //! eccentricity e (a fraction of the gap, magnets included), F = K e with K = pi R l B^2 / (2 mu_0). A static eccentricity
-//! pulls one way, a dynamic one turns with the shaft; the bearings carry their sum.
+//! pulls in one direction, a dynamic one turns with the shaft; the bearings carry their sum.
 
 use crate::scalar::Scalar;
-use crate::variable::Own;
+use crate::variable::View;
 use crate::variables;
 
 variables! {
@@ -48,8 +48,8 @@ pub struct MagneticPull<S> {
 
 impl<S: Scalar> MagneticPull<S> {
     /// Is there any?
-    pub fn needed(own: &Own<MagneticPullParameter>) -> bool {
-        own.away(MagneticPullParameter::MagneticPull)
+    pub fn needed(view: &View<MagneticPullParameter>) -> bool {
+        view.away(MagneticPullParameter::MagneticPull)
     }
 
     pub fn derive(raw: &[S]) -> Self {

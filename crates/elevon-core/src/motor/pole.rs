@@ -9,7 +9,7 @@
 
 use crate::scalar::Scalar;
 use crate::three;
-use crate::variable::Own;
+use crate::variable::View;
 use crate::variables;
 
 variables! {
@@ -45,8 +45,8 @@ impl<S: Scalar> WeakPole<S> {
         Self { mean: one - loss * share, depth, phase, half_pairs: S::splat(0.5) * pole_pairs, share }
     }
 
-    pub fn needed(own: &Own<PoleParameter>) -> bool {
-        own.away(PoleParameter::PoleLoss)
+    pub fn needed(view: &View<PoleParameter>) -> bool {
+        view.away(PoleParameter::PoleLoss)
     }
 
     /// Factors on the coefficients of the three phases.

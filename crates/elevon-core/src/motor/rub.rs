@@ -2,13 +2,13 @@
 //!
 //! Rotor and stator touch where |e| + filled > c; all are fractions of the gap. The rotor is then pushed back against its
 //! own bending and its bearings, N = K (|e| + filled - c), and the contact rubs with T = mu N R against the motion (Coulomb).
-//! A static eccentricity presses one way, a dynamic one turns with the shaft: it shakes the stator once a turn. Both
+//! A static eccentricity presses in one direction, a dynamic one turns with the shaft: it shakes the stator once a turn. Both
 //! together touch once a turn. The heat of the rub warms no node, and the touching parts do not wear.
 
 use super::magnetic_pull::Eccentricity;
 use super::star::MotorParameter;
 use crate::scalar::Scalar;
-use crate::variable::{acts::When, Own};
+use crate::variable::{acts::When, View};
 use crate::variables;
 
 variables! {
@@ -45,9 +45,9 @@ pub struct Rub<S> {
 
 impl<S: Scalar> Rub<S> {
     /// Can the gap close? An eccentricity that a fault moves may become any; `unbalanced` adds one that depends on inertias.
-    pub fn needed(own: &Own<RubParameter>, motor: &Own<MotorParameter>, unbalanced: bool) -> bool {
+    pub fn needed(view: &View<RubParameter>, motor: &View<MotorParameter>, unbalanced: bool) -> bool {
         let eccentricity = motor.most(MotorParameter::EccentricityStatic) + motor.most(MotorParameter::EccentricityDynamic);
-        unbalanced || eccentricity + own.most(RubParameter::RubFilled) > own.value(RubParameter::RubClearance)
+        unbalanced || eccentricity + view.most(RubParameter::RubFilled) > view.value(RubParameter::RubClearance)
     }
 
     pub fn derive(raw: &[S]) -> Self {
@@ -74,7 +74,7 @@ impl<S: Scalar> Rub<S> {
         [normal, self.friction * normal * self.radius]
     }
 
-    /// Force on the stator along the static eccentricity: the contact presses outwards and drags with the rotor's motion. A
+    /// Force on the stator along the static eccentricity: the contact presses outwards and rubs against the rotor's motion. A
     /// gap that is filled all round a centred rotor pushes nowhere.
     #[inline(always)]
     pub fn force(&self, eccentricity: &Eccentricity<S>, angle: S, speed: S) -> S {
@@ -125,7 +125,7 @@ mod tests {
         }
     }
 
-    /// Where the two point the same way: the contact lasts while cos theta > (c^2 - a^2 - b^2)/(2 a b).
+    /// Where the two point in the same direction: the contact lasts while cos theta > (c^2 - a^2 - b^2)/(2 a b).
     #[test]
     fn static_and_dynamic_together_touch_once_a_turn() {
         let (a, b, c) = (0.5_f64, 0.48, 0.95);

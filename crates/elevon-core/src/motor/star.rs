@@ -5,7 +5,7 @@ use super::short::{Contacts, KINDS};
 use crate::scalar::Scalar;
 use crate::three;
 use crate::variable::acts::When;
-use crate::variable::Own;
+use crate::variable::View;
 use crate::{choices, variables};
 
 choices! {
@@ -82,13 +82,13 @@ pub struct MotorStructure {
 }
 
 impl MotorStructure {
-    pub fn read(own: &Own<MotorParameter>) -> Self {
+    pub fn read(view: &View<MotorParameter>) -> Self {
         use MotorParameter as P;
         Self {
-            trapezoidal: EmfShape::read(own.value(P::EmfShape)) == EmfShape::Trapezoidal,
-            shorted_loop: ShortModel::read(own.value(P::ShortModel)) == ShortModel::Loop,
-            static_eccentricity: own.away(P::EccentricityStatic),
-            dynamic_eccentricity: own.away(P::EccentricityDynamic),
+            trapezoidal: EmfShape::read(view.value(P::EmfShape)) == EmfShape::Trapezoidal,
+            shorted_loop: ShortModel::read(view.value(P::ShortModel)) == ShortModel::Loop,
+            static_eccentricity: view.away(P::EccentricityStatic),
+            dynamic_eccentricity: view.away(P::EccentricityDynamic),
             weak_pole: false,
         }
     }
@@ -111,13 +111,13 @@ impl MotorStructure {
 }
 
 /// Is some phase interrupted at some time?
-pub fn interrupted(own: &Own<MotorParameter>) -> bool {
-    own.any_away([MotorParameter::OpenA, MotorParameter::OpenB, MotorParameter::OpenC])
+pub fn interrupted(view: &View<MotorParameter>) -> bool {
+    view.any_away([MotorParameter::OpenA, MotorParameter::OpenB, MotorParameter::OpenC])
 }
 
 /// Do resistance or flux follow the temperature?
-pub fn warms(own: &Own<MotorParameter>) -> bool {
-    own.any_away([MotorParameter::TemperatureCoefficient, MotorParameter::FluxTemperatureCoefficient])
+pub fn warms(view: &View<MotorParameter>) -> bool {
+    view.any_away([MotorParameter::TemperatureCoefficient, MotorParameter::FluxTemperatureCoefficient])
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -273,7 +273,7 @@ impl<S: Scalar> Star<S> {
 }
 
 impl<S: Scalar> StarState<S> {
-    pub fn rest() -> Self {
+    pub fn initial() -> Self {
         Self { current: [S::zero(); 3], contact: [[S::zero(); 3]; KINDS], resistance_factor: S::one(), flux_factor: S::one() }
     }
 

@@ -6,7 +6,7 @@
 
 use crate::scalar::Scalar;
 use crate::three;
-use crate::variable::Own;
+use crate::variable::View;
 use crate::{choices, variables};
 
 /// Stefan-Boltzmann constant, W/(m2 K4).
@@ -36,7 +36,7 @@ variables! {
             when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);
         Emissivity => "emissivity", "epsilon", "1", Unit, Plant, Some(0.9), "emissivity of the surface; 0: no radiation",
             when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);
-        Ambient => "ambient", "T_a", "K", Positive, Plant, Some(293.15), "temperature of the air; without a thermal model, the shown temperature of the surface";
+        Ambient => "ambient", "T_a", "K", Positive, Plant, Some(293.15), "temperature of the air; without a thermal model, the reported temperature of the surface";
         Warning => "warning", "-", "K", Positive, Controller, Some(403.15), "winding temperature above which the warning is set";
         Trip => "trip", "-", "K", Positive, Controller, Some(428.15), "winding temperature at which the drive opens its bridge and the run ends",
             when(&[Chosen("thermal.model", &["quasi_static", "dynamic"])]);
@@ -100,8 +100,8 @@ impl<S: Scalar> Network<S> {
         }
     }
 
-    pub fn needed(own: &Own<ThermalParameter>) -> bool {
-        ThermalModel::read(own.value(ThermalParameter::Model)) != ThermalModel::Off
+    pub fn needed(view: &View<ThermalParameter>) -> bool {
+        ThermalModel::read(view.value(ThermalParameter::Model)) != ThermalModel::Off
     }
 
     /// The given temperatures, the air's where none is given (NaN).

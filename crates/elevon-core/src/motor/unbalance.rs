@@ -1,7 +1,7 @@
 //! Excess mass on one side of the rotor: inertia, gravity torque, and the gap it narrows (N 4.4).
 
 use crate::scalar::Scalar;
-use crate::variable::Own;
+use crate::variable::View;
 use crate::variables;
 
 const GRAVITY: f64 = 9.806_65;
@@ -45,8 +45,8 @@ impl<S: Scalar> Unbalance<S> {
         }
     }
 
-    pub fn needed(own: &Own<UnbalanceParameter>) -> bool {
-        own.away(UnbalanceParameter::UnbalanceInertia)
+    pub fn needed(view: &View<UnbalanceParameter>) -> bool {
+        view.away(UnbalanceParameter::UnbalanceInertia)
     }
 
     /// Gravity torque on the shaft.

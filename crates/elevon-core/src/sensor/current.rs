@@ -2,7 +2,7 @@
 
 use crate::scalar::Scalar;
 use crate::three;
-use crate::variable::Own;
+use crate::variable::View;
 use crate::variables;
 
 variables! {
@@ -23,11 +23,11 @@ variables! {
             high_only("its drive controls the equivalent current itself, not three of which one stands still");
         StuckC => "current.stuck_c", "-", "1", Flag, Sensor, Some(0.0), "1: the sensor of phase c stands still at its last value",
             high_only("its drive controls the equivalent current itself, not three of which one stands still");
-        DeadA => "current.dead_a", "-", "1", Flag, Sensor, Some(0.0), "1: the sensor of phase a shows nothing",
+        DeadA => "current.dead_a", "-", "1", Flag, Sensor, Some(0.0), "1: the sensor of phase a reports zero",
             high_only("its drive controls the equivalent current itself, not three of which one is not seen");
-        DeadB => "current.dead_b", "-", "1", Flag, Sensor, Some(0.0), "1: the sensor of phase b shows nothing",
+        DeadB => "current.dead_b", "-", "1", Flag, Sensor, Some(0.0), "1: the sensor of phase b reports zero",
             high_only("its drive controls the equivalent current itself, not three of which one is not seen");
-        DeadC => "current.dead_c", "-", "1", Flag, Sensor, Some(0.0), "1: the sensor of phase c shows nothing",
+        DeadC => "current.dead_c", "-", "1", Flag, Sensor, Some(0.0), "1: the sensor of phase c reports zero",
             high_only("its drive controls the equivalent current itself, not three of which one is not seen");
         NoiseDeviation => "current.noise_deviation", "-", "A", NonNegative, Sensor, Some(0.0), "standard deviation of the noise of each sensor",
             high_only("the noise of single phase currents is none of its one");
@@ -35,7 +35,7 @@ variables! {
             high_only("the noise of single phase currents is none of its one").when(&[Away("sensor.current.noise_deviation", 0.0)]);
         Bits => "current.bits", "-", "1", Between(0.0, 32.0), Sensor, Some(0.0), "resolution over twice the range; 0: not quantised",
             high_only("single phase currents are quantised, not its one");
-        FullScale => "current.full_scale", "-", "A", Positive, Sensor, Some(40.0), "largest current the quantised sensor shows",
+        FullScale => "current.full_scale", "-", "A", Positive, Sensor, Some(40.0), "largest current the quantised sensor reports",
             high_only("single phase currents are quantised, not its one").when(&[Away("sensor.current.bits", 0.0)]);
         Bandwidth => "current.bandwidth", "-", "Hz", NonNegative, Sensor, Some(0.0), "first-order filter of the current that the drive controls; 0: none",
             high_only("the drive's own current filter is faster than its step");
@@ -75,24 +75,24 @@ impl<S: Scalar> CurrentSensor<S> {
         }
     }
 
-    /// What the three sensors show; `noise` has unit deviation, `held` is what they showed last.
+    /// Readings of the three sensors; `noise` has unit deviation, `last` are their previous readings.
     #[inline(always)]
-    pub fn measure(&self, current: [S; 3], noise: [S; 3], held: [S; 3]) -> [S; 3] {
+    pub fn measure(&self, current: [S; 3], noise: [S; 3], last: [S; 3]) -> [S; 3] {
         let half = S::splat(0.5);
         let quantised = S::zero().lt(self.resolution);
         three!(|j| {
             let raw = self.gain[j] * current[j] + (self.offset[j] + self.noise_deviation * noise[j]);
             let steps = (raw.clamp_abs(self.full_scale) * self.per_resolution).round();
-            let shown = S::select(quantised, steps * self.resolution, raw);
-            let live = S::select(half.le(self.dead[j]), S::zero(), shown);
-            S::select(half.le(self.stuck[j]), held[j], live)
+            let reading = S::select(quantised, steps * self.resolution, raw);
+            let live = S::select(half.le(self.dead[j]), S::zero(), reading);
+            S::select(half.le(self.stuck[j]), last[j], live)
         })
     }
 
     /// Does the measured current differ from the true one at all? Then it must be fed back.
-    pub fn needed(own: &Own<CurrentSensorParameter>) -> bool {
+    pub fn needed(view: &View<CurrentSensorParameter>) -> bool {
         use CurrentSensorParameter as P;
-        own.any_away_among(P::GainA, P::NoiseDeviation) || own.away(P::Bits)
+        view.any_away_among(P::GainA, P::NoiseDeviation) || view.away(P::Bits)
     }
 }
 
@@ -106,7 +106,7 @@ mod tests {
         let mut raw: Vec<f64> = CURRENT_SENSOR.iter().map(|v| v.default.unwrap_or(0.0)).collect();
         raw[P::StuckA as usize] = 1.0;
         raw[P::DeadB as usize] = 1.0;
-        let shown = CurrentSensor::derive(&raw).measure([3.0, -1.0, -2.0], [0.0; 3], [0.5, 0.6, 0.7]);
-        assert_eq!(shown, [0.5, 0.0, -2.0]);
+        let reading = CurrentSensor::derive(&raw).measure([3.0, -1.0, -2.0], [0.0; 3], [0.5, 0.6, 0.7]);
+        assert_eq!(reading, [0.5, 0.0, -2.0]);
     }
 }

@@ -1,7 +1,7 @@
 //! Incremental encoder driven through a wheel pair (reference sheet 1.1: 5000 pulses, x4, wheels 22:88).
 
 use crate::scalar::Scalar;
-use crate::variable::Own;
+use crate::variable::View;
 use crate::variables;
 
 variables! {
@@ -10,8 +10,8 @@ variables! {
         Pulses => "encoder.pulses", "-", "1", Positive, Sensor, Some(5000.0), "pulses per turn of the encoder";
         Edges => "encoder.edges", "-", "1", Positive, Sensor, Some(4.0), "edges counted per pulse";
         WheelRatio => "encoder.wheel_ratio", "-", "1", Positive, Sensor, Some(4.0), "encoder turns per output turn (88 / 22 teeth)";
-        Offset => "encoder.offset", "-", "rad", Any, Sensor, Some(0.0), "offset of the shown output position";
-        Gain => "encoder.gain", "-", "1", Any, Sensor, Some(1.0), "gain of the shown output position";
+        Offset => "encoder.offset", "-", "rad", Any, Sensor, Some(0.0), "offset of the reported output position";
+        Gain => "encoder.gain", "-", "1", Any, Sensor, Some(1.0), "gain of the reported output position";
         MissingCounts => "encoder.missing_counts", "-", "1", Unit, Sensor, Some(0.0), "fraction of the counts that are lost, spread evenly over the disc";
         DarkShare => "encoder.dark_share", "-", "1", Unit, Sensor, Some(0.0), "share of the disc in whose sectors no counts come";
         DarkSectors => "encoder.dark_sectors", "-", "1", Between(1.0, 1000.0), Sensor, Some(1.0), "number of dark sectors, equal and evenly spread; its whole part counts",
@@ -19,7 +19,7 @@ variables! {
         DarkPosition => "encoder.dark_position", "-", "rad", Any, Sensor, Some(0.0), "angle of the disc at the middle of a dark sector",
             when(&[Away("sensor.encoder.dark_share", 0.0)]);
         Dead => "encoder.dead", "-", "1", Flag, Sensor, Some(0.0), "1: no counts come at all";
-        Stuck => "encoder.stuck", "-", "1", Flag, Sensor, Some(0.0), "1: the shown position stands still at its last value while the counter goes on";
+        Stuck => "encoder.stuck", "-", "1", Flag, Sensor, Some(0.0), "1: the reported position stands still at its last value while the counter goes on";
     }
 }
 
@@ -46,7 +46,7 @@ pub struct EncoderState<S> {
     counts: S,
     /// Counts that did not come.
     lost: S,
-    pub shown: S,
+    pub reading: S,
 }
 
 impl<S: Scalar> Encoder<S> {
@@ -72,12 +72,12 @@ impl<S: Scalar> Encoder<S> {
     }
 
     /// Does it ever lose counts, or stand still?
-    pub fn loses(own: &Own<EncoderParameter>) -> bool {
-        own.any_away([EncoderParameter::DarkShare, EncoderParameter::Dead, EncoderParameter::Stuck])
+    pub fn loses(view: &View<EncoderParameter>) -> bool {
+        view.any_away([EncoderParameter::DarkShare, EncoderParameter::Dead, EncoderParameter::Stuck])
     }
 
     pub fn start(&self, output: S) -> EncoderState<S> {
-        EncoderState { output, counts: (output * self.per_count).floor(), lost: S::zero(), shown: self.read(output) }
+        EncoderState { output, counts: (output * self.per_count).floor(), lost: S::zero(), reading: self.read(output) }
     }
 
     /// The pitch an output position lies in, whether it is dark there, and how much was dark from the zero up to it.
@@ -90,7 +90,7 @@ impl<S: Scalar> Encoder<S> {
         (pitch, beyond.abs().lt(half), pitch * self.share + beyond.clamp_abs(half))
     }
 
-    /// Counts on to the output position, and shows what came. Exact for steps of any length, since what a way loses depends on
+    /// Counts on to the output position, and reports the sum. Exact for steps of any length, since what a movement loses depends on
     /// its ends alone.
     #[inline(always)]
     pub fn advance(&self, output: S, s: &mut EncoderState<S>) {
@@ -102,10 +102,10 @@ impl<S: Scalar> Encoder<S> {
         s.output = output;
         s.counts = S::select(none, s.counts, (output * self.per_count - s.lost).floor());
         let now = s.counts * self.count + self.offset;
-        s.shown = S::select(half.le(self.stuck), s.shown, now);
+        s.reading = S::select(half.le(self.stuck), s.reading, now);
     }
 
-    /// Shown output position: whole counts since the output's zero.
+    /// Reported output position: whole counts since the output's zero.
     #[inline(always)]
     pub fn read(&self, output: S) -> S {
         (output * self.per_count).floor() * self.count + self.offset
@@ -126,12 +126,12 @@ mod tests {
         Encoder::derive(&raw, TAU)
     }
 
-    /// Shown after moving in small steps through the given output positions.
+    /// Reading after moving in small steps through the given output positions.
     fn moved(e: &Encoder<f64>, s: &mut EncoderState<f64>, from: f64, to: f64) -> f64 {
         for i in 0..=10_000 {
             e.advance(from + (to - from) * f64::from(i) * 1e-4, s);
         }
-        s.shown
+        s.reading
     }
 
     #[test]
@@ -140,7 +140,7 @@ mod tests {
         let mut s = e.start(0.0);
         for output in [0.1, 0.77, -0.3] {
             e.advance(output, &mut s);
-            assert_eq!(s.shown, e.read(output));
+            assert_eq!(s.reading, e.read(output));
         }
     }
 
@@ -155,7 +155,7 @@ mod tests {
             assert!((there - 0.9 * 0.5 * TAU).abs() < 1e-4, "{there}");
             let mut leaping = e.start(0.0);
             e.advance(0.5 * TAU, &mut leaping);
-            assert!((leaping.shown - there).abs() < 1e-4);
+            assert!((leaping.reading - there).abs() < 1e-4);
             let back = moved(&e, &mut s, 0.5 * TAU, 0.0);
             assert!(back.abs() < 1e-4, "{back}");
         }

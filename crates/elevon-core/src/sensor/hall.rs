@@ -26,7 +26,7 @@ variables! {
 #[derive(Clone, Copy, Debug)]
 pub struct Hall<S> {
     offset: S,
-    own: [S; 3],
+    offsets: [S; 3],
     high: [S; 3],
     low: [S; 3],
     power_off: S,
@@ -56,7 +56,7 @@ impl<S: Scalar> Hall<S> {
         let from = |p: P| three!(|j| raw[p as usize + j]);
         Self {
             offset: g(P::Offset),
-            own: from(P::OffsetA),
+            offsets: from(P::OffsetA),
             high: from(P::StuckHighA),
             low: from(P::StuckLowA),
             power_off: g(P::PowerOff),
@@ -72,7 +72,7 @@ impl<S: Scalar> Hall<S> {
         let common = angle + self.offset;
         let dead = half.le(self.power_off);
         three!(|j| {
-            let turns = (common + self.own[j]) * S::splat(PER_TURN) - S::splat(1.0 / 12.0 + j as f64 / 3.0);
+            let turns = (common + self.offsets[j]) * S::splat(PER_TURN) - S::splat(1.0 / 12.0 + j as f64 / 3.0);
             let high = (turns - turns.floor()).lt(half) | half.le(self.high[j]);
             S::select(high & self.low[j].lt(half) & !dead, S::one(), S::zero())
         })
@@ -119,7 +119,7 @@ impl<S: Scalar> Hall<S> {
         s.code = three!(|j| S::select(same, s.code[j], code[j]));
     }
 
-    /// Speed shown at time `t`: the last interval's, never more than the time since the last edge allows.
+    /// Speed reported at time `t`: the last interval's, never more than the time since the last edge allows.
     #[inline(always)]
     pub fn speed(&self, s: &HallState<S>, t: S) -> S {
         let since = (t - s.last_edge).maximum(S::splat(1e-9));

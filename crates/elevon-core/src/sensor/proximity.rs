@@ -27,7 +27,7 @@ pub struct Switches {
     on: [bool; 4],
     waiting: [f64; 4],
     /// What the control unit sees: 0, 25, 75 %, lock sleeve.
-    pub shown: [bool; 4],
+    pub reading: [bool; 4],
 }
 
 fn sensed(raw: &[f64], before: &[bool; 4], ram: f64, locked: bool) -> [bool; 4] {
@@ -45,8 +45,8 @@ fn sensed(raw: &[f64], before: &[bool; 4], ram: f64, locked: bool) -> [bool; 4] 
 impl Switches {
     pub fn start(raw: &[f64], ram: f64, locked: bool) -> Self {
         let on = sensed(raw, &[false; 4], ram, locked);
-        let mut switches = Self { on, waiting: [0.0; 4], shown: on };
-        switches.show(raw);
+        let mut switches = Self { on, waiting: [0.0; 4], reading: on };
+        switches.read(raw);
         switches
     }
 
@@ -61,14 +61,14 @@ impl Switches {
                 self.waiting[j] = 0.0;
             }
         }
-        self.show(raw);
+        self.read(raw);
     }
 
-    fn show(&mut self, raw: &[f64]) {
+    fn read(&mut self, raw: &[f64]) {
         use ProximityParameter as P;
         for j in 0..4 {
             let (stuck_on, stuck_off) = (raw[P::On0 as usize + j] >= 0.5, raw[P::Off0 as usize + j] >= 0.5);
-            self.shown[j] = (self.on[j] || stuck_on) && !stuck_off;
+            self.reading[j] = (self.on[j] || stuck_on) && !stuck_off;
         }
     }
 }

@@ -1,15 +1,15 @@
 //! Motor resolver: commutation angle, motor position and, through its converter, motor speed (N 4.5).
 //!
-//! Channel mismatch scales the sine channel: the shown angle is atan2(g sin, cos). Shorted turns of a secondary winding do
+//! Channel mismatch scales the sine channel: the reported angle is atan2(g sin, cos). Shorted turns of a secondary winding do
 //! the same to its channel, an open one leaves a residue; the converter divides the channels, so that a weaker excitation
-//! turns no angle. Without power, or with too little signal, it shows a shaft at rest: the held angle or zero, no speed.
+//! turns no angle. Without power, or with too little signal, it reports a shaft at rest: the last angle or zero, no speed.
 
 use crate::scalar::Scalar;
-use crate::variable::Own;
+use crate::variable::View;
 use crate::{choices, variables};
 
 choices! {
-    /// What a converter shows without power.
+    /// What a converter reports without power.
     LossShows { Held "held", Zero "zero" }
 }
 
@@ -17,10 +17,10 @@ variables! {
     /// The resolver on the motor shaft.
     ResolverParameter, RESOLVER {
         Mismatch => "resolver.mismatch", "-", "1", Between(0.0, 0.99), Sensor, Some(0.0), "amplitude lost by the sine channel";
-        Offset => "resolver.offset", "-", "rad", Any, Sensor, Some(0.0), "offset of the shown motor angle";
-        Gain => "resolver.gain", "-", "1", Any, Sensor, Some(1.0), "gain of the shown motor position and speed (not of the commutation angle)";
+        Offset => "resolver.offset", "-", "rad", Any, Sensor, Some(0.0), "offset of the reported motor angle";
+        Gain => "resolver.gain", "-", "1", Any, Sensor, Some(1.0), "gain of the reported motor position and speed (not of the commutation angle)";
         PowerOff => "resolver.power_off", "-", "1", Flag, Sensor, Some(0.0), "1 while the resolver has no power";
-        LossShows => "resolver.loss_shows", "-", "1", Choice(LossShows::NAMES), Sensor, Some(0.0), "what the converter shows without power",
+        LossShows => "resolver.loss_shows", "-", "1", Choice(LossShows::NAMES), Sensor, Some(0.0), "what the converter reports without power",
             when(&[Either(&[
                 Away("sensor.resolver.power_off", 0.0), Away("sensor.resolver.excitation_short", 0.0), Away("sensor.resolver.sine_open", 0.0),
                 Away("sensor.resolver.cosine_open", 0.0), Away("sensor.resolver.sine_short", 0.0), Away("sensor.resolver.cosine_short", 0.0),
@@ -29,25 +29,25 @@ variables! {
         CosineShort => "resolver.cosine_short", "-", "1", Between(0.0, 0.99), Sensor, Some(0.0), "fraction of the turns of the cosine winding shorted";
         ExcitationShort => "resolver.excitation_short", "-", "1", Between(0.0, 0.99), Sensor, Some(0.0), "fraction of the excitation lost by shorted turns: both channels weaken, the angle stays until too little is left";
         SineOpen => "resolver.sine_open", "-", "1", Flag, Sensor, Some(0.0), "1: the sine winding is interrupted",
-            high_only("the shown angle leaps by half a turn in a small part of its step");
+            high_only("the reported angle leaps by half a turn in a small part of its step");
         CosineOpen => "resolver.cosine_open", "-", "1", Flag, Sensor, Some(0.0), "1: the cosine winding is interrupted",
-            high_only("the shown angle leaps by half a turn in a small part of its step");
+            high_only("the reported angle leaps by half a turn in a small part of its step");
         OpenResidue => "resolver.open_residue", "-", "1", Between(1e-6, 0.5), Sensor, Some(1e-3), "amplitude left in the channel of an open winding by stray coupling; ASSUMED: 0.1 %, a capacitive path of the cable",
-            high_only("the shown angle leaps by half a turn in a small part of its step").when(&[Either(&[Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0)])]);
+            high_only("the reported angle leaps by half a turn in a small part of its step").when(&[Either(&[Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0)])]);
         LeastSignal => "resolver.least_signal", "-", "1", Unit, Sensor, Some(0.7), "amplitude of the stronger channel below which the converter has no signal; ASSUMED: where common converters report the loss",
             when(&[Either(&[
                 Away("sensor.resolver.excitation_short", 0.0), Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0),
                 Away("sensor.resolver.sine_short", 0.0), Away("sensor.resolver.cosine_short", 0.0),
             ])]);
-        TrackingLimit => "resolver.tracking_limit", "-", "rad/s", Positive, Sensor, Some(6_283.185_307_179_586), "largest speed the converter shows; ASSUMED: 1000 turns/s, a common converter of 12 bits",
+        TrackingLimit => "resolver.tracking_limit", "-", "rad/s", Positive, Sensor, Some(6_283.185_307_179_586), "largest speed the converter reports; ASSUMED: 1000 turns/s, a common converter of 12 bits",
             when(&[Either(&[
                 Away("sensor.resolver.mismatch", 0.0), Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0),
                 Away("sensor.resolver.sine_short", 0.0), Away("sensor.resolver.cosine_short", 0.0),
             ])]);
         Stuck => "resolver.stuck", "-", "1", Flag, Sensor, Some(0.0), "1: the converter's reading stands still at its last value, angle and speed";
-        NoiseDeviation => "resolver.noise_deviation", "-", "rad", NonNegative, Sensor, Some(0.0), "standard deviation of the noise of the shown motor angle",
+        NoiseDeviation => "resolver.noise_deviation", "-", "rad", NonNegative, Sensor, Some(0.0), "standard deviation of the noise of the reported motor angle",
             high_only("its step is longer than the noise's band");
-        SpeedNoiseDeviation => "resolver.speed_noise_deviation", "-", "rad/s", NonNegative, Sensor, Some(0.0), "standard deviation of the noise of the shown motor speed",
+        SpeedNoiseDeviation => "resolver.speed_noise_deviation", "-", "rad/s", NonNegative, Sensor, Some(0.0), "standard deviation of the noise of the reported motor speed",
             high_only("its step is longer than the noise's band");
         NoiseSampleTime => "resolver.noise_sample_time", "-", "s", Positive, Sensor, Some(2.5e-4), "both noises are held over this time, which sets their band",
             high_only("its step is longer than the noise's band")
@@ -117,48 +117,48 @@ impl<S: Scalar> Resolver<S> {
         }
     }
 
-    /// With both windings whole: what an open one shows is finer than the steps of the low fidelity.
+    /// With both windings whole: the angle with an open one changes within a step of the reduced-order model.
     pub fn without_leaps(raw: &[S]) -> Self {
-        let mut own = [S::zero(); RESOLVER.len()];
-        own.copy_from_slice(&raw[..RESOLVER.len()]);
-        own[ResolverParameter::SineOpen as usize] = S::zero();
-        own[ResolverParameter::CosineOpen as usize] = S::zero();
-        Self::derive(&own)
+        let mut intact = [S::zero(); RESOLVER.len()];
+        intact.copy_from_slice(&raw[..RESOLVER.len()]);
+        intact[ResolverParameter::SineOpen as usize] = S::zero();
+        intact[ResolverParameter::CosineOpen as usize] = S::zero();
+        Self::derive(&intact)
     }
 
     /// Does its reading ever stand still?
-    pub fn stands(own: &Own<ResolverParameter>) -> bool {
+    pub fn stands(view: &View<ResolverParameter>) -> bool {
         use ResolverParameter as P;
-        own.any_away([P::PowerOff, P::Stuck, P::ExcitationShort])
+        view.any_away([P::PowerOff, P::Stuck, P::ExcitationShort])
     }
 
-    /// Does it ever show another angle than the shaft's?
-    pub fn needed(own: &Own<ResolverParameter>) -> bool {
+    /// Can it report another angle than the shaft's?
+    pub fn needed(view: &View<ResolverParameter>) -> bool {
         use ResolverParameter as P;
-        own.any_away([P::Mismatch, P::Offset, P::Gain, P::PowerOff, P::Stuck]) || Self::signal_fails(own)
+        view.any_away([P::Mismatch, P::Offset, P::Gain, P::PowerOff, P::Stuck]) || Self::signal_fails(view)
     }
 
     /// Is there noise?
-    pub fn noisy(own: &Own<ResolverParameter>) -> bool {
-        own.any_away([ResolverParameter::NoiseDeviation, ResolverParameter::SpeedNoiseDeviation])
+    pub fn noisy(view: &View<ResolverParameter>) -> bool {
+        view.any_away([ResolverParameter::NoiseDeviation, ResolverParameter::SpeedNoiseDeviation])
     }
 
     /// Is a winding ever shorted or open?
-    fn signal_fails(own: &Own<ResolverParameter>) -> bool {
-        own.any_away_among(ResolverParameter::SineShort, ResolverParameter::CosineOpen)
+    fn signal_fails(view: &View<ResolverParameter>) -> bool {
+        view.any_away_among(ResolverParameter::SineShort, ResolverParameter::CosineOpen)
     }
 
-    /// Does it ever show what it showed before?
-    pub fn remembers(own: &Own<ResolverParameter>) -> bool {
-        own.away(ResolverParameter::Stuck) || Self::lost(own)
+    /// Can it repeat an earlier reading?
+    pub fn remembers(view: &View<ResolverParameter>) -> bool {
+        view.away(ResolverParameter::Stuck) || Self::lost(view)
     }
 
     /// Is it ever without power or signal?
-    pub fn lost(own: &Own<ResolverParameter>) -> bool {
-        own.away(ResolverParameter::PowerOff) || Self::signal_fails(own)
+    pub fn lost(view: &View<ResolverParameter>) -> bool {
+        view.away(ResolverParameter::PowerOff) || Self::signal_fails(view)
     }
 
-    /// Adds noise of unit deviation to a reading, unless that is held.
+    /// Adds noise of unit deviation to a reading, unless that is frozen.
     #[inline(always)]
     pub fn disturbed(&self, reading: Reading<S>, noise: [S; 2]) -> Reading<S> {
         let half = S::splat(0.5);
@@ -180,34 +180,34 @@ impl<S: Scalar> Resolver<S> {
         self.amplitude * (sine * sine + cosine * cosine).sqrt()
     }
 
-    /// Change of the speed shown over that of the shaft's: none without power or while it stands still.
+    /// Change of the reported speed over that of the shaft's: none without power or while it stands still.
     #[inline(always)]
     pub fn follows(&self) -> S {
         let half = S::splat(0.5);
         S::select(half.le(self.off) | half.le(self.stuck), S::zero(), self.gain)
     }
 
-    /// Reading at angle `theta`, speed `omega`; `held` is the last one with power on.
+    /// Reading at angle `theta`, speed `omega`; `memory` is the last one with power on.
     #[inline(always)]
-    pub fn read(&self, theta: S, omega: S, held: &mut ResolverState<S>) -> Reading<S> {
+    pub fn read(&self, theta: S, omega: S, memory: &mut ResolverState<S>) -> Reading<S> {
         let half = S::splat(0.5);
         let (off, stuck) = (half.le(self.off), half.le(self.stuck));
         let (sin, cos) = theta.sin_cos();
         // atan2(a s, b c) = theta + atan2((a - b) s c, b c^2 + a s^2): unwrapped, and exact.
         let (ss, cc) = (sin * sin, cos * cos);
         let error = S::atan2_right(self.gain_less * sin * cos, self.cosine * cc + self.sine * ss);
-        // d/dt atan2(a s, b c) = omega a b / (b^2 c^2 + a^2 s^2): the converter tracks what it shows.
+        // d/dt atan2(a s, b c) = omega a b / (b^2 c^2 + a^2 s^2): the converter tracks what it reports.
         // Alike channels change no bit.
         let alike = self.gain_less.equals(S::zero());
         let tracked = self.sine * self.cosine / (self.cosine * self.cosine * cc + self.sine * self.sine * ss);
-        let shown = theta + error + self.offset;
+        let reading = theta + error + self.offset;
         let rate = S::select(alike, S::one(), tracked);
         let turning = S::select(off, S::zero(), (omega * rate).clamp_abs(self.tracking_limit));
-        held.angle = S::select(off | stuck, held.angle, shown);
-        held.speed = S::select(stuck, held.speed, turning);
-        let lost = S::select(half.lt(self.zero_when_off), S::zero(), held.angle);
-        let angle = S::select(off & !stuck, lost, held.angle);
-        Reading { angle, position: self.gain * angle, speed: self.gain * held.speed }
+        memory.angle = S::select(off | stuck, memory.angle, reading);
+        memory.speed = S::select(stuck, memory.speed, turning);
+        let lost = S::select(half.lt(self.zero_when_off), S::zero(), memory.angle);
+        let angle = S::select(off & !stuck, lost, memory.angle);
+        Reading { angle, position: self.gain * angle, speed: self.gain * memory.speed }
     }
 }
 
@@ -234,10 +234,10 @@ mod tests {
         for (p, a, b) in [(P::SineShort, 0.6, 1.0), (P::CosineShort, 1.0, 0.6)] {
             let r = resolver(&[(p, 0.4)]);
             for theta in [-1.4_f64, -0.3, 0.2, 0.9, 1.5] {
-                let shown = r.read(theta, 2.0, &mut fresh());
-                assert!((shown.angle - (a * theta.sin()).atan2(b * theta.cos())).abs() < 1e-13);
+                let reading = r.read(theta, 2.0, &mut fresh());
+                assert!((reading.angle - (a * theta.sin()).atan2(b * theta.cos())).abs() < 1e-13);
                 let ahead = r.read(theta + 1e-6, 2.0, &mut fresh()).angle - r.read(theta - 1e-6, 2.0, &mut fresh()).angle;
-                assert!((shown.speed - ahead / 1e-6).abs() < 1e-8);
+                assert!((reading.speed - ahead / 1e-6).abs() < 1e-8);
             }
         }
     }
@@ -245,8 +245,8 @@ mod tests {
     #[test]
     fn an_open_sine_winding_shows_multiples_of_half_a_turn() {
         let r = resolver(&[(P::SineOpen, 1.0)]);
-        for (theta, shown) in [(0.4, 0.0), (1.2, 0.0), (2.0, PI), (4.0, PI), (5.0, 2.0 * PI), (-2.0, -PI)] {
-            assert!((r.read(theta, 1.0, &mut fresh()).angle - shown).abs() < 0.01, "{theta}");
+        for (theta, reading) in [(0.4, 0.0), (1.2, 0.0), (2.0, PI), (4.0, PI), (5.0, 2.0 * PI), (-2.0, -PI)] {
+            assert!((r.read(theta, 1.0, &mut fresh()).angle - reading).abs() < 0.01, "{theta}");
         }
         let crossing = r.read(FRAC_PI_2, 100.0, &mut fresh());
         assert_eq!(crossing.speed, 6_283.185_307_179_586);
@@ -254,36 +254,36 @@ mod tests {
 
     #[test]
     fn a_weaker_excitation_turns_no_angle_until_the_signal_is_lost() {
-        let mut held = fresh();
-        let weak = resolver(&[(P::ExcitationShort, 0.29)]).read(1.0, 3.0, &mut held);
+        let mut memory = fresh();
+        let weak = resolver(&[(P::ExcitationShort, 0.29)]).read(1.0, 3.0, &mut memory);
         assert_eq!((weak.angle, weak.speed), (1.0, 3.0));
-        let lost = resolver(&[(P::ExcitationShort, 0.31)]).read(2.0, 3.0, &mut held);
+        let lost = resolver(&[(P::ExcitationShort, 0.31)]).read(2.0, 3.0, &mut memory);
         assert_eq!((lost.angle, lost.speed), (1.0, 0.0));
-        let both = resolver(&[(P::SineOpen, 1.0), (P::CosineOpen, 1.0)]).read(2.0, 3.0, &mut held);
+        let both = resolver(&[(P::SineOpen, 1.0), (P::CosineOpen, 1.0)]).read(2.0, 3.0, &mut memory);
         assert_eq!((both.angle, both.speed), (1.0, 0.0));
     }
 
     #[test]
     fn a_stuck_reading_holds_and_comes_back_true() {
         let (free, stuck) = (resolver(&[]), resolver(&[(P::Stuck, 1.0)]));
-        let mut held = fresh();
-        free.read(1.0, 3.0, &mut held);
-        let shown = stuck.read(5.0, 7.0, &mut held);
-        assert_eq!((shown.angle, shown.speed), (1.0, 3.0));
-        let again = free.read(6.0, 8.0, &mut held);
+        let mut memory = fresh();
+        free.read(1.0, 3.0, &mut memory);
+        let reading = stuck.read(5.0, 7.0, &mut memory);
+        assert_eq!((reading.angle, reading.speed), (1.0, 3.0));
+        let again = free.read(6.0, 8.0, &mut memory);
         assert_eq!((again.angle, again.speed), (6.0, 8.0));
     }
 
     #[test]
     fn noise_is_added_to_a_live_reading() {
         let noise = [(P::NoiseDeviation, 1e-3), (P::SpeedNoiseDeviation, 0.5)];
-        let shown = resolver(&noise).disturbed(Reading { angle: 0.3, position: 0.4, speed: 3.0 }, [2.0, -1.0]);
-        assert!((shown.angle - 0.302).abs() < 1e-15 && (shown.position - 0.402).abs() < 1e-15);
-        assert_eq!(shown.speed, 2.5);
-        for held in [P::PowerOff, P::Stuck] {
-            let shown =
-                resolver(&[noise[0], noise[1], (held, 1.0)]).disturbed(Reading { angle: 0.3, position: 0.4, speed: 0.0 }, [2.0, -1.0]);
-            assert_eq!((shown.angle, shown.position, shown.speed), (0.3, 0.4, 0.0));
+        let reading = resolver(&noise).disturbed(Reading { angle: 0.3, position: 0.4, speed: 3.0 }, [2.0, -1.0]);
+        assert!((reading.angle - 0.302).abs() < 1e-15 && (reading.position - 0.402).abs() < 1e-15);
+        assert_eq!(reading.speed, 2.5);
+        for memory in [P::PowerOff, P::Stuck] {
+            let reading =
+                resolver(&[noise[0], noise[1], (memory, 1.0)]).disturbed(Reading { angle: 0.3, position: 0.4, speed: 0.0 }, [2.0, -1.0]);
+            assert_eq!((reading.angle, reading.position, reading.speed), (0.3, 0.4, 0.0));
         }
     }
 }

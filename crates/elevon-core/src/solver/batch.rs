@@ -81,7 +81,7 @@ fn run_width<W: Wiring>(width: Width, runs: &[&RunSpec], clocks: &[Clock], recor
     with_lanes!(width.of(runs.len()), Lanes => run_block::<W, Lanes>(runs, clocks, recorded, monitor))
 }
 
-/// The runs of one block. What panics in company is run alone: a defect may cost the runs that show it, no others.
+/// The runs of one block. What panics in company is run alone: a defect may cost the runs that have it, no others.
 fn run_caught<W: Wiring>(width: Width, runs: &[&RunSpec], clocks: &[Clock], recorded: &[usize], monitor: &Monitor) -> Vec<RunOutput> {
     let work = || run_width::<W>(width, runs, clocks, recorded, monitor);
     match (catch_unwind(AssertUnwindSafe(work)), runs) {

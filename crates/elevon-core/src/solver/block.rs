@@ -36,7 +36,7 @@ pub struct Block<'a, W: Wiring, S: Scalar, L: Lift<S>> {
     pub(super) clocks: &'a [Clock],
     structure: W::Structure,
     /// The recorded signals.
-    asked: Signals,
+    selection: Signals,
     pub(super) dt: f64,
     steps: Steps,
     /// The step that comes next.
@@ -99,7 +99,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             stopped: vec![None; runs.len()],
             last: vec![Vec::new(); runs.len()],
             structure,
-            asked: Signals::of(recorded),
+            selection: Signals::of(recorded),
             wall: 0.0,
         };
         block.begin(runs);
@@ -261,7 +261,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             return;
         }
         for chunk in 0..self.states.len() {
-            self.observe(chunk, k, self.asked, out);
+            self.observe(chunk, k, self.selection, out);
             let lost = S::vectorize(Record::<S, L> {
                 observed: out,
                 clocks: self.clocks,
@@ -288,7 +288,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         }
     }
 
-    pub(super) fn observe(&self, chunk: usize, k: Steps, asked: Signals, out: &mut [S]) {
+    pub(super) fn observe(&self, chunk: usize, k: Steps, selection: Signals, out: &mut [S]) {
         let t = k as f64 * self.dt;
         S::vectorize(Observe::<W, S> {
             structure: &self.structure,
@@ -296,7 +296,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             inputs: &self.inputs[chunk],
             state: &self.states[chunk],
             t,
-            asked,
+            selection,
             out,
         });
     }

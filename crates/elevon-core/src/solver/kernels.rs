@@ -83,7 +83,7 @@ pub(super) struct Observe<'a, W: Wiring, S: Scalar> {
     pub inputs: &'a Inputs<S>,
     pub state: &'a W::State<S>,
     pub t: f64,
-    pub asked: Signals,
+    pub selection: Signals,
     pub out: &'a mut [S],
 }
 
@@ -91,7 +91,7 @@ impl<W: Wiring, S: Scalar> Kernel for Observe<'_, W, S> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        W::observe(self.structure, self.model, self.inputs, self.state, S::splat(self.t), self.asked, self.out);
+        W::observe(self.structure, self.model, self.inputs, self.state, S::splat(self.t), self.selection, self.out);
     }
 }
 

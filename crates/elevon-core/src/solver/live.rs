@@ -44,7 +44,7 @@ pub trait Live: Send + Sync {
     fn copy(&self) -> Box<dyn Live>;
 }
 
-/// Lanes of runs and what they were asked.
+/// Lanes of runs and their specification.
 struct Session<W: Wiring, S: Scalar> {
     block: Block<'static, W, S, Plain>,
     runs: Vec<RunSpec>,

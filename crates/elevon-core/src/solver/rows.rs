@@ -40,7 +40,7 @@ pub(super) struct Rows<S> {
 }
 
 impl<S: Scalar> Rows<S> {
-    /// For the lanes `first..first + S::LANES`, of which those from `real` on are padding; room for a run of `steps`.
+    /// For the lanes `first..first + S::LANES`, of which those from `real` on are padding; capacity for a run of `steps`.
     pub fn new<L: Lift<S>>(first: usize, real: usize, clocks: &[Clock], faults: &FaultLanes, steps: Steps, lift: &L) -> Self {
         let all = first..first + S::LANES;
         let labels: Vec<usize> = all.clone().map(|lane| faults.count(lane)).collect();
@@ -50,7 +50,7 @@ impl<S: Scalar> Rows<S> {
             let summing = clock.features.as_ref().map(|plan| Summing::new(plan, clock.signals.len(), S::LANES, SUMMED));
             let kept = if summing.is_some() { 0 } else { (steps / clock.period + 1) as usize };
             let labelled = if summing.is_some() { 0 } else { most_labels };
-            let room = |(labels, &ended): (&usize, &bool)| if ended { 0 } else { kept * (clock.signals.len() + labels) * lift.width() };
+            let capacity = |(labels, &ended): (&usize, &bool)| if ended { 0 } else { kept * (clock.signals.len() + labels) * lift.width() };
             let columns = clock.signals.len() + labelled;
             let most = if summing.is_some() { SUMMED } else { (GATHERED / columns.max(1)).max(1) };
             Table {
@@ -58,7 +58,7 @@ impl<S: Scalar> Rows<S> {
                 most,
                 labels: labelled,
                 gathered: Vec::with_capacity(most.min((steps / clock.period + 1) as usize) * columns),
-                lanes: labels.iter().zip(&ended).map(|lane| Vec::with_capacity(room(lane))).collect(),
+                lanes: labels.iter().zip(&ended).map(|lane| Vec::with_capacity(capacity(lane))).collect(),
                 summing,
             }
         };
@@ -100,7 +100,7 @@ impl<S: Scalar> Rows<S> {
         gathered.clear();
     }
 
-    /// Ends the lanes whose row of `clock` is not all numbers, and says in which signal each of them is not.
+    /// Ends the lanes whose row of `clock` is not all numbers, and states in which signal each of them is not.
     #[inline(never)]
     pub fn lose<L: Lift<S>>(&mut self, clock: &Clock, observed: &[S], lift: &L, lost: &mut Vec<(usize, usize)>) {
         for lane in 0..S::LANES {

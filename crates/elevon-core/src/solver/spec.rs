@@ -1,4 +1,4 @@
-//! What a run is asked and what it answers.
+//! Specification and outcome of a run.
 
 use crate::command::SourcePlan;
 use crate::fault::FaultSpec;

@@ -13,11 +13,11 @@ variables! {
         Total => "total", "2 BLK", "rad", NonNegative, Plant, None, "total backlash, twice the half amplitude BLK of the papers";
         Extra => "extra", "-", "rad", NonNegative, Plant, Some(0.0), "healthy 0; backlash added by wear";
         Model => "model", "-", "1", Choice(BacklashModel::NAMES), Plant, Some(0.0), "the backlash operator, or two masses with an elastic, damped dead zone",
-            high_only("it keeps the backlash operator: two masses on a contact need the steps of the high one");
+            high_only("it keeps the backlash operator: two masses on a contact need the steps of the switching model");
         Stiffness => "stiffness", "K", "N m/rad", Positive, Plant, Some(1e4), "contact stiffness at the output (elastic model)",
-            high_only("it keeps the backlash operator: two masses on a contact need the steps of the high one").when(&[Chosen("backlash.model", &["elastic"])]);
+            high_only("it keeps the backlash operator: two masses on a contact need the steps of the switching model").when(&[Chosen("backlash.model", &["elastic"])]);
         Damping => "damping", "C", "N m s/rad", NonNegative, Plant, Some(0.0), "contact damping at the output (elastic model)",
-            high_only("it keeps the backlash operator: two masses on a contact need the steps of the high one").when(&[Chosen("backlash.model", &["elastic"])]);
+            high_only("it keeps the backlash operator: two masses on a contact need the steps of the switching model").when(&[Chosen("backlash.model", &["elastic"])]);
     }
 }
 

@@ -1,13 +1,13 @@
 //! The motor's bearing with a local defect, a worn cage, or more radial load than it was measured with
 //! (docs/theory/friction.md, "Bearings").
 //!
-//! Balls pass a defect as often as the geometry says (gamma = d/D cos alpha, Z balls, per turn of the shaft): outer ring
+//! Balls pass a defect as often as the geometry states (gamma = d/D cos alpha, Z balls, per turn of the shaft): outer ring
 //! Z/2 (1 - gamma), inner ring Z/2 (1 + gamma), a ball's defect on both rings D/d (1 - gamma^2), the cage turns
 //! (1 - gamma)/2. At each pass a loaded ball falls into the defect and is driven out again: a well of energy Q delta, of
 //! which half is lost on the far edge. The bearing's friction when healthy is part of the measured friction of the shaft.
 
 use crate::scalar::Scalar;
-use crate::variable::Own;
+use crate::variable::View;
 use crate::variables;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -112,8 +112,8 @@ pub struct BearingTorque<S> {
 
 impl<S: Scalar> Bearing<S> {
     /// Is there any?
-    pub fn needed(own: &Own<BearingParameter>) -> bool {
-        own.any_away([
+    pub fn needed(view: &View<BearingParameter>) -> bool {
+        view.any_away([
             BearingParameter::OuterDefect,
             BearingParameter::InnerDefect,
             BearingParameter::BallDefect,
@@ -247,7 +247,7 @@ mod tests {
         assert!((friction - 0.5 * force * drop * order / TAU).abs() < 1e-15);
     }
 
-    /// As many pulses in many turns as the order says, and stronger under load.
+    /// As many pulses in many turns as the order states, and stronger under load.
     #[test]
     fn passes_are_counted_by_the_order_and_grow_with_the_load() {
         for (p, i) in [(P::OuterDefect, 0), (P::InnerDefect, 1), (P::BallDefect, 2)] {

@@ -42,7 +42,7 @@ impl<S: Scalar> Brake<S> {
         free * self.works
     }
 
-    /// Resistive torque; `free` is 1 while the coil holds the spring back. What drags drags behind the spring, too.
+    /// Resistive torque; `free` is 1 while the coil holds the spring back. The residual torque acts behind the spring, too.
     #[inline(always)]
     pub fn torque(&self, free: S) -> S {
         S::select(S::splat(0.5).lt(self.open(free)), self.drag, self.drag.maximum(self.torque))

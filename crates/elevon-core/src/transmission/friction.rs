@@ -1,7 +1,7 @@
 //! Borello's dry friction with exact stick (T2; reference sheet 1.6) and viscous friction.
 
 use crate::scalar::Scalar;
-use crate::variable::Own;
+use crate::variable::View;
 use crate::variables;
 
 variables! {
@@ -55,13 +55,13 @@ impl<S: Scalar> Friction<S> {
     }
 
     /// Does the viscous coefficient change with the speed?
-    pub fn sloped(own: &Own<FrictionParameter>) -> bool {
-        own.away(FrictionParameter::ViscousSlope)
+    pub fn sloped(view: &View<FrictionParameter>) -> bool {
+        view.away(FrictionParameter::ViscousSlope)
     }
 
     /// Does the dry friction differ between the directions?
-    pub fn directed(own: &Own<FrictionParameter>) -> bool {
-        own.away(FrictionParameter::ReverseScale)
+    pub fn directed(view: &View<FrictionParameter>) -> bool {
+        view.away(FrictionParameter::ReverseScale)
     }
 
     /// Dry friction, at rest and moving, in the direction of motion, or of the `active` torque that would start it.
@@ -73,8 +73,8 @@ impl<S: Scalar> Friction<S> {
     }
 
     /// Does the mechanism ever seize?
-    pub fn jams(own: &Own<FrictionParameter>) -> bool {
-        own.away(FrictionParameter::JamTorque)
+    pub fn jams(view: &View<FrictionParameter>) -> bool {
+        view.away(FrictionParameter::JamTorque)
     }
 
     /// Static over dynamic dry friction, 1 where there is none: what else is dry sticks as much above its dynamic value.
@@ -99,21 +99,21 @@ impl<S: Scalar> Friction<S> {
     /// Dry friction at `speed` under the `active` torque: at rest it holds what it can.
     #[inline(always)]
     pub fn dry_torque(active: S, speed: S, static_limit: S, dynamic: S) -> S {
-        let held = active.clamp_abs(static_limit);
-        S::select(speed.equals(S::zero()), held, speed.signed(dynamic))
+        let sticking = active.clamp_abs(static_limit);
+        S::select(speed.equals(S::zero()), sticking, speed.signed(dynamic))
     }
 
     /// Torque left to accelerate. `active` is what would move the shaft from rest, `resist` what opposes it when it moves
     /// (loads, dynamic dry and viscous friction): two early sums, so that the motor torque enters last.
     #[inline(always)]
     pub fn net_torque(torque: S, load: S, resist: S, speed: S, static_limit: S) -> S {
-        let rest = speed.equals(S::zero());
-        if !S::any(rest) {
+        let at_rest = speed.equals(S::zero());
+        if !S::any(at_rest) {
             return torque - resist;
         }
         let active = torque - load;
         let from_rest = active - active.clamp_abs(static_limit);
-        S::select(rest, from_rest, torque - resist)
+        S::select(at_rest, from_rest, torque - resist)
     }
 
     /// Seizes where the output first reaches the jam's position while the jam is there; one that is gone holds nothing.

@@ -2,7 +2,7 @@
 
 use crate::scalar::Scalar;
 use crate::transmission::stop::Stop;
-use crate::variable::Own;
+use crate::variable::View;
 use crate::variables;
 
 variables! {
@@ -69,8 +69,8 @@ impl<S: Scalar> Gear<S> {
     }
 
     /// Does a load add to the friction?
-    pub fn loaded(own: &Own<GearParameter>) -> bool {
-        own.any_away([GearParameter::Efficiency, GearParameter::EfficiencyAiding])
+    pub fn loaded(view: &View<GearParameter>) -> bool {
+        view.any_away([GearParameter::Efficiency, GearParameter::EfficiencyAiding])
     }
 
     /// Friction that an output torque adds on the motor shaft (Borello and Dalla Vedova 2006). `direction` is the

@@ -9,7 +9,7 @@ variables! {
     LockParameter, LOCK {
         Travel => "travel", "s_max", "m", Positive, Plant, None, "nut travel beyond the stroke";
         EngageTravel => "engage_travel", "s_on", "m", Positive, Plant, None, "travel at which the segments are supported: locked";
-        ReleaseTravel => "release_travel", "s_off", "m", Positive, Plant, None, "travel on the way back at which they let go";
+        ReleaseTravel => "release_travel", "s_off", "m", Positive, Plant, None, "travel, moving back, at which they let go";
         SpringForce => "spring_force", "F_0", "N", NonNegative, Plant, None, "sleeve spring at the end of the stroke, pushing the nut on";
         SpringRate => "spring_rate", "k", "N/m", NonNegative, Plant, None, "loss of spring force over the travel";
         SpringScale => "spring_scale", "-", "1", Unit, Plant, Some(1.0), "healthy 1; less: the sleeve spring is weak";
@@ -62,8 +62,8 @@ impl<S: Scalar> Lock<S> {
     /// Locked (1) or not after a step at `travel`.
     #[inline(always)]
     pub fn engaged(&self, before: S, travel: S) -> S {
-        let held = S::select(travel.le(self.release) & self.stuck.lt(S::splat(0.5)), S::zero(), before);
-        S::select(self.engage.le(travel), S::one(), held)
+        let before_end = S::select(travel.le(self.release) & self.stuck.lt(S::splat(0.5)), S::zero(), before);
+        S::select(self.engage.le(travel), S::one(), before_end)
     }
 
     /// Does a stuck lock hold the nut back at this travel?

@@ -1,12 +1,12 @@
 //! Ball screw: efficiencies, preload, blocked return channels, starved and contaminated lubrication, spalls
 //! (docs/theory/ballscrew.md, "Screw" and "Faults").
 //!
-//! A set gives the two efficiencies; they mean a friction coefficient on the inclined plane of the thread. Faults add
-//! to that coefficient, and the efficiencies follow. With nothing added the set's own numbers are used unchanged.
+//! An actuator file gives the two efficiencies; they mean a friction coefficient on the inclined plane of the thread. Faults add
+//! to that coefficient, and the efficiencies follow. With nothing added the file's numbers are used unchanged.
 
 use crate::scalar::Scalar;
 use crate::three;
-use crate::variable::Own;
+use crate::variable::View;
 use crate::variables;
 use std::f64::consts::{PI, TAU};
 
@@ -80,7 +80,7 @@ const DEBRIS_FRICTION: f64 = 0.5;
 /// A load of 2^(3/2) times the preload relieves one half of a double nut altogether: with Hertz' deflection Q^(2/3) of both
 /// halves held together, Q_A^(2/3) + Q_B^(2/3) = 2 F_pr^(2/3), Q_A - Q_B = F.
 const RELIEF: f64 = 2.0 * std::f64::consts::SQRT_2;
-/// Q_B / F_pr = y^(3/2) q(y^(1/2)), y = 1 - F / (2^(3/2) F_pr): coefficients of q, ascending; off by 4e-5 at most.
+/// Q_B / F_pr = y^(3/2) q(y^(1/2)), y = 1 - F / (2^(3/2) F_pr): coefficients of q, ascending; within 4e-5.
 const RELIEVED: [f64; 5] = [1.53960, -1.19476, 1.13376, -0.67106, 0.19246];
 
 /// One defect that balls pass.
@@ -100,7 +100,7 @@ pub struct Screw<S> {
     pub efficiency_aiding: S,
     /// Friction torque of the preload on the motor shaft without load; under load the relieved half's share of it is left.
     pub preload_torque: S,
-    /// Factor on the viscous friction: starved grease drags less.
+    /// Factor on the viscous friction: starved grease resists less.
     pub viscous: S,
     /// Spread of the dry friction under debris.
     pub scatter: S,
@@ -162,16 +162,16 @@ impl<S: Scalar> Screw<S> {
     }
 
     /// Do balls pass a spall?
-    pub fn preloaded(own: &Own<ScrewParameter>) -> bool {
-        own.away(ScrewParameter::Preload)
+    pub fn preloaded(view: &View<ScrewParameter>) -> bool {
+        view.away(ScrewParameter::Preload)
     }
-    pub fn spalled(own: &Own<ScrewParameter>) -> bool {
-        own.any_away([ScrewParameter::SpallGroove, ScrewParameter::SpallNut, ScrewParameter::SpallBall])
+    pub fn spalled(view: &View<ScrewParameter>) -> bool {
+        view.any_away([ScrewParameter::SpallGroove, ScrewParameter::SpallNut, ScrewParameter::SpallBall])
     }
 
     /// Does debris scatter the friction?
-    pub fn contaminated(own: &Own<ScrewParameter>) -> bool {
-        own.away(ScrewParameter::Debris)
+    pub fn contaminated(view: &View<ScrewParameter>) -> bool {
+        view.away(ScrewParameter::Debris)
     }
 
     /// `gear` is the ratio of a gearbox between motor and screw.

@@ -21,11 +21,11 @@ impl<S: Scalar> Stop<S> {
     /// outwards, all of it as soon as it pushes inwards.
     #[inline(always)]
     pub fn react(&self, position: S, speed: S, net: S) -> S {
-        let rest = speed.equals(S::zero());
-        if !S::any(rest) {
+        let at_rest = speed.equals(S::zero());
+        if !S::any(at_rest) {
             return net;
         }
-        S::select(rest & self.outwards(position, net), S::zero(), net)
+        S::select(at_rest & self.outwards(position, net), S::zero(), net)
     }
 
     /// Position and speed after a step: what passed a stop is put back to it, at rest (the impact is inelastic).
@@ -35,8 +35,8 @@ impl<S: Scalar> Stop<S> {
         if !S::any(above | below) {
             return (position, speed);
         }
-        let held = S::select(above, self.upper, S::select(below, self.lower, position));
-        (held, S::select(above | below, S::zero(), speed))
+        let limited = S::select(above, self.upper, S::select(below, self.lower, position));
+        (limited, S::select(above | below, S::zero(), speed))
     }
 }
 

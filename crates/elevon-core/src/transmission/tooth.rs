@@ -7,7 +7,7 @@
 //! that lag: the torque ripple of the transmission error.
 
 use crate::scalar::Scalar;
-use crate::variable::Own;
+use crate::variable::View;
 use crate::variables;
 use std::f64::consts::{PI, TAU};
 
@@ -43,8 +43,8 @@ pub struct Lag<S> {
 
 impl<S: Scalar> Teeth<S> {
     /// Is there any?
-    pub fn needed(own: &Own<ToothParameter>) -> bool {
-        own.any_away([ToothParameter::ToothWear, ToothParameter::ToothChip])
+    pub fn needed(view: &View<ToothParameter>) -> bool {
+        view.any_away([ToothParameter::ToothWear, ToothParameter::ToothChip])
     }
 
     pub fn derive(raw: &[S]) -> Self {
@@ -138,7 +138,7 @@ mod tests {
         }
     }
 
-    /// Whichever way the load pushes, the flank yields: no work over a mesh.
+    /// Whichever direction the load pushes, the flank yields: no work over a mesh.
     #[test]
     fn the_ripple_does_no_work_over_a_mesh() {
         let t = teeth(&[(P::ToothWear, 3e-4)]);

@@ -2,7 +2,7 @@
 //! one resonance of the structure, a second-order system with a state of its own.
 
 use crate::scalar::Scalar;
-use crate::variable::Own;
+use crate::variable::View;
 use crate::{choices, variables};
 
 choices! {
@@ -43,7 +43,7 @@ pub struct VibrationState<S> {
 }
 
 impl<S: Scalar> VibrationState<S> {
-    pub fn rest() -> Self {
+    pub fn initial() -> Self {
         Self { displacement: S::zero(), speed: S::zero(), acceleration: S::zero() }
     }
 }
@@ -55,8 +55,8 @@ impl<S: Scalar> Vibration<S> {
         Self { stiffness: zero, damping: zero, per_mass: zero, per_approach: zero, teeth: zero, ripple: zero }
     }
 
-    pub fn needed(own: &Own<VibrationParameter>) -> bool {
-        VibrationModel::read(own.value(VibrationParameter::Model)) != VibrationModel::Off
+    pub fn needed(view: &View<VibrationParameter>) -> bool {
+        VibrationModel::read(view.value(VibrationParameter::Model)) != VibrationModel::Off
     }
 
     pub fn derive(raw: &[S]) -> Self {
@@ -103,7 +103,7 @@ mod tests {
     /// Amplitude of the acceleration under a unit force of a frequency, after the start has died away.
     fn response(hertz: f64) -> f64 {
         let (mode, dt) = (mode(), 1e-6);
-        let mut state = VibrationState::rest();
+        let mut state = VibrationState::initial();
         let (mut sine, mut cosine) = (0.0, 0.0);
         let (begin, end) = (200_000, 300_000);
         for k in 0..end {

@@ -19,7 +19,7 @@ pub enum When {
     /// The two numbers differ.
     Differ(&'static str, &'static str),
     Either(&'static [When]),
-    /// Asked of one fidelity only.
+    /// Required of one fidelity only.
     In(Fidelity, &'static [When]),
 }
 
@@ -35,12 +35,12 @@ pub struct Acts {
 /// In both fidelities, whatever the other parameters are.
 pub const ALWAYS: Acts = Acts { not_modelled: [""; 2], when: &[] };
 
-/// In the high fidelity only, and why not in the low one.
+/// In the switching model only, and why not in the reduced-order model.
 pub const fn high_only(reason: &'static str) -> Acts {
     Acts { not_modelled: ["", reason], when: &[] }
 }
 
-/// In the low fidelity only, and why not in the high one.
+/// In the reduced-order model only, and why not in the switching model.
 pub const fn low_only(reason: &'static str) -> Acts {
     Acts { not_modelled: [reason, ""], when: &[] }
 }
@@ -81,12 +81,12 @@ pub fn records(groups: &[Group]) -> impl Iterator<Item = (String, &'static Varia
 }
 
 impl Standing<'_> {
-    /// The place and record of a path; without writing out the paths of all records, since every run asks.
+    /// The place and record of a path; without writing out the paths of all records, since every run needs it.
     fn find(&self, path: &str) -> Option<(usize, &'static Variable)> {
         let mut begin = 0;
         for group in self.groups {
-            let rest = if group.prefix.is_empty() { Some(path) } else { path.strip_prefix(group.prefix).and_then(|p| p.strip_prefix('.')) };
-            if let Some(i) = rest.and_then(|rest| group.variables.iter().position(|v| v.path == rest)) {
+            let tail = if group.prefix.is_empty() { Some(path) } else { path.strip_prefix(group.prefix).and_then(|p| p.strip_prefix('.')) };
+            if let Some(i) = tail.and_then(|tail| group.variables.iter().position(|v| v.path == tail)) {
                 return Some((begin + i, &group.variables[i]));
             }
             begin += group.variables.len();
@@ -180,14 +180,14 @@ mod tests {
     use super::*;
     use crate::registry::KINDS;
 
-    /// Paths and names that a condition asks for.
-    fn asked(all: &[When], out: &mut Vec<(&'static str, &'static [&'static str])>) {
+    /// Paths and names that a condition names.
+    fn paths(all: &[When], out: &mut Vec<(&'static str, &'static [&'static str])>) {
         for one in all {
             match *one {
                 When::Chosen(path, names) => out.push((path, names)),
                 When::Away(path, _) => out.push((path, &[])),
                 When::Differ(a, b) => out.extend([(a, &[] as &[&str]), (b, &[])]),
-                When::Either(more) | When::In(_, more) => asked(more, out),
+                When::Either(more) | When::In(_, more) => paths(more, out),
             }
         }
     }
@@ -197,7 +197,7 @@ mod tests {
     fn conditions_ask_for_what_exists() {
         let every: Vec<_> = KINDS.iter().flat_map(|k| records(k.fidelities[0].1.groups()).collect::<Vec<_>>()).collect();
         let mut conditions = Vec::new();
-        every.iter().for_each(|(_, v)| asked(v.acts.when, &mut conditions));
+        every.iter().for_each(|(_, v)| paths(v.acts.when, &mut conditions));
         assert!(!conditions.is_empty());
         for (path, names) in conditions {
             let found = every.iter().find(|(p, _)| p == path);

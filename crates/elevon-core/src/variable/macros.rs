@@ -60,7 +60,7 @@ macro_rules! choices {
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         #[repr(u8)]
         pub enum $id { $($variant),* }
-        // Not every choice is asked for both by name and by index.
+        // Not every choice is looked up both by name and by index.
         #[allow(dead_code)]
         impl $id {
             pub const NAMES: &'static [&'static str] = &[$($name),*];
@@ -148,8 +148,8 @@ macro_rules! groups {
         // Some components are always there.
         #[allow(dead_code)]
         impl<'a> Parts<'a> {
-            $(pub fn $view(self) -> $crate::variable::Own<'a, $id> {
-                $crate::variable::Own::new(Raw(self.0.raw).$view(), Raw(self.0.touched).$view())
+            $(pub fn $view(self) -> $crate::variable::View<'a, $id> {
+                $crate::variable::View::new(Raw(self.0.raw).$view(), Raw(self.0.touched).$view())
             })*
         }
 
@@ -188,8 +188,8 @@ macro_rules! groups {
         // Some components are always there.
         #[allow(dead_code)]
         impl<'a> Parts<'a> {
-            $(pub fn $more(self) -> $crate::variable::Own<'a, $id> {
-                $crate::variable::Own::new($more(self.0.raw), $more(self.0.touched))
+            $(pub fn $more(self) -> $crate::variable::View<'a, $id> {
+                $crate::variable::View::new($more(self.0.raw), $more(self.0.touched))
             })*
         }
 

@@ -1,4 +1,4 @@
-//! What a signal is to its actuator, whatever its name: logs, calibration and diagnosis ask for roles.
+//! What a signal is to its actuator, whatever its name: logs, calibration and diagnosis request roles.
 
 /// Declares the roles: variant, name, SI units that a signal in this role may have, and what it is.
 macro_rules! roles {
@@ -27,8 +27,8 @@ macro_rules! roles {
 }
 
 roles! {
-    Command "command" ["rad", "m", "rad/s", "N m", "1"] "what is asked of the actuator: position, speed or torque by its mode, or the state to go to";
-    OutputPosition "output_position" ["rad", "m"] "position of the output, as its sensor shows it";
+    Command "command" ["rad", "m", "rad/s", "N m", "1"] "what is commanded of the actuator: position, speed or torque by its mode, or the state to go to";
+    OutputPosition "output_position" ["rad", "m"] "position of the output, as its sensor reports it";
     OutputSpeed "output_speed" ["rad/s", "m/s"] "speed of the output";
     MotorPosition "motor_position" ["rad"] "angle of the motor's shaft";
     MotorSpeed "motor_speed" ["rad/s"] "speed of the motor's shaft";
@@ -47,7 +47,7 @@ roles! {
     SupplyVoltage "supply_voltage" ["V"] "voltage of the DC link";
     SupplyCurrent "supply_current" ["A"] "current drawn from the source";
     Load "load" ["N m", "N"] "load on the output";
-    LoadCell "load_cell" ["N m", "N"] "what a load cell between actuator and load or brake shows";
+    LoadCell "load_cell" ["N m", "N"] "what a load cell between actuator and load or brake reports";
     Brake "brake" ["N m", "N"] "what a brake can oppose";
     Temperature "temperature" ["K"] "temperature of the winding";
     SurfaceTemperature "surface_temperature" ["K"] "temperature of the motor's surface";
@@ -63,7 +63,7 @@ roles! {
     BrakeReleased "brake_released" ["1"] "1 while the brake is open";
     Locked "locked" ["1"] "1 while a lock is engaged";
     State "state" ["1"] "state of the control unit";
-    FaultCode "fault_code" ["1"] "fault that the control unit shows";
+    FaultCode "fault_code" ["1"] "fault that the control unit reports";
     Trigger "trigger" ["1"] "edge that starts another recorder";
     Vibration "vibration" ["m/s2"] "acceleration at the actuator's structure";
     Transitions "leg_transitions" ["1"] "count of the bridge's leg transitions since some instant";

@@ -24,7 +24,7 @@ pub fn catalogue() -> Vec<FaultKind> {
     };
     let mut all = common(LINEAR);
     for fault in &mut all {
-        fault.effect = told_apart(fault.kind).unwrap_or(fault.effect);
+        fault.effect = distinction(fault.kind).unwrap_or(fault.effect);
     }
     all.extend([
         FaultKind {
@@ -54,7 +54,7 @@ pub fn catalogue() -> Vec<FaultKind> {
         FaultKind {
             kind: "adapter_gap", unit: "m", range: Range::Between(0.0, 5e-3), attributes: &[],
             places: places!("adapter": "backlash.extra" Add),
-            effect: "gap of the backlash adapter between load cell and ram, the stand's way to seed backlash: impacts at each reversal; `backlash` is the same lost motion of worn parts",
+            effect: "gap of the backlash adapter between load cell and ram, the stand's means to seed backlash: impacts at each reversal; `backlash` is the same lost motion of worn parts",
             source: "N 4.1",
         },
     ]);
@@ -62,7 +62,7 @@ pub fn catalogue() -> Vec<FaultKind> {
 }
 
 /// Sentences for kinds of the common catalogue that have a namesake among the screw's own.
-fn told_apart(kind: &str) -> Option<&'static str> {
+fn distinction(kind: &str) -> Option<&'static str> {
     match kind {
         "jam" => Some("torque on the motor shaft at which the whole mechanism seizes; a blocked return channel of the nut is `return_jam`"),
         "lubrication" => Some("fraction added to the viscous drag (negative: thinner lubricant); a screw that loses its lubricant is `lubrication_loss`"),

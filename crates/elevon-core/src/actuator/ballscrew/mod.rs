@@ -75,7 +75,7 @@ impl Form for Ballscrew {
     }
 }
 
-/// The ballscrew actuator at high fidelity.
+/// The switching model of the ballscrew actuator.
 pub type High = super::servo::High<Ballscrew>;
-/// The ballscrew actuator at low fidelity: the printed L-R circuit.
+/// The reduced-order model of the ballscrew actuator: the printed L-R circuit.
 pub type Low = super::servo::Low<Ballscrew>;

@@ -107,7 +107,7 @@ const NUT: [Signal; 2] = [
     Signal { role: Some(Role::NutTemperature), ..signal("nut_temperature", "K", "temperature of the nut") },
     signal("heat_nut", "W", "friction heat that stays in the nut, mean of the network's last tick"),
 ];
-const HIGH_OWN: &[Signal] = &[
+const HIGH_SPECIFIC: &[Signal] = &[
     signal("ram_position", "m", "ram position, on the nut's side of the backlash"),
     signal("ram_speed", "m/s", "ram speed, on the nut's side of the backlash"),
     signal("load_friction_force", "N", "friction and damping of the load side, the brake's force included"),
@@ -119,10 +119,10 @@ const HIGH_OWN: &[Signal] = &[
     NUT[1],
     Signal {
         role: Some(Role::Vibration),
-        ..signal("vibration", "m/s2", "acceleration that the accelerometer on the screw's housing shows")
+        ..signal("vibration", "m/s2", "acceleration that the accelerometer on the screw's housing measures")
     },
 ];
-const LOW_OWN: &[Signal] = &[
+const LOW_SPECIFIC: &[Signal] = &[
     signal("ram_position", "m", "ram position, on the nut's side of the backlash"),
     signal("ram_speed", "m/s", "ram speed, on the nut's side of the backlash"),
     signal("screw_torque", "N m", "force through the nut, referred to the motor shaft without losses"),
@@ -134,7 +134,7 @@ const LOW_OWN: &[Signal] = &[
     NUT[1],
 ];
 
-pub const HIGH: &[Signal] = &extended::<{ signals::HIGH.len() + HIGH_OWN.len() }>(
+pub const HIGH: &[Signal] = &extended::<{ signals::HIGH.len() + HIGH_SPECIFIC.len() }>(
     signals::HIGH,
     &[
         change(H::Command as usize, "", "m", "command with its noise (m at the ram, rad/s or N m by the control mode)"),
@@ -146,22 +146,22 @@ pub const HIGH: &[Signal] = &extended::<{ signals::HIGH.len() + HIGH_OWN.len() }
             H::TransmissionTorque as usize,
             "joint_force",
             "N",
-            "force through the joint between ram and load: what the load cell shows",
+            "force through the joint between ram and load: what the load cell reports",
         ),
-        change(H::EncoderPosition as usize, "", "m", "load position the encoder shows"),
+        change(H::EncoderPosition as usize, "", "m", "load position the encoder reports"),
     ],
-    HIGH_OWN,
+    HIGH_SPECIFIC,
 );
-pub const LOW: &[Signal] = &extended::<{ signals::LOW.len() + LOW_OWN.len() }>(
+pub const LOW: &[Signal] = &extended::<{ signals::LOW.len() + LOW_SPECIFIC.len() }>(
     signals::LOW,
     &[
         change(L::Command as usize, "", "m", "command (m at the ram, rad/s or N m by the control mode)"),
         change(L::OutputPosition as usize, "", "m", "position of the load side"),
         change(L::OutputSpeed as usize, "", "m/s", "speed of the load side"),
         change(L::BrakeTorque as usize, "brake_force", "N", "force the brake can oppose on the load side"),
-        change(L::EncoderPosition as usize, "", "m", "load position the encoder shows"),
+        change(L::EncoderPosition as usize, "", "m", "load position the encoder reports"),
     ],
-    LOW_OWN,
+    LOW_SPECIFIC,
 );
 
 fn finding(path: &str, value: f64, limit: f64, message: String) -> Finding {

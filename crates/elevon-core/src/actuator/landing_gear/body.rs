@@ -3,7 +3,7 @@
 use super::layout::*;
 use super::mechanics::{Acting, Mechanics, Motion};
 use super::signals::{Quantity as Q, ENERGIES};
-use super::unit::{Shown, Unit};
+use super::unit::{PlantSignals, Unit};
 use crate::actuator::{Inputs, Setup};
 use crate::control::pi_rate::PiRateParameter;
 use crate::control::sequence::COMMANDS;
@@ -91,7 +91,7 @@ pub struct Body<S> {
     charge: S,
     /// Sum and largest magnitude of the line current since the last tick, and what they were then.
     line: [S; 2],
-    shown_line: [S; 2],
+    line_reading: [S; 2],
     cell_noise: S,
     /// Share of the lock's strength in use, at the last tick.
     pub lock_use: S,
@@ -151,7 +151,7 @@ impl<S: Scalar> Constants<S> {
             bus: zero,
             charge: zero,
             line: [zero; 2],
-            shown_line: [zero; 2],
+            line_reading: [zero; 2],
             cell_noise: zero,
             lock_use: zero,
             energy: [zero; 5],
@@ -171,7 +171,7 @@ impl<S: Scalar> Constants<S> {
         let speed = self.hall.speed(&s.hall, t);
         let counted = s.hall.count * self.hall.pitch * self.mechanics.travel;
         let bus = s.charge * self.per_control_period;
-        s.shown_line = [s.line[0] * self.dt * self.per_control_period, s.line[1]];
+        s.line_reading = [s.line[0] * self.dt * self.per_control_period, s.line[1]];
         s.line = [S::zero(); 2];
         let high = s.hall.code[0] + s.hall.code[1] + s.hall.code[2];
         if S::any(t.equals(S::zero())) {
@@ -179,7 +179,7 @@ impl<S: Scalar> Constants<S> {
             s.link = self.source(inputs, t);
         }
         for lane in 0..S::LANES {
-            let shown = Shown {
+            let plant = PlantSignals {
                 time: t.lane(lane),
                 command: command.lane(lane),
                 on_wheels: wheels.lane(lane),
@@ -188,7 +188,7 @@ impl<S: Scalar> Constants<S> {
                 speed: speed.lane(lane),
                 ram: s.motion.nut_position.lane(lane).min(self.mechanics.lever.stroke.lane(lane)),
                 locked: s.motion.locked.lane(lane),
-                line: s.shown_line[0].lane(lane),
+                line: s.line_reading[0].lane(lane),
                 counted: counted.lane(lane),
                 travel: self.mechanics.travel.lane(lane),
                 pitch: (self.hall.pitch * self.mechanics.travel).lane(lane),
@@ -198,7 +198,7 @@ impl<S: Scalar> Constants<S> {
                 rig: structure.rig,
                 nut_speed: s.motion.nut_speed.lane(lane),
             };
-            s.units[lane].tick(&self.raw[lane], &shown);
+            s.units[lane].tick(&self.raw[lane], &plant);
         }
         self.obey(s, inputs[OUTPUT].at(t), noise);
     }
@@ -275,9 +275,9 @@ impl<S: Scalar> Constants<S> {
         let number = S::splat(COMMANDS.len() as f64);
         out[Q::Command as usize] = S::select(number.le(command), command - number, command);
         out[Q::MotorTorque as usize] = torque;
-        s.show_units(out);
-        self.show_electric(s, out);
-        self.show_motion(structure, s, inputs[OUTPUT].at(t), out);
+        s.write_units(out);
+        self.write_electric(s, out);
+        self.write_motion(structure, s, inputs[OUTPUT].at(t), out);
         for (i, x) in s.energy.iter().enumerate() {
             out[Q::EnergySupply as usize + i] = *x;
         }
@@ -288,15 +288,15 @@ impl<S: Scalar> Constants<S> {
         out[Q::EnergyCapacitor as usize] = S::splat(0.5) * self.supply.capacitance * s.link * s.link;
     }
 
-    fn show_electric(&self, s: &Body<S>, out: &mut [S]) {
+    fn write_electric(&self, s: &Body<S>, out: &mut [S]) {
         let mut set = |q: Q, x: S| out[q as usize] = x;
         set(Q::VoltageRef, s.demand);
         set(Q::Duty, self.duty(s));
         set(Q::CurrentBus, s.bus);
         set(Q::CurrentSource, s.flow.source);
         set(Q::SupplyVoltage, s.link);
-        set(Q::CurrentMean, s.shown_line[0]);
-        set(Q::CurrentPeak, s.shown_line[1]);
+        set(Q::CurrentMean, s.line_reading[0]);
+        set(Q::CurrentPeak, s.line_reading[1]);
         set(Q::HallA, s.hall.code[0]);
         set(Q::HallB, s.hall.code[1]);
         set(Q::HallC, s.hall.code[2]);
@@ -306,7 +306,7 @@ impl<S: Scalar> Constants<S> {
     }
 
     /// Motor, nut, ram and lever under the force `output` on the ram.
-    fn show_motion(&self, structure: &Structure, s: &Body<S>, output: S, out: &mut [S]) {
+    fn write_motion(&self, structure: &Structure, s: &Body<S>, output: S, out: &mut [S]) {
         let mut set = |q: Q, x: S| out[q as usize] = x;
         let m = &self.mechanics;
         set(Q::MotorPosition, s.motion.motor_position);
@@ -351,8 +351,8 @@ impl<S: Scalar> Body<S> {
         self.released = self.released.maximum(flag(&|u| u.sequence.released) * cable);
     }
 
-    /// What the control units show.
-    fn show_units(&self, out: &mut [S]) {
+    /// What the control units report.
+    fn write_units(&self, out: &mut [S]) {
         let mut set = |q: Q, x: S| out[q as usize] = x;
         let unit = |f: &dyn Fn(&Unit) -> f64| S::from_fn(|lane| f(&self.units[lane]));
         let flag = |f: &dyn Fn(&Unit) -> bool| S::from_fn(|lane| f64::from(u8::from(f(&self.units[lane]))));
@@ -362,10 +362,10 @@ impl<S: Scalar> Body<S> {
         set(Q::WarningCode, unit(&|u| f64::from(u.sequence.warning)));
         set(Q::SpeedRef, unit(&|u| u.speed.reference));
         set(Q::SpeedMeas, unit(&|u| u.speed_meas));
-        set(Q::Proximity0, flag(&|u| u.switches.shown[0]));
-        set(Q::Proximity25, flag(&|u| u.switches.shown[1]));
-        set(Q::Proximity75, flag(&|u| u.switches.shown[2]));
-        set(Q::Proximity100, flag(&|u| u.switches.shown[3]));
+        set(Q::Proximity0, flag(&|u| u.switches.reading[0]));
+        set(Q::Proximity25, flag(&|u| u.switches.reading[1]));
+        set(Q::Proximity75, flag(&|u| u.switches.reading[2]));
+        set(Q::Proximity100, flag(&|u| u.switches.reading[3]));
     }
 
     /// Positive where something went otherwise than commanded.

@@ -63,11 +63,11 @@ fn tables(out: &mut Vec<Finding>, raw: &[f64]) {
             let (a, b) = (speed(k), speed(k + 1));
             ordered(out, raw, (a.0, &a.1), (b.0, &b.1), false, "m/s");
         }
-        for (ff, ffm, way) in [
+        for (ff, ffm, direction) in [
             (Friction::FfExtension1, Friction::FfmExtension1, "extension"),
             (Friction::FfRetraction1, Friction::FfmRetraction1, "retraction"),
         ] {
-            let (low, high) = (format!("friction.ff_{way}_{}", k + 1), format!("friction.ffm_{way}_{}", k + 1));
+            let (low, high) = (format!("friction.ff_{direction}_{}", k + 1), format!("friction.ffm_{direction}_{}", k + 1));
             ordered(out, raw, (ff.at() + k, &low), (ffm.at() + k, &high), true, "N");
         }
     }

@@ -162,7 +162,7 @@ fn sensors() -> Vec<FaultKind> {
             range: Range::Between(0.0, 1.0),
             attributes: PERIOD,
             places: places!("sensor.hall": "hall.power_off" Pulse),
-            effect: "duty of the Hall sensors' power lost: the code 000, no commutation, speed shown as zero",
+            effect: "duty of the Hall sensors' power lost: the code 000, no commutation, speed reported as zero",
             source: "N 4.5 (resolver power, here the Hall sensors')",
         },
         FaultKind {

@@ -1,4 +1,4 @@
-//! High fidelity: three phases, a bridge whose legs are chopped to ZERO, diodes; speeds on a coarser step.
+//! Switching model: three phases, a bridge whose legs are chopped to ZERO, diodes; speeds on a coarser step.
 
 use super::body::{Body, Constants, Structure, E_COPPER, E_INVERTER};
 use super::layout::*;
@@ -13,7 +13,7 @@ use crate::three;
 use crate::time::Steps;
 use crate::variable::Signal;
 
-/// The landing-gear actuator at high fidelity.
+/// The switching model of the landing-gear actuator.
 #[derive(Clone)]
 pub struct High;
 
@@ -131,16 +131,16 @@ fn electric<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, so
         let blanking = s.bridge;
         let kept = s.legs;
         let off = three!(|j| S::select(split, chopped[j], legs[j]));
-        let rest = part(m, &structure.bridge, s, off, k, resistance, dt - first, whole.current);
+        let second = part(m, &structure.bridge, s, off, k, resistance, dt - first, whole.current);
         s.bridge.keep(split, &blanking);
         s.legs = three!(|j| S::select(split, chopped[j], kept[j]));
         let add = |a: S, b: S| S::select(split, a + b, a);
-        whole.current = three!(|j| S::select(split, rest.current[j], whole.current[j]));
-        whole.voltage = three!(|j| S::select(split, rest.voltage[j], whole.voltage[j]));
-        whole.charge = add(whole.charge, rest.charge);
-        whole.impulse = add(whole.impulse, rest.impulse);
-        whole.copper = add(whole.copper, rest.copper);
-        whole.inverter = add(whole.inverter, rest.inverter);
+        whole.current = three!(|j| S::select(split, second.current[j], whole.current[j]));
+        whole.voltage = three!(|j| S::select(split, second.voltage[j], whole.voltage[j]));
+        whole.charge = add(whole.charge, second.charge);
+        whole.impulse = add(whole.impulse, second.impulse);
+        whole.copper = add(whole.copper, second.copper);
+        whole.inverter = add(whole.inverter, second.inverter);
     }
     s.current = whole.current;
     s.voltage = whole.voltage;
@@ -226,7 +226,7 @@ impl Wiring for High {
             body: model.c.start(raw, initial),
             current: [zero; 3],
             legs: [zero; 3],
-            bridge: BridgeState::rest(),
+            bridge: BridgeState::initial(),
             cut: zero,
             torque: zero,
             voltage: [zero; 3],
@@ -261,7 +261,7 @@ impl Wiring for High {
         }
     }
 
-    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, _asked: Signals, out: &mut [S]) {
+    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, _selection: Signals, out: &mut [S]) {
         let (k, _) = m.c.coupling(structure, s.body.motion.motor_position);
         let torque = m.c.star.saturate(m.c.star.torque(k, s.current));
         m.c.observe(structure, inputs, &s.body, torque, t, out);

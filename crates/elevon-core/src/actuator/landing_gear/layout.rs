@@ -58,9 +58,9 @@ variables! {
 }
 
 variables! {
-    /// The low fidelity.
+    /// The reduced-order model.
     LowParameter, LOW {
-        Step => "step", "dt_low", "s", Between(1e-12, 1.0), Solver, Some(2e-5), "solver step of the low fidelity",
+        Step => "step", "dt_low", "s", Between(1e-12, 1.0), Solver, Some(2e-5), "solver step of the reduced-order model",
             low_only("it has solver.step");
         CommutationFactor => "commutation_factor", "c", "1", NonNegative, Plant, Some(1.1), "mean torque loss of the commutations as a resistance c p |w| L",
             low_only("it has the commutations themselves");
@@ -68,7 +68,7 @@ variables! {
 }
 
 variables! {
-    /// The fixed-step solver of the high fidelity.
+    /// The fixed-step solver of the switching model.
     SolverParameter, SOLVER {
         Step => "step", "dt", "s", Between(1e-12, 1.0), Solver, Some(1e-6), "solver step of the electrical part",
             high_only("it has low.step");
@@ -102,7 +102,7 @@ const GEAR_INVERTER: [Variable; INVERTER.len()] = {
                 P::HysteresisBand as usize,
                 acts::nowhere("its bridge is commutated by Hall sensors and a carrier, not by relays"),
             ),
-            Relabel::acts(P::TripCurrent as usize, acts::high_only("its mean current shows no peaks to trip on")),
+            Relabel::acts(P::TripCurrent as usize, acts::high_only("its mean current has no peaks to trip on")),
             Relabel::acts(P::DeadTime as usize, acts::high_only("its mean voltages have no switches")),
             Relabel::acts(P::OnResistance as usize, acts::ALWAYS),
             Relabel::acts(P::DiodeDrop as usize, acts::ALWAYS),

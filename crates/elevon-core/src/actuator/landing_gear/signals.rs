@@ -3,7 +3,7 @@
 use crate::signals;
 
 signals! {
-    /// Signals of both fidelities; the low one leaves out the phases (`PHASES`).
+    /// Signals of both fidelities; the reduced-order model leaves out the phases (`PHASES`).
     Quantity, ALL {
         Command => "command", "-", "1", "0 stop, 1 extend, 2 retract, 3 free fall", Command;
         State => "state", "-", "1", "0 retracted, 1 extending, 2 locked, 3 retracting, 4 stopped, 5 released, 6 fault", State;
@@ -77,7 +77,7 @@ signals! {
     }
 }
 
-/// First of the signals that only the high fidelity has.
+/// First of the signals that only the switching model has.
 pub const PHASES: usize = Quantity::CurrentA as usize;
 /// First and last energy.
 pub const ENERGIES: std::ops::Range<usize> = Quantity::EnergySupply as usize..PHASES;

@@ -27,9 +27,9 @@ pub struct Unit {
     reported: bool,
 }
 
-/// What the plant shows the unit at a tick.
+/// The plant's signals that the unit reads at a tick.
 #[derive(Clone, Copy, Debug)]
-pub struct Shown {
+pub struct PlantSignals {
     pub time: f64,
     pub command: f64,
     pub on_wheels: f64,
@@ -77,7 +77,7 @@ impl Unit {
         let locked = nut - stroke >= raw.lock()[LockParameter::EngageTravel as usize];
         let released = ReleaseOpen::read(raw.release()[ReleaseParameter::Open as usize]) == ReleaseOpen::Yes;
         let switches = Switches::start(raw.proximity(), nut.min(stroke), locked);
-        let phase = match switches.shown {
+        let phase = match switches.reading {
             [_, _, _, true] => Phase::Locked,
             _ if released => Phase::Released,
             [true, ..] => Phase::Retracted,
@@ -85,7 +85,7 @@ impl Unit {
         };
         let coil = Coil::new(Powered::read(raw.brake()[BrakeParameter::Powered as usize]) == Powered::Always);
         Self {
-            sequence: Sequence::start(phase, released, places(raw), switches.shown),
+            sequence: Sequence::start(phase, released, places(raw), switches.reading),
             speed: PiRate::default(),
             switches,
             coil,
@@ -101,65 +101,65 @@ impl Unit {
         }
     }
 
-    pub fn tick(&mut self, raw: &[f64], shown: &Shown) {
+    pub fn tick(&mut self, raw: &[f64], plant: &PlantSignals) {
         let raw = Raw(raw);
         let p = raw.sequence();
         let dt = raw.pi_rate()[PiRateParameter::Period as usize];
-        self.switches.step(raw.proximity(), shown.ram, shown.locked > 0.5, dt);
+        self.switches.step(raw.proximity(), plant.ram, plant.locked > 0.5, dt);
         let share = dt / (dt + p[SequenceParameter::CurrentFilter as usize]);
-        self.current = settled(self.current + (shown.bus - self.current) * share);
-        self.line = settled(self.line + (shown.line - self.line) * share);
-        self.speed_meas = shown.speed;
-        let seen = self.seen(raw, shown, dt);
+        self.current = settled(self.current + (plant.bus - self.current) * share);
+        self.line = settled(self.line + (plant.line - self.line) * share);
+        self.speed_meas = plant.speed;
+        let seen = self.seen(raw, plant, dt);
         let orders = self.sequence.step(p, &seen);
         if orders.fresh || !orders.drive {
             self.speed = PiRate::default();
         }
         self.driving = orders.drive;
         self.demand =
-            if orders.drive { self.speed.step(raw.pi_rate(), orders.extending, orders.target, shown.speed, shown.supply) } else { 0.0 };
+            if orders.drive { self.speed.step(raw.pi_rate(), orders.extending, orders.target, plant.speed, plant.supply) } else { 0.0 };
         let software = BrakeReading::read(p[SequenceParameter::BrakeReading as usize]) == BrakeReading::SoftwareBrake;
         self.short = orders.short || (software && orders.drive && self.demand.abs() < p[SequenceParameter::BrakeVoltage as usize]);
         let brake = raw.brake();
         let powered = orders.brake_powered || Powered::read(brake[BrakeParameter::Powered as usize]) == Powered::Always;
         self.coil.step(powered, brake[BrakeParameter::ReleaseDelay as usize], brake[BrakeParameter::EngageDelay as usize], dt);
-        self.judge(shown, dt);
+        self.judge(plant, dt);
     }
 
-    fn seen(&mut self, raw: Raw<'_, f64>, shown: &Shown, dt: f64) -> Seen {
-        let wrong = shown.hall_errors - self.hall_errors;
-        self.hall_errors = shown.hall_errors;
+    fn seen(&mut self, raw: Raw<'_, f64>, plant: &PlantSignals, dt: f64) -> Seen {
+        let wrong = plant.hall_errors - self.hall_errors;
+        self.hall_errors = plant.hall_errors;
         // While no code comes the motor may run as fast as it is let.
-        let blind = if shown.hall_valid { 0.0 } else { dt * shown.travel * raw.sequence()[SequenceParameter::Overspeed as usize] };
+        let blind = if plant.hall_valid { 0.0 } else { dt * plant.travel * raw.sequence()[SequenceParameter::Overspeed as usize] };
         Seen {
             dt,
-            time: shown.time,
-            command: shown.command.round().clamp(0.0, 2.0 * COMMANDS.len() as f64 - 1.0) as u8,
-            on_wheels: shown.on_wheels > 0.5,
-            supply: shown.supply,
+            time: plant.time,
+            command: plant.command.round().clamp(0.0, 2.0 * COMMANDS.len() as f64 - 1.0) as u8,
+            on_wheels: plant.on_wheels > 0.5,
+            supply: plant.supply,
             current: self.current,
             line: self.line,
-            line_now: shown.line,
-            speed: shown.speed,
+            line_now: plant.line,
+            speed: plant.speed,
             demand: self.demand,
-            switches: self.switches.shown,
-            counted: shown.counted,
-            lost: wrong * HIDDEN * shown.pitch + blind,
-            hall_errors: shown.hall_errors,
-            hall_valid: shown.hall_valid,
-            tripped: shown.tripped,
-            rig: shown.rig,
+            switches: self.switches.reading,
+            counted: plant.counted,
+            lost: wrong * HIDDEN * plant.pitch + blind,
+            hall_errors: plant.hall_errors,
+            hall_valid: plant.hall_valid,
+            tripped: plant.tripped,
+            rig: plant.rig,
             release_time: raw.release()[ReleaseParameter::Time as usize],
         }
     }
 
     /// A ram that should fall and rests unlocked did not arrive.
-    fn judge(&mut self, shown: &Shown, dt: f64) {
-        let hangs = self.sequence.released && shown.locked < 0.5 && shown.nut_speed == 0.0 && !shown.rig;
+    fn judge(&mut self, plant: &PlantSignals, dt: f64) {
+        let hangs = self.sequence.released && plant.locked < 0.5 && plant.nut_speed == 0.0 && !plant.rig;
         self.hanging = if hangs { self.hanging + dt } else { 0.0 };
         if self.hanging > HANGING && !self.reported {
             self.reported = true;
-            self.sequence.notes.add(Note::Hanging { time: shown.time, place: shown.ram });
+            self.sequence.notes.add(Note::Hanging { time: plant.time, place: plant.ram });
         }
     }
 

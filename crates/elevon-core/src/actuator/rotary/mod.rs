@@ -60,7 +60,7 @@ impl Form for Rotary {
     }
 }
 
-/// The rotary actuator at high fidelity.
+/// The switching model of the rotary actuator.
 pub type High = super::servo::High<Rotary>;
-/// The rotary actuator at low fidelity.
+/// The reduced-order model of the rotary actuator.
 pub type Low = super::servo::Low<Rotary>;

@@ -91,7 +91,7 @@ fn derivative_inertia(out: &mut Vec<Finding>, raw: &[f64], inertia: f64, dt: f64
         out.push(Finding::warning("control.speed_gain", gain, limit, message));
     } else {
         let message =
-            format!("{what}: stable here, where the current has no delay, but not in the high fidelity above {limit:.4} N m s/rad");
+            format!("{what}: stable here, where the current has no delay, but not in the switching model above {limit:.4} N m s/rad");
         out.push(Finding::warning("control.speed_gain", gain, limit, message));
     }
 }
@@ -147,7 +147,7 @@ fn thermal(out: &mut Vec<Finding>, raw: &[f64]) {
             "thermal.convection",
             0.0,
             0.0,
-            "thermal.convection: 0 W/(m2 K) with thermal.emissivity 0 leaves the heat no way out; one of them must be above 0".into(),
+            "thermal.convection: 0 W/(m2 K) with thermal.emissivity 0 leaves the heat no path out; one of them must be above 0".into(),
         ));
     }
     let names = ["thermal.ambient", "thermal.warning", "thermal.trip"];
@@ -168,7 +168,7 @@ pub fn faulted_high<F: Form>(raw: &[f64]) -> Vec<Finding> {
     out
 }
 
-/// The same for the low fidelity, whose steps are exact or implicit.
+/// The same for the reduced-order model, whose steps are exact or implicit.
 pub fn faulted_low<F: Form>(raw: &[f64]) -> Vec<Finding> {
     F::check(raw)
 }

@@ -1,4 +1,4 @@
-//! What of a high-fidelity servo a run needs: the components say so, `full` and `extra` follow. Equal over a lane block.
+//! What of a switching servo model a run needs: the components state it, `full` and `extra` follow. Equal over a lane block.
 
 use super::form::Form;
 use super::layout::*;
@@ -66,7 +66,7 @@ details! {
     }
 }
 
-/// What a run says of its servo.
+/// What a run reports of its servo.
 pub(super) struct Needs<'a> {
     pub parts: Parts<'a>,
 }

@@ -48,7 +48,7 @@ variables! {
                 Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0), Away("sensor.resolver.stuck", 0.0),
                 Away("sensor.resolver.noise_deviation", 0.0),
             ])]);
-        FeedbackLoss => "feedback_loss", "-", "1", Choice(FeedbackLoss::NAMES), Controller, Some(0.0), "without resolver power the drive runs on with what it is shown, or opens its bridge until it returns",
+        FeedbackLoss => "feedback_loss", "-", "1", Choice(FeedbackLoss::NAMES), Controller, Some(0.0), "without resolver power the drive runs on with the last reading, or opens its bridge until it returns",
             when(&[Either(&[
                 Away("sensor.resolver.power_off", 0.0), Away("sensor.resolver.sine_short", 0.0), Away("sensor.resolver.cosine_short", 0.0),
                 Away("sensor.resolver.excitation_short", 0.0), Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0),
@@ -59,7 +59,7 @@ variables! {
 variables! {
     /// The fixed-step solver.
     SolverParameter, SOLVER {
-        Step => "step", "dt", "s", Between(1e-12, 1.0), Solver, Some(1e-6), "solver step of the high fidelity",
+        Step => "step", "dt", "s", Between(1e-12, 1.0), Solver, Some(1e-6), "solver step of the switching model",
             high_only("it has low.step");
         Method => "method", "-", "1", Choice(Method::NAMES), Solver, Some(0.0), "explicit Euler (the papers), or semi-implicit: positions move with the new speed",
             high_only("it is semi-implicit");

@@ -1,4 +1,4 @@
-//! What resolver and encoder show of the shaft, to the controller and to the observer alike.
+//! What resolver and encoder report of the shaft, to the controller and to the observer alike.
 
 use super::form::Form;
 use super::layout::*;
@@ -34,9 +34,9 @@ details! {
 }
 
 impl SensingDetails {
-    /// Does the resolver ever show another angle than the shaft's?
+    /// Can the resolver report another angle than the shaft's?
     #[inline(always)]
-    pub(super) fn shows(&self) -> bool {
+    pub(super) fn distorts(&self) -> bool {
         self.resolver || self.noisy
     }
 }
@@ -63,7 +63,7 @@ impl<S: Scalar> Sensing<S> {
         Self { encoder: Encoder::derive(Raw(raw).encoder(), turn), resolver: Resolver::derive(Raw(raw).resolver()) }
     }
 
-    /// As the low fidelity has them.
+    /// As the reduced-order model has them.
     pub(super) fn derive_low(raw: &[S], d: &SensingDetails) -> Self {
         Self { resolver: Resolver::without_leaps(Raw(raw).resolver()), ..Self::derive(raw, d) }
     }
@@ -79,17 +79,17 @@ impl<S: Scalar> Sensing<S> {
         S::splat(0.5).lt(self.resolver.off)
     }
 
-    /// Change of the speed shown over that of the shaft's.
+    /// Change of the reported speed over that of the shaft's.
     #[inline(always)]
     pub(super) fn follows(&self) -> S {
         self.resolver.follows()
     }
 
-    /// Angle that the resolver would show elsewhere.
+    /// Angle that the resolver would report elsewhere.
     #[inline(always)]
     pub(super) fn angle(&self, position: S, speed: S, sensed: Sensed<S>) -> S {
-        let mut held = sensed.resolver;
-        self.resolver.read(position, speed, &mut held).angle
+        let mut memory = sensed.resolver;
+        self.resolver.read(position, speed, &mut memory).angle
     }
 
     /// The resolver's reading.
@@ -110,7 +110,7 @@ impl<S: Scalar> Sensing<S> {
     pub(super) fn count<const FULL: bool>(&self, d: &SensingDetails, s: &ShaftState<S>, sensed: &mut Sensed<S>) -> S {
         if FULL && d.counting {
             self.encoder.advance(s.output_position, &mut sensed.encoder);
-            sensed.encoder.shown
+            sensed.encoder.reading
         } else {
             self.encoder.read(s.output_position)
         }
@@ -135,7 +135,7 @@ impl<S: Scalar> Sensing<S> {
 
     /// Position of the encoder; position, speed and signal of the resolver.
     #[inline(always)]
-    pub(super) fn show(&self, d: &SensingDetails, s: &ShaftState<S>, sensed: Sensed<S>) -> [S; 4] {
+    pub(super) fn readings(&self, d: &SensingDetails, s: &ShaftState<S>, sensed: Sensed<S>) -> [S; 4] {
         let mut sensed = sensed;
         let reading = self.shaft::<true>(d, s, &mut sensed);
         let signal = if d.resolver { self.resolver.signal(s.motor_position) } else { S::one() };

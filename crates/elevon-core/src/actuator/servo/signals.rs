@@ -6,8 +6,8 @@ use crate::signals;
 use crate::variable::{extended, Signal};
 
 signals! {
-    /// Signals of the high fidelity.
-    HighSignal, HIGH_OWN {
+    /// Signals of the switching model.
+    HighSignal, HIGH_SPECIFIC {
         Command => "command", "-", "rad", "command with its noise (rad at the output, rad/s or N m by the control mode)", Command;
         OutputPosition => "output_position", "theta_u", "rad", "output position", OutputPosition;
         OutputSpeed => "output_speed", "omega_u", "rad/s", "output speed", OutputSpeed;
@@ -60,9 +60,9 @@ signals! {
         TapCurrentB => "tap_current_b", "-", "A", "current from terminal b to the centre tap";
         TapCurrentC => "tap_current_c", "-", "A", "current from terminal c to the centre tap";
         UnbalanceTorque => "unbalance_torque", "T_u", "N m", "gravity torque of the rotor's excess mass";
-        EncoderPosition => "encoder_position", "-", "rad", "output position the encoder shows", OutputPosition;
-        ResolverPosition => "resolver_position", "-", "rad", "motor angle the resolver shows", MotorPosition;
-        ResolverSpeed => "resolver_speed", "-", "rad/s", "motor speed the resolver shows", MotorSpeed;
+        EncoderPosition => "encoder_position", "-", "rad", "output position the encoder reports", OutputPosition;
+        ResolverPosition => "resolver_position", "-", "rad", "motor angle the resolver reports", MotorPosition;
+        ResolverSpeed => "resolver_speed", "-", "rad/s", "motor speed the resolver reports", MotorSpeed;
         ResolverSignal => "resolver_signal", "-", "1", "size of the resolver's sine and cosine over the healthy one";
         LegTransitions => "leg_transitions", "-", "1", "leg transitions since the start; with sampled relays (inverter.relay_crossing) at 1 us a quarter more than relays without delay make: the step's own, as is that part of the currents' ripple", Transitions;
         Tripped => "tripped", "-", "1", "1 once the drive has tripped";
@@ -88,8 +88,8 @@ signals! {
 }
 
 signals! {
-    /// Signals of the low fidelity: the same names where they mean the same.
-    LowSignal, LOW_OWN {
+    /// Signals of the reduced-order model: the same names where they mean the same.
+    LowSignal, LOW_SPECIFIC {
         Command => "command", "-", "rad", "command (rad at the output, rad/s or N m by the control mode)", Command;
         OutputPosition => "output_position", "theta_u", "rad", "output position", OutputPosition;
         OutputSpeed => "output_speed", "omega_u", "rad/s", "output speed", OutputSpeed;
@@ -113,9 +113,9 @@ signals! {
         HeatAir => "heat_air", "-", "W", "heat given to the air, mean of the network's last tick";
         ThermalWarning => "thermal_warning", "-", "1", "1 while the winding is above its warning temperature";
         Limited => "limited", "-", "1", "1 while the speed or the torque reference stands at its limit";
-        EncoderPosition => "encoder_position", "-", "rad", "output position the encoder shows", OutputPosition;
-        ResolverPosition => "resolver_position", "-", "rad", "motor angle the resolver shows", MotorPosition;
-        ResolverSpeed => "resolver_speed", "-", "rad/s", "motor speed the resolver shows", MotorSpeed;
+        EncoderPosition => "encoder_position", "-", "rad", "output position the encoder reports", OutputPosition;
+        ResolverPosition => "resolver_position", "-", "rad", "motor angle the resolver reports", MotorPosition;
+        ResolverSpeed => "resolver_speed", "-", "rad/s", "motor speed the resolver reports", MotorSpeed;
         ResolverSignal => "resolver_signal", "-", "1", "size of the resolver's sine and cosine over the healthy one";
         Tripped => "tripped", "-", "1", "1 once the drive has tripped";
         EnergyCopper => "energy_copper", "-", "J", "copper losses, counted with a thermal network";
@@ -125,12 +125,12 @@ signals! {
     }
 }
 
-/// Both fidelities show what acts on the shaft beside plain friction.
-pub const HIGH: &[Signal] = &extended::<{ HIGH_OWN.len() + TRAIN.len() }>(HIGH_OWN, &[], TRAIN);
-pub const LOW: &[Signal] = &extended::<{ LOW_OWN.len() + TRAIN.len() }>(LOW_OWN, &[], TRAIN);
+/// Both fidelities report what acts on the shaft in addition to plain friction.
+pub const HIGH: &[Signal] = &extended::<{ HIGH_SPECIFIC.len() + TRAIN.len() }>(HIGH_SPECIFIC, &[], TRAIN);
+pub const LOW: &[Signal] = &extended::<{ LOW_SPECIFIC.len() + TRAIN.len() }>(LOW_SPECIFIC, &[], TRAIN);
 
 /// Writes what stands behind the `own` signals of a fidelity.
 #[inline(always)]
-pub(super) fn shared<S: Scalar>(own: &[Signal], shown: [S; TRAIN.len()], out: &mut [S]) {
-    out[own.len()..own.len() + TRAIN.len()].copy_from_slice(&shown);
+pub(super) fn shared<S: Scalar>(list: &[Signal], values: [S; TRAIN.len()], out: &mut [S]) {
+    out[list.len()..list.len() + TRAIN.len()].copy_from_slice(&values);
 }

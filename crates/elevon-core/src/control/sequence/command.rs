@@ -1,4 +1,4 @@
-//! Commands: accepted, refused, repeated; and the notes from which a run says what went otherwise than commanded.
+//! Commands: accepted, refused, repeated; and the notes from which a run states what went otherwise than commanded.
 
 use super::codes::*;
 use super::{Phase, Seen, Sequence, SequenceParameter as P};
@@ -53,8 +53,8 @@ impl Note {
         let name = |command: &u8| COMMANDS[usize::from(*command)];
         match self {
             Note::Refused { time, command, reason, value } => {
-                let shown = if matches!(*reason, SUPPLY_LOW | SUPPLY_HIGH) { format!(" ({value:.1} V)") } else { String::new() };
-                format!("{} refused at {time:.2} s: {}{shown}", name(command), REFUSALS[usize::from(*reason)])
+                let voltage = if matches!(*reason, SUPPLY_LOW | SUPPLY_HIGH) { format!(" ({value:.1} V)") } else { String::new() };
+                format!("{} refused at {time:.2} s: {}{voltage}", name(command), REFUSALS[usize::from(*reason)])
             }
             Note::Failed { time, fault, command: STOP } => {
                 format!("fault of the control unit at rest at {time:.2} s: {}", FAULTS[usize::from(*fault)])

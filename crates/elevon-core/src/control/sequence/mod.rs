@@ -28,7 +28,7 @@ variables! {
         SpeedLow => "speed_low", "w_mL", "rad/s", Positive, Controller, None, "motor speed near the end: beyond 75 % extending, below 25 % retracting";
         BrakeVoltage => "brake_voltage", "V_demth", "V", NonNegative, Controller, None, "SW brake maximum voltage command: the demand below which the windings are shorted, or that first releases the brake (brake_reading)";
         BrakeReading => "brake_reading", "-", "1", Choice(BrakeReading::NAMES), Controller, Some(0.0), "software_brake: below brake_voltage all low switches short the windings, the brake opens with the move; release: brake_voltage first releases the brake, which stays open until the move ends";
-        ProofCurrent => "proof_current", "-", "A", NonNegative, Controller, Some(0.0), "torque proof: mean line current that must flow before the brake opens; 0: none is asked for";
+        ProofCurrent => "proof_current", "-", "A", NonNegative, Controller, Some(0.0), "torque proof: mean line current that must flow before the brake opens; 0: none is required";
         MotionTimeout => "motion_timeout", "-", "s", Positive, Controller, None, "longest move";
         UnlockTimeout => "unlock_timeout", "-", "s", Positive, Controller, None, "longest time from retract until the lock sleeve lets go";
         LockTimeout => "lock_timeout", "-", "s", Positive, Controller, None, "longest low-speed part of an extension without the lock sleeve";
@@ -69,7 +69,7 @@ pub enum Phase {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Move {
-    Rest,
+    Idle,
     Extend,
     Retract,
     Halt,
@@ -168,7 +168,7 @@ impl Sequence {
     pub fn start(phase: Phase, released: bool, places: Places, switches: [bool; 4]) -> Self {
         Self {
             phase,
-            action: Move::Rest,
+            action: Move::Idle,
             following: None,
             wanted: STOP,
             last: STOP,
@@ -216,7 +216,7 @@ impl Sequence {
         self.orders(p, see)
     }
 
-    /// The count moves the interval; agreeing switches narrow it. Apart from the screw the motor's count says nothing.
+    /// The count moves the interval; agreeing switches narrow it. Apart from the screw the motor's count bears no information.
     fn locate(&mut self, see: &Seen) {
         self.position.advance(see.counted, see.lost);
         if self.released || self.releasing > 0.0 {

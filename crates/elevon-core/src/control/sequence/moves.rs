@@ -23,11 +23,11 @@ impl Sequence {
     fn finish(&mut self, phase: Phase) {
         self.phase = phase;
         self.following = None;
-        self.rest_now();
+        self.stop_now();
     }
 
-    fn rest_now(&mut self) {
-        self.action = Move::Rest;
+    fn stop_now(&mut self) {
+        self.action = Move::Idle;
         (self.resting, self.gone) = (0.0, 0.0);
     }
 
@@ -36,7 +36,7 @@ impl Sequence {
             self.release(see);
         }
         match self.action {
-            Move::Rest => self.rest(see),
+            Move::Idle => self.idle(see),
             Move::Extend if self.locked_by_count(see) || self.locked_at_the_stop(p, see) => self.finish(Phase::Locked),
             Move::Retract if self.retracted_by_count(p, see) => self.finish(Phase::Retracted),
             Move::Extend if self.wanted != EXTEND => self.halt(),
@@ -50,7 +50,7 @@ impl Sequence {
             }
             Move::Halt if see.speed.abs() < p[P::StallSpeed as usize] || self.since > p[P::LockTimeout as usize] => {
                 self.phase = Phase::Stopped;
-                self.rest_now();
+                self.stop_now();
             }
             _ => {}
         }
@@ -85,7 +85,7 @@ impl Sequence {
         }
     }
 
-    fn rest(&mut self, see: &Seen) {
+    fn idle(&mut self, see: &Seen) {
         if self.pause > 0.0 {
             self.pause -= see.dt;
             return;
@@ -93,7 +93,7 @@ impl Sequence {
         if self.phase == Phase::Fault && self.cleared && self.wanted != STOP && self.wanted != FREE_FALL {
             self.phase = Phase::Stopped;
             (self.cleared, self.fault) = (false, 0);
-            self.rest_now();
+            self.stop_now();
         }
         let next = match (self.phase, self.wanted) {
             (Phase::Stopped, EXTEND) | (Phase::Stopped, RETRACT) if self.following.is_some() => self.following,
@@ -109,17 +109,17 @@ impl Sequence {
     pub(super) fn orders(&mut self, p: &[f64], see: &Seen) -> Orders {
         let (high, low) = (p[P::SpeedHigh as usize], p[P::SpeedLow as usize]);
         let target = match self.action {
-            Move::Rest | Move::Halt => 0.0,
+            Move::Idle | Move::Halt => 0.0,
             Move::Extend if !see.switches[2] => high,
             Move::Extend | Move::Reseat => low,
             Move::Retract if see.switches[1] => -high,
             Move::Retract | Move::BackOff => -low,
         };
-        let drive = self.action != Move::Rest;
+        let drive = self.action != Move::Idle;
         let software = BrakeReading::read(p[P::BrakeReading as usize]) == BrakeReading::SoftwareBrake;
-        let asked = software || see.demand.abs() >= p[P::BrakeVoltage as usize];
+        let request = software || see.demand.abs() >= p[P::BrakeVoltage as usize];
         let proven = see.line_now.abs() >= p[P::ProofCurrent as usize];
-        self.brake_open = drive && (self.brake_open || (asked && proven));
+        self.brake_open = drive && (self.brake_open || (request && proven));
         // A leg that moves at rest has lost its brake: the windings are what is left to hold it.
         let short = software && self.phase == Phase::Fault && self.fault == UNCOMMANDED;
         Orders { drive, extending: self.extending, target, brake_powered: self.brake_open, short, fresh: self.fresh }

@@ -53,7 +53,7 @@ impl Places {
 }
 
 impl Position {
-    /// What the switches alone say at power-up.
+    /// What the switches alone state at power-up.
     pub fn start(places: &Places, switches: [bool; 4], counted: f64) -> Self {
         let (low, high) = places.whole();
         let mut position = Self { low, high, counted };
@@ -130,7 +130,7 @@ mod tests {
         assert!(position.high - position.low < 1.6, "{position:?}");
     }
 
-    /// Every switch stuck either way is contradicted by the count somewhere on the stroke.
+    /// Every switch stuck on or off is contradicted by the count somewhere on the stroke.
     #[test]
     fn stuck_switches_are_contradicted() {
         for switch in 0..4 {
@@ -139,15 +139,15 @@ mod tests {
                 let mut found = false;
                 for tick in 1..=2_672 {
                     let x = 0.75 + 0.1 * f64::from(tick);
-                    let mut shown = seen(x);
+                    let mut readings = seen(x);
                     if x > 2.5 {
-                        shown[switch] = stuck;
+                        readings[switch] = stuck;
                     }
                     position.advance(x - 0.75, 0.0);
-                    found |= position.contradicted(&PLACES, shown, &MARGINS) == Some(switch);
-                    position.narrow(&PLACES, shown, 0.5);
+                    found |= position.contradicted(&PLACES, readings, &MARGINS) == Some(switch);
+                    position.narrow(&PLACES, readings, 0.5);
                 }
-                // The switch at 0 % off and those at 25 % on are what the stroke upwards shows in any case.
+                // The switch at 0 % off and those at 25 % on are what the stroke upwards has in any case.
                 let harmless = switch == 0 && !stuck;
                 assert_eq!(found, !harmless, "switch {switch} stuck {stuck}");
             }

@@ -10,7 +10,7 @@ impl Sequence {
     pub(super) fn fail(&mut self, see: &Seen, fault: u8) {
         self.note(see, fault);
         self.phase = Phase::Fault;
-        self.action = Move::Rest;
+        self.action = Move::Idle;
         self.following = None;
         self.wanted = STOP;
         self.cleared = false;
@@ -53,14 +53,14 @@ impl Sequence {
             self.fail(see, OVERSPEED);
         } else if see.current > p[P::Overcurrent as usize] {
             self.fail(see, OVERCURRENT);
-        } else if self.action == Move::Rest {
-            self.watch_rest(p, see);
+        } else if self.action == Move::Idle {
+            self.watch_idle(p, see);
         } else if self.action != Move::Halt {
             self.watch_move(p, see);
         }
     }
 
-    /// The leg falls without the motor: nothing is left to stop, the switches alone tell.
+    /// The leg falls without the motor: nothing is left to stop, only the switches report.
     fn watch_fall(&mut self, p: &[f64], see: &Seen, switches_fail: bool) {
         let lost_lock = self.phase == Phase::Locked && !see.switches[3];
         if lost_lock {
@@ -76,7 +76,7 @@ impl Sequence {
     }
 
     /// At rest the count stands still, and the switch of the end stays on. The count is zeroed at the ends.
-    fn watch_rest(&mut self, p: &[f64], see: &Seen) {
+    fn watch_idle(&mut self, p: &[f64], see: &Seen) {
         let settled = self.resting >= p[P::RestTime as usize];
         if self.resting == 0.0 {
             self.arrived = see.counted;
@@ -138,17 +138,17 @@ impl Sequence {
 
     /// Further back than a switch may be wrong, against its command.
     fn driven_back(&mut self, p: &[f64], see: &Seen) -> bool {
-        let way = if self.extending { 1.0 } else { -1.0 };
-        self.furthest = self.furthest.max(way * see.counted);
-        self.furthest - way * see.counted > p[P::ProximityTravel as usize]
+        let direction = if self.extending { 1.0 } else { -1.0 };
+        self.furthest = self.furthest.max(direction * see.counted);
+        self.furthest - direction * see.counted > p[P::ProximityTravel as usize]
     }
 
     /// Current that no load of a healthy leg needs. In retraction a drag hides below what the heaviest load takes.
     fn watch_drag(&mut self, p: &[f64], see: &Seen) {
         let (motoring, limit) =
             if self.extending { (see.line, p[P::DragExtension as usize]) } else { (-see.line, p[P::DragRetraction as usize]) };
-        let drags = motoring > limit && see.speed.abs() > p[P::StallSpeed as usize] && self.action != Move::Reseat;
-        self.dragging = if drags { self.dragging + see.dt } else { 0.0 };
+        let overload = motoring > limit && see.speed.abs() > p[P::StallSpeed as usize] && self.action != Move::Reseat;
+        self.dragging = if overload { self.dragging + see.dt } else { 0.0 };
         if self.dragging > p[P::DragTime as usize] {
             self.warning = DRAG;
         }
@@ -167,7 +167,7 @@ impl Sequence {
         see.time - self.hall_times[needed.clamp(1, 8) - 1] < window || self.hall_invalid > window
     }
 
-    /// Pairs that no position of the ram shows, and switches that the count contradicts.
+    /// Pairs that no position of the ram has, and switches that the count contradicts.
     fn switches_fail(&mut self, p: &[f64], see: &Seen) -> bool {
         let [at_0, at_25, at_75, lock] = see.switches;
         let pair = (lock && !at_75) || (at_75 && !at_25) || (at_25 && at_0);

@@ -4,14 +4,14 @@
 //! phase floats until its terminal voltage v_n + e_j leaves the rails. The neutral voltage sums the
 //! connected phases only. A shorted switch whose partner is gated shoots through: the drive trips.
 //!
-//! Dead time need not be whole steps: in the step in which a switch closes, its leg shows the mean of diode and switch
+//! Dead time need not be whole steps: in the step in which a switch closes, its leg has the mean of diode and switch
 //! over the step. The volt-seconds are exact for a current that keeps its sign within the step; a leg without current
 //! has no diode to follow and is given to its switch at once.
 
 use crate::scalar::Scalar;
 use crate::three;
 use crate::variable::acts::{Fidelity, When};
-use crate::variable::Own;
+use crate::variable::View;
 use crate::variables;
 
 /// The bridge is without gates at some time.
@@ -111,23 +111,23 @@ pub struct BridgeStructure {
 }
 
 impl BridgeStructure {
-    pub fn read(own: &Own<InverterParameter>, open_phases: bool) -> Self {
+    pub fn read(view: &View<InverterParameter>, open_phases: bool) -> Self {
         use InverterParameter as P;
-        let switch_faults = own.any_away_among(P::OpenAHigh, P::ShortedCLow);
-        Self { switch_faults, open_phases, trips: switch_faults || own.away(P::TripCurrent) }
+        let switch_faults = view.any_away_among(P::OpenAHigh, P::ShortedCLow);
+        Self { switch_faults, open_phases, trips: switch_faults || view.away(P::TripCurrent) }
     }
 
     /// Of a bridge that is looked at without gates only: switches that never close are then like any other.
-    pub fn gateless(own: &Own<InverterParameter>) -> Self {
+    pub fn gateless(view: &View<InverterParameter>) -> Self {
         use InverterParameter as P;
-        let switch_faults = own.any_away_among(P::ShortedAHigh, P::ShortedCLow);
-        Self { switch_faults, open_phases: true, trips: switch_faults || own.away(P::TripCurrent) }
+        let switch_faults = view.any_away_among(P::ShortedAHigh, P::ShortedCLow);
+        Self { switch_faults, open_phases: true, trips: switch_faults || view.away(P::TripCurrent) }
     }
 }
 
-/// Does the bridge show more than ideal switches?
-pub fn detailed(own: &Own<InverterParameter>) -> bool {
-    own.any_away_among(InverterParameter::OnResistance, InverterParameter::ShortedCLow)
+/// Has the bridge more than ideal switches?
+pub fn detailed(view: &View<InverterParameter>) -> bool {
+    view.any_away_among(InverterParameter::OnResistance, InverterParameter::ShortedCLow)
 }
 
 /// The legs of one step, and the neutral voltage where some leg is loose.
@@ -147,7 +147,7 @@ pub trait Circuit<S: Scalar> {
     fn potentials(&self, voltage: [S; 3], connected: [S::Mask; 3]) -> ([S; 3], S);
 }
 
-/// What the windings show to the bridge at the start of a step.
+/// Currents and EMF of the windings at the bridge at the start of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Windings<S> {
     pub current: [S; 3],
@@ -210,8 +210,8 @@ impl<S: Scalar> Bridge<S> {
         let (zero, one, half) = (S::zero(), S::one(), S::splat(0.5));
         let diode = half_supply + self.diode_drop;
         for j in 0..3 {
-            let held = half.le(self.shorted[j][0]) | half.le(self.shorted[j][1]);
-            let within = zero.lt(off[j]) & off[j].lt(one) & !current[j].equals(zero) & !held;
+            let shorted = half.le(self.shorted[j][0]) | half.le(self.shorted[j][1]);
+            let within = zero.lt(off[j]) & off[j].lt(one) & !current[j].equals(zero) & !shorted;
             let positive = zero.lt(current[j]);
             let voltage = off[j].fma(S::select(positive, -diode, diode) - legs.voltage[j], legs.voltage[j]);
             let rail = off[j].fma(S::select(positive, -half_supply, half_supply) - legs.rail[j], legs.rail[j]);
@@ -244,12 +244,12 @@ impl<S: Scalar> Bridge<S> {
                 self.watch(s, gates[j][0] & gates[j][1], current[j]);
             }
         }
-        let mut legs = self.held(gates, half_supply, current);
+        let mut legs = self.determined(gates, half_supply, current);
         if let Some(off) = off {
             self.blank(&mut legs, off, half_supply, current);
         }
-        let all_held = !S::any(legs.passive[0] | legs.passive[1] | legs.passive[2]);
-        if all_held && !structure.open_phases {
+        let all_driven = !S::any(legs.passive[0] | legs.passive[1] | legs.passive[2]);
+        if all_driven && !structure.open_phases {
             return Connection { legs, loose: None };
         }
         let neutral = self.release(&mut legs, half_supply, w);
@@ -268,7 +268,7 @@ impl<S: Scalar> Bridge<S> {
 
     /// Every leg at the rail of its switch that conducts.
     #[inline(always)]
-    fn held(&self, gates: [[S::Mask; 2]; 3], half_supply: S, current: [S; 3]) -> Legs<S> {
+    fn determined(&self, gates: [[S::Mask; 2]; 3], half_supply: S, current: [S; 3]) -> Legs<S> {
         let rail = three!(|j| S::select(gates[j][0], half_supply, -half_supply));
         Legs {
             voltage: three!(|j| (-self.on_resistance).fma(current[j], rail[j])),
@@ -359,7 +359,7 @@ impl<S: Scalar> Circuit<S> for Windings<S> {
 }
 
 impl<S: Scalar> BridgeState<S> {
-    pub fn rest() -> Self {
+    pub fn initial() -> Self {
         Self { blanking: [S::zero(); 3], tripped: S::zero() }
     }
 

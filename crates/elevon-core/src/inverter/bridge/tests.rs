@@ -21,7 +21,7 @@ fn windings(current: f64) -> Windings<f64> {
 /// Volt-seconds of leg a over `steps` steps that begin with its command changing to `new`.
 fn volt_seconds(dead_time: f64, new: f64, current: f64, steps: usize) -> f64 {
     let bridge = bridge(dead_time);
-    let mut state = BridgeState::rest();
+    let mut state = BridgeState::initial();
     let (mut old, legs) = ([-new, -1.0, -1.0], [new, -1.0, -1.0]);
     let mut sum = 0.0;
     for _ in 0..steps {
@@ -39,9 +39,9 @@ fn a_switch_below_one_half_is_a_healthy_one() {
             let (mut raw, touched) = (vec![0.0; INVERTER.len()], vec![false; INVERTER.len()]);
             raw[InverterParameter::SupplyScale as usize] = 1.0;
             raw[switch as usize] = value;
-            let own = Own::new(&raw, &touched);
-            assert_eq!(BridgeStructure::read(&own, false).switch_faults, acts, "{switch:?} {value}");
-            assert_eq!(BridgeStructure::gateless(&own).trips, acts && switch == InverterParameter::ShortedCLow);
+            let view = View::new(&raw, &touched);
+            assert_eq!(BridgeStructure::read(&view, false).switch_faults, acts, "{switch:?} {value}");
+            assert_eq!(BridgeStructure::gateless(&view).trips, acts && switch == InverterParameter::ShortedCLow);
         }
     }
 }
@@ -61,7 +61,7 @@ fn dead_time_has_its_volt_seconds_at_any_length() {
 #[test]
 fn a_transition_split_within_a_step_begins_its_dead_time_there() {
     let bridge = bridge(0.5e-6);
-    let mut state = BridgeState::rest();
+    let mut state = BridgeState::initial();
     let structure = BridgeStructure::default();
     let (low, high) = ([-1.0; 3], [1.0, -1.0, -1.0]);
     let mut part = |old, new, dt| {

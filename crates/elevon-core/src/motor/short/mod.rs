@@ -27,7 +27,7 @@ pub use parameters::{ShortParameter, TapParameter, SHORT, TAP};
 use super::star::{MotorParameter, ShortModel, Star};
 use crate::scalar::Scalar;
 use crate::three;
-use crate::variable::Own;
+use crate::variable::View;
 
 /// Kinds of contact: shorted turns of a phase, resistor from a terminal to the centre tap, between phases j and j + 1,
 /// from a phase to ground.
@@ -44,7 +44,7 @@ pub type Contacts<S> = [[S; 3]; KINDS];
 pub type ShortStructure = [bool; KINDS];
 
 /// Which kinds of contact a run meets. Turns are shorted in loops, or only missing.
-pub fn kinds(motor: &Own<MotorParameter>, tap: &Own<TapParameter>, short: &Own<ShortParameter>) -> ShortStructure {
+pub fn kinds(motor: &View<MotorParameter>, tap: &View<TapParameter>, short: &View<ShortParameter>) -> ShortStructure {
     use MotorParameter as M;
     use ShortParameter as P;
     let loops = ShortModel::read(motor.value(M::ShortModel)) == ShortModel::Loop;

@@ -17,7 +17,7 @@ pub struct Discrete<S> {
     mean: [Contacts<S>; 2],
     /// dt / L.
     per: [S; 3],
-    own: [[S; 3]; 3],
+    admittance: [[S; 3]; 3],
     across: [S; 3],
     per_sum: S,
     /// What the legs draw of a current fed to the neutral.
@@ -72,7 +72,7 @@ impl<S: Scalar> Discrete<S> {
             end: nothing,
             mean: nothing,
             per,
-            own: diagonal(per),
+            admittance: diagonal(per),
             across: per,
             per_sum: per[0] + per[1] + per[2],
             share: per,
@@ -87,7 +87,7 @@ impl<S: Scalar> Discrete<S> {
         new.per_sum = S::one() / new.per_sum;
         let y = new.across;
         new.share = three!(|j| y[j] * new.per_sum);
-        let drawn = |j: usize, k: usize| resistance * (new.own[j][k] - y[j] * new.share[k]);
+        let drawn = |j: usize, k: usize| resistance * (new.admittance[j][k] - y[j] * new.share[k]);
         new.held = inverse(three!(|j| three!(|k| new.held[j][k] + drawn(j, k))));
         new
     }
@@ -105,12 +105,12 @@ impl<S: Scalar> Discrete<S> {
         self.mean[0][kind][j] = x.weight * (sixth.fma(r, S::splat(0.5) * l) * per);
         self.mean[1][kind][j] = l * sixth.fma(r, l) * per;
         let squared = x.ratio * x.ratio * g;
-        self.own[j][j] = self.own[j][j] + squared;
+        self.admittance[j][j] = self.admittance[j][j] + squared;
         if kind == PAIR {
             let k = (j + 1) % 3;
-            self.own[k][k] = self.own[k][k] + squared;
-            self.own[j][k] = self.own[j][k] - squared;
-            self.own[k][j] = self.own[k][j] - squared;
+            self.admittance[k][k] = self.admittance[k][k] + squared;
+            self.admittance[j][k] = self.admittance[j][k] - squared;
+            self.admittance[k][j] = self.admittance[k][j] - squared;
         } else {
             let loose = loose(x.ratio, kind);
             self.across[j] = self.across[j] + x.ratio * g * loose;
@@ -213,8 +213,8 @@ impl<'a, S: Scalar> Network<'a, S> {
     /// Currents of the legs at the step's end.
     #[inline(always)]
     pub fn ends(&self, v: [S; 3], neutral: S) -> [S; 3] {
-        let Discrete { own, across, .. } = self.discrete;
-        three!(|j| self.inject[j] + (own[j][0] * v[0] + own[j][1] * v[1] + own[j][2] * v[2]) - across[j] * neutral)
+        let Discrete { admittance, across, .. } = self.discrete;
+        three!(|j| self.inject[j] + (admittance[j][0] * v[0] + admittance[j][1] * v[1] + admittance[j][2] * v[2]) - across[j] * neutral)
     }
 
     /// Voltage that drives a contact.
@@ -357,17 +357,17 @@ impl<S: Scalar> Network<'_, S> {
     #[inline(always)]
     pub fn solve(&self, voltage: [S; 3], resistance: [S; 3], connected: [S::Mask; 3]) -> ([S; 3], S) {
         let (zero, one) = (S::zero(), S::one());
-        let Discrete { own, across: y, per_sum, share, .. } = self.discrete;
+        let Discrete { admittance, across: y, per_sum, share, .. } = self.discrete;
         let held: [S; 3] = three!(|j| S::indicator(connected[j]));
         let r: [S; 3] = three!(|j| S::select(connected[j], resistance[j], one));
-        let mut z = three!(|j| three!(|k| r[j] * (own[j][k] - y[j] * y[k] * *per_sum)));
+        let mut z = three!(|j| three!(|k| r[j] * (admittance[j][k] - y[j] * y[k] * *per_sum)));
         let mut b: [S; 3] = three!(|j| held[j] * voltage[j] - r[j] * (self.inject[j] - share[j] * self.feed));
         let mut lost = S::mask(false);
         let mut v = voltage;
         let mut per = [zero; 3];
         for j in 0..3 {
             z[j][j] = z[j][j] + held[j];
-            let fixed = (S::splat(FLOATING) * own[j][j]).lt(z[j][j]);
+            let fixed = (S::splat(FLOATING) * admittance[j][j]).lt(z[j][j]);
             lost = lost | !fixed;
             per[j] = S::select(fixed, one / S::select(fixed, z[j][j], one), zero);
             for l in j + 1..3 {

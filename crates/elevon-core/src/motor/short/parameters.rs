@@ -20,7 +20,7 @@ const PARTED_BY_PAIR: When = When::Away("motor.phase_short_turns", 1.0);
 const PARTED_BY_GROUND: When = When::Away("motor.ground_short_turns", 1.0);
 
 variables! {
-    /// Resistors between terminals and centre tap: the stand's way to seed a short (N 4.3).
+    /// Resistors between terminals and centre tap: the stand's means to seed a short (N 4.3).
     TapParameter, TAP {
         TapLevelA => "tap_level_a", "f_a", "1", Between(0.0, 0.9), Plant, Some(0.0), "healthy 0; level f of the resistor R = ref (1 - f)/f from terminal a to the centre",
             high_only("the resistor draws its own current from the link and leaves the winding's alone");

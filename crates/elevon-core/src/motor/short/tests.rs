@@ -94,7 +94,7 @@ fn outcome<S: Scalar>(net: &Network<'_, S>, contact: &Contacts<S>, v: [S; 3], ne
     (net.turns(v, neutral), after)
 }
 
-const REST: Contacts<f64> = [[0.0; 3]; KINDS];
+const NO_CURRENT: Contacts<f64> = [[0.0; 3]; KINDS];
 
 fn sines(amplitude: f64, angle: f64) -> [f64; 3] {
     three!(|j| amplitude * (angle - std::f64::consts::TAU * j as f64 / 3.0).sin())
@@ -126,7 +126,7 @@ fn a_contact_without_conductance_is_the_healthy_motor() {
     for case in ALL {
         for kappa in [0.0, KAPPA, 1.0] {
             let open = Rig::new(Some(Case { resistance: 1e12, ..case }), kappa);
-            let (mut x, mut y, mut size) = (([0.0; 3], REST), ([0.0; 3], REST), 0.0_f64);
+            let (mut x, mut y, mut size) = (([0.0; 3], NO_CURRENT), ([0.0; 3], NO_CURRENT), 0.0_f64);
             for k in 0..20_000 {
                 for (rig, state) in [(&healthy, &mut x), (&open, &mut y)] {
                     let net = rig.network(state.0, &state.1, [0.0; 3], 0.0);
@@ -147,7 +147,7 @@ fn flows_close_at_every_contact() {
     for case in ALL {
         for resistance in [1e-2, 1.0, 40.0, 1e4] {
             let rig = Rig::new(Some(Case { resistance, ..case }), KAPPA);
-            let (mut m, mut c, ground) = ([0.0; 3], REST, -190.0);
+            let (mut m, mut c, ground) = ([0.0; 3], NO_CURRENT, -190.0);
             let (mut drawn, mut heat, mut emf_work, mut given) = (0.0, 0.0, 0.0, 0.0);
             for k in 0..50_000 {
                 let e = sines(K * SPEED, SPEED * POLES * k as f64 * DT);
@@ -174,14 +174,14 @@ fn flows_close_at_every_contact() {
 fn at_its_onset_the_loop_carries_the_phase_current_and_cleared_it_carries_none() {
     let rig = Rig::new(Some(ALL[0]), KAPPA);
     let m = [4.0, -2.5, -1.5];
-    assert_eq!(rig.shorts.loops(&rig.structure, m, &REST), [4.0, 0.0, 0.0]);
+    assert_eq!(rig.shorts.loops(&rig.structure, m, &NO_CURRENT), [4.0, 0.0, 0.0]);
     let mut healthy = Rig::new(None, KAPPA);
     healthy.structure = rig.structure;
-    let mut burnt = REST;
+    let mut burnt = NO_CURRENT;
     burnt[LOOP][0] = 6.0;
     let net = healthy.network(m, &burnt, [0.0; 3], 0.0);
     let (turns, contact) = outcome(&net, &burnt, [0.0; 3], net.neutral([0.0; 3]));
-    assert_eq!(contact, REST);
+    assert_eq!(contact, NO_CURRENT);
     assert_eq!(healthy.shorts.loops(&healthy.structure, m, &contact), [0.0; 3]);
     assert!((turns[0] + turns[1] + turns[2]).abs() < 1e-12);
 }
@@ -191,8 +191,8 @@ fn the_contact_does_not_follow_the_coppers_temperature() {
     let rig = Rig::new(Some(Case { kind: LOOP, phase: 0, turns: 0.2, resistance: 10.0 }), 1.0);
     for factor in [1.0, 1.4] {
         let discrete = Discrete::new(&rig.shorts, [1e-12; 3], factor, 0.0);
-        let net = Network::new(&rig.shorts, &discrete, rig.structure, [0.0; 3], &REST, [0.0; 3], 0.0, [0.0; 3]);
-        let (_, contact) = outcome(&net, &REST, [100.0, -50.0, -50.0], 0.0);
+        let net = Network::new(&rig.shorts, &discrete, rig.structure, [0.0; 3], &NO_CURRENT, [0.0; 3], 0.0, [0.0; 3]);
+        let (_, contact) = outcome(&net, &NO_CURRENT, [100.0, -50.0, -50.0], 0.0);
         // mu v over R_c and the warm mu N R.
         let expected = 0.2 * 100.0 / (10.0 + factor * 0.2 * 0.8 * R);
         assert!((contact[LOOP][0] - expected).abs() < 1e-12 * expected);
@@ -204,7 +204,7 @@ fn held_legs_have_the_potentials_of_the_elimination() {
     for case in ALL {
         let rig = Rig::new(Some(case), KAPPA);
         let discrete = Discrete::new(&rig.shorts, rig.star.dt_per_inductance, 1.0, 0.3);
-        let (mut contact, drop) = (REST, sines(40.0, 0.3));
+        let (mut contact, drop) = (NO_CURRENT, sines(40.0, 0.3));
         contact[case.kind][case.phase] = 0.7;
         let net = Network::new(&rig.shorts, &discrete, rig.structure, [0.4, -0.3, -0.1], &contact, drop, -190.0, [0.0; 3]);
         let (v, neutral) = net.behind([190.0, -190.0, 188.0]);
@@ -220,7 +220,7 @@ fn held_legs_have_the_potentials_of_the_elimination() {
 fn loose_legs_carry_nothing() {
     for case in ALL {
         let rig = Rig::new(Some(case), KAPPA);
-        let mut contact = REST;
+        let mut contact = NO_CURRENT;
         contact[case.kind][case.phase] = 0.7;
         for connected in [[true, true, false], [false, true, false], [false, false, false]] {
             let net = rig.network([0.4, -0.3, -0.1], &contact, sines(40.0, 0.3), -190.0);
@@ -253,9 +253,9 @@ fn stepped<S: Scalar>(raw: &[Vec<S>; 3]) -> Vec<S> {
         let (v, neutral) = net.solve(splat(chopped(40 * k)), splat([0.2; 3]), connected);
         let (turns, contact) = outcome(&net, &c, v, neutral);
         let x = net.account([m, turns], [&c, &contact], v, neutral, splat([R; 3]), S::splat(1.1));
-        let held = net.behind(v).1;
+        let behind = net.behind(v).1;
         (m, c) = (turns, contact);
-        out.extend([m[0], m[1], m[2], neutral, held, x.copper, x.contact, x.tap, x.loops, x.ground]);
+        out.extend([m[0], m[1], m[2], neutral, behind, x.copper, x.contact, x.tap, x.loops, x.ground]);
         out.extend(c.iter().flatten().chain(&x.legs).copied());
     }
     out

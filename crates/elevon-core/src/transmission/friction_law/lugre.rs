@@ -53,30 +53,30 @@ impl<S: Scalar> Bristle<S> {
         let [fixed, moving] = push.limits;
         // A limit that fell (a released brake) lets go of what the bristles held above it.
         let z = bristle.clamp_abs(fixed / self.stiffness);
-        let held = push.free - k * self.stiffness * z;
+        let sticking = push.free - k * self.stiffness * z;
         let c = self.stiffness * h / moving.maximum(S::splat(NONE));
-        // c u^2 + b u - |held| = 0 for the size u of the new speed.
+        // c u^2 + b u - |sticking| = 0 for the size u of the new speed.
         let ahead = push.free + k * self.damping * z / h;
-        let b = k.fma(self.stiffness.fma(h, self.damping), S::one()) - held.signed(c * ahead);
-        let root = b.fma(b, S::splat(4.0) * c * held.abs()).sqrt();
+        let b = k.fma(self.stiffness.fma(h, self.damping), S::one()) - sticking.signed(c * ahead);
+        let root = b.fma(b, S::splat(4.0) * c * sticking.abs()).sqrt();
         let rising = S::zero().le(b);
-        let size = S::select(rising, S::splat(2.0) * held.abs(), root - b) / S::select(rising, b + root, S::splat(2.0) * c);
-        self.moved(push, z, held.signed(size))
+        let size = S::select(rising, S::splat(2.0) * sticking.abs(), root - b) / S::select(rising, b + root, S::splat(2.0) * c);
+        self.moved(push, z, sticking.signed(size))
     }
 
-    /// The same beside an end stop: at rest there, what would leave `outwards` stays, and its bristles with it.
+    /// The same at an end stop: at rest there, what would leave `outwards` stays, and its bristles with it.
     #[inline(always)]
-    pub fn advance_beside(&self, push: &Push<S>, bristle: S, speed: S, stop: &Stop<S>, position: S) -> Moved<S> {
+    pub fn advance_at_stop(&self, push: &Push<S>, bristle: S, speed: S, stop: &Stop<S>, position: S) -> Moved<S> {
         let moved = self.advance(push, bristle);
         let stopped = speed.equals(S::zero()) & stop.outwards(position, moved.speed);
         if !S::any(stopped) {
             return moved;
         }
-        let held = self.moved(push, bristle, S::zero());
+        let sticking = self.moved(push, bristle, S::zero());
         Moved {
-            speed: S::select(stopped, held.speed, moved.speed),
-            bristle: S::select(stopped, held.bristle, moved.bristle),
-            dry: S::select(stopped, held.dry, moved.dry),
+            speed: S::select(stopped, sticking.speed, moved.speed),
+            bristle: S::select(stopped, sticking.bristle, moved.bristle),
+            dry: S::select(stopped, sticking.dry, moved.dry),
         }
     }
 

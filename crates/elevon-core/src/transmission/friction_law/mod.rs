@@ -1,6 +1,6 @@
 //! Laws of the dry friction of the motor shaft, chosen by `friction.law` (docs/theory/friction.md).
 //!
-//! A law says how much dry friction there is: the limit at rest and the value when moving (`limits`). Laws without a state
+//! A law states how much dry friction there is: the limit at rest and the value when moving (`limits`). Laws without a state
 //! stick as Borello's does; a law with bristles moves shaft and bristles together (`lugre`).
 
 mod load_dependent;
@@ -10,7 +10,7 @@ mod stribeck;
 pub use lugre::{Bristle, Moved, Push};
 
 use crate::scalar::Scalar;
-use crate::variable::Own;
+use crate::variable::View;
 use crate::{choices, variables};
 use load_dependent::LoadTerms;
 use stribeck::Stribeck;
@@ -59,8 +59,8 @@ impl FrictionLaw {
     }
 
     /// The law of a run.
-    pub fn chosen(own: &Own<FrictionLawParameter>) -> Self {
-        Self::read(own.value(FrictionLawParameter::Law))
+    pub fn chosen(view: &View<FrictionLawParameter>) -> Self {
+        Self::read(view.value(FrictionLawParameter::Law))
     }
 }
 

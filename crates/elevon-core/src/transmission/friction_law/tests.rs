@@ -100,7 +100,7 @@ fn one_coefficient_acts_on_the_torque_through_the_gear() {
     }
 }
 
-/// Directional (m5): the same pair of torques costs more the way the larger coefficient goes; signs turn together.
+/// Directional (m5): the same pair of torques costs more in the direction of the larger coefficient; signs turn together.
 #[test]
 fn the_directional_form_tells_motor_from_load() {
     let law = law(&[(P::LoadMotor, 0.05), (P::LoadExternal, 0.2), (P::LoadMotorStribeck, 0.02), (P::LoadExternalStribeck, 0.04)]);
@@ -113,7 +113,7 @@ fn the_directional_form_tells_motor_from_load() {
     close(fixed, FIXED + 0.15 + 0.02 + 0.02, 1e-15);
 }
 
-/// Quadratic (m6): the load's square where the motor wins, the motor's where the load wins, none where both push one way.
+/// Quadratic (m6): the load's square where the motor wins, the motor's where the load wins, none where both push in one direction.
 #[test]
 fn the_quadratic_terms_follow_who_drives() {
     let none = [P::LoadMotor, P::LoadExternal, P::LoadMotorStribeck, P::LoadExternalStribeck].map(|p| (p, 0.0));
@@ -185,7 +185,7 @@ fn lugre_holds_up_to_the_static_limit_with_its_stiffness() {
         let [speed, z, angle, _] = run(&law, h, steps, 0.0, ramp(0.95));
         assert!(speed.abs() < 1e-4, "{stiffness} at {h}: {speed}");
         close(z * stiffness, 0.95 * FIXED, 1e-3 * FIXED);
-        // The bristles yield a little on their way: z lags the angle, never leads it.
+        // The bristles yield a little as they move: z lags the angle, never leads it.
         assert!(angle >= z * (1.0 - 1e-9), "{angle} against {z}");
         let [speed, ..] = run(&law, h, steps, 0.0, ramp(1.05));
         assert!(speed > 1.0, "{stiffness} at {h}: {speed}");
@@ -307,10 +307,10 @@ fn lanes_have_the_bits_of_single_runs() {
         let limits = together.limits(kind, given, speed, torque, load);
         let push = Push { free: speed + torque, limits, dt: Lanes::splat(1e-6), dt_per_inertia: Lanes::splat(4e-4) };
         let moved = together.bristle.advance(&push, Lanes::splat(1e-4));
-        for (i, &own) in speeds.iter().enumerate() {
+        for (i, &speed) in speeds.iter().enumerate() {
             let alone = Law::derive(&all.map(|p| each(i, p)), 1.0);
-            let limits_alone = alone.limits(kind, [FIXED, MOVING], own, torque.lane(i), load.lane(i));
-            let push = Push { free: own + torque.lane(i), limits: limits_alone, dt: 1e-6, dt_per_inertia: 4e-4 };
+            let limits_alone = alone.limits(kind, [FIXED, MOVING], speed, torque.lane(i), load.lane(i));
+            let push = Push { free: speed + torque.lane(i), limits: limits_alone, dt: 1e-6, dt_per_inertia: 4e-4 };
             let moved_alone = alone.bristle.advance(&push, 1e-4);
             assert_eq!(limits.map(|x| x.lane(i)), limits_alone, "{kind:?}");
             assert_eq!(
@@ -321,7 +321,7 @@ fn lanes_have_the_bits_of_single_runs() {
     }
 }
 
-/// The low model's sensitivities go through the laws: slopes are finite and those of differences.
+/// The reduced-order model's sensitivities go through the laws: slopes are finite and those of differences.
 #[test]
 fn slopes_are_exact() {
     use crate::scalar::{Dual, Scalar};

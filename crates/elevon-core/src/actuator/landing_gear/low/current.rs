@@ -20,7 +20,7 @@ fn against<S: Scalar>(m: &Model<S>, chopping: Chopping, link: S) -> S {
     }
 }
 
-/// The pair's L di/dt = V - R i over a step, the commutations a part of R: share of the way to V/R.
+/// The pair's L di/dt = V - R i over a step, the commutations a part of R: share of the approach to V/R.
 #[derive(Clone, Copy)]
 pub(super) struct Lag<S> {
     pub(super) share: S,
@@ -90,7 +90,7 @@ fn freewheels<S: Scalar>(m: &Model<S>, p: &Pair<S>, s: &Body<S>, duty: S) -> S {
     S::select(zero.lt(fall), lasts, off)
 }
 
-/// Mean currents of the phase that is not used: beside the pair, and alone with the HIGH leg.
+/// Mean currents of the phase that is not used: shared with the pair, and alone with the HIGH leg.
 pub(super) struct Third<S> {
     pub(super) shared: S,
     pub(super) alone: S,
@@ -105,11 +105,11 @@ pub(super) fn third_current<S: Scalar>(m: &Model<S>, p: &Pair<S>, s: &Body<S>, d
     let inductance = S::select(zero.lt(p.inductance), p.inductance, one);
     let per_volt = m.c.modulator.period / inductance;
     let speed = s.motion.motor_speed;
-    let excess = (p.beside * speed - half * m.diode_drop).maximum(zero);
+    let excess = (p.emf_shared * speed - half * m.diode_drop).maximum(zero);
     let against = (half * (s.link + m.diode_drop) - excess).maximum(S::splat(1e-3) * s.link.maximum(one));
     let rise = S::splat(4.0 / 3.0) * per_volt * excess;
     let fall = S::splat(4.0 / 3.0) * per_volt * against;
-    let drift = per_volt * (p.apart * speed - m.diode_drop);
+    let drift = per_volt * (p.emf_alone * speed - m.diode_drop);
     let off = freewheels(m, p, s, duty);
     let floats = (one - duty - off).maximum(zero);
     let peak = rise * off;

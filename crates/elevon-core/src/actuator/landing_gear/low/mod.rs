@@ -1,4 +1,4 @@
-//! Low fidelity: the conducting pair as one circuit, its current averaged over a carrier period, continuous or not;
+//! Reduced-order model: the conducting pair as one circuit, its current averaged over a carrier period, continuous or not;
 //! the commutations as a resistance that grows with speed.
 
 mod current;
@@ -21,7 +21,7 @@ use crate::three;
 use crate::time::Steps;
 use crate::variable::Signal;
 
-/// The landing-gear actuator at low fidelity.
+/// The reduced-order model of the landing-gear actuator.
 #[derive(Clone)]
 pub struct Low;
 
@@ -75,26 +75,26 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
     s.current = S::select(current.abs().lt(S::splat(1e-30)), zero, current);
     let i = s.current;
     // Half of the third phase's current comes from each of the pair; it brakes.
-    let (mut line, mut dragged) = (i, zero);
+    let (mut line, mut third_torque) = (i, zero);
     if structure.chopping == Chopping::LowSide {
         let third = third_current(m, &p, &s.body, duty * (one - s.tripped));
         line = i + i.signed(S::select(short, zero, half * third.shared + third.alone));
-        dragged = S::select(short, zero, third.shared * p.beside + third.alone * p.apart);
+        third_torque = S::select(short, zero, third.shared * p.emf_shared + third.alone * p.emf_alone);
     }
     s.line = line;
     Constants::meter(&mut s.body, line);
     let square = i * i;
     let outgoing = handed_over(m, structure.chopping, &p, s, duty, i);
     let driving = p.constant * i - S::select(short, zero, p.handed * outgoing);
-    s.torque = m.c.star.saturate(driving - dragged);
+    s.torque = m.c.star.saturate(driving - third_torque);
     let speed = s.body.motion.motor_speed;
     let drop = match structure.chopping {
         Chopping::LowSide => m.diode_drop,
         Chopping::Both => m.diode_drop + m.diode_drop,
     };
     let mut winding = p.winding * square;
-    let mut drops = i.abs() * (one - duty) * drop + (p.resistance - p.winding) * square + dragged * speed;
-    let mut drawn = (driving - dragged) * speed + winding + drops;
+    let mut drops = i.abs() * (one - duty) * drop + (p.resistance - p.winding) * square + third_torque * speed;
+    let mut drawn = (driving - third_torque) * speed + winding + drops;
     if S::any(short) {
         // All that a shorted winding brakes becomes heat in its own circuit.
         let heat = -(p.constant * speed * i);
@@ -193,7 +193,7 @@ impl Wiring for Low {
         }
     }
 
-    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, _asked: Signals, out: &mut [S]) {
+    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, _selection: Signals, out: &mut [S]) {
         m.c.observe(structure, inputs, &s.body, s.torque, t, out);
         out[Q::CurrentLine as usize] = s.line;
         out[Q::EnergyMagnetic as usize] = S::splat(0.5) * pair(m, structure, s).inductance * s.current * s.current;

@@ -14,9 +14,9 @@ pub(super) struct Pair<S> {
     pub(super) inductance: S,
     pub(super) closed: S,
     /// Coefficient of the phase that is not used less the mean of those that are; none of an interrupted phase.
-    pub(super) beside: S,
+    pub(super) emf_shared: S,
     /// The same less that of the HIGH leg's.
-    pub(super) apart: S,
+    pub(super) emf_alone: S,
     /// Coefficient of the phase that took over last less that of the one that left.
     pub(super) handed: S,
     /// 1: the HIGH leg's; -1: the LOW leg's.
@@ -29,15 +29,15 @@ pub(super) fn pair<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>)
     let resistance = m.c.resistance();
     let demand = six_step::demand(s.body.hall.code);
     let zero = S::zero();
-    let way = s.body.demand.signed(S::one());
+    let direction = s.body.demand.signed(S::one());
     let mut pair = Pair {
         constant: zero,
         winding: zero,
         resistance: zero,
         inductance: zero,
         closed: zero,
-        beside: zero,
-        apart: zero,
+        emf_shared: zero,
+        emf_alone: zero,
         handed: zero,
         upper: zero,
     };
@@ -49,17 +49,17 @@ pub(super) fn pair<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>)
         pair.inductance = pair.inductance + used * m.inductance[j];
         let cut = S::indicator(S::splat(0.5).le(m.c.star.open[j]));
         open = open + used * cut;
-        pair.beside = pair.beside + S::select(S::splat(0.5).lt(used), S::splat(-0.5) * k[j], k[j]);
-        let high = S::indicator(S::splat(0.5).lt(demand[j] * way));
-        pair.apart = pair.apart + (S::one() - used - high) * k[j];
+        pair.emf_shared = pair.emf_shared + S::select(S::splat(0.5).lt(used), S::splat(-0.5) * k[j], k[j]);
+        let high = S::indicator(S::splat(0.5).lt(demand[j] * direction));
+        pair.emf_alone = pair.emf_alone + (S::one() - used - high) * k[j];
         spare = spare + (S::one() - used) * (S::one() - cut);
         pair.closed = pair.closed + used;
         pair.handed = pair.handed + s.handover.change[j] * k[j];
-        pair.upper = pair.upper + s.handover.change[j] * used * way;
+        pair.upper = pair.upper + s.handover.change[j] * used * direction;
     }
     pair.resistance = pair.winding + m.on_resistance + m.on_resistance;
-    pair.beside = pair.beside * spare;
-    pair.apart = pair.apart * spare;
+    pair.emf_shared = pair.emf_shared * spare;
+    pair.emf_alone = pair.emf_alone * spare;
     pair.closed = S::indicator(S::splat(0.5).lt(pair.closed) & open.lt(S::splat(0.5)));
     pair
 }

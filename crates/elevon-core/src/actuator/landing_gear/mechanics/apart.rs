@@ -12,8 +12,8 @@ impl<S: Scalar> Mechanics<S> {
         let brake = self.brake.torque(a.brake_free);
         let pushed = a.motor_torque + detent;
         let heading = S::select(s.motor_speed.equals(zero), pushed, s.motor_speed);
-        let own = self.friction.at(s.motor_speed * self.travel, zero.le(heading), s.nut_position, self.screw.turns);
-        let rubbing = self.travel * (own.train - own.screw).maximum(zero);
+        let friction = self.friction.at(s.motor_speed * self.travel, zero.le(heading), s.nut_position, self.screw.turns);
+        let rubbing = self.travel * (friction.train - friction.screw).maximum(zero);
         let other = brake + self.bearing;
         let motor = Shaft {
             speed: s.motor_speed,

@@ -12,14 +12,14 @@ impl<S: Scalar> Mechanics<S> {
         let mut coasting = *s;
         self.apart(&mut coasting, a, f);
         let (old, new) = (s.nut_speed, a.rig_speed);
-        let way = new.sign();
+        let direction = new.sign();
         let rubs = self.friction.at(new, zero.le(new), s.nut_position, self.screw.turns);
         let detent = self.detent_torque(s.motor_position);
         let jam = self.screw.jam(s.nut_position);
-        let torque = a.motor_torque + detent - way * (self.brake.torque(a.brake_free) + self.bearing);
+        let torque = a.motor_torque + detent - direction * (self.brake.torque(a.brake_free) + self.bearing);
         let inertia = self.inertia_train * self.per_travel * self.per_travel;
-        let connected = way * (rubs.train + jam) - torque * self.per_travel + inertia * (new - old) / self.dt;
-        let released = way * (rubs.screw + jam) + self.governor.force(new) + self.mass_screw * (new - old) / self.dt;
+        let connected = direction * (rubs.train + jam) - torque * self.per_travel + inertia * (new - old) / self.dt;
+        let released = direction * (rubs.screw + jam) + self.governor.force(new) + self.mass_screw * (new - old) / self.dt;
         let weight = self.mass * S::splat(GRAVITY);
         s.rig_force = S::select(apart, released, connected) - weight - f.spring;
         s.nut_speed = new;

@@ -62,7 +62,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             range: Range::Any,
             attributes: &[],
             places: places!("sensor.encoder": "sensor.encoder.offset" Add),
-            effect: "offset of the shown output position; the position loop feels it where control.position_feedback = encoder",
+            effect: "offset of the reported output position; the position loop feels it where control.position_feedback = encoder",
             source: "T3 Table 1.1 (position sensor)",
         },
         FaultKind {
@@ -80,7 +80,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             range: Range::Unit,
             attributes: &[],
             places: places!("sensor.encoder": "sensor.encoder.missing_counts" Add),
-            effect: "fraction of the encoder's counts lost, spread evenly: the shown travel is too short; the position loop feels it where control.position_feedback = encoder",
+            effect: "fraction of the encoder's counts lost, spread evenly: the reported displacement is too short; the position loop feels it where control.position_feedback = encoder",
             source: "N 4.5",
         },
         FaultKind {
@@ -89,7 +89,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             range: Range::Unit,
             attributes: SECTORS,
             places: places!("sensor.encoder": "sensor.encoder.dark_share" Add),
-            effect: "share of the encoder's disc that gives no counts: the shown position stands in a dark sector, and what was lost stays lost until the disc turns back through it or the drive is referenced anew; the position loop feels it where control.position_feedback = encoder",
+            effect: "share of the encoder's disc that gives no counts: the reported position stands in a dark sector, and what was lost stays lost until the disc turns back through it or the drive is referenced anew; the position loop feels it where control.position_feedback = encoder",
             source: "N 4.5 (sectors of the disc)",
         },
         FaultKind {
@@ -110,7 +110,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             range: Range::Unit,
             attributes: &[],
             places: places!("sensor.resolver.sine": "sensor.resolver.sine_open" Set, "sensor.resolver.cosine": "sensor.resolver.cosine_open" Set),
-            effect: "1: the winding is interrupted; with one channel dead the shown angle leaps by half a turn",
+            effect: "1: the winding is interrupted; with one channel dead the reported angle leaps by half a turn",
             source: "N 4.5 (windings of the resolver)",
         },
         FaultKind {
@@ -138,7 +138,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             attributes: &[],
             places: places!("sensor.current_a": "sensor.current.stuck_a" Set, "sensor.current_b": "sensor.current.stuck_b" Set, "sensor.current_c": "sensor.current.stuck_c" Set),
             effect: "1: the current sensor stands still at its value of the onset: its leg controls nothing; between relays the other two legs leave its phase what the star allows, a carrier drive controls a wrong current",
-            source: "ASSUMED: the usual failure of a sensor's electronics, beside gain and offset of T2",
+            source: "ASSUMED: the usual failure of a sensor's electronics, in addition to gain and offset of T2",
         },
         FaultKind {
             kind: "dead",
@@ -146,7 +146,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             range: Range::Unit,
             attributes: &[],
             places: places!("sensor.encoder": "sensor.encoder.dead" Set),
-            effect: "1: no counts come: the shown position stands still, and what was lost stays lost until the drive is referenced anew; the position loop feels it where control.position_feedback = encoder",
+            effect: "1: no counts come: the reported position stands still, and what was lost stays lost until the drive is referenced anew; the position loop feels it where control.position_feedback = encoder",
             source: "N 4.5",
         },
         FaultKind {
@@ -155,8 +155,8 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             range: Range::Unit,
             attributes: &[],
             places: places!("sensor.current_a": "sensor.current.dead_a" Set, "sensor.current_b": "sensor.current.dead_b" Set, "sensor.current_c": "sensor.current.dead_c" Set),
-            effect: "1: the current sensor shows nothing: its leg controls nothing; between relays the other two legs leave its phase what the star allows, a carrier drive controls a wrong current",
-            source: "ASSUMED: broken wire, beside gain and offset of T2",
+            effect: "1: the current sensor reports zero: its leg controls nothing; between relays the other two legs leave its phase what the star allows, a carrier drive controls a wrong current",
+            source: "ASSUMED: broken wire, in addition to gain and offset of T2",
         },
     ]
 }

@@ -74,7 +74,7 @@ pub fn electrical() -> Vec<FaultKind> {
         FaultKind {
             kind: "phase_short", unit: "S", range: Range::Between(0.0, 1e3), attributes: TOUCHING,
             places: places!("motor.phases_ab": "motor.phase_short_ab" Add, "motor.phases_bc": "motor.phase_short_bc" Add, "motor.phases_ca": "motor.phase_short_ca" Add),
-            effect: "conductance of a contact between the windings of two phases: the drive feeds it beside them, their torque falls, the contact heats",
+            effect: "conductance of a contact between the windings of two phases: the drive feeds it with them, their torque falls, the contact heats",
             source: "T3 Table 1.1 (phase-to-phase short); place and circuit ASSUMED",
         },
         FaultKind {

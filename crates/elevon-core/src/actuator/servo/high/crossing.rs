@@ -114,9 +114,9 @@ impl<S: Scalar> Switched<'_, S> {
         }
         let legs = s.legs;
         s.legs = turned;
-        let rest = S::one() - share;
-        let second = self.part(m, s, legs, rest);
-        (second.0, three!(|j| share * first.1[j] + rest * second.1[j]))
+        let remainder = S::one() - share;
+        let second = self.part(m, s, legs, remainder);
+        (second.0, three!(|j| share * first.1[j] + remainder * second.1[j]))
     }
 }
 

@@ -92,7 +92,7 @@ pub(crate) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
         if let Some(v_n) = connection.loose {
             let connected = connection.legs.connected;
             neutral = S::select(connected[0] & connected[1] & connected[2], plain, v_n);
-            // A floating phase shows its EMF over the neutral.
+            // A floating phase has its EMF over the neutral.
             terminal = three!(|j| S::select(connected[j], terminal[j], neutral + emf[j]));
             legs = Some(connection.legs);
         } else {

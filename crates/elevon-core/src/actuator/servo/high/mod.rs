@@ -1,4 +1,4 @@
-//! High fidelity: three phases, switching inverter, fixed step (reference sheet 1.2 to 1.7).
+//! Switching model: three phases, switching inverter, fixed step (reference sheet 1.2 to 1.7).
 
 mod crossing;
 mod electric;
@@ -22,7 +22,7 @@ use crate::time::Steps;
 use crate::variable::Signal;
 use std::marker::PhantomData;
 
-/// A servo at high fidelity.
+/// The switching model of a servo.
 #[derive(Clone)]
 pub struct High<F>(PhantomData<F>);
 
@@ -111,7 +111,7 @@ impl<F: Form> Wiring for High<F> {
         inputs: &Inputs<S>,
         state: &State<S>,
         t: S,
-        _asked: Signals,
+        _selection: Signals,
         out: &mut [S],
     ) {
         // A row costs what a step does, and there are hundreds of steps to a row.

@@ -64,7 +64,7 @@ pub struct State<S> {
     pub(crate) current_noise: [S; 3],
     pub(crate) sensed: Sensed<S>,
     /// What the current sensors showed last.
-    pub(crate) current_shown: [S; 3],
+    pub(crate) current_reading: [S; 3],
     pub(crate) filtered: [S; 3],
     pub(crate) transitions: S,
     /// Phase-to-neutral voltages of the last step (detailed bridge).

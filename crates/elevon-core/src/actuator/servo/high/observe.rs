@@ -1,4 +1,4 @@
-//! All signals of the high fidelity from its state. Nothing here feeds back.
+//! All signals of the switching model from its state. Nothing here feeds back.
 
 use super::electric::{coupling, motor_torque};
 use super::model::*;
@@ -6,8 +6,8 @@ use super::step::{leg_current, link_voltage, park, seen_current};
 use crate::actuator::servo::advance::Instant;
 use crate::actuator::servo::details::Structure;
 use crate::actuator::servo::layout::*;
-use crate::actuator::servo::shaft::Shown;
-use crate::actuator::servo::signals::{shared, HighSignal as Q, HIGH, HIGH_OWN};
+use crate::actuator::servo::shaft::ShaftSignals;
+use crate::actuator::servo::signals::{shared, HighSignal as Q, HIGH, HIGH_SPECIFIC};
 use crate::actuator::Inputs;
 use crate::motor::short::{GROUND, PAIR, TAPPED};
 use crate::scalar::{three_phase, Kernel, Scalar};
@@ -34,10 +34,10 @@ impl<S: Scalar> Kernel for Observation<'_, S> {
         out[Q::Command as usize] = inputs[COMMAND].at(t) + state.command_noise;
         electrical(structure, model, inputs, state, t, out);
         let x = Instant::at(inputs, t);
-        let shown = mechanical(structure, model, &x, state, out);
+        let signals = mechanical(structure, model, &x, state, out);
         energies(model, structure, state, out);
         if linear {
-            screw(structure, model, &x, state, &shown, out);
+            screw(structure, model, &x, state, &signals, out);
         }
     }
 }
@@ -65,7 +65,7 @@ fn states<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, out: &mu
     set(Q::HeatDrive, s.extra.drive_heat.power);
     set(Q::ThermalWarning, m.extra.network.warns(warm));
     set(Q::Limited, m.control.limited(&s.control));
-    let [encoder, resolver, speed, signal] = m.sensing.show(&structure.sensing, &s.shaft, s.sensed);
+    let [encoder, resolver, speed, signal] = m.sensing.readings(&structure.sensing, &s.shaft, s.sensed);
     set(Q::EncoderPosition, encoder);
     set(Q::ResolverPosition, resolver);
     set(Q::ResolverSpeed, speed);
@@ -73,9 +73,9 @@ fn states<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, out: &mu
 }
 
 #[inline(always)]
-fn screw<S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s: &State<S>, shown: &Shown<S>, out: &mut [S]) {
-    let [position, speed, torque, efficiency, aiding] = m.shaft.show_screw(&s.shaft, shown);
-    let [friction, spall] = m.shaft.show_load_side(&structure.shaft, x, &s.shaft, shown);
+fn screw<S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s: &State<S>, signals: &ShaftSignals<S>, out: &mut [S]) {
+    let [position, speed, torque, efficiency, aiding] = m.shaft.observe_screw(&s.shaft, signals);
+    let [friction, spall] = m.shaft.observe_load_side(&structure.shaft, x, &s.shaft, signals);
     out[HIGH.len()..].copy_from_slice(&[
         position,
         speed,
@@ -132,23 +132,23 @@ fn ideal_voltage<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, s
 }
 
 #[inline(always)]
-fn mechanical<S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s: &State<S>, out: &mut [S]) -> Shown<S> {
+fn mechanical<S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s: &State<S>, out: &mut [S]) -> ShaftSignals<S> {
     let (sin, cos) = m.star.electrical_angle(s.shaft.motor_position).sin_cos();
     let c = coupling::<S, true>(m, structure, s, sin, cos);
     let torque = motor_torque(m, s, &c);
-    let shown = m.shaft.show(&structure.shaft, x, &s.shaft, torque);
+    let signals = m.shaft.observe(&structure.shaft, x, &s.shaft, torque);
     let mut set = |q: Q, x: S| out[q as usize] = x;
-    set(Q::OutputSpeed, shown.output_speed);
+    set(Q::OutputSpeed, signals.output_speed);
     set(Q::MotorTorque, torque);
-    set(Q::UnbalanceTorque, shown.unbalance);
-    set(Q::FrictionTorque, shown.friction);
-    set(Q::BrakeTorque, shown.brake);
-    set(Q::LoadTorque, shown.load);
-    set(Q::StopTorque, shown.stop);
-    set(Q::OutputTorque, shown.output_torque);
-    set(Q::TransmissionTorque, shown.through);
-    shared(HIGH_OWN, shown.added.signals(), out);
-    shown
+    set(Q::UnbalanceTorque, signals.unbalance);
+    set(Q::FrictionTorque, signals.friction);
+    set(Q::BrakeTorque, signals.brake);
+    set(Q::LoadTorque, signals.load);
+    set(Q::StopTorque, signals.stop);
+    set(Q::OutputTorque, signals.output_torque);
+    set(Q::TransmissionTorque, signals.through);
+    shared(HIGH_SPECIFIC, signals.added.signals(), out);
+    signals
 }
 
 #[inline(always)]

@@ -72,17 +72,17 @@ fn solve<S: Scalar>(
     let resistance = three!(|j| S::select(legs.passive[j], S::zero(), m.bridge.on_resistance));
     let source = three!(|j| resistance[j].fma(old[j], legs.voltage[j]));
     let (terminal, neutral) = net.behind(source);
-    let held = Solved { terminal, neutral, rail: legs.rail };
+    let driven = Solved { terminal, neutral, rail: legs.rail };
     let passive = legs.passive[0] | legs.passive[1] | legs.passive[2];
     if !S::any(passive) {
-        return held;
+        return driven;
     }
     let loose = released(net, &legs, source, resistance);
     let pick = |x: S, y: S| S::select(passive, x, y);
     Solved {
-        terminal: three!(|j| pick(loose.terminal[j], held.terminal[j])),
-        neutral: pick(loose.neutral, held.neutral),
-        rail: three!(|j| pick(loose.rail[j], held.rail[j])),
+        terminal: three!(|j| pick(loose.terminal[j], driven.terminal[j])),
+        neutral: pick(loose.neutral, driven.neutral),
+        rail: three!(|j| pick(loose.rail[j], driven.rail[j])),
     }
 }
 

@@ -30,22 +30,22 @@ pub(crate) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> St
     let or = |i: usize, other: S| S::select(initial[i].equals(initial[i]), initial[i], other);
     let zero = S::zero();
     let shaft = model.shaft.start([initial[0], initial[1]], [initial[2], initial[3]]);
-    let mut star = StarState::rest();
+    let mut star = StarState::initial();
     star.current = three!(|j| or(4 + j, zero));
     let warm = model.extra.network.start_at([initial[7], initial[8]]);
     heat(raw, &mut star, &warm);
     State {
         star,
         legs: [-S::one(); 3],
-        bridge: BridgeState::rest(),
-        control: PositionSpeedState::rest(),
+        bridge: BridgeState::initial(),
+        control: PositionSpeedState::initial(),
         current_ref: zero,
-        current_control: CurrentControlState::rest(),
+        current_control: CurrentControlState::initial(),
         shaft,
         command_noise: zero,
         current_noise: [zero; 3],
         sensed: model.sensing.start(&shaft),
-        current_shown: star.current,
+        current_reading: star.current,
         filtered: [zero; 3],
         transitions: zero,
         voltage: [zero; 3],
@@ -54,7 +54,7 @@ pub(crate) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> St
             network: warm,
             sensed: star.current,
             last_reference: S::splat(f64::NAN),
-            link: DcLinkState::rest(),
+            link: DcLinkState::initial(),
             drive_heat: model.extra.drive_heat.start(),
             contacts: discrete(model, &star),
         },

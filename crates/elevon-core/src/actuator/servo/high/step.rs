@@ -1,4 +1,4 @@
-//! One step of the high fidelity. It reads like the block diagram: sensors, control electronics, power electronics,
+//! One step of the switching model. It reads like the block diagram: sensors, control electronics, power electronics,
 //! motor, transmission, acquisition. With `FULL` false the optional details compile to nothing, with `EXTRA` false those
 //! that only some servos have; a detail at its healthy value changes no bit, so the forms agree exactly where both apply.
 
@@ -47,7 +47,7 @@ pub(crate) fn measured_current<S: Scalar, const FULL: bool, const EXTRA: bool>(
         current = three!(|j| legs[j]);
     }
     if FULL && structure.measured_current {
-        m.sensor.measure(current, s.current_noise, s.current_shown)
+        m.sensor.measure(current, s.current_noise, s.current_reading)
     } else {
         current
     }
@@ -122,13 +122,13 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     let (sin, cos) = m.star.electrical_angle(s.shaft.motor_position).sin_cos();
     let mut measured = measured_current::<S, FULL, EXTRA>(m, structure, s);
     if FULL && structure.measured_current {
-        s.current_shown = measured;
+        s.current_reading = measured;
     }
     if EXTRA && structure.current_filter {
         s.extra.sensed = three!(|j| low_pass(m.extra.closing, s.extra.sensed[j], measured[j]));
         measured = s.extra.sensed;
     }
-    let (sin_c, cos_c) = if FULL && structure.sensing.shows() && (!EXTRA || structure.sensing.commutated) {
+    let (sin_c, cos_c) = if FULL && structure.sensing.distorts() && (!EXTRA || structure.sensing.commutated) {
         m.star.electrical_angle(reading.angle).sin_cos()
     } else {
         (sin, cos)
@@ -170,7 +170,7 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     let torque = motor_torque(m, s, &c);
     let (current, voltage): ([S; 3], [S; 3]);
     if EXTRA && structure.located {
-        let rate = if structure.sensing.shows() && structure.sensing.commutated { reading.speed } else { s.shaft.motor_speed };
+        let rate = if structure.sensing.distorts() && structure.sensing.commutated { reading.speed } else { s.shaft.motor_speed };
         let seen = Seen { error, sines: sin_phases, cosines: cos_phases, rate };
         let (i, v) = apart::<S, _>(Located { model: m, structure, state: &mut *s, coupling: &c, half_supply, old_legs, seen });
         (current, voltage) = (three!(|j| i[j]), three!(|j| v[j]));

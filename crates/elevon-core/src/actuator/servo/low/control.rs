@@ -1,4 +1,4 @@
-//! The controller of the low fidelity: P, and PID whose derivative acts as inertia (docs/theory/low-fidelity.md, "The speed
+//! The controller of the reduced-order model: P, and PID whose derivative acts as inertia (docs/theory/low-fidelity.md, "The speed
 //! derivative as inertia"); or one PID on the position. Jumps of the speed error pass the derivative's filter (`jump.rs`).
 
 use super::jump::Jumps;
@@ -62,12 +62,12 @@ impl<S: Scalar> Control<S> {
     }
 }
 
-/// What the controller asks for before the derivative of the speed is known.
+/// What the controller demands before the derivative of the speed is known.
 pub(super) struct Demand<S> {
     speed_ref: S,
     error: S,
     position_error: S,
-    /// What the sensors show of the speed.
+    /// What the sensors report of the speed.
     speed: S,
     pub torque: S,
     /// Of jumps: what the torque limit cuts off them, N m s.
@@ -80,7 +80,7 @@ fn slew<S: Scalar>(m: &Model<S>, supply: S) -> S {
     m.drive.voltage_ratio * supply * m.drive.supply_scale / (m.cold[2] * m.control.per_torque_constant)
 }
 
-/// Speed that is asked for, within its limit.
+/// Commanded speed, within its limit.
 #[inline(always)]
 fn speed_reference<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, command: S, position_error: S) -> S {
     let c = &m.control;
@@ -97,18 +97,18 @@ fn speed_reference<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State
     demanded.clamp_abs(c.speed_limit)
 }
 
-/// Change of the speed that the resolver shows beside the shaft's own acceleration, which is solved for.
+/// Change of the speed that the resolver reports on top of the shaft's acceleration, which is solved for.
 #[inline(always)]
-fn shown_beside<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &mut State<S>, speed: S) -> S {
+fn reading_deviation<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &mut State<S>, speed: S) -> S {
     if !(FULL && structure.sensing.resolver) {
         return S::zero();
     }
-    let beside = speed - s.jumps.shown - m.sensing.follows() * (s.shaft.motor_speed - s.jumps.moved);
-    (s.jumps.shown, s.jumps.moved) = (speed, s.shaft.motor_speed);
-    beside
+    let deviation = speed - s.jumps.reading - m.sensing.follows() * (s.shaft.motor_speed - s.jumps.motion);
+    (s.jumps.reading, s.jumps.motion) = (speed, s.shaft.motor_speed);
+    deviation
 }
 
-/// The controller's answer to a command and what the sensors show.
+/// The controller's answer to a command and the sensors' readings.
 #[inline(always)]
 pub(super) fn demand<S: Scalar, const FULL: bool>(
     m: &Model<S>,
@@ -130,8 +130,8 @@ pub(super) fn demand<S: Scalar, const FULL: bool>(
     if structure.control.mode == Mode::Torque {
         return none;
     }
-    let change = speed_ref - s.jumps.asked - shown_beside::<S, FULL>(m, structure, s, speed);
-    s.jumps.asked = speed_ref;
+    let change = speed_ref - s.jumps.reference - reading_deviation::<S, FULL>(m, structure, s, speed);
+    s.jumps.reference = speed_ref;
     let mut torque = c.speed_gain * error + s.integral;
     let mut cut = zero;
     if structure.control.derivative {
@@ -146,32 +146,32 @@ pub(super) fn demand<S: Scalar, const FULL: bool>(
     Demand { torque, cut, ..none }
 }
 
-/// Steps the integrator, with the anti-windup of the high fidelity's PID.
+/// Steps the integrator, with the anti-windup of the switching model's PID.
 #[inline(always)]
-pub(super) fn integrate<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, asked: &Demand<S>, unlimited: S) {
+pub(super) fn integrate<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, demand: &Demand<S>, unlimited: S) {
     let c = &m.control;
-    s.speed_ref = asked.speed_ref;
+    s.speed_ref = demand.speed_ref;
     if !structure.integral {
         return;
     }
     let zero = S::zero();
-    let mut change = c.integral_step * asked.error;
+    let mut change = c.integral_step * demand.error;
     if structure.control.conditional {
         change = S::select(s.torque_ref.equals(unlimited), change, zero);
     }
     if structure.control.back_calculation {
-        let excess = (s.torque_ref - unlimited) / c.per_dt - asked.cut;
+        let excess = (s.torque_ref - unlimited) / c.per_dt - demand.cut;
         change = c.back_calculation.fma(excess, change);
     }
     if structure.control.hold_at_rest {
-        let rest = asked.speed.equals(zero);
-        change = S::select(rest & zero.lt(s.rested), zero, change);
-        s.rested = S::indicator(rest);
+        let at_rest = demand.speed.equals(zero);
+        change = S::select(at_rest & zero.lt(s.rested), zero, change);
+        s.rested = S::indicator(at_rest);
     }
     if structure.control.hold_on_error != ErrorHold::Off {
-        let below = asked.position_error.abs().lt(c.threshold);
-        let held = if structure.control.hold_on_error == ErrorHold::Below { below } else { !below };
-        change = S::select(held, zero, change);
+        let below = demand.position_error.abs().lt(c.threshold);
+        let frozen = if structure.control.hold_on_error == ErrorHold::Below { below } else { !below };
+        change = S::select(frozen, zero, change);
     }
     s.integral = s.integral + change;
 }

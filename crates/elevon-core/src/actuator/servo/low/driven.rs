@@ -1,4 +1,4 @@
-//! The low fidelity where one current does not stand for three: references turned away from the rotor by what the resolver
+//! The reduced-order model where one current does not stand for three: references turned away from the rotor by what the resolver
 //! shows, relays with an interrupted phase or unlike sensors, a carrier drive with an interrupted phase. The three windings
 //! are stepped behind mean leg voltages, exactly for voltages held over a part of a step (docs/theory/low-fidelity.md,
 //! "Three windings behind mean legs").
@@ -23,7 +23,7 @@ pub struct DrivenState<S> {
 }
 
 impl<S: Scalar> DrivenState<S> {
-    pub(super) fn rest() -> Self {
+    pub(super) fn initial() -> Self {
         Self { legs: [S::zero(); 3], integral: [S::zero(); 2] }
     }
 }
@@ -36,7 +36,7 @@ pub(super) struct Driven<S> {
     pub copper: S,
     pub drawn: S,
     pub voltage: S,
-    /// Quadrature component at the step's end, in the rotor's frame and as the drive's sensors show it.
+    /// Quadrature component at the step's end, in the rotor's frame and as the drive's sensors report it.
     pub quadrature: S,
     pub seen: S,
 }
@@ -73,8 +73,8 @@ pub(super) fn driven_step<S: Scalar>(
     let share = one / parts;
     let dt = share * m.dt;
     let resistance: [S; 3] = three!(|j| m.resistance[j] * s.resistance_factor);
-    let held = per_winding(m, resistance, dt);
-    let per_volt = three!(|j| S::select(half.le(m.star.open[j]), zero, held[j]));
+    let gain = per_winding(m, resistance, dt);
+    let per_volt = three!(|j| S::select(half.le(m.star.open[j]), zero, gain[j]));
     let mut x = Driven { phases: i, torque: zero, copper: zero, drawn: zero, voltage: zero, quadrature: zero, seen: zero };
     let mut k = zero;
     // Where the shaft's position takes the new speed, speed and currents stand half a step before it.
@@ -85,7 +85,7 @@ pub(super) fn driven_step<S: Scalar>(
         let at = |instant: S| ((instant - middle) * dt).fma(speed, s.shaft.motor_position);
         let along: [S; 3] = coefficients(m, structure, at(k + half));
         let emf: [S; 3] = three!(|j| along[j] * s.flux_factor * speed);
-        let (sin, cos) = m.star.electrical_angle(shown(m, structure, s, at(k + one))).sin_cos();
+        let (sin, cos) = m.star.electrical_angle(angle_reading(m, structure, s, at(k + one))).sin_cos();
         let (sines, cosines) = three_phase(sin, cos);
         let free = three!(|j| x.phases[j] - per_volt[j] * (emf[j] + resistance[j] * x.phases[j]));
         let drift = three!(|j| emf[j] / resistance[j] + x.phases[j]);
@@ -119,7 +119,7 @@ pub(super) fn driven_step<S: Scalar>(
 
 /// Angle of the shaft by which the drive places its references.
 #[inline(always)]
-fn shown<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, position: S) -> S {
+fn angle_reading<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, position: S) -> S {
     if structure.sensing.resolver && structure.sensing.commutated {
         m.sensing.angle(position, s.shaft.motor_speed, s.sensed)
     } else {
@@ -127,7 +127,7 @@ fn shown<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, position:
     }
 }
 
-/// The PI of a carrier drive with its zero on the winding's pole, decoupled, on the currents that the sensors show.
+/// The PI of a carrier drive with its zero on the winding's pole, decoupled, on the currents that the sensors report.
 struct Carrier<S> {
     gain: [S; 3],
     emf_constant: S,
@@ -156,22 +156,22 @@ impl<S: Scalar> Carrier<S> {
     #[inline(always)]
     fn step(&self, part: &Part<S>, memory: &mut DrivenState<S>, wanted: S, i: [S; 3]) -> [S; 3] {
         let (zero, one) = (S::zero(), S::one());
-        let shown: [S; 3] = three!(|j| self.gain[j] * i[j]);
-        let (q, d) = (quadrature(shown, part.sines), -quadrature(shown, part.cosines));
+        let reading: [S; 3] = three!(|j| self.gain[j] * i[j]);
+        let (q, d) = (quadrature(reading, part.sines), -quadrature(reading, part.cosines));
         let error = [-d, wanted - q];
         // As a first-order lag looked at by parts.
         let gain = self.inductance / part.dt * (one - (-(self.bandwidth * part.dt)).exp());
         let electrical = self.electrical_inductance * part.speed;
         let emf = self.emf_constant * part.speed;
-        let asked =
+        let reference =
             [gain.fma(error[0], memory.integral[0]) - electrical * q, gain.fma(error[1], memory.integral[1]) + electrical * d + emf];
-        let size = (asked[0] * asked[0] + asked[1] * asked[1]).sqrt();
+        let size = (reference[0] * reference[0] + reference[1] * reference[1]).sqrt();
         let largest = self.voltage_ratio * S::splat(2.0) * part.half_supply;
         let limited = largest.lt(size);
         let scale = S::select(limited, largest / S::select(limited, size, one), one);
         let step = S::select(limited, zero, self.bandwidth * self.resistance * part.dt);
         memory.integral = [0, 1].map(|a| step.fma(error[a], memory.integral[a]));
-        memory.legs = three!(|j| scale * (asked[1] * part.sines[j] - asked[0] * part.cosines[j]));
+        memory.legs = three!(|j| scale * (reference[1] * part.sines[j] - reference[0] * part.cosines[j]));
         settled(part, memory.legs)
     }
 }
@@ -200,8 +200,8 @@ pub(super) mod tests {
 
     /// A part of the star at rest with the currents `i`, phases interrupted where `open`.
     pub fn part(i: [f64; 3], open: [bool; 3], angle: f64) -> Part<f64> {
-        let held = (1.0 - (-DT * R / L).exp()) / R;
-        let per_volt = open.map(|gone| if gone { 0.0 } else { held });
+        let gain = (1.0 - (-DT * R / L).exp()) / R;
+        let per_volt = open.map(|gone| if gone { 0.0 } else { gain });
         let (sines, cosines) = three_phase(angle.sin(), angle.cos());
         Part {
             dt: DT,
@@ -220,7 +220,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn held_legs_charge_a_star_as_its_exponential() {
+    fn fixed_legs_charge_a_star_as_its_exponential() {
         let legs = [10.0, -2.0, 1.0];
         let mut i = [0.0; 3];
         for _ in 0..100 {
@@ -256,7 +256,7 @@ pub(super) mod tests {
             electrical_inductance: 0.04,
             voltage_ratio: 0.5,
         };
-        let (mut i, mut memory, angle) = ([0.0; 3], DrivenState::rest(), 0.7);
+        let (mut i, mut memory, angle) = ([0.0; 3], DrivenState::initial(), 0.7);
         for k in 1..100 {
             let x = part(i, [false; 3], angle);
             i = drive.step(&x, &mut memory, 3.0, i);

@@ -1,4 +1,4 @@
-//! Jumps of the speed error behind the derivative's filter. A step of the low fidelity is long against the filter's time
+//! Jumps of the speed error behind the derivative's filter. A step of the reduced-order model is long against the filter's time
 //! T = T_d / N: of a jump y its answer K_p N y exp(-t/T) passes as the mean over the step of what the torque's limit and
 //! the slope g of the current leave of it. What changes smoothly has a slope instead, K_p T_d times it.
 //!
@@ -10,9 +10,9 @@ use crate::actuator::servo::layout::*;
 use crate::control::position_speed::ControlParameter;
 use crate::scalar::Scalar;
 
-/// What a step's slope may ask for, of the torque limit, before a change counts as a jump.
+/// What a step's slope may demand, of the torque limit, before a change counts as a jump.
 const SMOOTH: f64 = 0.1;
-/// A rest of a jump that asks for less than this part of the torque limit is none.
+/// A remainder of a jump that demands less than this part of the torque limit is none.
 const GONE: f64 = 1e-6;
 
 /// Constants of the derivative's filter.
@@ -34,10 +34,10 @@ pub struct JumpState<S> {
     change: S,
     pub(super) level: S,
     /// Set point of the step before; before the first step the shaft's speed, of which the filter knows nothing.
-    pub(super) asked: S,
+    pub(super) reference: S,
     /// Speed that the resolver showed, and that of the shaft.
-    pub(super) shown: S,
-    pub(super) moved: S,
+    pub(super) reading: S,
+    pub(super) motion: S,
 }
 
 /// Mean torque over a step, and what the torque's limit cuts off, N m s.
@@ -57,8 +57,8 @@ impl<S: Scalar> Jumps<S> {
         let gain = S::select(there, speed_gain * at(ControlParameter::DerivativeFilter), zero);
         let limit = at(ControlParameter::TorqueConstant) * at(ControlParameter::CurrentLimit);
         let never = S::splat(f64::INFINITY);
-        let asks = zero.lt(gain);
-        let per = |x: S| S::select(asks, limit / S::select(asks, x, one), never);
+        let demands = zero.lt(gain);
+        let per = |x: S| S::select(demands, limit / S::select(demands, x, one), never);
         Self {
             gain,
             time,
@@ -76,8 +76,8 @@ impl<S: Scalar> Jumps<S> {
         let alike = zero.lt(change * s.change);
         let steady = S::select(alike, change.signed(change.abs().minimum(s.change.abs())), zero);
         s.change = change;
-        let rest = change - steady;
-        let jump = S::select(self.least.lt(rest.abs()), rest, zero);
+        let remainder = change - steady;
+        let jump = S::select(self.least.lt(remainder.abs()), remainder, zero);
         (change - jump, jump)
     }
 
@@ -86,22 +86,22 @@ impl<S: Scalar> Jumps<S> {
     pub(super) fn pass(&self, s: &mut JumpState<S>, jump: S, limit: S, slew: S) -> Kick<S> {
         let (zero, one, half) = (S::zero(), S::one(), S::splat(0.5));
         let level = s.level + jump;
-        let asked = self.gain * level.abs();
+        let request = self.gain * level.abs();
         let limit = limit.maximum(S::splat(f64::MIN_POSITIVE));
-        let until = (self.time * (asked / limit).maximum(one).ln()).minimum(self.dt);
-        let cut = (asked * self.time * (one - (-(until / self.time)).exp()) - limit * until).maximum(zero);
-        let whole = asked * self.time * (one - self.decay) - cut;
-        let t = (self.time * lambert(asked / (slew * self.time))).minimum(self.dt);
+        let until = (self.time * (request / limit).maximum(one).ln()).minimum(self.dt);
+        let cut = (request * self.time * (one - (-(until / self.time)).exp()) - limit * until).maximum(zero);
+        let whole = request * self.time * (one - self.decay) - cut;
+        let t = (self.time * lambert(request / (slew * self.time))).minimum(self.dt);
         let followed = slew * t * (half * t + (half * t).maximum(self.time));
-        let rest = level * self.decay;
-        s.level = S::select(rest.abs().lt(self.gone), zero, rest);
+        let remainder = level * self.decay;
+        s.level = S::select(remainder.abs().lt(self.gone), zero, remainder);
         Kick { torque: level.signed(whole.minimum(followed)) / self.dt, cut: level.signed(cut) }
     }
 }
 
 impl<S: Scalar> JumpState<S> {
     pub(super) fn start(speed: S) -> Self {
-        Self { change: S::zero(), level: S::zero(), asked: speed, shown: speed, moved: speed }
+        Self { change: S::zero(), level: S::zero(), reference: speed, reading: speed, motion: speed }
     }
 }
 

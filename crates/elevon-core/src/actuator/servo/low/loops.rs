@@ -1,10 +1,11 @@
-//! Shorted turns as a loop of their own, at low fidelity. The phase current i_j is imposed; behind the contact resistance
+//! Shorted turns as a loop of their own, in the reduced-order model. The phase current i_j is imposed; behind the contact resistance
 //! R_c the loop of mu turns carries i_f:
 //!
 //!     L_f di_f/dt = R_c (i_j - i_f) - mu R i_f - M di_j/dt - mu k_j omega,   L_f = mu L - M, M = kappa mu (1 - mu) L
 //!
 //! With i_f = i_j all turns link the flux of the whole winding, L_f + M = mu L, whatever kappa: the split of the high
-//! fidelity (motor/short). Turns that are not shorted carry the phase's current. The loop is stepped exactly for held right-hand sides, so any R_c runs; R_c without limit is the healthy winding.
+//! fidelity (motor/short). Turns that are not shorted carry the phase's current. The loop is stepped exactly for held right-hand
+//! sides, so any R_c runs; R_c without limit is the healthy winding.
 
 use super::model::State;
 use super::phase::Phase;
@@ -25,7 +26,7 @@ pub struct Loops<S> {
     /// dt / L_f.
     dt_per_inductance: [S; 3],
     /// Inductance of the turns outside the short, N L - M.
-    pub(super) rest: [S; 3],
+    pub(super) intact: [S; 3],
 }
 
 /// What the loops add to a step.
@@ -40,21 +41,21 @@ impl<S: Scalar> Loops<S> {
     pub(super) fn derive(raw: &[S], dt: S) -> Self {
         let at = |p: MotorParameter| raw[p.at()];
         let (zero, one) = (S::zero(), S::one());
-        let rest: [S; 3] = three!(|j| raw[MotorParameter::TurnsA.at() + j]);
-        let turns: [S; 3] = three!(|j| one - rest[j]);
+        let intact: [S; 3] = three!(|j| raw[MotorParameter::TurnsA.at() + j]);
+        let turns: [S; 3] = three!(|j| one - intact[j]);
         let inductance = at(MotorParameter::WindingInductance);
         Self {
             turns,
-            ratio: three!(|j| turns[j] / rest[j]),
+            ratio: three!(|j| turns[j] / intact[j]),
             resistance: three!(|j| turns[j] * at(MotorParameter::WindingResistance)),
             contact: at(MotorParameter::ShortContactResistance),
-            mutual_per_dt: three!(|j| at(MotorParameter::ShortCoupling) * turns[j] * rest[j] * inductance / dt),
+            mutual_per_dt: three!(|j| at(MotorParameter::ShortCoupling) * turns[j] * intact[j] * inductance / dt),
             dt_per_inductance: three!(|j| {
                 let there = zero.lt(turns[j]);
-                let own = turns[j] * (one - at(MotorParameter::ShortCoupling) * rest[j]) * inductance;
-                S::select(there, dt / S::select(there, own, one), zero)
+                let value = turns[j] * (one - at(MotorParameter::ShortCoupling) * intact[j]) * inductance;
+                S::select(there, dt / S::select(there, value, one), zero)
             }),
-            rest: three!(|j| rest[j] * (one - at(MotorParameter::ShortCoupling) * turns[j]) * inductance),
+            intact: three!(|j| intact[j] * (one - at(MotorParameter::ShortCoupling) * turns[j]) * inductance),
         }
     }
 
@@ -66,8 +67,8 @@ impl<S: Scalar> Loops<S> {
         let mut added = Added { torque: zero, copper: zero, contact: zero };
         for j in 0..3 {
             let there = zero.lt(self.turns[j]);
-            let own = self.resistance[j] * s.resistance_factor;
-            let total = S::select(there, own + self.contact, one);
+            let value = self.resistance[j] * s.resistance_factor;
+            let total = S::select(there, value + self.contact, one);
             let k = p.coefficients[j] * self.ratio[j];
             let driven = self.contact * after[j] - self.mutual_per_dt[j] * (after[j] - before[j]) - k * speed;
             let settled = driven / total;
@@ -76,7 +77,7 @@ impl<S: Scalar> Loops<S> {
             let middle = half * (s.loops[j] + new);
             added.torque = added.torque + k * middle;
             let through = S::select(there, half * (before[j] + after[j]) - middle, zero);
-            added.copper = added.copper + own * middle * middle;
+            added.copper = added.copper + value * middle * middle;
             added.contact = added.contact + self.contact * through * through;
             s.loops[j] = new;
         }
@@ -88,10 +89,10 @@ impl<S: Scalar> Loops<S> {
     pub(super) fn voltage(&self, s: &State<S>, p: &Phase<S>) -> S {
         let speed = s.shaft.motor_speed;
         let across = |j: usize| {
-            let own = self.resistance[j] * s.resistance_factor;
-            let guarded = S::select(S::zero().lt(self.turns[j]), own + self.contact, S::one());
+            let value = self.resistance[j] * s.resistance_factor;
+            let guarded = S::select(S::zero().lt(self.turns[j]), value + self.contact, S::one());
             let felt = self.contact / guarded * S::indicator(S::zero().lt(self.turns[j]));
-            p.imposed[j] * felt * (own * s.phases[j] + p.coefficients[j] * self.ratio[j] * speed)
+            p.imposed[j] * felt * (value * s.phases[j] + p.coefficients[j] * self.ratio[j] * speed)
         };
         S::splat(2.0 / 3.0) * (across(0) + across(1) + across(2))
     }

@@ -1,5 +1,5 @@
-//! Low fidelity: one equivalent phase (reference sheet 1.9). Same blocks, same parameters where shared; PID
-//! without anti-windup and derivative filter; the shaft and its loads are those of the high fidelity.
+//! Reduced-order model: one equivalent phase (reference sheet 1.9). Same blocks, same parameters where shared; PID
+//! without anti-windup and derivative filter; the shaft and its loads are those of the switching model.
 
 mod control;
 mod driven;
@@ -28,7 +28,7 @@ use crate::time::Steps;
 use crate::variable::Signal;
 use std::marker::PhantomData;
 
-/// A servo at low fidelity.
+/// The reduced-order model of a servo.
 #[derive(Clone)]
 pub struct Low<F>(PhantomData<F>);
 
@@ -55,7 +55,7 @@ impl<F: Form> Wiring for Low<F> {
         raw[SolverParameter::FaultGrid.at()].max(raw[LowParameter::Step.at()])
     }
 
-    /// An open winding of the resolver is none of its details: what that shows is finer than its steps.
+    /// An open winding of the resolver is none of its details: its angle changes within a step.
     fn structure(setup: &Setup) -> Structure {
         let (mut raw, mut touched) = (setup.raw.to_vec(), setup.touched.to_vec());
         for winding in [ResolverParameter::SineOpen, ResolverParameter::CosineOpen] {
@@ -146,10 +146,10 @@ impl<F: Form> Wiring for Low<F> {
         inputs: &Inputs<S>,
         state: &State<S>,
         t: S,
-        asked: Signals,
+        selection: Signals,
         out: &mut [S],
     ) {
-        apart::<S, _>(Observation { structure, model, inputs, state, t, asked, linear: F::LINEAR, out });
+        apart::<S, _>(Observation { structure, model, inputs, state, t, selection, linear: F::LINEAR, out });
     }
 
     #[inline(always)]

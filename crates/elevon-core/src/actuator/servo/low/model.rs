@@ -1,4 +1,4 @@
-//! Constants and state of a run at low fidelity.
+//! Constants and state of a run in the reduced-order model.
 
 use super::control::Control;
 use super::driven::DrivenState;
@@ -26,7 +26,7 @@ use crate::sensor::resolver::{Resolver, ResolverParameter};
 use crate::three;
 
 details! {
-    /// What of a low-fidelity servo a run needs; equal over a lane block.
+    /// What of a reduced-order servo model a run needs; equal over a lane block.
     Structure, read<F>(parts: Parts)
     always {
         drive: DriveKind = DriveKind::read(parts.drive().value(DriveParameter::Kind));
@@ -156,7 +156,7 @@ pub struct State<S> {
     pub driven: DrivenState<S>,
     pub command_noise: S,
     pub jumps: JumpState<S>,
-    /// 1: the speed shown was zero at the last step.
+    /// 1: the reported speed was zero at the last step.
     pub rested: S,
     pub voltage: S,
     pub integral: S,
@@ -236,7 +236,7 @@ impl<S: Scalar> Model<S> {
         Self {
             dt,
             resistance: star.resistance,
-            inductance: if structure.loops { circuits.rest } else { three!(|j| one / star.per_inductance[j]) },
+            inductance: if structure.loops { circuits.intact } else { three!(|j| one / star.per_inductance[j]) },
             healthy: Phase::new(constant * flux_factor, circuit, &control, shaft.inertia),
             cold,
             drive: Drive::derive(raw, structure, &star, dt),
@@ -259,7 +259,7 @@ impl<S: Scalar> Model<S> {
         let warm = self.network.start_at([initial[3], initial[4]]);
         let (resistance_factor, flux_factor) = heat(raw, &warm);
         State {
-            link: DcLinkState::rest(),
+            link: DcLinkState::initial(),
             resistance_factor,
             flux_factor,
             network: warm,
@@ -270,8 +270,8 @@ impl<S: Scalar> Model<S> {
             current_seen: zero,
             phases: [zero; 3],
             loops: [zero; 3],
-            bridge: BridgeState::rest(),
-            driven: DrivenState::rest(),
+            bridge: BridgeState::initial(),
+            driven: DrivenState::initial(),
             command_noise: zero,
             jumps: JumpState::start(shaft.motor_speed),
             rested: zero,
@@ -298,7 +298,7 @@ impl<S: Scalar> State<S> {
 /// Factors of the winding's resistance and of the flux.
 fn heat<S: Scalar>(raw: &[S], warm: &NetworkState<S>) -> (S, S) {
     if ThermalModel::read(raw[ThermalParameter::Model.at()]) == ThermalModel::Off {
-        let mut star = StarState::rest();
+        let mut star = StarState::initial();
         star.heat(Raw(raw).motor(), raw[MotorParameter::WindingTemperature.at()]);
         return (star.resistance_factor, star.flux_factor);
     }

@@ -1,16 +1,16 @@
-//! All signals of the low fidelity from its state. Nothing here feeds back.
+//! All signals of the reduced-order model from its state. Nothing here feeds back.
 
 use super::model::{Model, State, Structure};
 use crate::actuator::servo::advance::Instant;
 use crate::actuator::servo::layout::COMMAND;
-use crate::actuator::servo::signals::{shared, LowSignal as Q, LOW, LOW_OWN};
+use crate::actuator::servo::signals::{shared, LowSignal as Q, LOW, LOW_SPECIFIC};
 use crate::actuator::{Inputs, Signals};
 use crate::scalar::{Kernel, Scalar};
 
 /// What the loads on the shaft decide; what stands behind the own signals is theirs, too.
 const OF_SHAFT: Signals =
     Signals::of(&[Q::OutputSpeed as usize, Q::FrictionTorque as usize, Q::LoadTorque as usize, Q::StopTorque as usize])
-        .and_from(LOW_OWN.len());
+        .and_from(LOW_SPECIFIC.len());
 const OF_INPUTS: Signals = Signals::of(&[Q::BrakeTorque as usize, Q::SupplyVoltage as usize]);
 const SENSORS: [Q; 4] = [Q::EncoderPosition, Q::ResolverPosition, Q::ResolverSpeed, Q::ResolverSignal];
 const OF_SENSORS: Signals = Signals::of(&[SENSORS[0] as usize, SENSORS[1] as usize, SENSORS[2] as usize, SENSORS[3] as usize]);
@@ -22,7 +22,7 @@ pub(super) struct Observation<'a, S: Scalar> {
     pub inputs: &'a Inputs<S>,
     pub state: &'a State<S>,
     pub t: S,
-    pub asked: Signals,
+    pub selection: Signals,
     /// With the signals of a screw.
     pub linear: bool,
     pub out: &'a mut [S],
@@ -32,18 +32,18 @@ impl<S: Scalar> Kernel for Observation<'_, S> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        let Self { structure, model, inputs, state, t, asked, linear, out } = self;
+        let Self { structure, model, inputs, state, t, selection, linear, out } = self;
         states(structure, model, state, out);
-        if asked.any(Signals::of(&[Q::Command as usize])) {
+        if selection.any(Signals::of(&[Q::Command as usize])) {
             out[Q::Command as usize] = inputs[COMMAND].at(t) + state.command_noise;
         }
-        if asked.any(OF_SENSORS) {
-            let shown = model.sensing.show(&structure.sensing, &state.shaft, state.sensed);
-            for (q, value) in SENSORS.into_iter().zip(shown) {
+        if selection.any(OF_SENSORS) {
+            let signals = model.sensing.readings(&structure.sensing, &state.shaft, state.sensed);
+            for (q, value) in SENSORS.into_iter().zip(signals) {
                 out[q as usize] = value;
             }
         }
-        if asked.any(OF_INPUTS) || asked.any(OF_SHAFT) {
+        if selection.any(OF_INPUTS) || selection.any(OF_SHAFT) {
             loaded(structure, model, &Instant::at(inputs, t), state, linear, out);
         }
     }
@@ -83,21 +83,21 @@ fn states<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, out: &mu
 /// What inputs and loads decide.
 #[inline(always)]
 fn loaded<S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s: &State<S>, linear: bool, out: &mut [S]) {
-    let shown = m.shaft.show(&structure.shaft, x, &s.shaft, s.motor_torque);
+    let signals = m.shaft.observe(&structure.shaft, x, &s.shaft, s.motor_torque);
     let source = x.supply * m.drive.supply_scale;
     for (q, value) in [
-        (Q::OutputSpeed, shown.output_speed),
-        (Q::FrictionTorque, shown.friction),
+        (Q::OutputSpeed, signals.output_speed),
+        (Q::FrictionTorque, signals.friction),
         (Q::BrakeTorque, x.brake),
-        (Q::LoadTorque, shown.load),
-        (Q::StopTorque, shown.stop),
+        (Q::LoadTorque, signals.load),
+        (Q::StopTorque, signals.stop),
         (Q::SupplyVoltage, if structure.link { m.drive.link.voltage(&s.link, source) } else { source }),
     ] {
         out[q as usize] = value;
     }
-    shared(LOW_OWN, shown.added.signals(), out);
+    shared(LOW_SPECIFIC, signals.added.signals(), out);
     if linear {
-        let [position, speed, torque, efficiency, aiding] = m.shaft.show_screw(&s.shaft, &shown);
+        let [position, speed, torque, efficiency, aiding] = m.shaft.observe_screw(&s.shaft, &signals);
         // Current and voltage of the printed L-R circuit.
         let root = S::splat(1.5_f64.sqrt());
         let nut = &s.shaft.nut;

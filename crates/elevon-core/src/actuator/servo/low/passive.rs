@@ -1,6 +1,6 @@
-//! The low fidelity without gates: a bridge that has tripped, lost its feedback or is off leaves diodes and shorted
+//! The reduced-order model without gates: a bridge that has tripped, lost its feedback or is off leaves diodes and shorted
 //! switches on the three windings, which carry what the EMFs drive. The current of one phase cannot stand for that: the
-//! windings are stepped one by one through the high fidelity's bridge, exactly for voltages held over a part of the
+//! windings are stepped one by one through the switching model's bridge, exactly for voltages held over a part of the
 //! step. The diodes follow the EMFs as they turn, so that a step is cut into parts of a small electrical angle.
 
 use super::model::{Model, State, Structure};
@@ -11,7 +11,7 @@ use crate::scalar::{three_phase, Scalar};
 use crate::three;
 
 /// Electrical angle over which EMFs are held, rad, and most parts of a step: beyond, a step is more than four turns.
-const HELD: f64 = 0.1;
+const LONGEST_TURN: f64 = 0.1;
 const MOST: f64 = 256.0;
 
 /// A step behind the bridge without gates.
@@ -39,7 +39,7 @@ struct Part<S> {
 #[inline(always)]
 pub(super) fn parts<S: Scalar>(m: &Model<S>, speed: S) -> S {
     let turned = (m.star.pole_pairs * speed * m.dt).abs();
-    -((turned * S::splat(-1.0 / HELD)).floor()).clamp(S::splat(-MOST), S::splat(-1.0))
+    -((turned * S::splat(-1.0 / LONGEST_TURN)).floor()).clamp(S::splat(-MOST), S::splat(-1.0))
 }
 
 /// (1 - exp(-R dt / L)) / R of each winding: its current per volt held over `dt`.

@@ -23,7 +23,7 @@ pub struct Phase<S> {
     pub direct: S,
     /// Angle and speed of the shaft by which the references are placed.
     pub believed: [S; 2],
-    /// Quadrature component of the imposed currents in the rotor's frame, and as the drive's sensors show it.
+    /// Quadrature component of the imposed currents in the rotor's frame, and as the drive's sensors report it.
     pub quadrature: S,
     pub seen: S,
 }
@@ -92,14 +92,14 @@ pub(super) fn phase<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>
     let none = e.inductance.equals(S::zero());
     let [_, healthy, inductance] = m.cold;
     let circuit = Circuit::new(S::select(none, healthy, e.resistance), S::select(none, inductance, e.inductance), m.dt);
-    let shown = three!(|j| m.drive.gain[j] * imposed[j]);
+    let reading = three!(|j| m.drive.gain[j] * imposed[j]);
     Phase {
         coefficients: three!(|j| k[j] * s.flux_factor),
         direct: if commutated { -(quadrature(k, cosines) * s.flux_factor) } else { S::zero() },
         imposed,
         believed,
         quadrature: quadrature(imposed, rotor),
-        seen: quadrature(shown, sines),
+        seen: quadrature(reading, sines),
         ..Phase::new(e.torque_constant * s.flux_factor, circuit, &m.control, m.shaft.inertia)
     }
 }

@@ -10,7 +10,7 @@ use crate::motor::equivalent::quadrature;
 use crate::scalar::{three_phase, Scalar};
 use crate::three;
 
-/// Fall of the mean error with the voltage that the phase needs, over the link's: measured at high fidelity.
+/// Fall of the mean error with the voltage that the phase needs, over the link's: measured in the switching model.
 const FALL: f64 = 11.0;
 /// Rounds in which the legs see what the others do.
 const ROUNDS: usize = 3;
@@ -45,8 +45,8 @@ impl<S: Scalar, const EXTRA: bool> Pushed<'_, S, EXTRA> {
     }
 }
 
-/// What the controller asks for but for its derivative, the derivative as inertia, 1/(J + eta D).
-pub(super) struct Asked<S> {
+/// What the controller demands but for its derivative, the derivative as inertia, 1/(J + eta D).
+pub(super) struct TorqueDemand<S> {
     pub torque: S,
     pub inertia: S,
     pub per_inertia: S,
@@ -60,7 +60,7 @@ pub(super) fn within_band<S: Scalar, const EXTRA: bool>(
     structure: &Structure,
     s: &State<S>,
     p: &Phase<S>,
-    asked: &Asked<S>,
+    demand: &TorqueDemand<S>,
     band: S,
     loads: &Loads<S>,
 ) -> S {
@@ -69,14 +69,14 @@ pub(super) fn within_band<S: Scalar, const EXTRA: bool>(
     let drift = p.torque_constant * p.circuit.current(s.current, -emf);
     let band = p.torque_constant * band;
     let coasting = by.torque(drift, m.per_inertia);
-    let gap = drift - p.efficacy * (asked.torque - asked.inertia * coasting);
+    let gap = drift - p.efficacy * (demand.torque - demand.inertia * coasting);
     let push = gap.signed(band);
-    let mut edge = by.torque(p.efficacy.fma(asked.torque, push), asked.per_inertia);
-    let reference = asked.torque - asked.inertia * edge;
+    let mut edge = by.torque(p.efficacy.fma(demand.torque, push), demand.per_inertia);
+    let reference = demand.torque - demand.inertia * edge;
     let limited = m.control.torque_limit.lt(reference.abs());
     if S::any(limited) {
-        let held = by.torque(p.efficacy.fma(reference.clamp_abs(m.control.torque_limit), push), m.per_inertia);
-        edge = S::select(limited, held, edge);
+        let limit = by.torque(p.efficacy.fma(reference.clamp_abs(m.control.torque_limit), push), m.per_inertia);
+        edge = S::select(limited, limit, edge);
     }
     S::select(gap.abs().le(band), coasting, edge)
 }
@@ -94,7 +94,8 @@ pub(super) fn aligned<S: Scalar>(m: &Model<S>, structure: &Structure, position: 
 
 /// Mean legs of the relays: each gives what brings its phase to the edge of its mean band, within the rails, on the side to
 /// which the current decays between the pushes. An error that all phases share, as of unlike sensors, stays up to that mean
-/// error; what is left of it drives the legs to one rail. With an interrupted phase the edges are those of a backlash: a leg keeps its voltage until the error has left the
+/// error; what is left of it drives the legs to one rail. With an interrupted phase the edges are those of a backlash: a leg keeps
+/// its voltage until the error has left the
 /// mean band.
 pub(super) struct Relays<S> {
     gain: [S; 3],
@@ -125,7 +126,7 @@ impl<S: Scalar> Relays<S> {
         }
     }
 
-    /// Share of a current error that all phases have, by what their sensors show of the star.
+    /// Share of a current error that all phases have, by what their sensors report of the star.
     #[inline(always)]
     fn common(&self, errors: [S; 3]) -> S {
         let weight = &self.weight;
@@ -175,7 +176,7 @@ mod tests {
     #[test]
     fn the_emf_holds_every_current_at_the_edge_of_its_band() {
         let relays = Relays { gain: [1.0; 3], weight: [1.0; 3], edge: 0.1, backlash: 0.0, shared: 0.0, six_step: false };
-        let (mut i, mut memory, wanted) = ([0.0; 3], DrivenState::rest(), 3.0);
+        let (mut i, mut memory, wanted) = ([0.0; 3], DrivenState::initial(), 3.0);
         let turns = 400;
         let (mut mean, mut worst) = (0.0, 0.0_f64);
         for k in 0..2 * turns {
@@ -195,7 +196,7 @@ mod tests {
     #[test]
     fn unlike_sensors_leave_all_phases_one_error() {
         let relays = Relays { gain: [0.5, 1.0, 1.0], weight: [2.0, 1.0, 1.0], edge: 0.0, backlash: 0.0, shared: 0.3, six_step: false };
-        let (mut i, mut memory) = ([0.0; 3], DrivenState::rest());
+        let (mut i, mut memory) = ([0.0; 3], DrivenState::initial());
         for _ in 0..50 {
             i = relays.step(&part(i, [false; 3], 1.2), &mut memory, 1.0);
         }
@@ -210,7 +211,7 @@ mod tests {
     #[test]
     fn a_leg_in_its_backlash_keeps_its_voltage() {
         let relays = Relays { gain: [1.0; 3], weight: [1.0; 3], edge: 0.0, backlash: 0.5, shared: 0.0, six_step: false };
-        let mut memory = DrivenState::rest();
+        let mut memory = DrivenState::initial();
         relays.step(&part([0.0; 3], [false, false, true], 0.3), &mut memory, 0.4);
         assert_eq!(memory.legs, [0.0; 3]);
     }
@@ -218,7 +219,7 @@ mod tests {
     #[test]
     fn relays_out_of_reach_are_six_step() {
         let relays = Relays { gain: [1.0; 3], weight: [1.0; 3], edge: 0.1, backlash: 0.0, shared: 0.0, six_step: false };
-        let mut memory = DrivenState::rest();
+        let mut memory = DrivenState::initial();
         let x = part([0.0; 3], [false; 3], 0.3);
         relays.step(&x, &mut memory, 1e3);
         for j in 0..3 {
@@ -229,8 +230,8 @@ mod tests {
     #[test]
     fn relays_of_an_open_phase_carry_half_the_difference_of_the_references() {
         let relays = Relays { gain: [1.0; 3], weight: [1.0; 3], edge: 0.0, backlash: 0.0, shared: 0.0, six_step: false };
-        let (mut i, mut memory) = ([0.0; 3], DrivenState::rest());
-        // Between the two references: whose leg has room left decides.
+        let (mut i, mut memory) = ([0.0; 3], DrivenState::initial());
+        // Between the two references: whose leg has voltage left decides.
         let x = |i| part(i, [false, false, true], 0.5 * std::f64::consts::PI - std::f64::consts::PI / 3.0);
         for _ in 0..200 {
             i = relays.step(&x(i), &mut memory, 3.0);

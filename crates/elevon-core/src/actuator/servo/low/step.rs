@@ -1,4 +1,4 @@
-//! One step of the low fidelity: sensors, control electronics, equivalent phase, shaft. The derivative of the measured
+//! One step of the reduced-order model: sensors, control electronics, equivalent phase, shaft. The derivative of the measured
 //! speed is solved with the acceleration (docs/theory/low-fidelity.md, "The speed derivative as inertia").
 
 use super::control::{demand, integrate};
@@ -6,7 +6,7 @@ use super::driven::driven_step;
 use super::model::{Model, State, Structure};
 use super::passive::passive_step;
 use super::phase::{phase, Phase};
-use super::relays::{mean_error, within_band, Asked};
+use super::relays::{mean_error, within_band, TorqueDemand};
 use crate::actuator::servo::advance::{Instant, Stepper};
 use crate::actuator::servo::layout::DriveKind;
 use crate::scalar::Scalar;
@@ -53,14 +53,14 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
     let largest = m.drive.voltage_ratio * supply;
     // v_q^2 + v_d^2 stays inside the largest phase voltage; v_d is the cross coupling p omega L i_q, and
     // the EMF where the references are misplaced.
-    let room = largest * largest - cross * cross;
+    let margin = largest * largest - cross * cross;
     s.voltage = driving + emf;
-    let limited = room.lt(s.voltage * s.voltage);
+    let limited = margin.lt(s.voltage * s.voltage);
     let mut reached = target;
     if S::any(limited) {
-        let held = s.voltage.clamp_abs(room.maximum(S::zero()).sqrt());
-        s.voltage = S::select(limited, held, s.voltage);
-        reached = S::select(limited, circuit.current(s.current, held - emf), target);
+        let clamped = s.voltage.clamp_abs(margin.maximum(S::zero()).sqrt());
+        s.voltage = S::select(limited, clamped, s.voltage);
+        reached = S::select(limited, circuit.current(s.current, clamped - emf), target);
     }
     let before = s.current;
     s.current = reached;
@@ -104,7 +104,8 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
     }
 }
 
-/// Trips the drive, and where the bridge has no gates lets the EMFs drive the windings. Copper loss of the step and power drawn from the link.
+/// Trips the drive, and where the bridge has no gates lets the EMFs drive the windings. Copper loss of the step and power drawn from
+/// the link.
 #[inline(always)]
 fn without_gates<S: Scalar>(
     m: &Model<S>,
@@ -146,7 +147,7 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
         m.sensing.count::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed);
     }
     let position = m.sensing.output::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed, &reading, m.shaft.gear.per_ratio);
-    let asked = demand::<S, FULL>(m, structure, s, [x.command + s.command_noise, x.supply], position, &reading);
+    let demand = demand::<S, FULL>(m, structure, s, [x.command + s.command_noise, x.supply], position, &reading);
 
     // Loads, and the acceleration that the derivative of the speed takes part in.
     let here;
@@ -157,16 +158,16 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
         &m.healthy
     };
     let (mut derivative_inertia, mut per_inertia) = (m.control.derivative_inertia, p.per_effective_inertia);
-    let mut torque = p.efficacy * asked.torque;
+    let mut torque = p.efficacy * demand.torque;
     let mut answer = p.efficacy;
     if EXTRA && structure.driven {
         // The windings make of a reference what they can: the torque there is, and what a step adds to it.
         answer = answer.maximum(S::zero()) * m.drive.tracking;
-        torque = answer.fma(asked.torque - s.torque_ref, s.motor_torque);
+        torque = answer.fma(demand.torque - s.torque_ref, s.motor_torque);
         per_inertia = S::one() / answer.fma(derivative_inertia, m.shaft.inertia);
     }
     if FULL && structure.sensing.resolver {
-        // The derivative sees what the resolver shows of the acceleration.
+        // The derivative acts on the acceleration that the resolver reports.
         derivative_inertia = derivative_inertia * m.sensing.follows();
         per_inertia = S::one() / answer.fma(derivative_inertia, m.shaft.inertia);
     }
@@ -174,20 +175,20 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
     let supply = supply::<S, EXTRA>(m, structure, x, s, p);
     let relays = structure.drive == DriveKind::Hysteresis && structure.control.derivative && !(EXTRA && structure.driven);
     let acceleration = if relays {
-        let asked = Asked { torque: asked.torque, inertia: derivative_inertia, per_inertia };
-        within_band::<S, EXTRA>(m, structure, s, p, &asked, supply.band, &loads)
+        let demand = TorqueDemand { torque: demand.torque, inertia: derivative_inertia, per_inertia };
+        within_band::<S, EXTRA>(m, structure, s, p, &demand, supply.band, &loads)
     } else {
         m.shaft.acceleration::<EXTRA>(&structure.shaft, &s.shaft, &loads, torque, per_inertia)
     };
-    let unlimited = asked.torque - derivative_inertia * acceleration;
+    let unlimited = demand.torque - derivative_inertia * acceleration;
     s.torque_ref = unlimited.clamp_abs(m.control.torque_limit);
-    integrate(m, structure, s, &asked, unlimited);
+    integrate(m, structure, s, &demand, unlimited);
 
     // Equivalent phase, motor and transmission dynamics.
     electric_step::<S, EXTRA>(m, structure, &supply, s, p);
     s.motor_torque = m.star.saturate(s.motor_torque);
     if EXTRA && structure.shaft.train.law.knows_torque() {
-        // The friction knows the torque that acts, not the one that was asked for.
+        // The friction knows the torque that acts, not the one that was demanded.
         loads = m.shaft.loads::<FULL, EXTRA>(&structure.shaft, x, &s.shaft, s.motor_torque);
     }
     m.shaft.step::<FULL, EXTRA>(&structure.shaft, x, &mut s.shaft, &loads, s.motor_torque);

@@ -11,7 +11,7 @@ pub(in crate::actuator::servo) struct Loads<S> {
     pub output_torque: S,
     /// Signed torque on the motor shaft, and the part of it that is not the contact of the elastic backlash.
     pub load: S,
-    pub(super) own: S,
+    pub(super) motor_side: S,
     /// Torque between gear and output, at the output.
     pub(super) through: S,
     pub static_limit: S,
@@ -37,7 +37,7 @@ impl<S: Scalar> Shaft<S> {
         let elastic = FULL && d.elastic;
         let through = if elastic { self.contact(d, s) } else { output_torque };
         let mut load = through.fma(self.gear.per_ratio, x.shaft);
-        let mut own = if elastic { x.shaft } else { load };
+        let mut motor_side = if elastic { x.shaft } else { load };
         let mut added = x.brake;
         let mut nut = S::zero();
         if EXTRA {
@@ -50,7 +50,7 @@ impl<S: Scalar> Shaft<S> {
             }
             let (torque, friction, spalled) = self.disturbance(d, s, through);
             load = load - torque;
-            own = own - torque;
+            motor_side = motor_side - torque;
             added = added + friction;
             nut = spalled;
         }
@@ -97,7 +97,7 @@ impl<S: Scalar> Shaft<S> {
         let speed = s.motor_speed;
         let viscous = self.viscous::<FULL, EXTRA>(d, speed);
         let resist = load + speed.signed(dynamic) + viscous;
-        Loads { brake, output_torque, load, own, through, static_limit, dynamic, viscous, nut, resist }
+        Loads { brake, output_torque, load, motor_side, through, static_limit, dynamic, viscous, nut, resist }
     }
 
     #[inline(always)]

@@ -3,12 +3,12 @@
 //! and it keeps the accounts of their work.
 
 mod loads;
-mod show;
+mod observe;
 mod step;
 mod train;
 
 pub(super) use self::loads::Loads;
-pub(super) use self::show::Shown;
+pub(super) use self::observe::ShaftSignals;
 pub(super) use self::train::TRAIN;
 use self::train::{Train, TrainDetails};
 use super::form::Form;
@@ -36,7 +36,7 @@ details! {
         linear: bool = F::LINEAR;
         /// Positions move with the new speed.
         semi_implicit: bool = x.semi_implicit;
-        /// Positions move with the mean of both speeds: exact for a torque held over a long step. A spring asks for the new
+        /// Positions move with the mean of both speeds: exact for a torque held over a long step. A spring needs the new
         /// speed, which neither feeds nor damps its swing; so do worn flanks under load and cogging.
         middle: bool = x.low
             && !x.parts.load().away(LoadParameter::Stiffness)
@@ -69,7 +69,7 @@ details! {
     }
 }
 
-/// What a run says of its shaft; the low fidelity neither has the elastic backlash nor sums work.
+/// What a run reports of its shaft; the reduced-order model neither has the elastic backlash nor sums work.
 pub(super) struct ShaftNeeds<'a> {
     pub parts: Parts<'a>,
     pub semi_implicit: bool,
@@ -198,7 +198,7 @@ impl<S: Scalar> Shaft<S> {
             scatter: S::one(),
             bristle: zero,
             nut: self.nut.start(),
-            vibration: VibrationState::rest(),
+            vibration: VibrationState::initial(),
             work: Work { friction: zero, brake: zero, load: zero, impact: zero },
         }
     }
@@ -209,7 +209,7 @@ impl<S: Scalar> Shaft<S> {
 pub(super) fn refuses_start<F: Form>(raw: &[f64], at: [f64; 2]) -> Option<String> {
     let ([motor, output], half) = (at, Backlash::derive(Raw(raw).backlash()).half);
     let driver = motor / F::ratio(raw);
-    // What an elastic backlash is wound up by is for the caller to say.
+    // What an elastic backlash is wound up by is for the caller to state.
     let elastic = BacklashModel::read(Raw(raw).backlash()[BacklashParameter::Model as usize]) == BacklashModel::Elastic;
     let apart = (output - driver).abs();
     (!elastic && apart > half * (1.0 + 1e-9) + 1e-12).then(|| {

@@ -49,7 +49,7 @@ impl<S: Scalar> Shaft<S> {
         if d.elastic {
             bristle.advance(&push, s.bristle)
         } else {
-            bristle.advance_beside(&push, s.bristle, s.motor_speed, &self.gear.motor_stop, s.motor_position)
+            bristle.advance_at_stop(&push, s.bristle, s.motor_speed, &self.gear.motor_stop, s.motor_position)
         }
     }
 
@@ -78,10 +78,10 @@ impl<S: Scalar> Shaft<S> {
         let speed = s.motor_speed;
         let (new_speed, on_bristles) = self.new_speed::<EXTRA>(d, s, loads, torque);
         let moved = self.dt.fma(self.advancing(d, speed, new_speed), s.motor_position);
-        let (position, held_speed) = if FULL && d.elastic { (moved, new_speed) } else { self.gear.motor_stop.hold(moved, new_speed) };
+        let (position, end_speed) = if FULL && d.elastic { (moved, new_speed) } else { self.gear.motor_stop.hold(moved, new_speed) };
         if FULL && d.accounts {
             let dry = on_bristles.unwrap_or_else(|| Friction::dry_torque(torque - loads.load, speed, loads.static_limit, loads.dynamic));
-            self.account(s, loads, [speed, new_speed, held_speed], dry);
+            self.account(s, loads, [speed, new_speed, end_speed], dry);
         }
         if EXTRA && d.nut {
             s.nut.collected = s.nut.collected + self.dt * self.nut.share * loads.nut * speed.abs();
@@ -99,7 +99,7 @@ impl<S: Scalar> Shaft<S> {
             self.friction.seize(s.output_position, &mut s.jam_side, &mut s.jammed);
         }
         s.motor_position = position;
-        s.motor_speed = held_speed;
+        s.motor_speed = end_speed;
     }
 
     /// Speed that moves the position in a step.
@@ -149,7 +149,7 @@ impl<S: Scalar> Shaft<S> {
             speed + self.dt * (self.per_output_inertia * net)
         };
         let moved = s.output_position + self.dt * if d.semi_implicit { new_speed } else { speed };
-        let (position, held) = self.gear.output_stop.hold(moved, new_speed);
+        let (position, end_speed) = self.gear.output_stop.hold(moved, new_speed);
         if d.accounts {
             let middle = S::splat(0.5) * (speed + new_speed);
             s.work.load = s.work.load + self.dt * loads.output_torque * middle;
@@ -157,24 +157,24 @@ impl<S: Scalar> Shaft<S> {
                 self.account_load_side(d, x, s, active, middle);
             }
             let motor = s.motor_speed * self.gear.per_ratio;
-            let stopped = S::splat(0.5) * self.output_inertia * (new_speed * new_speed - held * held);
+            let stopped = S::splat(0.5) * self.output_inertia * (new_speed * new_speed - end_speed * end_speed);
             s.work.impact = s.work.impact + self.dt * loads.through * (motor - middle) + stopped;
         }
         s.output_position = position;
-        s.output_speed = held;
+        s.output_speed = end_speed;
     }
 
     /// Work of a step at its middle; `speeds` before, after and as the stops leave it.
     #[inline(always)]
-    fn account(&self, s: &mut ShaftState<S>, loads: &Loads<S>, [old, new, held]: [S; 3], dry: S) {
+    fn account(&self, s: &mut ShaftState<S>, loads: &Loads<S>, [old, new, end_speed]: [S; 3], dry: S) {
         let half = S::splat(0.5);
         let middle = half * (old + new);
         // The brake takes its share of the dry friction.
         let share = loads.brake / loads.dynamic.maximum(S::splat(1e-300));
         s.work.brake = s.work.brake + self.dt * (dry * share) * middle;
         s.work.friction = s.work.friction + self.dt * (dry * (S::one() - share) + loads.viscous) * middle;
-        s.work.load = s.work.load + self.dt * loads.own * middle;
-        s.work.impact = s.work.impact + half * self.inertia * (new * new - held * held);
+        s.work.load = s.work.load + self.dt * loads.motor_side * middle;
+        s.work.impact = s.work.impact + half * self.inertia * (new * new - end_speed * end_speed);
     }
 
     #[inline(always)]

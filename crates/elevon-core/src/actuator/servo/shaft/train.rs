@@ -1,4 +1,4 @@
-//! What acts on the motor shaft beside the plain friction: the law of the dry friction, cogging, a bearing with a defect or a
+//! What acts on the motor shaft in addition to the plain friction: the law of the dry friction, cogging, a bearing with a defect or a
 //! magnetic pull on it, worn teeth.
 
 use crate::actuator::servo::form::Form;
@@ -95,8 +95,8 @@ impl<S: Scalar> Train<S> {
         let at = |p: MotorParameter| raw[p.at()];
         let (sin, cos) = at(MotorParameter::EccentricityDynamicPhase).sin_cos();
         let (sin_x, cos_x) = phase.sin_cos();
-        let own = at(MotorParameter::EccentricityDynamic);
-        let turning = [own * cos + eccentricity * cos_x, own * sin + eccentricity * sin_x];
+        let dynamic = at(MotorParameter::EccentricityDynamic);
+        let turning = [dynamic * cos + eccentricity * cos_x, dynamic * sin + eccentricity * sin_x];
         Self {
             law: Law::derive(view.friction_law(), raw[FrictionParameter::DryScale.at()]),
             cogging: Cogging::derive(view.cogging()),

@@ -96,7 +96,7 @@ fn simulated(case: Case) -> (Vec<C>, Vec<C>) {
     let period = (std::f64::consts::TAU / w / DT).round() as usize;
     // Ten time constants of the slowest current, ground's through the whole star.
     let begin = period * 5;
-    let (mut m, mut c) = ([0.0; 3], REST);
+    let (mut m, mut c) = ([0.0; 3], NO_CURRENT);
     let (mut above, mut below) = (vec![C(0.0, 0.0); 3], vec![C(0.0, 0.0); 3]);
     for k in 0..begin + period {
         // Potentials stand for the middle of the step, EMF and R m for its start.

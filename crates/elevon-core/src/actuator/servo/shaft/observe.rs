@@ -1,4 +1,4 @@
-//! What the shaft shows to an observer. Nothing here feeds back.
+//! The shaft's signals for an observer. Nothing here feeds back.
 
 use super::loads::Loads;
 use super::train::Added;
@@ -7,8 +7,8 @@ use crate::actuator::servo::advance::Instant;
 use crate::scalar::Scalar;
 use crate::transmission::friction::Friction;
 
-/// What the shaft shows to an observer.
-pub(in crate::actuator::servo) struct Shown<S> {
+/// The shaft's signals for an observer.
+pub(in crate::actuator::servo) struct ShaftSignals<S> {
     pub output_speed: S,
     pub friction: S,
     pub brake: S,
@@ -22,12 +22,12 @@ pub(in crate::actuator::servo) struct Shown<S> {
 }
 
 impl<S: Scalar> Shaft<S> {
-    /// What the shaft shows while the motor gives `torque`.
+    /// The shaft's signals while the motor gives `torque`.
     #[inline(always)]
-    pub(in crate::actuator::servo) fn show(&self, d: &ShaftDetails, x: &Instant<S>, s: &ShaftState<S>, torque: S) -> Shown<S> {
+    pub(in crate::actuator::servo) fn observe(&self, d: &ShaftDetails, x: &Instant<S>, s: &ShaftState<S>, torque: S) -> ShaftSignals<S> {
         let loads = self.loads::<true, true>(d, x, s, torque);
         let dry = self.dry(d, s, &loads, torque);
-        Shown {
+        ShaftSignals {
             output_speed: self.output_speed(d, s),
             friction: dry + loads.viscous,
             brake: x.brake,
@@ -58,11 +58,11 @@ impl<S: Scalar> Shaft<S> {
             let active = loads.through - loads.output_torque;
             let limit = if d.load_side { self.load_side_friction(d, x) } else { zero };
             let net = active - active.clamp_abs(limit);
-            let held = s.output_speed.equals(zero) & self.gear.output_stop.outwards(s.output_position, net);
-            return S::select(held, net * self.gear.per_ratio, zero);
+            let pressed = s.output_speed.equals(zero) & self.gear.output_stop.outwards(s.output_position, net);
+            return S::select(pressed, net * self.gear.per_ratio, zero);
         }
-        let held = s.motor_speed.equals(zero) & self.gear.motor_stop.outwards(s.motor_position, net);
-        S::select(held, net, zero)
+        let pressed = s.motor_speed.equals(zero) & self.gear.motor_stop.outwards(s.motor_position, net);
+        S::select(pressed, net, zero)
     }
 
     /// In the operator model the output moves with the motor while the backlash is taken up, else it rests.
@@ -79,26 +79,26 @@ impl<S: Scalar> Shaft<S> {
 
     /// Ram position and speed, the screw's torque at the motor shaft, its efficiencies.
     #[inline(always)]
-    pub(in crate::actuator::servo) fn show_screw(&self, s: &ShaftState<S>, shown: &Shown<S>) -> [S; 5] {
+    pub(in crate::actuator::servo) fn observe_screw(&self, s: &ShaftState<S>, signals: &ShaftSignals<S>) -> [S; 5] {
         let per_ratio = self.gear.per_ratio;
         let efficiency = [self.screw.efficiency, self.screw.efficiency_aiding];
-        [s.motor_position * per_ratio, s.motor_speed * per_ratio, shown.through * per_ratio, efficiency[0], efficiency[1]]
+        [s.motor_position * per_ratio, s.motor_speed * per_ratio, signals.through * per_ratio, efficiency[0], efficiency[1]]
     }
 
     /// Friction and damping of the load side, and the torque of spalls.
     #[inline(always)]
-    pub(in crate::actuator::servo) fn show_load_side(
+    pub(in crate::actuator::servo) fn observe_load_side(
         &self,
         d: &ShaftDetails,
         x: &Instant<S>,
         s: &ShaftState<S>,
-        shown: &Shown<S>,
+        signals: &ShaftSignals<S>,
     ) -> [S; 2] {
         let limit = self.load_side_friction(d, x);
-        let dry = Friction::dry_torque(shown.through - shown.output_torque, shown.output_speed, limit, limit);
+        let dry = Friction::dry_torque(signals.through - signals.output_torque, signals.output_speed, limit, limit);
         let spall =
-            if d.spall { self.screw.spall(s.motor_position, shown.through, s.motor_position * self.gear.per_ratio).0 } else { S::zero() };
-        [dry + self.load_damping * shown.output_speed, spall]
+            if d.spall { self.screw.spall(s.motor_position, signals.through, s.motor_position * self.gear.per_ratio).0 } else { S::zero() };
+        [dry + self.load_damping * signals.output_speed, spall]
     }
 
     #[inline(always)]
