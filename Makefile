@@ -14,8 +14,8 @@ unexport PYTHONDONTWRITEBYTECODE
 unexport VIRTUAL_ENV
 unexport CONDA_PREFIX
 
-# The build for work on physics: one lane type, compiled in seconds. Its extension stands in a folder of its own, where
-# only `make check` looks; the package beside it is links into this tree.
+# The build for work on physics: one batch type, compiled in seconds. Its extension stands in a
+# folder of its own, where only `make check` looks; the package beside it is links into this tree.
 PHYSICS := --locked --quiet --profile physics --features physics
 OVERLAY := $(CURDIR)/$(STAMPS)/physics
 CHECK   ?= tests/physics
