@@ -1,4 +1,4 @@
-"""An actuator: a name, a wiring, and an immutable set of parameters."""
+"""An actuator: a name, a wiring, and immutable parameters."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Actuator:
     Attributes
     ----------
     name, title : str
-        From the set's header.
+        From the actuator file's header.
     wiring : str
         Which of the core's wirings it is.
     parameters : ParameterSet
@@ -54,12 +54,12 @@ class Actuator:
 
     @classmethod
     def load(cls, reference: str | os.PathLike[str]) -> Actuator:
-        """Load an actuator by the name of its set, or from a TOML file.
+        """Load an actuator by name, or from a TOML file.
 
         Raises
         ------
         UnknownNameError
-            No such set; the message holds the nearest names.
+            No such actuator; the message holds the nearest names.
         InputError
             The file is wrong; the message holds file, line, path and limit.
         """
@@ -82,7 +82,7 @@ class Actuator:
         *,
         source: str = "set by the caller",
         place: str = "",
-        asked: bool = True,
+        request: bool = True,
     ) -> Actuator:
         """Return an actuator with some values changed.
 
@@ -94,8 +94,8 @@ class Actuator:
             Kept as the source of the changed values.
         place : str
             Named in errors, such as the file the values come from.
-        asked : bool
-            These are the user's wishes: where one cannot act, that is said.
+        request : bool
+            Whether the caller wants these values: one that has no effect is then reported.
 
         Raises
         ------
@@ -106,15 +106,17 @@ class Actuator:
             return self
         return replace(
             self,
-            parameters=self.parameters.replaced(values, source=source, place=place, asked=asked),
+            parameters=self.parameters.replaced(
+                values, source=source, place=place, request=request
+            ),
         )
 
     def _repr_html_(self) -> str:
         from elevon.report.cards import Html, card
 
         facts = [("", self.title), ("wiring", self.wiring), ("hash", self.hash)]
-        shown = Html(self.parameters._repr_html_())
-        return card(self.name, facts, shown, folded=f"{len(self.parameters)} parameters")
+        table = Html(self.parameters._repr_html_())
+        return card(self.name, facts, table, folded=f"{len(self.parameters)} parameters")
 
     @property
     def hash(self) -> str:
@@ -125,7 +127,7 @@ class Actuator:
         """Return what the core says against these values together (empty when nothing).
 
         Each finding has ``severity``, ``path``, ``value``, ``limit`` and ``message``: a step too
-        large for a named pole, gains that cannot be stable, limits the wrong way round. With an
+        large for a named pole, gains that cannot be stable, limits that are exchanged. With an
         ``error`` nothing runs; a ``warning`` says what to expect.
         """
         from elevon import _core

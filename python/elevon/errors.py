@@ -34,7 +34,7 @@ __all__ = [
     "unknown",
 ]
 
-_SHOWN = 60
+_LONGEST_QUOTE = 60
 
 
 class ElevonError(Exception):
@@ -77,7 +77,7 @@ class ArgumentTypeError(InputError, TypeError):
 
 
 class NotActingError(InputError):
-    """A parameter or fault was set where it cannot act, and the caller asked to be strict."""
+    """A parameter or fault was set where it has no effect, and the caller wants that refused."""
 
 
 class UnitError(InputError):
@@ -139,7 +139,7 @@ class DivergedError(SimulationError):
         self.signal = signal
 
 
-class Interrupted(ElevonError):  # noqa: N818 - an interruption is asked for, it is no error
+class Interrupted(ElevonError):  # noqa: N818 - an interruption is wanted, it is no error
     """The work was stopped by the user before its end."""
 
     exit_code: ClassVar[int] = 130
@@ -158,15 +158,15 @@ class ElevonWarning(UserWarning):
 
 
 class NotActingWarning(ElevonWarning):
-    """A parameter or fault was set away from neutral where it cannot act."""
+    """A parameter or fault was set away from neutral where it has no effect."""
 
 
 class UncheckedWarning(ElevonWarning):
-    """A file carries no checksum: whether it is as it was written nobody can tell."""
+    """A file carries no checksum: whether it is as it was written cannot be checked."""
 
 
 class FindingWarning(ElevonWarning):
-    """The core doubts these values together, but runs them."""
+    """The core questions these values together, but runs them."""
 
 
 def nearest(name: str, candidates: Iterable[str], count: int = 3) -> list[str]:
@@ -243,8 +243,8 @@ def unknown(
 
 def quoted(text: str) -> str:
     """Return foreign text safe to show: escaped, quoted, and cut to a readable length."""
-    shown = text if len(text) <= _SHOWN else text[:_SHOWN] + "..."
-    return ascii(shown)
+    cut = text if len(text) <= _LONGEST_QUOTE else text[:_LONGEST_QUOTE] + "..."
+    return ascii(cut)
 
 
 def _plain(name: str) -> str:

@@ -14,7 +14,7 @@ _SHARE = 0.8
 
 
 def available_bytes() -> int | None:
-    """Return the memory that can be had without swapping, in bytes; None where nobody tells."""
+    """Return the memory that can be had without swapping, in bytes; None where unknown."""
     limits = [limit for limit in (_system(), _container()) if limit is not None]
     return min(limits) if limits else None
 

@@ -65,32 +65,32 @@ def estimate_texts(
     unit : str
         Of the SI.
     written : str, optional
-        The unit in which the set gives the parameter, which is preferred.
+        The unit in which the actuator file gives the parameter, which is preferred.
     """
-    shown = written or shown_unit(unit)
-    check_kind(shown, unit)
-    value_, low, high = (float(to_display(x, shown)) for x in (value, *interval))
-    return (*interval_texts(value_, low, high), "" if shown == "1" else shown)
+    display = written or shown_unit(unit)
+    check_kind(display, unit)
+    value_, low, high = (float(to_display(x, display)) for x in (value, *interval))
+    return (*interval_texts(value_, low, high), "" if display == "1" else display)
 
 
 def estimate_row(item: Estimate, actuator: Actuator, *more: str) -> tuple[str, ...]:
     """Return a calibration's row: parameter, before, after, low, high, unit, more, holds for."""
     unit = written_unit(actuator, item.path)
-    value, low, high, shown = estimate_texts(item.value, item.interval, item.unit, unit)
-    old = "" if item.old is None else _plain(float(to_display(item.old, shown or "1")))
-    return (item.path, old, value, low, high, shown, *more, ", ".join(item.given))
+    value, low, high, display = estimate_texts(item.value, item.interval, item.unit, unit)
+    old = "" if item.old is None else _plain(float(to_display(item.old, display or "1")))
+    return (item.path, old, value, low, high, display, *more, ", ".join(item.given))
 
 
 def severity_texts(value: float, interval: tuple[float, float], unit: str) -> tuple[str, str, str]:
-    """Return a severity and its interval as a person says it: angles in deg, shares in %."""
-    shown = "%" if unit == "1" else shown_unit(unit)
-    texts = interval_texts(*(float(to_display(x, shown)) for x in (value, *interval)))
-    first, low, high = (f"{text} {shown}" for text in texts)
+    """Return a severity and its interval as a person writes it: angles in deg, shares in %."""
+    display = "%" if unit == "1" else shown_unit(unit)
+    texts = interval_texts(*(float(to_display(x, display)) for x in (value, *interval)))
+    first, low, high = (f"{text} {display}" for text in texts)
     return first, low, high
 
 
 def written_unit(actuator: Actuator, path: str) -> str:
-    """Return the unit in which a set gives a parameter; empty where it has none of that name."""
+    """Return the unit in which an actuator file gives a parameter; empty where it has none."""
     item = actuator.parameters.get(path)
     return "" if item is None else item.unit
 
@@ -100,8 +100,11 @@ def quantity_text(value: float, unit: str, digits: int = _DIGITS) -> tuple[str, 
 
     A temperature stays in K: a difference has no zero to be counted from.
     """
-    shown = unit if unit in {"", "1", "K"} else shown_unit(unit)
-    return f"{float(to_display(value, shown or '1')):.{digits}g}", "" if shown == "1" else shown
+    display = unit if unit in {"", "1", "K"} else shown_unit(unit)
+    return (
+        f"{float(to_display(value, display or '1')):.{digits}g}",
+        "" if display == "1" else display,
+    )
 
 
 def _plain(value: float) -> str:

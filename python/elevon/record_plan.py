@@ -66,7 +66,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "voltages": ("voltage_a", "voltage_b", "voltage_c"),
 }
 
-#: What is kept when nothing is said: the rate of the Torino drive's log (T1).
+#: What is kept when nothing is given: the rate of the Torino drive's log (T1).
 DEFAULT_RECORD = "drive_log,essential@400 Hz"
 
 #: The same for an actuator with a control unit: what a test engineer reads.
@@ -163,7 +163,7 @@ def record_plan(
 
 
 def clock_name(period_steps: int, step: float) -> str:
-    """Return the name of a clock: an identifier that tells its rate."""
+    """Return the name of a clock: an identifier with its rate."""
     if period_steps == 1:
         return "every_step"
     rate = f"{1.0 / (period_steps * step):.6g}".replace(".", "p").replace("+", "")

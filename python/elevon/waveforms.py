@@ -122,11 +122,11 @@ def evaluate(kind: str, given: Mapping[str, float], time: npt.ArrayLike) -> npt.
     return _core.waveform(kind, values, np.ascontiguousarray(time, dtype=np.float64))
 
 
-def unit_of(parameter: WaveParameter, own: str) -> str:
+def unit_of(parameter: WaveParameter, port_unit: str) -> str:
     """Return the SI unit of a parameter where the waveform drives a quantity in the unit `own`."""
     if parameter.unit == "":
-        return own
-    return own + parameter.unit if parameter.unit.startswith("/") else parameter.unit
+        return port_unit
+    return port_unit + parameter.unit if parameter.unit.startswith("/") else parameter.unit
 
 
 #: Names of instants: any of them may be anywhere on the time axis.

@@ -233,7 +233,7 @@ def _taken(folder: Path, path: Path) -> int:
             handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         except OSError as error:
             raise OutputError(f"{folder}: cannot be written: {error.strerror or error}") from error
-        if not _held(handle):
+        if not _take(handle):
             os.close(handle)
             raise BusyError(f"{folder}: another process works there{_holder(path)}")
         with suppress(OSError):
@@ -249,7 +249,7 @@ def is_locked(folder: Path) -> bool:
     except OSError:
         return False
     try:
-        return not _held(handle)
+        return not _take(handle)
     finally:
         os.close(handle)
 
@@ -271,10 +271,10 @@ def sweep(folder: Path) -> list[Path]:
     return gone
 
 
-def _held(handle: int) -> bool:
+def _take(handle: int) -> bool:
     """Take the lock of an open file, or find it taken; either goes with the process."""
     if sys.platform == "win32":
-        return _held_on_windows(handle)
+        return _take_on_windows(handle)
     import fcntl
 
     try:
@@ -284,7 +284,7 @@ def _held(handle: int) -> bool:
     return True
 
 
-def _held_on_windows(handle: int) -> bool:
+def _take_on_windows(handle: int) -> bool:
     """Lock one byte far behind the signature: Windows lets nobody read a locked byte."""
     import msvcrt
 

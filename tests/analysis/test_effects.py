@@ -5,21 +5,21 @@ import itertools
 import numpy as np
 import pytest
 
-from elevon.analysis import Response, effects_of
-from elevon.analysis.response import Factor
+from elevon.analysis import CampaignResponse, effects_of
+from elevon.analysis.response import VariedFactor
 
 LETTERS = "ABCDE"
 
 
 def _response(coded, values, block=None):
     factors = [
-        Factor(LETTERS[k], f"factor_{k}", "1", "control", 3.0 + column, (2.0, 4.0))
+        VariedFactor(LETTERS[k], f"factor_{k}", "1", "control", 3.0 + column, (2.0, 4.0))
         for k, column in enumerate(np.asarray(coded, dtype=float).T)
     ]
     count = len(values)
     block = np.zeros(count, dtype=int) if block is None else np.asarray(block)
     index = np.arange(count)
-    return Response("y", "A", index, index, block, np.asarray(values), factors, [], [])
+    return CampaignResponse("y", "A", index, index, block, np.asarray(values), factors, [], [])
 
 
 def _full(factors):

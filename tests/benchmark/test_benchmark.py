@@ -13,22 +13,23 @@ from elevon.benchmark.score import _auc, _interval, _resampled
 
 @pytest.mark.parametrize("name", ACTUATORS)
 def test_parts_are_dealt_by_unit_and_both_benches_have_the_same_faults(name):
-    own = _resolved(plan_text(name, 20, 5, 3), name)
+    first = _resolved(plan_text(name, 20, 5, 3), name)
     other = _resolved(plan_text(name, 7, 5, 8, shifted=True), name)
-    parts = {u: set(own.index.split[own.index.unit == u]) for u in np.unique(own.index.unit)}
+    parts = {u: set(first.index.split[first.index.unit == u]) for u in np.unique(first.index.unit)}
     assert all(len(part) == 1 for part in parts.values())
     counts = [sum(part == {name} for part in parts.values()) for name in ("train", "test")]
     assert counts == [10, 6]
     assert set(other.index.split) == {"shifted"}
-    assert own.fault_names() == other.fault_names()
-    assert own.actuator.hash != other.actuator.hash
-    drawn = np.column_stack([c.values for c in own.columns if c.kind == "fault"])
+    assert first.fault_names() == other.fault_names()
+    assert first.actuator.hash != other.actuator.hash
+    drawn = np.column_stack([c.values for c in first.columns if c.kind == "fault"])
     healthy = (drawn == 0.0).all(axis=1)
     assert 0.1 < healthy.mean() < 0.8
     assert (drawn.max(axis=0) > 0.0).all()
     again = _resolved(plan_text(name, 20, 5, 3), name)
     assert all(
-        np.array_equal(a.values, b.values) for a, b in zip(own.columns, again.columns, strict=True)
+        np.array_equal(a.values, b.values)
+        for a, b in zip(first.columns, again.columns, strict=True)
     )
 
 

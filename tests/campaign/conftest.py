@@ -52,7 +52,7 @@ def cli(capsys):
         extra = ["--json"] if json_output else []
         code = main([str(item) for item in arguments] + extra)
         captured = capsys.readouterr()
-        told = json.loads(captured.out) if captured.out and json_output else captured.out
-        return code, told or None, captured.err
+        report = json.loads(captured.out) if captured.out and json_output else captured.out
+        return code, report or None, captured.err
 
     return run

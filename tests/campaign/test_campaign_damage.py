@@ -69,8 +69,8 @@ def test_a_damaged_table_of_a_finished_campaign_is_mended(plan, cli, tmp_path, n
     good = (out / name).read_bytes()
     flip(out / name, (out / name).stat().st_size // 2)
     assert cli("dataset", "verify", out)[0] == 1
-    code, told, _ = cli("campaign", "run", path, "--out", out)
-    assert (code, told["skipped"]) == (0, 4)  # nothing is simulated again
+    code, report, _ = cli("campaign", "run", path, "--out", out)
+    assert (code, report["skipped"]) == (0, 4)  # nothing is simulated again
     assert cli("dataset", "verify", out)[0] == 0
     assert (out / name).read_bytes() == good
 
@@ -81,6 +81,6 @@ def test_a_damaged_table_and_a_damaged_block(plan, cli, tmp_path):
     cli("campaign", "run", path, "--out", out)
     for name in ("runs.parquet", "ends/block_00001.parquet"):
         flip(out / name, (out / name).stat().st_size // 2)
-    code, told, _ = cli("campaign", "run", path, "--out", out)
-    assert (code, told["skipped"]) == (0, 4)
+    code, report, _ = cli("campaign", "run", path, "--out", out)
+    assert (code, report["skipped"]) == (0, 4)
     assert cli("dataset", "verify", out)[0] == 0

@@ -21,8 +21,8 @@ def test_a_cluster_gives_the_same_bytes(plan, cli, tmp_path):
     path = plan(24, head="runs_per_file = 2")  # more blocks than are given out ahead
     assert cli("campaign", "run", path, "--out", tmp_path / "one")[0] == 0
     arguments = ("campaign", "run", path, "--out", tmp_path / "many", "--cluster", "local:2")
-    code, told, _ = cli(*arguments)
-    assert (code, told["runs"], told["status"]) == (0, 24, "ok")
+    code, report, _ = cli(*arguments)
+    assert (code, report["runs"], report["status"]) == (0, 24, "ok")
     assert marks(tmp_path / "one") == marks(tmp_path / "many")
     assert cli("dataset", "verify", tmp_path / "many")[0] == 0
 

@@ -131,9 +131,9 @@ def test_opening_reads_the_manifest_only(made, monkeypatch):
 
 
 def test_a_whole_set_verifies(made, cli):
-    code, told, _ = cli("dataset", "verify", made)
-    assert (code, told["status"]) == (0, "pass")
-    assert all(check["passed"] for check in told["checks"])
+    code, report, _ = cli("dataset", "verify", made)
+    assert (code, report["status"]) == (0, "pass")
+    assert all(check["passed"] for check in report["checks"])
 
 
 def _flip(path, place=None):
@@ -186,29 +186,29 @@ DAMAGE = {
 def test_damage_is_found(copied, cli, name):
     damage, message = DAMAGE[name]
     damage(copied)
-    code, told, _ = cli("dataset", "verify", copied)
-    assert (code, told["status"]) == (1, "fail")
-    assert any(message in check["name"] for check in told["checks"] if not check["passed"])
+    code, report, _ = cli("dataset", "verify", copied)
+    assert (code, report["status"]) == (1, "fail")
+    assert any(message in check["name"] for check in report["checks"] if not check["passed"])
 
 
 def test_verifying_something_else_is_bad_input(tmp_path, cli):
-    code, told, err = cli("dataset", "verify", tmp_path)
-    assert (code, told) == (2, None)
+    code, report, err = cli("dataset", "verify", tmp_path)
+    assert (code, report) == (2, None)
     assert "is not a campaign folder" in err
 
 
 def test_describe(made, cli):
-    code, told, _ = cli("dataset", "describe", made)
+    code, report, _ = cli("dataset", "describe", made)
     assert code == 0
-    assert told["statuses"] == {"ok": 12}
-    assert told["healthy"] == 3
-    assert [(fault["name"], fault["runs"]) for fault in told["faults"]] == [
+    assert report["statuses"] == {"ok": 12}
+    assert report["healthy"] == 3
+    assert [(fault["name"], fault["runs"]) for fault in report["faults"]] == [
         ("friction@transmission", 6),
         ("backlash@transmission", 6),
     ]
-    friction = next(item for item in told["varied"] if item["name"] == "friction.dynamic")
+    friction = next(item for item in report["varied"] if item["name"] == "friction.dynamic")
     assert (friction["min"], friction["max"], sum(friction["histogram"])) == (0.2, 0.4, 12)
-    assert sum(told["splits"].values()) == 12
+    assert sum(report["splits"].values()) == 12
     assert cli("dataset", "describe", made, json_output=False)[0] == 0
 
 
@@ -225,12 +225,12 @@ def test_cards_tell_what_is_in_it(made):
 def test_cards_list_what_does_not_act_and_what_failed(plan, cli, tmp_path):
     tail = '[[vary]]\nparameter = "solver.step"\nvalues = ["1 us", "2 us"]\n'
     path = plan(0, head="allow_not_acting = true", tail=tail)
-    code, told, err = cli("campaign", "run", path, "--out", tmp_path / "out")
+    code, report, err = cli("campaign", "run", path, "--out", tmp_path / "out")
     assert code == 0
-    assert "solver.step = 2 us does not act" in told["not_acting"][0]
-    assert "does not act" in err
+    assert "solver.step = 2 us has no effect" in report["not_acting"][0]
+    assert "has no effect" in err
     for name in ("README.md", "card.html"):
-        assert "solver.step = 2 us does not act" in (tmp_path / "out" / name).read_text()
+        assert "solver.step = 2 us has no effect" in (tmp_path / "out" / name).read_text()
 
 
 def test_what_the_fidelity_does_not_carry(plan, cli, tmp_path):
@@ -247,9 +247,9 @@ def test_what_the_fidelity_does_not_carry(plan, cli, tmp_path):
     assert "run 1: " in err
     assert "exists at fidelity high, not low" in err
     allowed = plan(0, head="allow_not_acting = true", tail=tail)
-    code, told, _ = cli("campaign", "run", allowed, "--out", tmp_path / "out")
+    code, report, _ = cli("campaign", "run", allowed, "--out", tmp_path / "out")
     assert code == 0
-    assert name in told["not_acting"][0]
+    assert name in report["not_acting"][0]
     ds = elevon.load_campaign(tmp_path / "out")
     assert ds.runs.to_pandas()[name].tolist() == [0.0, value]
     assert (ds.signals.to_pandas()[name] == 0.0).all()
@@ -259,9 +259,9 @@ def test_what_the_fidelity_does_not_carry(plan, cli, tmp_path):
 def test_export_for_matlab(made, cli, tmp_path):
     from scipy.io import loadmat
 
-    code, told, _ = cli("dataset", "export", made, "--out", tmp_path / "mat", "--runs", "0,6-7")
+    code, report, _ = cli("dataset", "export", made, "--out", tmp_path / "mat", "--runs", "0,6-7")
     assert code == 0
-    assert told["runs"] == 3
+    assert report["runs"] == 3
     table = loadmat(tmp_path / "mat" / "runs.mat", squeeze_me=True, simplify_cells=True)
     assert table["runs"]["run"].tolist() == [0, 6, 7]
     assert table["names"]["backlash_at_transmission"] == "backlash@transmission"
@@ -313,8 +313,8 @@ def test_runs_that_cannot_be(text):
 
 def test_splitting_anew(copied, cli):
     before = {p: p.read_bytes() for p in (copied / "runs").rglob("*.parquet")}
-    code, told, _ = cli("dataset", "split", copied, "--share", "fit=0.75", "--share", "hold=0.25")
-    assert (code, told["splits"]) == (0, {"fit": 9, "hold": 3})
+    code, report, _ = cli("dataset", "split", copied, "--share", "fit=0.75", "--share", "hold=0.25")
+    assert (code, report["splits"]) == (0, {"fit": 9, "hold": 3})
     assert describe(elevon.load_campaign(copied))["splits"] == {"fit": 9, "hold": 3}
     assert cli("dataset", "verify", copied)[0] == 0
     assert {p: p.read_bytes() for p in before} == before

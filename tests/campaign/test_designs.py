@@ -91,8 +91,8 @@ def test_power_is_how_often_the_effect_is_seen():
     generator = np.random.default_rng(4)
     coded = np.vstack([full(list("ABC")).coded()] * 2)
     blocks = np.repeat([0, 1], 8)
-    asked = Power(effect=1.5, sd=1.0, terms=("A", "AB"))
-    rows = power_rows(asked, coded, blocks, list("ABC"), "design")
+    request = Power(effect=1.5, sd=1.0, terms=("A", "AB"))
+    rows = power_rows(request, coded, blocks, list("ABC"), "design")
     assert [row["term"] for row in rows] == ["A", "AB"]
     ab = coded[:, 0] * coded[:, 1]
     model = np.column_stack([np.ones(16), blocks, coded, ab])
@@ -165,15 +165,15 @@ def test_a_fraction_states_what_it_confounds(plan, cli):
     path = plan(
         0, tail='[design]\nkind = "fractional_factorial"\ngenerators = ["C=AB"]\n' + FACTORS
     )
-    code, told, _ = cli("campaign", "plan", path)
+    code, report, _ = cli("campaign", "plan", path)
     assert code == 0
-    assert told["runs"] == 4
-    assert told["design"]["resolution"] == "III"
-    assert told["design"]["generators"] == ["C=AB"]
-    assert told["design"]["aliases"]["A"] == ["BC"]
-    _, shown, _ = cli("campaign", "plan", path, json_output=False)
-    assert "resolution III; generators C=AB" in shown
-    assert "A is aliased with BC" in shown
+    assert report["runs"] == 4
+    assert report["design"]["resolution"] == "III"
+    assert report["design"]["generators"] == ["C=AB"]
+    assert report["design"]["aliases"]["A"] == ["BC"]
+    _, printed, _ = cli("campaign", "plan", path, json_output=False)
+    assert "resolution III; generators C=AB" in printed
+    assert "A is aliased with BC" in printed
 
 
 def test_a_blocking_quantity_goes_with_the_blocks(plan):

@@ -248,14 +248,14 @@ def test_a_run_is_prepared_without_asking_the_catalogue_again(plan, monkeypatch)
     """Ten thousand runs of one kind are one kind: the slow questions are asked once."""
     from elevon.campaign import resolved as resolved_module
 
-    asked = []
+    requests = []
     usual = resolved_module.prepare
     monkeypatch.setattr(
-        resolved_module, "prepare", lambda *a, **k: asked.append(1) or usual(*a, **k)
+        resolved_module, "prepare", lambda *a, **k: requests.append(1) or usual(*a, **k)
     )
     idle = check_module._idle
-    monkeypatch.setattr(check_module, "_idle", lambda *a: asked.append(2) or idle(*a))
+    monkeypatch.setattr(check_module, "_idle", lambda *a: requests.append(2) or idle(*a))
     resolved = resolve_plan(*load_plan(plan(500)))
     check_module.check(resolved)
-    assert asked.count(1) == 1
-    assert asked.count(2) <= 2
+    assert requests.count(1) == 1
+    assert requests.count(2) <= 2

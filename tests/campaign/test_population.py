@@ -44,11 +44,11 @@ def test_each_unit_has_its_own_values_for_life(plan):
     assert (resolved.index.unit.reshape(30, 5) == np.arange(30)[:, None]).all()
     assert (resolved.index.age.reshape(30, 5) == np.linspace(0.0, 1.0, 5)).all()
     friction = values["friction.dynamic"]
-    own = resolved.actuator.parameters.value("friction.dynamic")
+    nominal = resolved.actuator.parameters.value("friction.dynamic")
     assert (friction == friction[:, :1]).all()
     assert len(set(friction[:, 0])) == 30
-    assert np.abs(friction / own - 1.0).max() <= 0.15
-    assert 0.03 < np.std(friction[:, 0] / own) < 0.07
+    assert np.abs(friction / nominal - 1.0).max() <= 0.15
+    assert 0.03 < np.std(friction[:, 0] / nominal) < 0.07
     temperature = values["motor.winding_temperature"]
     assert 293.15 <= temperature.min() < temperature.max() <= 313.15
 

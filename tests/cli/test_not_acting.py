@@ -22,7 +22,7 @@ def test_it_is_named_on_stderr_and_stdout_stays_json(elevon_cli, case):
     assert result.code == 0
     assert result.json["status"] == "ok"
     assert f"elevon: warning: {name}" in result.err.replace("fault short@motor.phase_a: ", "")
-    assert "does not act: " in result.err
+    assert "has no effect: " in result.err
 
 
 @pytest.mark.parametrize("case", IDLE)
@@ -72,13 +72,13 @@ def test_a_plan_refuses_it_unless_it_allows_it(elevon_cli, tmp_path):
     plan.write_text(text)
     refused = elevon_cli("campaign", "run", plan, "--out", "refused")
     assert refused.code == 2
-    assert "run 1: solver.step = 2 us does not act" in refused.err
+    assert "run 1: solver.step = 2 us has no effect" in refused.err
     assert not (tmp_path / "refused").exists()
     plan.write_text("allow_not_acting = true\n" + text)
     allowed = elevon_cli("campaign", "run", plan, "--out", "allowed", "--json")
     assert allowed.code == 0
     assert json.loads(allowed.out)["runs"] == 2
-    assert allowed.err.count("elevon: warning: solver.step = 2 us does not act") == 1
+    assert allowed.err.count("elevon: warning: solver.step = 2 us has no effect") == 1
 
 
 def test_lists_say_where_it_acts(elevon_cli):
@@ -108,8 +108,8 @@ def test_a_comparison_names_what_neither_model_carries(elevon_cli, tmp_path):
         'duration = "1.2 s"\n[[command.terms]]\nkind = "sine"\namplitude = "7 deg"\n'
         'frequency = "2 Hz"\n'
     )
-    asked = ("compare", "torino-rotary", "--scenario", scenario, "--after", "0.5", "--strict")
-    assert elevon_cli(*asked, "--set", "solver.step=2 us").code == 0
-    refused = elevon_cli(*asked, "--set", "pwm.frequency=5 kHz")
+    words = ("compare", "torino-rotary", "--scenario", scenario, "--after", "0.5", "--strict")
+    assert elevon_cli(*words, "--set", "solver.step=2 us").code == 0
+    refused = elevon_cli(*words, "--set", "pwm.frequency=5 kHz")
     assert refused.code == 2
-    assert "pwm.frequency = 5 kHz does not act" in refused.err
+    assert "pwm.frequency = 5 kHz has no effect" in refused.err

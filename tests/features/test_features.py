@@ -155,8 +155,8 @@ def test_a_log_with_gaps_or_missing_samples_is_refused():
 def test_the_command_line_lists_them_and_computes_them(elevon_cli, tmp_path):
     listed = elevon_cli("list", "features", "--json").json["features"]
     assert [row["name"] for row in listed] == list(feature_records())
-    own = elevon_cli("list", "features", "nasa-ballscrew", "--json").json["features"]
-    assert next(row["unit"] for row in own if row["name"] == "lost_motion") == "m"
+    expected = elevon_cli("list", "features", "nasa-ballscrew", "--json").json["features"]
+    assert next(row["unit"] for row in expected if row["name"] == "lost_motion") == "m"
     run = _runs("torino-rotary", "4 deg")[0]
     recording = simulate(run.actuator, run.scenario, record="drive_log@1 kHz", features="all@1 kHz")
     recording.save(tmp_path / "log.parquet")

@@ -17,7 +17,7 @@ def test_a_base_and_one_number_are_enough(tmp_path):
     mine = elevon.Actuator.load(path)
     assert mine.name == "fast-gear"
     ratio = mine.parameters["gear.ratio"]
-    assert (ratio.value, ratio.source, ratio.confidence) == (50.0, "given by the user", "unknown")
+    assert (ratio.value, ratio.source, ratio.confidence) == (50.0, "given by the caller", "unknown")
     assert ratio.changed
     assert mine.parameters["motor.inertia"].value == 9e-4
     assert mine.parameters["motor.inertia"].text == "9 kg cm2"

@@ -64,9 +64,9 @@ def test_csv_is_plain_text_with_units(tmp_path):
 def test_csv_without_the_file_beside_it_says_so(tmp_path):
     path = one_clock().save(tmp_path / "a.csv")
     path.with_name("a.csv.json").unlink()
-    with pytest.warns(UncheckedWarning, match=r"no a\.csv\.json beside it") as told:
+    with pytest.warns(UncheckedWarning, match=r"no a\.csv\.json beside it") as caught:
         recording = Recording.load(path)
-    assert told[0].filename == __file__
+    assert caught[0].filename == __file__
     assert recording["force"].values.tobytes() == one_clock()["force"].values.tobytes()
     assert recording.meta == {}
 
@@ -90,7 +90,7 @@ def test_a_replacement_cut_short_leaves_one_whole_recording(tmp_path, monkeypatc
     path = one_clock().save(tmp_path / "a.csv")
     new = one_clock().with_meta(seed=9)
     changed = Recording.build([0, 1], {"x": [1, 2]}, {"x": "rad"}, meta={"seed": 9})
-    saved = csv.write_beside
+    saved = csv.write_description
 
     class Killed(BaseException):
         pass
@@ -106,7 +106,7 @@ def test_a_replacement_cut_short_leaves_one_whole_recording(tmp_path, monkeypatc
     old = one_clock() if step == "description" else changed
     for later, expected in ((changed, old), (new, new)):
         with monkeypatch.context() as patch:
-            patch.setattr(csv, "write_beside", killed)
+            patch.setattr(csv, "write_description", killed)
             with pytest.raises(Killed):
                 later.save(path, force=True)
         assert Recording.load(path).equals(expected)

@@ -119,9 +119,9 @@ def test_thinning_keeps_the_extremes_and_the_order_of_time(count, most, seed, mi
     time = np.cumsum(generator.uniform(0.1, 1.0, count))
     line = generator.normal(size=count)
     line[generator.uniform(size=count) < missing] = np.nan
-    shown, kept = thinned(time, {"x": line}, most)
-    assert shown.size <= max(most, count if count <= most else 0)
-    assert (np.diff(shown) >= 0).all()
+    displayed, kept = thinned(time, {"x": line}, most)
+    assert displayed.size <= max(most, count if count <= most else 0)
+    assert (np.diff(displayed) >= 0).all()
     finite = line[np.isfinite(line)]
     if finite.size:
         assert np.nanmax(kept["x"]) == finite.max()

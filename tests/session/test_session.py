@@ -121,8 +121,13 @@ def test_a_state_is_saved_and_restored():
 def test_a_parameter_changes_while_it_runs():
     """The same torque turns a free shaft of ten times the inertia a tenth as fast."""
     free = {"friction.static": 0.0, "friction.dynamic": 0.0, "friction.viscous": 0.0}
-    still = {"gear.inertia": 0.0, "load.inertia": 0.0, "backlash.total": 0.0, "drive.kind": "pwm"}
-    actuator = elevon.Actuator.load("torino-rotary").with_values({**free, **still})
+    standing = {
+        "gear.inertia": 0.0,
+        "load.inertia": 0.0,
+        "backlash.total": 0.0,
+        "drive.kind": "pwm",
+    }
+    actuator = elevon.Actuator.load("torino-rotary").with_values({**free, **standing})
     inertia = actuator.parameters["motor.inertia"].value
     session = elevon.Session(actuator, mode="torque", fidelity="low")
     rises = []
@@ -179,8 +184,13 @@ def test_what_the_equations_in_use_leave_out_is_refused_with_the_remedy():
 def test_own_controller_on_one_and_on_many():
     """A proportional controller of speed by torque: an exponential with the time J / K."""
     free = {"friction.static": 0.0, "friction.dynamic": 0.0, "friction.viscous": 0.0}
-    still = {"gear.inertia": 0.0, "load.inertia": 0.0, "backlash.total": 0.0, "drive.kind": "pwm"}
-    actuator = elevon.Actuator.load("torino-rotary").with_values({**free, **still})
+    standing = {
+        "gear.inertia": 0.0,
+        "load.inertia": 0.0,
+        "backlash.total": 0.0,
+        "drive.kind": "pwm",
+    }
+    actuator = elevon.Actuator.load("torino-rotary").with_values({**free, **standing})
     wanted, rise = 20.0, 0.02
     gain = actuator.parameters["motor.inertia"].value / rise
 
@@ -202,7 +212,7 @@ def test_own_controller_on_one_and_on_many():
 
 
 @pytest.mark.parametrize(
-    ("act", "error", "said"),
+    ("act", "error", "messages"),
     [
         (lambda s: s.set(comand=1.0), UnknownNameError, "command"),
         (lambda s: s.set(command="1 kg"), InputError, "kg"),
@@ -220,18 +230,18 @@ def test_own_controller_on_one_and_on_many():
         (lambda s: s.set_fault("short@motor.phase_a", 2.0), RangeError, "short"),
     ],
 )
-def test_wrong_input_is_named_and_changes_nothing(act, error, said):
+def test_wrong_input_is_named_and_changes_nothing(act, error, messages):
     session = elevon.Session("torino-rotary", tunable=["motor.inertia"])
     session.advance("1 ms")
     before = session.save().core.read([0, 1, 2]).tolist()
-    with pytest.raises(error, match=said):
+    with pytest.raises(error, match=messages):
         act(session)
     assert session.save().core.read([0, 1, 2]).tolist() == before
     assert session.time == pytest.approx(1e-3)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "options", "said"),
+    ("arguments", "options", "messages"),
     [
         (([],), {}, "an empty list"),
         ((["torino-rotary"],), {}, "a str is no run"),
@@ -241,8 +251,8 @@ def test_wrong_input_is_named_and_changes_nothing(act, error, said):
         (("torino-rotary",), {"mode": "sped"}, "speed"),
     ],
 )
-def test_a_wrong_session_is_refused(arguments, options, said):
-    with pytest.raises(InputError, match=said):
+def test_a_wrong_session_is_refused(arguments, options, messages):
+    with pytest.raises(InputError, match=messages):
         elevon.Session(*arguments, **options)
 
 
@@ -263,8 +273,8 @@ def test_each_lane_has_a_status_of_its_own():
 
 def test_a_change_that_one_lane_refuses_changes_none():
     actuator = elevon.Actuator.load("torino-rotary")
-    still = actuator.with_values({"motor.cogging_torque": "0.01 N m"})
-    runs = [elevon.Run(still), elevon.Run(actuator)]
+    standing = actuator.with_values({"motor.cogging_torque": "0.01 N m"})
+    runs = [elevon.Run(standing), elevon.Run(actuator)]
     session = elevon.Session(runs, fidelity="low")
     session.advance("1 ms")
     before = session.read(*SIGNALS), session.actuators

@@ -33,8 +33,8 @@ def test_a_scenario_is_an_object_a_dict_or_a_file(actuator, expected, tmp_path):
 
 
 def test_without_a_scenario_the_actuators_own_runs(actuator):
-    own = elevon.Scenario.from_dict(actuator.default_scenario)
-    assert elevon.Run(actuator).scenario == own
+    default = elevon.Scenario.from_dict(actuator.default_scenario)
+    assert elevon.Run(actuator).scenario == default
     for name in elevon.list_actuators():
         assert elevon.Run(name).scenario.seconds > 0.0
 
@@ -47,20 +47,20 @@ def test_a_run_is_a_value(actuator):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         ((3,), ["actuator", "an int", "expected an Actuator", "TOML file"]),
         (("torino-rotary", 4.0), ["scenario", "a float", "a Scenario, a dict", "None"]),
         (("torino-rotary", ["sine"]), ["scenario", "a list"]),
     ],
 )
-def test_other_types_are_refused_with_what_is_expected(arguments, said):
+def test_other_types_are_refused_with_what_is_expected(arguments, message):
     for call in (elevon.simulate, elevon.Run):
         with pytest.raises(TypeError) as caught:
             call(*arguments)
         assert isinstance(caught.value, ArgumentTypeError)
         assert isinstance(caught.value, elevon.InputError)
-        assert all(word in str(caught.value) for word in said)
+        assert all(word in str(caught.value) for word in message)
 
 
 def test_a_batch_of_something_else_is_refused(actuator):

@@ -14,7 +14,7 @@ IDLE = ACTUATOR.with_values({"solver.step": 2e-6})
 
 
 def test_a_warning_names_path_value_and_reason():
-    with pytest.warns(NotActingWarning, match=r"solver\.step = 2 us does not act: .*low\.step"):
+    with pytest.warns(NotActingWarning, match=r"solver\.step = 2 us has no effect: .*low\.step"):
         elevon.simulate(IDLE, SCENARIO, fidelity="low")
 
 
@@ -56,7 +56,7 @@ def test_doubts_of_the_core_are_warnings_and_its_refusals_errors(monkeypatch):
     found = [{"path": "a.b", "message": "a.b = 1 is near its limit", "severity": "warning"}]
     monkeypatch.setattr(elevon.Actuator, "findings", lambda *_: found)
     assert acting.check_values(ACTUATOR, "high") == [
-        acting.Doubt(FindingWarning, "a.b = 1 is near its limit")
+        acting.Notice(FindingWarning, "a.b = 1 is near its limit")
     ]
     found[0] = {**found[0], "severity": "error"}
     with pytest.raises(elevon.InputError, match="near its limit"):

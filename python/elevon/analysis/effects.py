@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.analysis.response import Response
-from elevon.analysis.terms import Column, blocks_matrix, further_contrasts, separate
+from elevon.analysis.response import CampaignResponse
+from elevon.analysis.terms import TermColumn, blocks_matrix, further_contrasts, separate
 from elevon.arrays import Floats
 from elevon.errors import InputError
 
-__all__ = ["Effects", "Term", "effects_of"]
+__all__ = ["EffectEstimate", "Effects", "effects_of"]
 
 EQUAL_REPEATS = (
     "the repeats of each point are equal: nothing random was simulated (sensor noise, spread of "
@@ -22,7 +22,7 @@ EQUAL_REPEATS = (
 
 
 @dataclass(frozen=True)
-class Term:
+class EffectEstimate:
     """One effect: the response's change from the lowest to the highest level.
 
     Attributes
@@ -79,7 +79,7 @@ class Effects:
     df: float | None
     mean: float
     factors: list[dict[str, Any]]
-    terms: list[Term]
+    terms: list[EffectEstimate]
     blocks: int
     with_blocks: list[str]
     blocked: list[str]
@@ -91,10 +91,10 @@ class Effects:
         return {**vars(self), "terms": [vars(term) for term in self.terms]}
 
 
-def effects_of(response: Response, *, level: float = 0.95) -> Effects:
+def effects_of(response: CampaignResponse, *, level: float = 0.95) -> Effects:
     """Estimate main effects and two-factor interactions by least squares.
 
-    The model has the mean, the blocks and every term that can be told apart; an effect is twice its
+    The model has the mean, the blocks and every term that can be separated; an effect is twice its
     coefficient with factors coded -1 to +1. Intervals: of a design with repeated points Student's t
     with the pure error of the repeats, unless these are equal (a simulation without noise); of an
     unreplicated orthogonal two-level design Lenth's pseudo standard error (R. V. Lenth,
@@ -122,7 +122,7 @@ def effects_of(response: Response, *, level: float = 0.95) -> Effects:
     matrix = np.column_stack([head, *(term.values for term in terms)])
     if np.linalg.matrix_rank(matrix) < matrix.shape[1]:
         raise InputError(
-            f"{response.name}: {len(response.values)} runs do not tell {len(letters)} factors "
+            f"{response.name}: {len(response.values)} runs do not separate {len(letters)} factors "
             f"and {head.shape[1]} block(s) apart"
         )
     fit = _fit(matrix, head.shape[1], response)
@@ -170,7 +170,7 @@ class _Judged:
     margins: list[float | None]
 
 
-def _fit(matrix: Floats, head: int, response: Response) -> _Fit:
+def _fit(matrix: Floats, head: int, response: CampaignResponse) -> _Fit:
     solution, *_ = np.linalg.lstsq(matrix, response.values)
     inverse = np.linalg.pinv(matrix.T @ matrix)
     scale: Floats = np.asarray(2.0 * np.sqrt(np.diag(inverse)[head:]), dtype=np.float64)
@@ -178,7 +178,7 @@ def _fit(matrix: Floats, head: int, response: Response) -> _Fit:
     return _Fit(matrix, head, effects, scale, response.values - matrix @ solution)
 
 
-def _judged(fit: _Fit, response: Response, coded: list[Floats], level: float) -> _Judged:
+def _judged(fit: _Fit, response: CampaignResponse, coded: list[Floats], level: float) -> _Judged:
     """Judge the effects by repeats, by Lenth's method or by the residual."""
     spread, df = _pure_error(response, coded)
     if df >= 1 and not _equal_repeats(spread, df, response):
@@ -197,19 +197,19 @@ def _points(coded: list[Floats]) -> tuple[Floats, npt.NDArray[np.int64]]:
     return points, number.reshape(-1)
 
 
-def _equal_repeats(spread: float, df: int, response: Response) -> bool:
-    """Tell whether the runs of a point are equal to rounding: nothing random was simulated.
+def _equal_repeats(spread: float, df: int, response: CampaignResponse) -> bool:
+    """Return whether the runs of a point are equal to rounding: nothing random was simulated.
 
     Such repeats say nothing of how far an effect can be trusted; they count as one run.
     """
     return df >= 1 and spread <= 1e-9 * float(np.abs(response.values).max())
 
 
-def _pure_error(response: Response, coded: list[Floats]) -> tuple[float, int]:
+def _pure_error(response: CampaignResponse, coded: list[Floats]) -> tuple[float, int]:
     """Return the deviation of runs of one point, less the blocks, and its degrees of freedom."""
     points = _points(coded)[1]
-    own = (points[:, None] == np.arange(points.max() + 1)).astype(np.float64)
-    matrix = np.column_stack([blocks_matrix(response.block), own])
+    indicators = (points[:, None] == np.arange(points.max() + 1)).astype(np.float64)
+    matrix = np.column_stack([blocks_matrix(response.block), indicators])
     df = len(points) - int(np.linalg.matrix_rank(matrix))
     if df < 1:
         return np.nan, 0
@@ -226,18 +226,18 @@ def _by_t(method: str, spread: float, df: int, fit: _Fit, level: float) -> _Judg
 
 
 def _orthogonal(fit: _Fit, coded: list[Floats]) -> bool:
-    """Tell whether all factors have two levels and the terms' columns are orthogonal."""
+    """Return whether all factors have two levels and the terms' columns are orthogonal."""
     two = all(np.allclose(np.abs(column), 1.0) for column in coded)
     products = fit.matrix.T @ fit.matrix
     return two and np.allclose(products, np.diag(np.diag(products)), atol=1e-6 * len(fit.matrix))
 
 
-def _by_lenth(fit: _Fit, response: Response, coded: list[Floats], level: float) -> _Judged:
+def _by_lenth(fit: _Fit, response: CampaignResponse, coded: list[Floats], level: float) -> _Judged:
     from scipy.stats import t
 
     further = further_contrasts(fit.matrix, coded)
-    rest = [2.0 * float(column @ response.values) / len(response.values) for column in further]
-    contrasts = np.abs([*fit.effects, *rest])
+    others = [2.0 * float(column @ response.values) / len(response.values) for column in further]
+    contrasts = np.abs([*fit.effects, *others])
     first = 1.5 * float(np.median(contrasts))
     small = contrasts[contrasts < 2.5 * first]
     if not small.size:
@@ -248,10 +248,14 @@ def _by_lenth(fit: _Fit, response: Response, coded: list[Floats], level: float) 
 
 
 def _row(
-    term: Column, effect: float, margin: float | None, letters: list[str], response: Response
-) -> Term:
+    term: TermColumn,
+    effect: float,
+    margin: float | None,
+    letters: list[str],
+    response: CampaignResponse,
+) -> EffectEstimate:
     effect = float(effect)
-    return Term(
+    return EffectEstimate(
         _word(term.factors, letters),
         " x ".join(response.factors[k].name for k in term.factors),
         effect,

@@ -10,10 +10,10 @@ import numpy as np
 
 from elevon.arrays import Floats
 
-__all__ = ["CoKriging", "Kriging", "Surrogate"]
+__all__ = ["CoKriging", "Interpolator", "Kriging"]
 
 
-class Surrogate(Protocol):
+class Interpolator(Protocol):
     """Predicts a response from the factors, coded -1 to +1."""
 
     def predict(self, points: Floats) -> tuple[Floats, Floats]:
@@ -58,12 +58,13 @@ class Kriging:
 
 @dataclass(frozen=True)
 class CoKriging:
-    """High fidelity = scale x low fidelity + difference (autoregressive, two levels).
+    """Switching model = scale x reduced-order model + difference (autoregressive, two levels).
 
     M. C. Kennedy and A. O'Hagan, Biometrika 87(1), 2000, in the recursive form of L. Le Gratiet and
-    J. Garnier, Int. J. Uncertainty Quantification 4(5), 2014: one process for the low fidelity, one
-    for the difference at the high points; the scale by least squares of the high values on the low
-    process there, beside a linear trend where the points allow one. The recursive form needs no
+    J. Garnier, Int. J. Uncertainty Quantification 4(5), 2014: one process for the reduced-order
+    model, one for the difference at the high points; the scale by least squares of the high
+    values on the low process there, beside a linear trend where the points allow one. The
+    recursive form needs no
     library beside the one for kriging.
     """
 

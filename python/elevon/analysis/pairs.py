@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from elevon.analysis.response import Factor, Response, read_response
+from elevon.analysis.response import CampaignResponse, VariedFactor, read_response
 from elevon.arrays import Floats
 from elevon.errors import InputError
 
@@ -60,7 +60,7 @@ class Pairs:
     correlation: float
 
 
-def samples_of(response: Response, bounds: Floats | None = None) -> Samples:
+def samples_of(response: CampaignResponse, bounds: Floats | None = None) -> Samples:
     """Return a response over its numeric factors, each point once (mean of its repeats)."""
     for factor in response.factors:
         if factor.levels and isinstance(factor.levels[0], str):
@@ -90,8 +90,8 @@ def pair(high: Dataset, low: Dataset, response: str) -> Pairs:
             f"{', '.join(names)}: their runs cannot be paired"
         )
     bounds = _bounds(below.factors)
-    own = _bounds(above.factors)
-    bounds = np.column_stack([np.minimum(bounds, own)[:, 0], np.maximum(bounds, own)[:, 1]])
+    limits = _bounds(above.factors)
+    bounds = np.column_stack([np.minimum(bounds, limits)[:, 0], np.maximum(bounds, limits)[:, 1]])
     upper, lower = samples_of(above, bounds), samples_of(below, bounds)
     known = {row.tobytes(): index for index, row in enumerate(lower.points)}
     partner = np.array([known.get(row.tobytes(), -1) for row in upper.points], dtype=np.int64)
@@ -106,5 +106,5 @@ def pair(high: Dataset, low: Dataset, response: str) -> Pairs:
     return Pairs(upper, lower, partner, correlation)
 
 
-def _bounds(factors: list[Factor]) -> Floats:
+def _bounds(factors: list[VariedFactor]) -> Floats:
     return np.array([[f.values.min(), f.values.max()] for f in factors])

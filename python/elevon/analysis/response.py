@@ -14,13 +14,13 @@ from elevon.errors import InputError, unknown
 if TYPE_CHECKING:
     from elevon.campaign import Dataset
 
-__all__ = ["Factor", "Response", "read_response"]
+__all__ = ["CampaignResponse", "VariedFactor", "read_response"]
 
 Ints = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Factor:
+class VariedFactor:
     """A varied quantity.
 
     Attributes
@@ -49,7 +49,7 @@ class Factor:
 
 
 @dataclass(frozen=True)
-class Response:
+class CampaignResponse:
     """A response of a campaign's runs.
 
     Attributes
@@ -74,12 +74,12 @@ class Response:
     point: Ints
     block: Ints
     values: Floats
-    factors: list[Factor]
+    factors: list[VariedFactor]
     with_blocks: list[str]
     left_out: list[int]
 
 
-def read_response(ds: Dataset, name: str) -> Response:
+def read_response(ds: Dataset, name: str) -> CampaignResponse:
     """Read a response of a campaign: a feature, or a number in the table of the runs.
 
     Raises
@@ -100,7 +100,7 @@ def read_response(ds: Dataset, name: str) -> Response:
     factors, with_blocks = _factors(ds, runs, good, block)
     if not factors:
         raise InputError(f"{ds.folder}: nothing varies among the runs with a value of {name!r}")
-    return Response(
+    return CampaignResponse(
         name,
         unit,
         numbers[good],
@@ -133,7 +133,7 @@ def _values(ds: Dataset, name: str, runs: Any) -> tuple[Floats, str]:
 
 def _factors(
     ds: Dataset, runs: Any, good: npt.NDArray[np.bool_], block: Ints
-) -> tuple[list[Factor], list[str]]:
+) -> tuple[list[VariedFactor], list[str]]:
     design = {item["name"]: item for item in ds.manifest.design.get("factors", [])}
     factors, with_blocks = [], []
     taken = {item["letter"] for item in design.values()}
@@ -148,7 +148,9 @@ def _factors(
             continue
         known = design.get(name)
         letter = known["letter"] if known else next(free, name)
-        factors.append(Factor(letter, name, column["unit"] or "1", column["role"], values, levels))
+        factors.append(
+            VariedFactor(letter, name, column["unit"] or "1", column["role"], values, levels)
+        )
     return factors, with_blocks
 
 
@@ -164,5 +166,5 @@ def _numbers(column: Any, good: npt.NDArray[np.bool_]) -> tuple[Floats, tuple[An
 
 
 def _follows(values: Floats, block: Ints) -> bool:
-    """Tell whether a quantity has one value in each block."""
+    """Return whether a quantity has one value in each block."""
     return all(len(np.unique(values[block == number])) == 1 for number in np.unique(block))

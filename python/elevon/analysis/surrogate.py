@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.analysis.kriging import CoKriging, Kriging, Surrogate
+from elevon.analysis.kriging import CoKriging, Interpolator, Kriging
 from elevon.analysis.pairs import Pairs, Samples
 from elevon.arrays import Floats
 from elevon.errors import InputError, Interrupted
 
-__all__ = ["Study", "Variant", "study"]
+__all__ = ["Study", "SurrogateScore", "study"]
 
 
 #: Part of the high points that is held out, and of the budget that co-kriging spends on high runs.
@@ -22,14 +22,14 @@ _HELD_OUT, _HIGH_SHARE = 0.3, 0.5
 
 
 @dataclass(frozen=True)
-class Variant:
+class SurrogateScore:
     """A surrogate's error on held-out high points over random splits.
 
     Attributes
     ----------
     name : str
-        ``kriging``, ``cokriging``, ``low`` (kriging of the low fidelity alone) or ``mean`` (no
-        surrogate: the training runs' mean).
+        ``kriging``, ``cokriging``, ``low`` (kriging of the reduced-order model alone) or
+        ``mean`` (no surrogate: the training runs' mean).
     high, low : int
         Runs it was given.
     errors : list of float
@@ -69,7 +69,7 @@ class Study:
     budget: int
     cost_ratio: float | None
     correlation: float | None
-    variants: list[Variant]
+    variants: list[SurrogateScore]
     gain: float | None
     gain_interval: tuple[float, float] | None
 
@@ -94,14 +94,15 @@ def study(
 
     In each of `splits` random splits 30 % of the high points are held out. Kriging gets `budget` of
     the others; co-kriging half as many, and low runs for the rest of the cost, the paired points
-    first (never a held-out point's partner); kriging of the low fidelity alone gets low runs only.
+    first (never a held-out point's partner); kriging of the reduced-order model
+    alone gets low runs only.
 
     Parameters
     ----------
     high : Samples
-        Of the high fidelity.
+        Of the switching model.
     pairs : Pairs, optional
-        With the low fidelity.
+        With the reduced-order model.
     cost_ratio : float
         Cost of a high run over that of a low one.
     budget : int, optional
@@ -117,27 +118,27 @@ def study(
         Too few points, or a budget that they do not have.
     """
     count = len(high.values)
-    held = max(round(_HELD_OUT * count), 1)
-    budget = (count - held) // 2 if budget is None else budget
+    withheld = max(round(_HELD_OUT * count), 1)
+    budget = (count - withheld) // 2 if budget is None else budget
     least = 2 * (high.points.shape[1] + 1)
-    if count - held < least:
+    if count - withheld < least:
         raise InputError(
-            f"{count} points are too few, {held} of them held out: {high.points.shape[1]} varied "
-            f"quantities need at least {least} to learn from"
+            f"{count} points are too few, {withheld} of them held out: "
+            f"{high.points.shape[1]} varied quantities need at least {least} to learn from"
         )
-    if not least <= budget <= count - held:
+    if not least <= budget <= count - withheld:
         raise InputError(
-            f"budget = {budget} high runs of {count} points, {held} of them held out: give "
-            f"{least} to {count - held}"
+            f"budget = {budget} high runs of {count} points, {withheld} of them held out: give "
+            f"{least} to {count - withheld}"
         )
     generator = np.random.default_rng(seed)
     errors: dict[str, list[float]] = {}
     runs: dict[str, tuple[int, int]] = {}
     for split in range(splits):
         order = generator.permutation(count)
-        for name, made in _fits(high, pairs, order, held, budget, cost_ratio, split):
+        for name, made in _fits(high, pairs, order, withheld, budget, cost_ratio, split):
             model, runs[name] = made
-            errors.setdefault(name, []).append(_error(model, high, order[:held]))
+            errors.setdefault(name, []).append(_error(model, high, order[:withheld]))
         if progress is not None and progress((split + 1) / splits) is False:
             raise Interrupted(f"interrupted after {split + 1} of {splits} splits")
     variants = [_variant(name, *runs[name], errors[name]) for name in errors]
@@ -148,7 +149,7 @@ def study(
         response=response,
         unit=unit,
         points=count,
-        held_out=held,
+        held_out=withheld,
         splits=splits,
         budget=budget,
         cost_ratio=None if pairs is None else cost_ratio,
@@ -171,22 +172,22 @@ def _fits(  # noqa: PLR0917 - one split, all of it needed
     high: Samples,
     pairs: Pairs | None,
     order: npt.NDArray[np.int64],
-    held: int,
+    withheld: int,
     budget: int,
     ratio: float,
     seed: int,
-) -> list[tuple[str, tuple[Surrogate, tuple[int, int]]]]:
-    own = order[held : held + budget]
-    points, values = high.points[own], high.values[own]
-    fits: list[tuple[str, tuple[Surrogate, tuple[int, int]]]] = [
+) -> list[tuple[str, tuple[Interpolator, tuple[int, int]]]]:
+    training = order[withheld : withheld + budget]
+    points, values = high.points[training], high.values[training]
+    fits: list[tuple[str, tuple[Interpolator, tuple[int, int]]]] = [
         ("mean", (_Mean(float(values.mean())), (budget, 0))),
         ("kriging", (Kriging.fit(points, values, seed), (budget, 0))),
     ]
     if pairs is None:
         return fits
-    some = own[: max(round(_HIGH_SHARE * budget), high.points.shape[1] + 2)]
-    low = _low_runs(pairs, order, held, round((budget - len(some)) * ratio), some)
-    every = _low_runs(pairs, order, held, round(budget * ratio), own)
+    some = training[: max(round(_HIGH_SHARE * budget), high.points.shape[1] + 2)]
+    low = _low_runs(pairs, order, withheld, round((budget - len(some)) * ratio), some)
+    every = _low_runs(pairs, order, withheld, round(budget * ratio), training)
     below = pairs.low
     both = CoKriging.fit(
         below.points[low],
@@ -204,27 +205,27 @@ def _fits(  # noqa: PLR0917 - one split, all of it needed
 def _low_runs(
     pairs: Pairs,
     order: npt.NDArray[np.int64],
-    held: int,
+    withheld: int,
     most: int,
     first: Sequence[int] | npt.NDArray[np.int64],
 ) -> npt.NDArray[np.int64]:
     """Return low runs for a cost: the partners of the high runs first, none of a held-out one."""
-    out = set(pairs.partner[order[:held]].tolist())
+    out = set(pairs.partner[order[:withheld]].tolist())
     partners = [int(p) for p in pairs.partner[first] if p >= 0]
-    rest = np.random.default_rng(order[:1]).permutation(len(pairs.low.values))
-    chosen = dict.fromkeys([*partners, *(int(r) for r in rest)])
+    order_of_low = np.random.default_rng(order[:1]).permutation(len(pairs.low.values))
+    chosen = dict.fromkeys([*partners, *(int(r) for r in order_of_low)])
     wanted = [index for index in chosen if index not in out]
     return np.array(wanted[: max(most, 4)], dtype=np.int64)
 
 
-def _error(model: Surrogate, high: Samples, held: npt.NDArray[np.int64]) -> float:
-    mean, _ = model.predict(high.points[held])
+def _error(model: Interpolator, high: Samples, withheld: npt.NDArray[np.int64]) -> float:
+    mean, _ = model.predict(high.points[withheld])
     spread = float(high.values.std())
-    return float(np.sqrt(np.mean((mean - high.values[held]) ** 2)) / spread)
+    return float(np.sqrt(np.mean((mean - high.values[withheld]) ** 2)) / spread)
 
 
-def _variant(name: str, high: int, low: int, errors: list[float]) -> Variant:
-    return Variant(name, high, low, errors, *_interval(np.array(errors)))
+def _variant(name: str, high: int, low: int, errors: list[float]) -> SurrogateScore:
+    return SurrogateScore(name, high, low, errors, *_interval(np.array(errors)))
 
 
 def _interval(values: Floats) -> tuple[float, tuple[float, float]]:

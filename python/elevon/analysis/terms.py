@@ -1,4 +1,4 @@
-"""Main effects and two-factor interactions of a design; which cannot be told apart."""
+"""Main effects and two-factor interactions of a design; which cannot be separated."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 
-__all__ = ["Column", "blocks_matrix", "further_contrasts", "separate"]
+__all__ = ["TermColumn", "blocks_matrix", "further_contrasts", "separate"]
 
 
 #: Columns whose correlation differs from 0 or 1 by less than this are not, or wholly, aliased.
@@ -19,7 +19,7 @@ _EQUAL = 1e-9
 
 
 @dataclass
-class Column:
+class TermColumn:
     """One term of the model.
 
     Attributes
@@ -39,14 +39,14 @@ class Column:
 
 def blocks_matrix(block: npt.NDArray[np.int64]) -> Floats:
     """Return the mean and the blocks as orthonormal columns."""
-    own = (block[:, None] == np.unique(block)[None, :]).astype(np.float64)
-    matrix: Floats = own / np.sqrt(own.sum(axis=0))
+    indicators = (block[:, None] == np.unique(block)[None, :]).astype(np.float64)
+    matrix: Floats = indicators / np.sqrt(indicators.sum(axis=0))
     return matrix
 
 
 def separate(
     coded: Sequence[Floats], head: Floats
-) -> tuple[list[Column], list[tuple[int, ...]], list[tuple[int, ...]]]:
+) -> tuple[list[TermColumn], list[tuple[int, ...]], list[tuple[int, ...]]]:
     """Return the terms that can be estimated together.
 
     Parameters
@@ -67,18 +67,18 @@ def separate(
     """
     names = [(k,) for k in range(len(coded))]
     pairs = list(itertools.combinations(range(len(coded)), 2))
-    terms: list[Column] = []
+    terms: list[TermColumn] = []
     blocked: list[tuple[int, ...]] = []
     partial: list[tuple[int, ...]] = []
     for name in [*names, *pairs]:
         values = np.prod([coded[k] for k in name], axis=0)
-        own = values - head @ (head.T @ values)
-        if np.linalg.norm(own) < 1e-6 * np.linalg.norm(values):
+        residual = values - head @ (head.T @ values)
+        if np.linalg.norm(residual) < 1e-6 * np.linalg.norm(values):
             blocked.append(name)
-        elif (same := _same(own, terms, head)) is not None:
+        elif (same := _same(residual, terms, head)) is not None:
             same[0].aliases.append((name, same[1]))
         else:
-            terms.append(Column(name, values))
+            terms.append(TermColumn(name, values))
     whole = np.column_stack([head, *(term.values for term in terms)])
     if np.linalg.matrix_rank(whole) < whole.shape[1]:
         partial = [term.factors for term in terms if len(term.factors) > 1]
@@ -86,10 +86,12 @@ def separate(
     return terms, blocked, partial
 
 
-def _same(own: Floats, terms: Sequence[Column], head: Floats) -> tuple[Column, float] | None:
+def _same(
+    residual: Floats, terms: Sequence[TermColumn], head: Floats
+) -> tuple[TermColumn, float] | None:
     for term in terms:
         other = term.values - head @ (head.T @ term.values)
-        cosine = float(own @ other / (np.linalg.norm(own) * np.linalg.norm(other)))
+        cosine = float(residual @ other / (np.linalg.norm(residual) * np.linalg.norm(other)))
         if abs(abs(cosine) - 1.0) < _EQUAL:
             return term, float(np.sign(cosine))
     return None
@@ -116,14 +118,14 @@ def further_contrasts(fitted: Floats, coded: Sequence[Floats]) -> list[Floats]:
     words = itertools.chain.from_iterable(
         itertools.combinations(range(len(coded)), order) for order in orders
     )
-    rest = (np.prod([coded[k] for k in word], axis=0) for word in words)
+    columns = (np.prod([coded[k] for k in word], axis=0) for word in words)
     unit = iter(np.eye(len(fitted)))
-    for values in itertools.chain(rest, unit):
+    for values in itertools.chain(columns, unit):
         if basis.shape[1] == len(fitted):
             break
-        own = values - basis @ (basis.T @ values)
-        own -= basis @ (basis.T @ own)
-        if (length := np.linalg.norm(own)) > 1e-6 * np.linalg.norm(values):
-            basis = np.column_stack([basis, own / length])
-            further.append(own / length * np.sqrt(len(fitted)))
+        residual = values - basis @ (basis.T @ values)
+        residual -= basis @ (basis.T @ residual)
+        if (length := np.linalg.norm(residual)) > 1e-6 * np.linalg.norm(values):
+            basis = np.column_stack([basis, residual / length])
+            further.append(residual / length * np.sqrt(len(fitted)))
     return further

@@ -9,7 +9,7 @@ from pathlib import Path
 from elevon.bench.traces import trace_files
 from elevon.errors import FormatError, InputError, OutputExistsError
 from elevon.files import check_output
-from elevon.recording.beside import beside
+from elevon.recording.description import description_path
 from elevon.worklog import Item, WorkLog
 
 __all__ = ["BenchState", "LogRecord", "finished_logs"]
@@ -76,7 +76,7 @@ class BenchState:
                 )
             for name in names:
                 traces = trace_files(folder, name, cell=True)
-                for file in (*traces, beside(traces[-1])):
+                for file in (*traces, description_path(traces[-1])):
                     check_output(file)
         return cls(WorkLog.begin(path, key))
 

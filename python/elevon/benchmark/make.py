@@ -25,11 +25,11 @@ ACTUATORS = ("torino-rotary", "nasa-ballscrew", "pisa-landing-gear")
 #: Units of each actuator, and ages at which each is seen.
 SIZES: Mapping[str, tuple[int, int]] = {"small": (30, 6), "full": (240, 8)}
 
-#: Units of the mismatched bench, over those of the set.
+#: Units of the mismatched bench, over those of the actuator file.
 _SHIFTED = 1.0 / 3.0
 _SPLIT = {"train": 0.5, "validation": 0.2, "test": 0.3}
 _LEAST_UNITS = 10
-#: Spread of the supply voltage over the set's own value.
+#: Spread of the supply voltage over the actuator file's value.
 _VOLTAGE = 0.03
 
 
@@ -97,9 +97,9 @@ def make_benchmark(
     _check_same(folder, settings)
     plans = {}
     for number, name in enumerate(ACTUATORS):
-        own = 1000 * seed + 10 * number
-        plans[name] = plan_text(name, units, ages, own)
-        plans[f"{name}-shifted"] = plan_text(name, shifted, ages, own + 5, shifted=True)
+        plan_seed = 1000 * seed + 10 * number
+        plans[name] = plan_text(name, units, ages, plan_seed)
+        plans[f"{name}-shifted"] = plan_text(name, shifted, ages, plan_seed + 5, shifted=True)
     campaigns, failed = [], 0
     for place, (name, text) in enumerate(plans.items()):
         result = run_campaign(

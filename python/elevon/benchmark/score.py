@@ -167,8 +167,8 @@ def _read(
     ended = np.isin(runs["status"].to_pylist(), ["ok", "tripped"])
     parts = {}
     for part in dict.fromkeys(split.tolist()):
-        own = (split == part) & ended
-        parts[part] = _Part(values[own], severity[own] / ends, unit[own], age[own])
+        rows = (split == part) & ended
+        parts[part] = _Part(values[rows], severity[rows] / ends, unit[rows], age[rows])
     return faults, ends, parts
 
 

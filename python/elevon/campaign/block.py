@@ -165,14 +165,14 @@ def simulate_block(
     progress: Callable[[float], Any] | None,
 ) -> list[dict[str, Any]]:
     """Simulate a block; a run that the core refuses after all is set apart, with its reason."""
-    own = {"fidelity": resolved.fidelity, "threads": threads}
+    options = {"fidelity": resolved.fidelity, "threads": threads}
     try:
-        return simulate_prepared(prepared, progress=progress, **own)  # type: ignore[arg-type]
+        return simulate_prepared(prepared, progress=progress, **options)  # type: ignore[arg-type]
     except InputError:
         results = []
         for item in prepared:
             try:
-                results += simulate_prepared([item], progress=progress, **own)  # type: ignore[arg-type]
+                results += simulate_prepared([item], progress=progress, **options)  # type: ignore[arg-type]
             except InputError as error:
                 results.append(_refused(item, str(error)))
         return results

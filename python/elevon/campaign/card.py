@@ -14,7 +14,7 @@ from elevon.report import Report, Section, Table
 
 __all__ = ["write_cards"]
 
-_FAILED_SHOWN = 20
+_FAILED_LISTED = 20
 
 
 def write_cards(ds: Dataset) -> None:
@@ -86,7 +86,7 @@ def _markdown(about: dict[str, Any], ds: Dataset) -> str:
     lines = [f"# {about['name']}", "", about["text"] or "Simulated runs of one actuator.", ""]
     lines += [f"* {fact}" for fact in _facts(about)]
     lines += [
-        "* `plan.toml` is the plan as given, `resolved.json` everything it stands for,",
+        "* `plan.toml` is the plan as given, `resolved.json` all that it means,",
         "  `manifest.json` every file with its SHA-256; `elevon dataset verify` checks them.",
         *(["* `card.html` shows typical signals of each fault."] if ds.clocks else []),
         "",
@@ -127,16 +127,16 @@ def _md_table(title: str, titles: Sequence[str], rows: Sequence[Sequence[object]
 
 def _not_acting(about: dict[str, Any]) -> Iterator[str]:
     if about["not_acting"]:
-        yield from ("", "## Set, but not acting", "")
+        yield from ("", "## Set, but without effect", "")
         yield from (f"* {text}" for text in about["not_acting"])
 
 
 def _failed(about: dict[str, Any]) -> Iterator[str]:
     if about["failed"]:
         yield from ("", "## Runs that failed", "")
-        shown = about["failed"][:_FAILED_SHOWN]
-        yield from (f"* run {f['run']}: {f['status']}: {f['reason']}" for f in shown)
-        if len(about["failed"]) > len(shown):
+        listed = about["failed"][:_FAILED_LISTED]
+        yield from (f"* run {f['run']}: {f['status']}: {f['reason']}" for f in listed)
+        if len(about["failed"]) > len(listed):
             yield "* and more: see `status` and `reason` in `runs.parquet`"
 
 
@@ -152,7 +152,7 @@ def _page(about: dict[str, Any], ds: Dataset) -> str:
     if about["varied"]:
         report.section("Varied quantities").table(Table(_VARIED_TITLES, _varied_rows(about)))
     if about["not_acting"]:
-        report.section("Set, but not acting").points(about["not_acting"])
+        report.section("Set, but without effect").points(about["not_acting"])
     if about["failed"]:
         report.section("Runs that failed").points([*_failed(about)][3:])
     if ds.clocks:
@@ -169,15 +169,15 @@ def _page(about: dict[str, Any], ds: Dataset) -> str:
 def _pictures(section: Section, ds: Dataset) -> None:
     """Add the responses (or first signals) of a typical run of each fault, and of one without."""
     pairs = typical_runs(ds)
-    shown = _shown(ds)
+    columns = _curve_columns(ds)
     if not pairs:
-        _curves(section, ds, {"run 0": 0}, shown, "run 0")
+        _curves(section, ds, {"run 0": 0}, columns, "run 0")
     for name, (faulty, other) in pairs.items():
         labels = {f"run {faulty}, {name}": faulty, f"run {other}, without": other}
-        _curves(section, ds, labels, shown, name)
+        _curves(section, ds, labels, columns, name)
 
 
-def _shown(ds: Dataset) -> list[dict[str, str]]:
+def _curve_columns(ds: Dataset) -> list[dict[str, str]]:
     """Return the columns that are drawn: the responses, else the first three signals."""
     faults = {item["name"] for item in ds.manifest.faults}
     columns = [
@@ -185,22 +185,22 @@ def _shown(ds: Dataset) -> list[dict[str, str]]:
         for column in ds.manifest.clocks[0]["columns"]
         if column["name"] not in {"run", "time", *faults}
     ]
-    asked = [column for column in columns if column["name"] in ds.manifest.responses]
-    return (asked or columns)[:3]
+    responses = [column for column in columns if column["name"] in ds.manifest.responses]
+    return (responses or columns)[:3]
 
 
 def _curves(
     section: Section,
     ds: Dataset,
     runs: dict[str, int],
-    shown: Sequence[dict[str, str]],
+    columns: Sequence[dict[str, str]],
     title: str,
 ) -> None:
     import numpy as np
 
     try:
         table = ds.signals.to_arrow(
-            ["run", "time", *(column["name"] for column in shown)], runs.values()
+            ["run", "time", *(column["name"] for column in columns)], runs.values()
         )
     except ElevonError as error:
         section.text(f"{title}: {error}")
@@ -211,7 +211,7 @@ def _curves(
     time = table["time"].to_numpy()[longest]
     if len(time) < 2:
         return
-    for column in shown:
+    for column in columns:
         values = table[column["name"]].to_numpy()
         lines = {
             label: np.interp(time, table["time"].to_numpy()[mask], values[mask], right=np.nan)

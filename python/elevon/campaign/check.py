@@ -22,11 +22,11 @@ from elevon.errors import (
 from elevon.memory import available_bytes, format_bytes
 from elevon.parameters.records import record_of
 from elevon.scenario import compile_scenario
-from elevon.simulate.acting import Doubt, not_acting, report
+from elevon.simulate.acting import Notice, not_acting, report
 
 __all__ = ["Checked", "borders", "check", "check_memory"]
 
-#: A file of signals is about this large, and holds at most so many runs (whole lanes of any width).
+#: A file of signals is about this large, and holds at most so many runs (whole SIMD batches).
 _FILE_BYTES, _FILE_RUNS = 16_000_000, 256
 
 
@@ -41,7 +41,7 @@ class Checked:
     clocks : dict
         Name of each clock to its plan.
     idle : list of str
-        What is set where it cannot act, with the reasons.
+        What is set where it has no effect, with the reasons.
     """
 
     sizes: npt.NDArray[np.int64]
@@ -61,30 +61,30 @@ def check(resolved: Resolved, progress: Callable[[float], Any] | None = None) ->
     InputError
         A run that cannot be; it is named, with place, value and limit.
     NotActingError
-        Something set that cannot act, unless the plan allows it.
+        Something set that has no effect, unless the plan allows it.
     """
     for column in resolved.columns:
         _check_range(resolved, column)
     count = len(resolved)
     checked = Checked(np.zeros(count, np.int64), np.zeros(count, np.int64))
-    findings: dict[str, tuple[int, Doubt]] = {}
-    idle: dict[Doubt, int] = {}
+    findings: dict[str, tuple[int, Notice]] = {}
+    idle: dict[Notice, int] = {}
     seen: set[Any] = set()
     for number in range(count):
         prepared = resolved.prepared(number)
         checked.sizes[number] = prepared.bytes
         checked.steps[number] = round(prepared.core["duration"] / prepared.step)
         checked.clocks.update({clock.name: clock for clock in prepared.plan})
-        for path, doubt in _together(resolved, number, prepared.core["parameters"]):
-            findings.setdefault(path, (number, doubt))
+        for path, notice in _together(resolved, number, prepared.core["parameters"]):
+            findings.setdefault(path, (number, notice))
         if (sign := (resolved.structure(number), _signature(resolved, number))) not in seen:
             seen.add(sign)
-            for doubt in _idle(resolved, number):
-                idle.setdefault(doubt, number)
+            for notice in _idle(resolved, number):
+                idle.setdefault(notice, number)
         if progress is not None and number % 256 == 0 and progress(number / count) is False:
             raise Interrupted(f"interrupted while run {number} of {count} was checked")
     report(
-        [[Doubt(FindingWarning, f"run {n}: {d.text}") for n, d in findings.values()]], strict=False
+        [[Notice(FindingWarning, f"run {n}: {d.text}") for n, d in findings.values()]], strict=False
     )
     return replace(checked, idle=_reported(resolved, idle))
 
@@ -101,9 +101,9 @@ def borders(sizes: npt.NDArray[np.int64], most: int | None) -> list[int]:
     """
     edges, total = [0], 0
     for index, size in enumerate(int(s) for s in sizes):
-        held = index - edges[-1]
-        full = held >= most if most else held >= _FILE_RUNS or total + size > _FILE_BYTES
-        if held and full:
+        count = index - edges[-1]
+        full = count >= most if most else count >= _FILE_RUNS or total + size > _FILE_BYTES
+        if count and full:
             edges.append(index)
             total = 0
         total += size
@@ -146,14 +146,14 @@ def _check_range(resolved: Resolved, column: Column) -> None:
 
 def _together(
     resolved: Resolved, number: int, vector: npt.NDArray[np.float64]
-) -> Iterator[tuple[str, Doubt]]:
-    """Yield the core's doubts about a run's values together; what it refuses is an error."""
+) -> Iterator[tuple[str, Notice]]:
+    """Yield the core's findings about a run's values together; what it refuses is an error."""
     from elevon import _core
 
     for finding in _core.check(resolved.wiring, resolved.fidelity, vector):
         if finding.get("severity", "error") == "error":
             raise InputError(f"run {number}: {finding['message']}")
-        yield str(finding["path"]), Doubt(FindingWarning, str(finding["message"]))
+        yield str(finding["path"]), Notice(FindingWarning, str(finding["message"]))
 
 
 def _signature(resolved: Resolved, number: int) -> tuple[int, ...]:
@@ -167,25 +167,25 @@ def _signature(resolved: Resolved, number: int) -> tuple[int, ...]:
     return tuple(signs)
 
 
-def _idle(resolved: Resolved, number: int) -> Iterator[Doubt]:
-    """Yield what is set in a run where it cannot act."""
+def _idle(resolved: Resolved, number: int) -> Iterator[Notice]:
+    """Yield what is set in a run where it has no effect."""
     run = resolved.run(number)
     actuator = run.actuator.with_values(run.scenario.parameters, source="scenario")
     compiled = compile_scenario(run.scenario, resolved.wiring, resolved.fidelity)
     yield from not_acting(actuator, compiled, resolved.fidelity)
 
 
-def _reported(resolved: Resolved, idle: dict[Doubt, int]) -> list[str]:
-    """Refuse what does not act, or say it where the plan allows it; return the list."""
+def _reported(resolved: Resolved, idle: dict[Notice, int]) -> list[str]:
+    """Refuse what has no effect, or report it where the plan allows it; return the list."""
     if idle and not resolved.allow_not_acting:
-        doubt, number = next(iter(idle.items()))
-        raise NotActingError(f"run {number}: {doubt.text} (allow_not_acting = true allows it)")
+        notice, number = next(iter(idle.items()))
+        raise NotActingError(f"run {number}: {notice.text} (allow_not_acting = true allows it)")
     not_modelled = [
-        Doubt(NotActingWarning, _not_modelled(name, resolved.fidelity, reason))
+        Notice(NotActingWarning, _not_modelled(name, resolved.fidelity, reason))
         for name, reason in resolved.not_carried().items()
     ]
     report([[*not_modelled, *idle]], strict=False)
-    return [doubt.text for doubt in (*not_modelled, *idle)]
+    return [notice.text for notice in (*not_modelled, *idle)]
 
 
 def _not_modelled(name: str, fidelity: str, reason: str) -> str:

@@ -24,7 +24,7 @@ from elevon.errors import InputError, Interrupted
 if TYPE_CHECKING:
     from distributed import Client
 
-    from elevon.campaign.folder import Work
+    from elevon.campaign.folder import CampaignWork
     from elevon.worklog import Item
 
 __all__ = ["in_cluster"]
@@ -36,7 +36,7 @@ _MOST_WORKERS = 1024
 _AHEAD = 3
 
 
-def in_cluster(work: Work, address: str, progress: Callable[[float], Any] | None) -> None:
+def in_cluster(work: CampaignWork, address: str, progress: Callable[[float], Any] | None) -> None:
     """Have the missing blocks of a campaign done by a cluster.
 
     Parameters
@@ -88,14 +88,14 @@ def _plan(folder: str) -> Resolved:
     return read_resolved(Path(folder))
 
 
-def _submitted(client: Client, work: Work, block: int) -> Any:
+def _submitted(client: Client, work: CampaignWork, block: int) -> Any:
     numbers = work.numbers(block)
     folder = str(work.folder.absolute())
     arguments = (folder, work.manifest.core, block, numbers.start, numbers.stop)
     return client.submit(worker_block, *arguments, pure=False)
 
 
-def _fraction(work: Work) -> float:
+def _fraction(work: CampaignWork) -> float:
     return len(work.log.items) / (len(work.edges) - 1)
 
 

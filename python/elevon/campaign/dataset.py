@@ -1,4 +1,4 @@
-"""A campaign's folder as a data set: tables that are read when they are asked for."""
+"""A campaign's folder as a data set: tables that are read on demand."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _mark(path: Path, stamp: int) -> str:  # noqa: ARG001 - a changed file is re
 
 @dataclass(frozen=True)
 class Table:
-    """One table of a data set, in one or several Parquet files; nothing is read before it is asked.
+    """One table of a data set, in one or several Parquet files; nothing is read too early.
 
     What this class reads into memory is compared with the SHA-256 of its files first. The lazy
     tables of polars and DuckDB read the files themselves; ``elevon dataset verify`` checks them.

@@ -171,8 +171,10 @@ def _spread_out(
         block = replicate * design.blocks // copies
     elif regular is not None:
         words = block_words(regular, design.blocks, place, design.block_generators)
-        own = np.concatenate([blocks_of(coded, words), np.arange(design.centre) % design.blocks])
-        block = np.tile(own, copies)
+        point_blocks = np.concatenate(
+            [blocks_of(coded, words), np.arange(design.centre) % design.blocks]
+        )
+        block = np.tile(point_blocks, copies)
     else:
         raise InputError(
             f"{place}: {design.blocks} blocks of {points} points in {copies} replicate(s): give a "
@@ -200,7 +202,7 @@ def _factor_values(
 def _of_table(
     design: Design, wiring: str, names: list[str], folder: Path | None, place: str
 ) -> Points:
-    """Read a user's table: a title for each factor (letter or name), a row a point."""
+    """Read a table of the caller: a title for each factor (letter or name), a row a point."""
     path = Path(str(design.file)).expanduser()
     path = path if path.is_absolute() or folder is None else folder / path
     try:

@@ -1,4 +1,4 @@
-"""What tells a plan from the one that a folder was begun with, in words."""
+"""How a plan differs from the one that a folder was begun with, in words."""
 
 from __future__ import annotations
 

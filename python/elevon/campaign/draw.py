@@ -93,7 +93,7 @@ def random_values(plan: Random, repeats: int, wiring: str, place: str) -> list[t
     plan : Random
         What is drawn.
     repeats : int
-        How often the whole set of draws is made, each time anew.
+        How often the whole series of draws is made, each time anew.
 
     Raises
     ------
@@ -197,7 +197,7 @@ def read_values(
 
 
 def _unit(target: Target, wiring: str, place: str) -> str | None:
-    """Return the SI unit of a target; None where only the values tell it."""
+    """Return the SI unit of a target; None where only the values decide it."""
     if target.parameter is not None:
         record = record_of(wiring, target.parameter, place)
         if record.choices is not None:

@@ -1,4 +1,4 @@
-"""What a plan's files say goes into the resolved plan: a file changed later changes nothing."""
+"""A plan's files go into the resolved plan: a file changed later changes nothing."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ __all__ = ["ENDS", "ends_table", "last_values", "read_ends"]
 
 ENDS = "ends"
 """Folder of the tables."""
-_OWN = {
+_OUTCOME = {
     "status": ("", "ok, tripped, diverged or refused"),
     "reason": ("", "why the status is not ok"),
     "sim_s": ("s", "simulated time"),
@@ -52,7 +52,7 @@ def ends_table(
     names = dict.fromkeys(name for row in rows for name in row)
     fields = [pa.field("run", pa.int64(), metadata={"unit": "1", "text": "number of the run"})]
     arrays = [pa.array(np.asarray(numbers, dtype=np.int64))]
-    for name, (unit, text) in _OWN.items():
+    for name, (unit, text) in _OUTCOME.items():
         array = pa.array(outcome[name])
         fields.append(pa.field(name, array.type, metadata={"unit": unit, "text": text}))
         arrays.append(array)
@@ -68,7 +68,7 @@ def last_values(row: Mapping[str, Any]) -> dict[str, float]:
     """Return the last values of a row of the table; none of a refused run."""
     if row["status"] == "refused":
         return {}
-    return {name: value for name, value in row.items() if name not in {"run", *_OWN}}
+    return {name: value for name, value in row.items() if name not in {"run", *_OUTCOME}}
 
 
 def read_ends(folder: Path, files: Mapping[str, dict[str, Any]]) -> dict[str, list[Any]] | None:
@@ -78,5 +78,5 @@ def read_ends(folder: Path, files: Mapping[str, dict[str, Any]]) -> dict[str, li
     mine = {name: about for name, about in files.items() if name.startswith(f"{ENDS}/")}
     if not mine or not Item(ENDS, mine, {}).intact(folder):
         return None
-    table = pq.read_table(folder / next(iter(mine)), columns=list(_OWN))
-    return {name: table[name].to_pylist() for name in _OWN}
+    table = pq.read_table(folder / next(iter(mine)), columns=list(_OUTCOME))
+    return {name: table[name].to_pylist() for name in _OUTCOME}

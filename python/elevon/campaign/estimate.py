@@ -16,7 +16,7 @@ from elevon.memory import format_bytes
 from elevon.simulate.batch import checked_threads, simulate_prepared
 
 if TYPE_CHECKING:
-    from elevon.campaign.folder import Work
+    from elevon.campaign.folder import CampaignWork
 
 __all__ = ["Cost", "check_disk", "estimate"]
 
@@ -51,7 +51,7 @@ class Cost:
     checked: Checked | None = None
 
     @classmethod
-    def of(cls, work: Work) -> Cost:
+    def of(cls, work: CampaignWork) -> Cost:
         """Return what is still to be done of a campaign."""
         about, total = work.manifest.estimate, len(work.resolved)
         runs = sum(len(work.numbers(block)) for block in work.missing)

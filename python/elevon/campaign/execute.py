@@ -13,7 +13,7 @@ from typing import Any
 from elevon.campaign.block import check_there, finish_block, simulate_block
 from elevon.campaign.check import check
 from elevon.campaign.estimate import Cost, estimate
-from elevon.campaign.folder import Work, begin, finish, finished, open_folder
+from elevon.campaign.folder import CampaignWork, begin, finish, finished, open_folder
 from elevon.campaign.resolved import Resolved
 from elevon.campaign.store import Manifest, read_resolved
 from elevon.simulate.batch import checked_threads
@@ -91,7 +91,7 @@ def run_campaign(
     progress : callable, optional
         Called with the done fraction; returning False interrupts.
     announce : callable, optional
-        Told, before anything runs, what the campaign will take.
+        Called, before anything runs, with what the campaign will take.
 
     Returns
     -------
@@ -146,7 +146,7 @@ def resume_campaign(
 
 
 def _carried_out(
-    work: Work,
+    work: CampaignWork,
     threads: int,
     *,
     cluster: str | None,
@@ -170,7 +170,7 @@ def _carried_out(
     return CampaignResult(work.manifest, outcome, skipped, time.perf_counter() - start)
 
 
-def _in_threads(work: Work, threads: int, progress: Report | None) -> None:
+def _in_threads(work: CampaignWork, threads: int, progress: Report | None) -> None:
     """Simulate block after block; a helper prepares the next and writes the last meanwhile."""
     if not work.missing:
         return
@@ -198,11 +198,11 @@ def _in_threads(work: Work, threads: int, progress: Report | None) -> None:
             _noted(work, writing)
 
 
-def _prepared(work: Work, block: int) -> list[Any]:
+def _prepared(work: CampaignWork, block: int) -> list[Any]:
     return [work.resolved.prepared(number) for number in work.numbers(block)]
 
 
-def _noted(work: Work, writing: Future[Item] | None) -> None:
+def _noted(work: CampaignWork, writing: Future[Item] | None) -> None:
     """Note a block that has been written."""
     if writing is not None:
         item = writing.result()
@@ -210,7 +210,7 @@ def _noted(work: Work, writing: Future[Item] | None) -> None:
         work.log.add(item)
 
 
-def _share(progress: Report | None, work: Work, block: int) -> Callable[[float], bool]:
+def _share(progress: Report | None, work: CampaignWork, block: int) -> Callable[[float], bool]:
     first, last, total = work.edges[block], work.edges[block + 1], work.edges[-1]
 
     def report(fraction: float) -> bool:

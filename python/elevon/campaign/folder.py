@@ -33,11 +33,11 @@ from elevon.files import write_text
 from elevon.record_plan import ClockPlan
 from elevon.worklog import LOCK, Item, WorkLog, digest
 
-__all__ = ["Work", "begin", "finish", "finished", "open_folder"]
+__all__ = ["CampaignWork", "begin", "finish", "finished", "open_folder"]
 
 
 @dataclass
-class Work:
+class CampaignWork:
     """A campaign that is carried out: its folder, its plan, what is done and what is missing."""
 
     folder: Path
@@ -66,7 +66,7 @@ class Work:
 
 
 def open_folder(folder: Path, resolved: Resolved, text: str) -> bool:
-    """Tell whether a folder holds this very campaign, begun before; nothing is written.
+    """Return whether a folder holds this very campaign, begun before; nothing is written.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def open_folder(folder: Path, resolved: Resolved, text: str) -> bool:
     return False
 
 
-def begin(folder: Path, resolved: Resolved, text: str | None, need: Cost | None) -> Work:
+def begin(folder: Path, resolved: Resolved, text: str | None, need: Cost | None) -> CampaignWork:
     """Make a folder a campaign's own, or find what is done in it; call with the lock held.
 
     Parameters
@@ -120,10 +120,10 @@ def begin(folder: Path, resolved: Resolved, text: str | None, need: Cost | None)
     manifest = _manifest(resolved, need)
     manifest.write(folder)
     log = WorkLog.begin(folder / LOG, manifest.plan_hash)
-    return Work(folder, resolved, manifest, log, list(range(len(need.edges) - 1)))
+    return CampaignWork(folder, resolved, manifest, log, list(range(len(need.edges) - 1)))
 
 
-def finished(work: Work) -> dict[str, list[Any]] | None:
+def finished(work: CampaignWork) -> dict[str, list[Any]] | None:
     """Return how every run ended where the campaign is finished and nothing is to be done."""
     files = Item("tables", work.manifest.files, {})
     if work.manifest.status == "running" or work.missing or not files.intact(work.folder):
@@ -133,7 +133,7 @@ def finished(work: Work) -> dict[str, list[Any]] | None:
     return read_outcome(work.folder)
 
 
-def finish(work: Work) -> dict[str, list[Any]]:
+def finish(work: CampaignWork) -> dict[str, list[Any]]:
     """Write the table of the runs, the cards and the manifest; return how every run ended.
 
     Raises
@@ -160,7 +160,7 @@ def finish(work: Work) -> dict[str, list[Any]]:
     return outcome
 
 
-def _there(folder: Path, resolved: Resolved, manifest: Manifest) -> Work:
+def _there(folder: Path, resolved: Resolved, manifest: Manifest) -> CampaignWork:
     """Find which blocks of a campaign are there, each file as it was written."""
     log = work_log(folder, manifest)
     before = {} if log is None else dict(log.items)
@@ -177,7 +177,7 @@ def _there(folder: Path, resolved: Resolved, manifest: Manifest) -> Work:
     log = WorkLog(folder / LOG, manifest.plan_hash, items)
     if missing or manifest.status == "running":
         log.rewrite()
-    return Work(folder, resolved, manifest, log, missing)
+    return CampaignWork(folder, resolved, manifest, log, missing)
 
 
 def _finished(folder: Path, manifest: Manifest) -> dict[str, Item]:
@@ -199,7 +199,7 @@ def _finished(folder: Path, manifest: Manifest) -> dict[str, Item]:
     return items
 
 
-def _outcome(work: Work, items: list[Item | None]) -> dict[str, list[Any]]:
+def _outcome(work: CampaignWork, items: list[Item | None]) -> dict[str, list[Any]]:
     outcome: dict[str, list[Any]] = {"status": [], "reason": [], "sim_s": [], "steps": []}
     for block, item in enumerate(items):
         numbers = work.numbers(block)

@@ -83,14 +83,14 @@ def _spread(
         raise InputError(f"{place}: {path} is a choice: it has no spread")
     if spread.distribution == "uniform":
         return ranged(spread, generator.random(count), actuator.wiring, place)
-    own = actuator.parameters.value(path)
+    nominal = actuator.parameters.value(path)
     sd, relative = _deviation(spread, record.unit, place)
     normal = _cut_normal(generator.random(count), float(spread.cut))
     if spread.distribution == "lognormal":
         if not relative:
             raise InputError(f"{place}: the 'sd' of a lognormal spread is a fraction: '3 %'")
-        return record.unit, own * np.exp(sd * normal)
-    return record.unit, own + (own * sd if relative else sd) * normal
+        return record.unit, nominal * np.exp(sd * normal)
+    return record.unit, nominal + (nominal * sd if relative else sd) * normal
 
 
 def _deviation(spread: Spread, unit: str, place: str) -> tuple[float, bool]:

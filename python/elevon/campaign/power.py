@@ -16,7 +16,7 @@ __all__ = ["power_rows"]
 
 
 def power_rows(
-    asked: Power,
+    request: Power,
     coded: Floats,
     blocks: npt.NDArray[np.int64],
     names: Sequence[str],
@@ -45,9 +45,9 @@ def power_rows(
     Returns
     -------
     list of dict
-        ``term``, ``power`` (None where it cannot be told), ``df`` and ``note``.
+        ``term``, ``power`` (None where it cannot be computed), ``df`` and ``note``.
     """
-    terms = list(asked.terms or names)
+    terms = list(request.terms or names)
     interactions = [term for term in terms if term not in names]
     columns = {name: coded[:, k] for k, name in enumerate(names)}
     for term in interactions:
@@ -58,7 +58,7 @@ def power_rows(
     freedom = len(coded) - rank
     inverse = np.linalg.pinv(matrix.T @ matrix)
     places = {name: len(head) + k for k, name in enumerate(columns)}
-    return [_row(asked, term, places[term], matrix, inverse, freedom) for term in terms]
+    return [_row(request, term, places[term], matrix, inverse, freedom) for term in terms]
 
 
 def _interaction(term: str, coded: Floats, names: Sequence[str], place: str) -> Floats:
@@ -71,7 +71,7 @@ def _interaction(term: str, coded: Floats, names: Sequence[str], place: str) -> 
 
 
 def _row(  # noqa: PLR0917 - one line of a table, all of it needed
-    asked: Power, term: str, column: int, matrix: Floats, inverse: Floats, freedom: int
+    request: Power, term: str, column: int, matrix: Floats, inverse: Floats, freedom: int
 ) -> dict[str, Any]:
     from scipy.stats import nct, t
 
@@ -80,8 +80,8 @@ def _row(  # noqa: PLR0917 - one line of a table, all of it needed
     if aliased or freedom < 1:
         note = "aliased with other terms" if aliased else "no degrees of freedom for the spread"
         return {"term": term, "power": None, "df": freedom, "note": note}
-    error = asked.sd * np.sqrt(inverse[column, column])
-    shift = 0.5 * asked.effect / error
-    limit = t.ppf(1.0 - 0.5 * asked.alpha, freedom)
+    error = request.sd * np.sqrt(inverse[column, column])
+    shift = 0.5 * request.effect / error
+    limit = t.ppf(1.0 - 0.5 * request.alpha, freedom)
     power = nct.sf(limit, freedom, shift) + nct.cdf(-limit, freedom, shift)
     return {"term": term, "power": float(power), "df": freedom, "note": ""}

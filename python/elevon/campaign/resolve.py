@@ -16,7 +16,7 @@ from elevon.campaign.embed import Embedder
 from elevon.campaign.grammar import Axis, Target
 from elevon.campaign.plan import Plan
 from elevon.campaign.population import Units, units_of
-from elevon.campaign.resolved import Index, Resolved, Variant
+from elevon.campaign.resolved import CaseChanges, Index, Resolved
 from elevon.campaign.split import dealt
 from elevon.documents import Document, read_toml, validated
 from elevon.errors import InputError
@@ -35,7 +35,7 @@ class _Parts:
     """What a plan combines: units at their ages, cases, axes, draws or points, and seeds."""
 
     units: Units | None
-    variants: list[Variant]
+    variants: list[CaseChanges]
     axes: list[tuple[Axis, str, Any]]
     draws: list[tuple[str, Any]]
     points: Points | None
@@ -62,7 +62,7 @@ def resolve_plan(plan: Plan, document: Document) -> Resolved:
     Returns
     -------
     Resolved
-        Runs numbered from 0. Whatever the plan's files said is in it.
+        Runs numbered from 0. The content of the plan's files is in it.
 
     Raises
     ------
@@ -189,11 +189,11 @@ def _base_scenario(
 ) -> dict[str, Any]:
     if isinstance(plan.scenario, str):
         path = files.located(plan.scenario)
-        own = read_toml(path)
-        check_units(own)
-        inner = Embedder(own.folder)
-        scenario = validated(Scenario, inner.scenario(own.data, own.place()), own)
-        files.sources[str(path)] = hashlib.sha256(own.text.encode()).hexdigest()
+        document = read_toml(path)
+        check_units(document)
+        inner = Embedder(document.folder)
+        scenario = validated(Scenario, inner.scenario(document.data, document.place()), document)
+        files.sources[str(path)] = hashlib.sha256(document.text.encode()).hexdigest()
         files.sources.update(inner.sources)
         return scenario.to_dict()
     data = plan.scenario if plan.scenario is not None else actuator.default_scenario
@@ -205,16 +205,16 @@ def _base_scenario(
     return Scenario.from_dict(files.scenario(data, place), place).to_dict()
 
 
-def _variants(plan: Plan, document: Document, files: Embedder) -> list[Variant]:
+def _variants(plan: Plan, document: Document, files: Embedder) -> list[CaseChanges]:
     if plan.case is None:
-        return [Variant()]
+        return [CaseChanges()]
     variants = []
     for index, case in enumerate(plan.case):
         place = document.place(("case", index))
         faults = [files.fault(item, place) for item in case.faults]
         read = [Fault.from_dict(item, place).to_dict() for item in faults]
         variants.append(
-            Variant(case.name, read, case.parameters, files.scenario(case.scenario, place))
+            CaseChanges(case.name, read, case.parameters, files.scenario(case.scenario, place))
         )
     return variants
 

@@ -23,13 +23,13 @@ from elevon.scenario import Scenario
 from elevon.simulate import Run
 from elevon.simulate.prepare import Prepared, prepare
 
-__all__ = ["Index", "Resolved", "Variant", "record_of_fault", "set_place"]
+__all__ = ["CaseChanges", "Index", "Resolved", "record_of_fault", "set_place"]
 
 Ints = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Variant:
+class CaseChanges:
     """What a case of the plan changes."""
 
     name: str = ""
@@ -72,7 +72,7 @@ class Resolved:
         With the plan's own parameters.
     scenario : dict
         Of all runs, before what a case or a column changes.
-    variants : list of Variant
+    variants : list of CaseChanges
         The plan's cases; one nameless one without.
     columns : list of Column
         The varied quantities.
@@ -88,7 +88,7 @@ class Resolved:
     fidelity: str
     record: list[str] | None
     scenario: dict[str, Any]
-    variants: list[Variant]
+    variants: list[CaseChanges]
     columns: list[Column]
     index: Index
     features: list[str] = field(default_factory=list)
@@ -199,7 +199,7 @@ class Resolved:
             try:
                 features = self.features or None
                 run = self.run(number)
-                prepared = prepare(run, self.fidelity, self.record, features, doubts=False)
+                prepared = prepare(run, self.fidelity, self.record, features, notices=False)
             except InputError as error:
                 start = "" if str(error).startswith("run ") else f"run {number}: "
                 raise type(error)(f"{start}{error}") from error
@@ -208,7 +208,7 @@ class Resolved:
                 self._known.popitem(last=False)
         return self._known[key]
 
-    def _scenario(self, number: int, variant: Variant, place: str) -> dict[str, Any]:
+    def _scenario(self, number: int, variant: CaseChanges, place: str) -> dict[str, Any]:
         data = copy.deepcopy({**self.scenario, **variant.scenario})
         for column in self.columns:
             if column.kind == "scenario":

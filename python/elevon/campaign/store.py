@@ -16,7 +16,7 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.campaign.block import write_table
 from elevon.campaign.draw import Column
-from elevon.campaign.resolved import Index, Resolved, Variant
+from elevon.campaign.resolved import CaseChanges, Index, Resolved
 from elevon.errors import FormatError, InputError
 from elevon.files import write_text
 from elevon.parameters import ParameterSet
@@ -56,7 +56,7 @@ class Manifest:
     not_acting : list of str
         What is set where it cannot act, allowed by the plan.
     sources : dict
-        Files that the plan named, with the SHA-256 of what they said.
+        Files that the plan named, with the SHA-256 of their content.
     files : dict
         Size and SHA-256 of the tables beside the blocks.
     blocks : list of dict
@@ -325,7 +325,7 @@ def _table(path: Path) -> Any:
     return pq.read_table(path, page_checksum_verification=True)
 
 
-_OWN = ("name", "text", "fidelity", "record", "features", "scenario", "responses")
+_COPIED = ("name", "text", "fidelity", "record", "features", "scenario", "responses")
 
 
 def _resolved(content: Mapping[str, Any], table: Any) -> Resolved:
@@ -338,11 +338,11 @@ def _resolved(content: Mapping[str, Any], table: Any) -> Resolved:
         title=data["title"],
         references=data["references"],
     )
-    own = {c: content[c] for c in _OWN}
+    copied = {c: content[c] for c in _COPIED}
     keys = ("allow_not_acting", "runs_per_file", "files", "sources", "design")
-    variants = [Variant(**item) for item in content["variants"]]
+    variants = [CaseChanges(**item) for item in content["variants"]]
     return Resolved(
-        **own,
+        **copied,
         **{key: content[key] for key in keys},
         actuator=actuator,
         variants=variants,
@@ -367,7 +367,7 @@ def _values(table: Any, name: str) -> Any:
     return column.to_numpy()
 
 
-def _index(table: Any, variants: Sequence[Variant]) -> Index:
+def _index(table: Any, variants: Sequence[CaseChanges]) -> Index:
     names = {variant.name: number for number, variant in enumerate(variants)}
     count = table.num_rows
     population = "age" in table.column_names

@@ -57,8 +57,8 @@ class Fraction:
         """Defining relation: word to sign, without the identity."""
         group = {0: 1}
         for factor, word, sign in self.generators:
-            own = word | (1 << factor)
-            group |= {old ^ own: s * sign for old, s in group.items()}
+            product = word | (1 << factor)
+            group |= {old ^ product: s * sign for old, s in group.items()}
         return {word: sign for word, sign in group.items() if word}
 
     @property
@@ -83,21 +83,21 @@ class Fraction:
         return design
 
     def aliases(self, order: int = 2) -> dict[str, list[str]]:
-        """Return what each effect of up to `order` factors cannot be told from, up to that order.
+        """Return what each effect of up to `order` factors is aliased with, up to that order.
 
         A minus sign means that the other effect enters negatively.
         """
         table = {}
         for size in range(1, order + 1):
             for chosen in itertools.combinations(range(len(self.names)), size):
-                own = sum(1 << k for k in chosen)
+                product = sum(1 << k for k in chosen)
                 others = [
-                    ("-" if sign < 0 else "") + spelled(own ^ word, self.names)
+                    ("-" if sign < 0 else "") + spelled(product ^ word, self.names)
                     for word, sign in self.words.items()
-                    if 0 < (own ^ word).bit_count() <= order
+                    if 0 < (product ^ word).bit_count() <= order
                 ]
                 if others:
-                    table[spelled(own, self.names)] = others
+                    table[spelled(product, self.names)] = others
         return table
 
 
@@ -196,7 +196,7 @@ def plackett_burman(factors: int, runs: int, place: str) -> Coded:
 
 
 def block_words(design: Fraction, count: int, place: str, words: Iterable[str] = ()) -> list[int]:
-    """Return the words whose signs tell the block, for a power of two of blocks.
+    """Return the words whose signs decide the block, for a power of two of blocks.
 
     Without `words` those are searched for that are confounded with interactions of the most
     factors.
@@ -298,8 +298,8 @@ def _pattern(chosen: Sequence[int], base: int) -> tuple[int, ...]:
     """Return how many words of each length a choice of generators has, short ones first."""
     group = [0]
     for place, word in enumerate(chosen):
-        own = word | 1 << (base + place)
-        group += [old ^ own for old in group]
+        product = word | 1 << (base + place)
+        group += [old ^ product for old in group]
     counts = [0] * (base + len(chosen) + 1)
     for word in group[1:]:
         counts[word.bit_count()] += 1

@@ -71,7 +71,7 @@ def plan(
     for part, count in _counted(resolved.index.split).items():
         typer.echo(f"split {part}: {count} runs")
     for text in checked.idle:
-        typer.echo(f"does not act: {text}")
+        typer.echo(f"has no effect: {text}")
     return 0
 
 

@@ -37,7 +37,7 @@ def describe(folder: FolderArgument, *, json: JsonOption = False) -> int:
     rows = [[v["name"], v["unit"], v["role"], *_ends(v)] for v in about["varied"]]
     print_table(["varied", "unit", "role", "smallest", "largest"], rows)
     for text in about["not_acting"]:
-        typer.echo(f"does not act: {text}")
+        typer.echo(f"has no effect: {text}")
     return 0
 
 

@@ -188,8 +188,8 @@ def variables(path: Path, check: Callable[[int], None]) -> Generator[Variable, N
     path : Path
         The file.
     check : callable
-        Told how many bytes all variables so far expand to, before any of them is held; raises
-        where that is too much.
+        Called with how many bytes all variables so far expand to, before any of them is held;
+        raises where that is too much.
 
     Yields
     ------
@@ -278,5 +278,5 @@ def _variable(source: _Source, data: memoryview, name: str | None = None) -> Var
         raise source.damaged("a variable has no size")
     if name is None and not raw:  # what a file's objects hold, kept beside its variables
         return Variable("", _KINDS[_OPAQUE], False, shape, source, data[:0])
-    own = bytes(raw).decode("latin-1") if name is None else name
-    return Variable(own, kind, bool((word >> 8) & _COMPLEX), shape, source, data[at:])
+    label = bytes(raw).decode("latin-1") if name is None else name
+    return Variable(label, kind, bool((word >> 8) & _COMPLEX), shape, source, data[at:])

@@ -44,7 +44,7 @@ def opened(path: Path) -> Iterator[Any]:
 
 
 def is_numeric(kind: Any) -> bool:
-    """Tell whether an Arrow type holds plain numbers."""
+    """Return whether an Arrow type holds plain numbers."""
     from pyarrow import types
 
     return bool(types.is_floating(kind) or types.is_integer(kind) or types.is_boolean(kind))

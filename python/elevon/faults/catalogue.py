@@ -75,10 +75,10 @@ def _check(
     low, high, low_open = bounds
     above = value > low or (value == low and not low_open)
     if not (above and value <= high):
-        shown = unit if unit != "1" else ""
+        display = unit if unit != "1" else ""
         raise RangeError(
             f"{subject} {format_quantity(value, unit)} is outside "
-            f"{_interval(*bounds)}{' ' + shown if shown else ''} ({text})"
+            f"{_interval(*bounds)}{' ' + display if display else ''} ({text})"
         )
 
 
@@ -149,9 +149,9 @@ def _unknown_kind(kind: str, known: tuple[FaultRecord, ...], where: str) -> Unkn
         return len(words & set(name.split("_")))
 
     things = words.difference(_STUCK)
-    akin = [name for name in kinds if things & set(name.split("_"))]
-    akin.sort(key=shared, reverse=True)
-    near = list(dict.fromkeys([*nearest(kind, kinds), *akin]))[:4]
+    related = [name for name in kinds if things & set(name.split("_"))]
+    related.sort(key=shared, reverse=True)
+    near = list(dict.fromkeys([*nearest(kind, kinds), *related]))[:4]
     if not near:
         return unknown("fault", kind, kinds, where or None)
     start = f"{where}: " if where else ""

@@ -65,28 +65,28 @@ class Fault:
         match = _SPEC.fullmatch(text)
         if match is None or not match[3]:
             raise InputError(f"fault {text!r} is not of the form {_FORM}")
-        severity, _, rest = match[3].partition(",")
+        severity, _, attributes = match[3].partition(",")
         return cls(
             kind=match[1],
             place=match[2],
             severity=severity.strip(),
-            attributes=pairs(rest, f"fault {text!r}"),
+            attributes=pairs(attributes, f"fault {text!r}"),
             profile=Profile() if match[4] is None else Profile.parse(match[4]),
         )
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], place: str = "fault") -> Fault:
         """Read a ``[[fault]]`` table: kind, place, severity, profile; other keys are attributes."""
-        rest = dict(data)
+        keys = dict(data)
         needed: dict[str, Any] = {}
         for key in ("kind", "place", "severity"):
-            if key not in rest:
+            if key not in keys:
                 raise InputError(f"{place}: {key!r} is missing")
-            needed[key] = rest.pop(key)
+            needed[key] = keys.pop(key)
         for key in ("kind", "place"):
             if not isinstance(needed[key], str):
                 raise InputError(f"{place}: {key} = {needed[key]!r} is not a text")
-        profile = rest.pop("profile", "constant")
+        profile = keys.pop("profile", "constant")
         if not isinstance(profile, (str, Mapping)):
             raise InputError(f"{place}: profile = {profile!r} is neither a table nor a text")
         read = (
@@ -94,7 +94,7 @@ class Fault:
             if isinstance(profile, str)
             else Profile.from_dict(profile, f"{place}.profile")
         )
-        return cls(attributes=rest, profile=read, **needed)
+        return cls(attributes=keys, profile=read, **needed)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the mapping `from_dict` reads."""
@@ -123,10 +123,12 @@ class Fault:
         start = f"{place}: " if place else ""
         record = find_record(self.kind, self.place, wiring, place)
         if fidelity not in record.fidelities:
-            shown = ", ".join(record.fidelities)
+            fidelities = ", ".join(record.fidelities)
             reason = record.not_modelled.get(fidelity, "")
             why = f": {reason}" if reason else ""
-            raise InputError(f"{start}{self.kind} exists at fidelity {shown}, not {fidelity}{why}")
+            raise InputError(
+                f"{start}{self.kind} exists at fidelity {fidelities}, not {fidelity}{why}"
+            )
         return {
             "kind": self.kind,
             "place": self.place,

@@ -48,17 +48,17 @@ class Profile:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], place: str = "profile") -> Profile:
         """Read a mapping with ``kind`` and the arguments as keys."""
-        rest = dict(data)
-        kind = rest.pop("kind", None)
+        keys = dict(data)
+        kind = keys.pop("kind", None)
         if not isinstance(kind, str):
             raise InputError(f"{place}: 'kind' is missing")
-        if (file := rest.pop("file", None)) is not None:
-            if "times" in rest or "values" in rest:
+        if (file := keys.pop("file", None)) is not None:
+            if "times" in keys or "values" in keys:
                 raise InputError(f"{place}: give either a file or times and values, not both")
-            rest["times"], rest["values"] = read_series(file, place)
-        times = numbers(rest.pop("times", ()), f"{place}: times")
-        values = numbers(rest.pop("values", ()), f"{place}: values")
-        return cls(kind, rest, times, values)
+            keys["times"], keys["values"] = read_series(file, place)
+        times = numbers(keys.pop("times", ()), f"{place}: times")
+        values = numbers(keys.pop("values", ()), f"{place}: values")
+        return cls(kind, keys, times, values)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the mapping `from_dict` reads."""

@@ -106,7 +106,7 @@ def recording_features(
 
 
 def _electrical(record: FeatureRecord, names: Sequence[str]) -> bool:
-    """Tell whether a feature needs the number of pole pairs; an error if it was named itself."""
+    """Return whether a feature needs the number of pole pairs; an error if it was named itself."""
     needs = "electrical" in record.name or record.name in _TURNING
     if needs and record.name in names:
         raise InputError(f"features: {record.name!r} needs the motor's pole_pairs")

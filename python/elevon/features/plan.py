@@ -15,7 +15,7 @@ from elevon.scenario.compile import signal_records, signal_units
 
 __all__ = ["MOVING_SPEED", "FeaturePlan", "core_plan", "feature_plans"]
 
-#: Motor speed in rad/s above which the motor counts as moving, where nothing else is said.
+#: Motor speed in rad/s above which the motor counts as moving, where nothing else is given.
 MOVING_SPEED = 1.0
 
 _PLACE = "features"
@@ -74,7 +74,7 @@ def core_plan(
     pole_pairs: float,
     moving_speed: float = MOVING_SPEED,
 ) -> dict[str, object]:
-    """Return the plan of a set of features as it crosses the seam."""
+    """Return the plan of features as it crosses the seam."""
     return {
         "names": list(names),
         "roles": list(roles),

@@ -1,4 +1,4 @@
-"""Parameter sets: every value with its unit, source, note and confidence."""
+"""Parameters of an actuator: every value with its unit, source, note and confidence."""
 
 from elevon.parameters.find import find_set, set_names
 from elevon.parameters.load import SetFile, load_set, set_errors

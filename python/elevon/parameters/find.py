@@ -1,4 +1,4 @@
-"""Where parameter sets are found: shipped with the package, in folders of the user, or a file."""
+"""Where actuator files are found: shipped with the package, in your folders, or by path."""
 
 from __future__ import annotations
 
@@ -9,43 +9,43 @@ from elevon.errors import InputError, UnknownNameError, unknown
 
 __all__ = ["VARIABLE", "find_set", "is_shipped", "set_names", "set_paths"]
 
-#: Folders with more sets, separated like PATH.
+#: Folders with more actuator files, separated like PATH.
 VARIABLE = "ELEVON_ACTUATORS"
 
 _SHIPPED = Path(__file__).parent.parent / "actuators"
 
 
 def set_paths() -> dict[str, Path]:
-    """Return every set by name; a set of the user hides a shipped one of the same name."""
+    """Return every actuator file by name; yours hides a shipped one of the same name."""
     folders = [_SHIPPED, *_user_folders()]
     return {file.stem: file for folder in folders for file in sorted(folder.glob("*.toml"))}
 
 
 def set_names() -> list[str]:
-    """Return the names of the sets that can be loaded by name, sorted."""
+    """Return the names of the actuators that can be loaded by name, sorted."""
     return sorted(set_paths())
 
 
 def is_shipped(path: Path) -> bool:
-    """Tell whether a file is one of the package's own sets."""
+    """Return whether a file is one that the package ships."""
     return path.resolve().parent == _SHIPPED.resolve()
 
 
 def find_set(reference: str | os.PathLike[str], folder: Path | None = None) -> Path:
-    """Find a set by name or by file.
+    """Find an actuator file by name or by path.
 
     Parameters
     ----------
     reference : str or path
-        The name of a set, or a TOML file.
+        The name of an actuator, or a TOML file.
     folder : Path, optional
-        Where a relative file is looked for first: the folder of the set that names it as `base`.
+        Where a relative file is looked for first: the folder of the file that names it as `base`.
         There, or where the program runs, ``mine`` is ``mine.toml`` too.
 
     Raises
     ------
     UnknownNameError
-        No set of that name; the message holds the nearest, and the file to write.
+        No actuator of that name; the message holds the nearest, and the file to write.
     InputError
         The file does not exist.
     """
@@ -56,12 +56,12 @@ def find_set(reference: str | os.PathLike[str], folder: Path | None = None) -> P
     if text in known:
         return known[text]
     near = [place / f"{text}.toml" for place in (folder or Path(), Path())]
-    beside = next((path for path in near if path.is_file()), None)
-    if beside is None:
+    found = next((path for path in near if path.is_file()), None)
+    if found is None:
         error = unknown("actuator", text, known)
         where = near[0]
         raise UnknownNameError(f"{error}; or write {where}", error.name, error.nearest)
-    return beside
+    return found
 
 
 def _file(text: str, folder: Path | None) -> Path:

@@ -1,4 +1,4 @@
-"""Read a set file: header, entries, and the set it is based on."""
+"""Read an actuator file: header, entries, and the file it is based on."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ _HEADER_KEYS = (
 _AMOUNT = re.compile(r"^\s*[+-]?[\d.]+(?:[eE][+-]?\d+)?")
 
 #: The source of a value that was written without one.
-GIVEN = "given by the user"
+GIVEN = "given by the caller"
 
 
 @dataclass(frozen=True)
 class SetFile:
-    """A parameter set as loaded from its file.
+    """Parameters as loaded from its file.
 
     Attributes
     ----------
@@ -73,12 +73,12 @@ class _Layer:
 
 
 def load_set(reference: str | os.PathLike[str]) -> SetFile:
-    """Load a parameter set by name or file, with the sets it is based on.
+    """Load an actuator file by name or path, with the files it is based on.
 
     Parameters
     ----------
     reference : str or path
-        Name of a set, or a TOML file.
+        Name of an actuator, or a TOML file.
 
     Returns
     -------
@@ -121,12 +121,12 @@ def load_set(reference: str | os.PathLike[str]) -> SetFile:
 
 
 def _name_of(path: Path) -> str:
-    """Return a set's name from its file's, of the characters that a name may have."""
+    """Return an actuator's name from its file's, of the characters that a name may have."""
     return re.sub(r"[^A-Za-z0-9._-]+", "-", path.stem).strip("-._") or "actuator"
 
 
 def set_errors(path: str | os.PathLike[str]) -> list[str]:
-    """Return everything that keeps a set file from loading, header and entries alike.
+    """Return everything that keeps an actuator file from loading, header and entries alike.
 
     Returns
     -------
@@ -164,7 +164,7 @@ def _entry_errors(path: Path) -> list[str]:
 def _marked(
     parameters: Mapping[str, Parameter], base: Mapping[str, Parameter], layer: _Layer, wiring: str
 ) -> dict[str, Parameter]:
-    """Mark what a set of the user's own changes in its base, or in the defaults the base leaves."""
+    """Mark what an actuator file changes in its base, or in the defaults the base leaves."""
     if not layer.header.base or is_shipped(Path(layer.document.origin)):
         return dict(parameters)
     known = records(wiring)
@@ -185,8 +185,8 @@ def _table(layers: list[_Layer], name: str) -> Mapping[str, Any] | None:
 
 
 def _chain(path: Path) -> Iterator[_Layer]:
-    """Yield the layers from a set down to its last base."""
-    from elevon.parameters.model import Header
+    """Yield the layers from a file down to its last base."""
+    from elevon.parameters.model import ActuatorHeader
 
     seen: list[Path] = []
     following: Path | None = path
@@ -197,14 +197,14 @@ def _chain(path: Path) -> Iterator[_Layer]:
             raise InputError(f"{path}: the bases go round in a circle: {names}")
         seen.append(resolved)
         document = read_toml(following)
-        rest = {
+        values = {
             key: value
             for key, value in document.data.items()
             if key not in _HEADER_KEYS and isinstance(value, dict)
         }
-        head = {key: value for key, value in document.data.items() if key not in rest}
-        header = validated(Header, head, document)
-        yield _Layer(document, header, rest)
+        head = {key: value for key, value in document.data.items() if key not in values}
+        header = validated(ActuatorHeader, head, document)
+        yield _Layer(document, header, values)
         base = header.base
         following = find_set(base, document.folder) if base else None
 
@@ -228,7 +228,7 @@ def _parameters(layer: _Layer, wiring: str, base: Mapping[str, Parameter]) -> di
 def _read(
     path: str, raw: Any, document: Document, wiring: str, below: Parameter | None
 ) -> Parameter:
-    from elevon.parameters.model import Entry
+    from elevon.parameters.model import ParameterEntry
 
     known = records(wiring)
     place = document.place(tuple(path.split(".")))
@@ -236,7 +236,7 @@ def _read(
         raise unknown("parameter", path, known, place)
     if not isinstance(raw, Mapping):
         return _given(path, raw, known[path], place, below)
-    entry = validated(Entry, raw, document.within(tuple(path.split("."))))
+    entry = validated(ParameterEntry, raw, document.within(tuple(path.split("."))))
     return _parameter(path, entry, known[path], place)
 
 

@@ -1,4 +1,4 @@
-"""What a set file may hold (checked by pydantic before anything is computed)."""
+"""What an actuator file may hold (checked by pydantic before anything is computed)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pydantic import (
     field_validator,
 )
 
-__all__ = ["Compare", "Entry", "Header", "Reference", "Thresholds"]
+__all__ = ["ActuatorHeader", "Citation", "Compare", "ParameterEntry", "ValidationLimits"]
 
 Number = StrictInt | StrictFloat
 
@@ -23,14 +23,14 @@ class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class Reference(_Strict):
+class Citation(_Strict):
     """A publication the sources point to."""
 
     key: StrictStr = Field(min_length=1, description="Short name used in the sources")
     text: StrictStr = Field(min_length=1, description="The full citation")
 
 
-class Entry(_Strict):
+class ParameterEntry(_Strict):
     """One parameter as written in the file."""
 
     value: Number | StrictStr = Field(description="The number, or the name of a choice")
@@ -51,8 +51,8 @@ class Entry(_Strict):
         return source
 
 
-class Thresholds(_Strict):
-    """What a set promises of its own agreement with a log."""
+class ValidationLimits(_Strict):
+    """What an actuator file promises of its agreement with a log."""
 
     transient: Number = Field(10.0, ge=0.0, description="Seconds left out at a log's beginning")
     limits: dict[str, Number] = Field(
@@ -75,8 +75,8 @@ class Compare(_Strict):
     scenario: dict[str, Any] = Field(description="In the form of a scenario file")
 
 
-class Header(_Strict):
-    """The keys of a set file that are not parameters."""
+class ActuatorHeader(_Strict):
+    """The keys of an actuator file that are not parameters."""
 
     name: StrictStr | None = Field(
         None, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", description="Of the file if absent"
@@ -85,10 +85,12 @@ class Header(_Strict):
     wiring: StrictStr | None = Field(
         None, description="Which wiring of the core; from the base if absent"
     )
-    base: StrictStr | None = Field(None, description="Set name or file this one overrides")
-    references: tuple[Reference, ...] = ()
+    base: StrictStr | None = Field(
+        None, description="Name of the actuator, or file, that this one overrides"
+    )
+    references: tuple[Citation, ...] = ()
     scenario: dict[str, Any] | None = Field(None, description="What runs when none is given")
     compare: Compare | None = Field(
         None, description="What `elevon compare` runs; without it, the scenario above"
     )
-    validation: Thresholds | None = Field(None, description="Thresholds of `elevon validate`")
+    validation: ValidationLimits | None = Field(None, description="Thresholds of `elevon validate`")

@@ -13,7 +13,7 @@ Confidence = Literal[
     "published", "derived", "assumed", "calibrated", "unknown", "default", "override"
 ]
 
-#: What a set file may say; `default` and `override` are given by the program.
+#: What an actuator file may give; `default` and `override` are given by the program.
 CONFIDENCES = ("published", "derived", "assumed", "calibrated", "unknown")
 
 
@@ -28,7 +28,7 @@ class Parameter:
     value : float or str
         SI value, or the name of a choice.
     unit : str
-        The unit as written in the set; empty for choices and pure numbers.
+        The unit as written in the file; empty for choices and pure numbers.
     source : str
         Where the number comes from; starts with ``ASSUMED`` when nobody published it.
     note : str
@@ -41,8 +41,8 @@ class Parameter:
     interval : tuple of float, optional
         SI limits of the calibrated value's interval.
     changed : bool
-        The output gave another value than the set (or, in a set of the user's own, than its base):
-        where it cannot act, that is said.
+        The caller gave another value than the file (or, in a file of the caller, than its base):
+        where it has no effect, that is reported.
     """
 
     path: str

@@ -55,11 +55,11 @@ class Record:
         return f"{low}{self.minimum:g}, {self.maximum:g}{high}"
 
     def read(
-        self, given: str | float, place: str | None = None, shown: str | None = None
+        self, given: str | float, place: str | None = None, display_unit: str | None = None
     ) -> float | str:
         """Read a value; a number is in SI, a text has a unit.
 
-        A text may do without where the unit it is `shown` in is that of the SI.
+        A text may do without where `display_unit` is that of the SI.
 
         Returns
         -------
@@ -74,7 +74,7 @@ class Record:
         place = place or self.path
         if self.choices is not None:
             return self._choice(given, place)
-        value = parse_quantity(given, self.unit or "1", place, shown)
+        value = parse_quantity(given, self.unit or "1", place, display_unit)
         self.check(value, place)
         return value
 
@@ -84,9 +84,9 @@ class Record:
         below = value < self.maximum or (value == self.maximum and not self.maximum_open)
         if math.isfinite(value) and above and below:
             return
-        shown = format_quantity(value, self.unit, 9) if math.isfinite(value) else str(value)
+        text = format_quantity(value, self.unit, 9) if math.isfinite(value) else str(value)
         raise RangeError(
-            f"{place or self.path} = {shown} is outside {self.range_text}"
+            f"{place or self.path} = {text} is outside {self.range_text}"
             f"{' ' + self.unit if self.unit not in ('', '1') else ''} ({self.text})"
         )
 

@@ -43,20 +43,20 @@ def emf_constant(torque_constant: float, flux_fraction: float = 1.0) -> float:
 
 
 def motor_torque_constant(parameters: _Values) -> float:
-    """Return a set's torque constant [N m/A], with the magnets as they are."""
+    """Return an actuator's torque constant [N m/A], with the magnets as they are."""
     value = parameters.value
     return torque_constant(value("motor.emf_constant"), value("motor.flux_fraction"))
 
 
 def constant_is_tied(parameters: _Values, tolerance: float) -> bool:
-    """Tell whether the controller's torque constant is the motor's, within a relative tolerance."""
+    """Return whether the controller's torque constant is the motor's, within a tolerance."""
     motor = motor_torque_constant(parameters)
-    own = parameters.value("control.torque_constant")
-    return motor > 0.0 and abs(own / motor - 1.0) < tolerance
+    constant = parameters.value("control.torque_constant")
+    return motor > 0.0 and abs(constant / motor - 1.0) < tolerance
 
 
 def static_following(parameters: _Values, dynamic: float) -> float:
-    """Return the static friction that belongs to a dynamic one: the set's ratio, at least 1."""
+    """Return the static friction that belongs to a dynamic one: the file's ratio, at least 1."""
     static, old = parameters.value("friction.static"), parameters.value("friction.dynamic")
     return max(static / max(old, _LEAST), 1.0) * dynamic
 

@@ -1,4 +1,4 @@
-"""JSON Schema of a wiring's set files: every path with its unit, range, default and text."""
+"""JSON Schema of a wiring's actuator files: every path with its unit, range, default and text."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["json_schema"]
 
 
 def json_schema(wiring: str) -> dict[str, Any]:
-    """Return the JSON Schema (2020-12) of a set file of one wiring.
+    """Return the JSON Schema (2020-12) of an actuator file of one wiring.
 
     Parameters
     ----------
@@ -25,19 +25,19 @@ def json_schema(wiring: str) -> dict[str, Any]:
         numbers of a file may be in any unit of the same kind, so no numeric limits are stated on
         ``value`` unless the parameter is a pure number.
     """
-    from elevon.parameters.model import Entry, Header
+    from elevon.parameters.model import ActuatorHeader, ParameterEntry
 
-    header = Header.model_json_schema()
+    header = ActuatorHeader.model_json_schema()
     properties: dict[str, Any] = dict(header["properties"])
     for record in records(wiring).values():
         _insert(properties, record.path.split("."), _leaf(record))
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": f"Elevon parameter set, wiring {wiring}",
+        "title": f"Elevon actuator file, wiring {wiring}",
         "type": "object",
         "properties": properties,
         "additionalProperties": False,
-        "$defs": {**header.get("$defs", {}), "Entry": Entry.model_json_schema()},
+        "$defs": {**header.get("$defs", {}), "Entry": ParameterEntry.model_json_schema()},
     }
 
 

@@ -114,7 +114,7 @@ class ParameterSet(Mapping[str, Parameter]):
         return self._vector
 
     def away(self) -> Mapping[str, str]:
-        """Return what the user changed away from neutral: path to the value as written."""
+        """Return what the caller changed away from neutral: path to the value as written."""
         if self._away is None:
             known = records(self.wiring)
             self._away = MappingProxyType(
@@ -132,9 +132,9 @@ class ParameterSet(Mapping[str, Parameter]):
         *,
         source: str = "set by the caller",
         place: str = "",
-        asked: bool = True,
+        request: bool = True,
     ) -> ParameterSet:
-        """Return a set with some values changed; a number alone is SI, text may carry a unit.
+        """Return parameters with some values changed; a number alone is SI, text may carry a unit.
 
         Raises
         ------
@@ -155,9 +155,9 @@ class ParameterSet(Mapping[str, Parameter]):
                 confidence="override",
                 old=old.value,
                 interval=None,
-                changed=old.changed or (asked and value != old.value),
+                changed=old.changed or (request and value != old.value),
             )
-        # Everything else was checked when this set was made.
+        # Everything else was checked when these parameters were made.
         result = ParameterSet.__new__(ParameterSet)
         result._hold(self.wiring, items)
         result._vector = self._changed_vector(items, values)
@@ -166,7 +166,7 @@ class ParameterSet(Mapping[str, Parameter]):
     def _changed_vector(
         self, items: Mapping[str, Parameter], changed: Iterable[str]
     ) -> npt.NDArray[np.float64]:
-        """Return this set's vector with some entries taken from other items."""
+        """Return this vector with some entries taken from other items."""
         vector = self.vector().copy()
         known = records(self.wiring)
         place = positions(self.wiring)

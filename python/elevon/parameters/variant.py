@@ -19,7 +19,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 _WIDTH = 100
 _HEAD = """\
 # {name}: a variant of {base}. Remove the # of a line and change its value; the rest is the base's.
-# A number needs its unit where one is shown ("8 kg cm2"). To say where a value comes from, write
+# A number needs its unit where one stands ("8 kg cm2"). To say where a value comes from, write
 #   [gear.ratio]
 #   value = 50
 #   source = "datasheet of the gearbox"
@@ -31,7 +31,7 @@ title = "{title}"
 
 
 def variant_text(name: str, base: Actuator, reference: str) -> str:
-    """Return the text of a set file that changes nothing yet.
+    """Return the text of an actuator file that changes nothing yet.
 
     Parameters
     ----------
@@ -40,12 +40,12 @@ def variant_text(name: str, base: Actuator, reference: str) -> str:
     base : Actuator
         What it is a variant of.
     reference : str
-        How the file names it: a set or a file.
+        How the file names it: a name or a file.
 
     Raises
     ------
     InputError
-        The name cannot be one of a set.
+        The name cannot be one of an actuator.
     """
     if not _NAME.fullmatch(name):
         raise InputError(f"{name!r}: a name has letters, digits, '.', '_' and '-'")
@@ -70,5 +70,5 @@ def _entry(parameter: Parameter, record: Record) -> list[str]:
     about = [f"{record.text}; {record.range_text}{unit}", parameter.source, record.acts_text]
     text = ". ".join(part for part in about if part)
     comment = textwrap.wrap(text, _WIDTH, initial_indent="#   ", subsequent_indent="#   ")
-    shown = f'"{value}"' if quoted else value
-    return [*comment, f"# {parameter.path} = {shown}"]
+    literal = f'"{value}"' if quoted else value
+    return [*comment, f"# {parameter.path} = {literal}"]

@@ -1,4 +1,4 @@
-"""Write values back into a set file, keeping its comments and order."""
+"""Write values back into an actuator file, keeping its comments and order."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["updated_set", "write_set"]
 
 
 def updated_set(text: str, changes: Iterable[Parameter]) -> str:
-    """Return the text of a set file with some entries replaced or added.
+    """Return the text of an actuator file with some entries replaced or added.
 
     Comments, order and every untouched entry stay as they are.
 
@@ -57,18 +57,18 @@ def write_set(
     title: str = "",
     force: bool = False,
 ) -> Path:
-    """Write a set file that overrides a base (or extends the file that is there).
+    """Write an actuator file that overrides a base (or extends the file that is there).
 
     Parameters
     ----------
     path : path
         The file; written whole or not at all.
     name : str
-        The set's name.
+        The actuator's name.
     changes : iterable of Parameter
         Entries to write.
     base : str, optional
-        The set or file the new one overrides.
+        The actuator or file the new one overrides.
     title : str
         One line.
     force : bool

@@ -90,7 +90,7 @@ class Channel:
         return to_display(self.values, unit)
 
     def equals(self, other: "Channel") -> bool:
-        """Tell whether two channels are the same, to the last bit of every value."""
+        """Return whether two channels are the same, to the last bit of every value."""
         same = (self.name, self.unit, self.text) == (other.name, other.unit, other.text)
         return (
             same

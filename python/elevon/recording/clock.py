@@ -76,7 +76,7 @@ class Clock:
         return [(float(self.time[k]), float(self.time[k + 1])) for k in self.gaps]
 
     def equals(self, other: "Clock") -> bool:
-        """Tell whether two clocks are the same, to the last bit of time."""
+        """Return whether two clocks are the same, to the last bit of time."""
         same = (self.name, self.rate, self.gaps) == (other.name, other.rate, other.gaps)
         return same and self.time.tobytes() == other.time.tobytes()
 

@@ -2,7 +2,7 @@
 
 The table is plain: a line of names with units (``time [s],output_position [rad]``), then numbers
 with the digits that give back every bit (a NaN comes back as the plain one). Everything else, and
-the SHA-256 of the table's bytes, stands in a file beside it (`elevon.recording.beside`).
+the SHA-256 of the table's bytes, stands in a file beside it (`elevon.recording.description`).
 
 A table holds ONE clock. A recording of several becomes one table a clock: ``run.csv`` is written as
 ``run.drive.csv`` and ``run.load_cell.csv``, each a recording of its own, and loading ``run.csv``
@@ -27,17 +27,17 @@ import numpy.typing as npt
 
 from elevon.errors import DamageError, FormatError, InputError, UncheckedWarning
 from elevon.files import atomic_path, check_output
-from elevon.recording.beside import (
-    Beside,
-    beside,
-    describes,
-    read_beside,
-    sha256_of,
-    write_beside,
-)
 from elevon.recording.channel import in_si
 from elevon.recording.clock import Clock
 from elevon.recording.contents import Contents, check_size, header_bytes, rebuild
+from elevon.recording.description import (
+    TableDescription,
+    describes,
+    description_path,
+    read_description,
+    sha256_of,
+    write_description,
+)
 from elevon.recording.header import Header
 from elevon.units import check_kind, to_si
 
@@ -65,7 +65,7 @@ def tables(path: Path, clocks: Iterable[str]) -> list[Path]:
 def check(path: Path, clocks: Iterable[str], *, force: bool) -> None:
     """Refuse, before any work, outputs that cannot be written; errors as `check_output`.
 
-    A description without a table, left by a save that was killed, stands in nobody's way.
+    A description without a table, left by a save that was killed, hinders nothing.
     """
     names = list(clocks)
     if not names:
@@ -73,8 +73,8 @@ def check(path: Path, clocks: Iterable[str], *, force: bool) -> None:
     check_output(path, force=force)
     for table in tables(path, names):
         check_output(table, force=force)
-        left_over = not table.exists() and describes(beside(table))
-        check_output(beside(table), force=force or left_over)
+        left_over = not table.exists() and describes(description_path(table))
+        check_output(description_path(table), force=force or left_over)
 
 
 def save(recording: Recording, path: Path, *, force: bool) -> None:
@@ -87,7 +87,7 @@ def save(recording: Recording, path: Path, *, force: bool) -> None:
         part = recording if len(paths) == 1 else recording.select(clock=clock)
         _save_one(part, table, whole, files, force=force)
     if len(paths) > 1:  # replaced with leave: the tables of the clocks stand for it now
-        for old in (path, beside(path)):
+        for old in (path, description_path(path)):
             old.unlink(missing_ok=True)
 
 
@@ -98,14 +98,14 @@ def _save_one(
     try:
         with atomic_path(table, force=force) as temporary:
             _write(recording, temporary)
-            about = Beside(sha256_of(temporary), Header.sealed(recording), whole, files)
-            write_beside(table, about, keep_old=replaced)
+            about = TableDescription(sha256_of(temporary), Header.sealed(recording), whole, files)
+            write_description(table, about, keep_old=replaced)
     except BaseException:
         if not table.exists():
-            beside(table).unlink(missing_ok=True)
+            description_path(table).unlink(missing_ok=True)
         raise
     if replaced:
-        write_beside(table, about, keep_old=False)
+        write_description(table, about, keep_old=False)
 
 
 def _write(recording: Recording, path: Path) -> None:
@@ -146,7 +146,7 @@ def joined_tables(path: Path) -> list[Path]:
         return []
     for near in sorted(path.parent.glob(f"{escape(path.stem)}.*{path.suffix}.json")):
         table = near.with_suffix("")
-        about = read_beside(table) if table.is_file() and describes(near) else None
+        about = read_description(table) if table.is_file() and describes(near) else None
         if about is None or len(about.files) < 2 or table.name not in about.files:
             continue
         present = [path.with_name(Path(name).name) for name in about.files]
@@ -190,7 +190,7 @@ def _read(path: Path, max_bytes: int) -> tuple[Contents, str]:
                 f"{path}: has its description in the first line, as earlier versions wrote it; "
                 "without that line it is read as a plain table (or save it anew from its source)"
             )
-        about = read_beside(path)
+        about = read_description(path)
         needed = _EXPANSION * path.stat().st_size if about is None else header_bytes(about.header)
         check_size(str(path), needed, max_bytes)
         columns = _heads(path, first)
@@ -198,7 +198,8 @@ def _read(path: Path, max_bytes: int) -> tuple[Contents, str]:
     if about is None:
         contents = _undescribed(path, columns, arrays)
         warnings.warn(
-            f"{path}: no {beside(path).name} beside it, so no checksum: damage cannot be seen",
+            f"{path}: no {description_path(path).name} beside it, so no checksum: "
+            "damage cannot be seen",
             UncheckedWarning,
             6,
         )
@@ -207,7 +208,9 @@ def _read(path: Path, max_bytes: int) -> tuple[Contents, str]:
         raise FormatError(f"{path}: describes {len(about.header.clocks)} clocks, a .csv holds one")
     described = {name: unit for name, (unit, _) in about.header.clocks[0].channels.items()}
     if columns != {"time": "s", **described}:
-        raise FormatError(f"{path}: the column names do not agree with {beside(path).name}")
+        raise FormatError(
+            f"{path}: the column names do not agree with {description_path(path).name}"
+        )
     return rebuild(about.header, lambda _: arrays, str(path)), about.of
 
 
@@ -236,16 +239,16 @@ def _heads(path: Path, line: str) -> dict[str, str]:
 
 
 def _numbers(path: Path, stream: Any, names: list[str]) -> dict[str, npt.NDArray[np.float64]]:
-    rest = stream.read()
-    if not rest.strip():
+    body = stream.read()
+    if not body.strip():
         return {name: np.empty(0) for name in names}
     read = _read_plain if find_spec("pyarrow") is None else _read_arrow
-    return read(path, rest, names)
+    return read(path, body, names)
 
 
-def _read_plain(path: Path, rest: bytes, names: list[str]) -> dict[str, npt.NDArray[np.float64]]:
+def _read_plain(path: Path, body: bytes, names: list[str]) -> dict[str, npt.NDArray[np.float64]]:
     """Read without pyarrow: strictly numbers with commas between them, one row a line."""
-    rows = [line.split(b",") for line in rest.splitlines() if line.strip()]
+    rows = [line.split(b",") for line in body.splitlines() if line.strip()]
     wrong = next((k for k, row in enumerate(rows) if len(row) != len(names)), None)
     if wrong is not None:
         raise FormatError(
@@ -258,14 +261,14 @@ def _read_plain(path: Path, rest: bytes, names: list[str]) -> dict[str, npt.NDAr
     return {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(names)}
 
 
-def _read_arrow(path: Path, rest: bytes, names: list[str]) -> dict[str, npt.NDArray[np.float64]]:
+def _read_arrow(path: Path, body: bytes, names: list[str]) -> dict[str, npt.NDArray[np.float64]]:
     import pyarrow as pa
     from pyarrow import csv
 
     kinds = dict.fromkeys(names, pa.float64())
     try:
         table = csv.read_csv(
-            pa.BufferReader(rest),
+            pa.BufferReader(body),
             csv.ReadOptions(column_names=names),
             csv.ParseOptions(quote_char=False),
             csv.ConvertOptions(column_types=kinds, null_values=[], strings_can_be_null=False),

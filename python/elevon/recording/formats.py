@@ -72,10 +72,10 @@ def files_of(path: Path) -> list[Path]:
     if path.suffix.lower() != ".csv":
         return [path] if path.is_file() else []
     from elevon.recording import csv
-    from elevon.recording.beside import beside
+    from elevon.recording.description import description_path
 
     parts = [path] if path.is_file() else csv.joined_tables(path)
-    return [file for table in parts for file in (table, beside(table)) if file.is_file()]
+    return [file for table in parts for file in (table, description_path(table)) if file.is_file()]
 
 
 def check_target(path: Path, clocks: Iterable[str], *, force: bool) -> None:

@@ -28,7 +28,7 @@ class Panel:
     Attributes
     ----------
     title, unit : str
-        What is shown, in what.
+        What is displayed, in which unit.
     time : ndarray, shape (n,)
         Abscissa: s, or Hz of a spectrum.
     lines : dict of str to ndarray, shape (n,)
@@ -112,7 +112,7 @@ def _first(recording: Recording, *names: str) -> Channel | None:
 
 
 def _tracked(recording: Recording, output: Channel) -> Channel | None:
-    """Return the command where it asks for a position or a speed on the output's clock."""
+    """Return the command where it demands a position or a speed on the output's clock."""
     command = _first(recording, "command")
     if command is None or command.clock is not output.clock:
         return None
@@ -127,12 +127,12 @@ def _position(recording: Recording, output: Channel, command: Channel | None) ->
         scaled = _over_ratio(motor, output)
         if scaled is not None:
             text, values = scaled
-            lines[f"{motor.name} {text}"] = _shown(values, unit)
+            lines[f"{motor.name} {text}"] = _displayed(values, unit)
     lines[output.name] = output.to(unit)
     return _panel("position", unit, output, lines)
 
 
-def _shown(values: Floats, unit: str) -> Floats:
+def _displayed(values: Floats, unit: str) -> Floats:
     """Return SI values in another unit."""
     return np.asarray(to_display(values, unit), dtype=np.float64)
 

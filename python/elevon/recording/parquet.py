@@ -82,12 +82,12 @@ def _tables(recording: Recording, schema: Any) -> Iterator[Any]:
     for clock in recording.clocks.values():
         if not len(clock) and len(recording.clocks) > 1:
             continue
-        own = {channel.name: channel.values for channel in recording.on_clock(clock.name)}
+        values_of = {channel.name: channel.values for channel in recording.on_clock(clock.name)}
         columns = {"time": pa.array(clock.time)}
         if len(recording.clocks) > 1:
             columns["clock"] = pa.repeat(pa.scalar(clock.name), len(clock))
         for channel in recording.channels:
-            values = own.get(channel.name)
+            values = values_of.get(channel.name)
             columns[channel.name] = (
                 pa.nulls(len(clock), pa.float64()) if values is None else pa.array(values)
             )

@@ -186,7 +186,7 @@ class Recording:
         return f"<Recording {self.status}: {len(self)} channels on [{clocks}]>"
 
     def _repr_html_(self) -> str:
-        from elevon.recording.shown import recording_card
+        from elevon.recording.notebook_card import recording_card
 
         return recording_card(self)
 
@@ -277,7 +277,7 @@ class Recording:
         )
 
     def equals(self, other: "Recording") -> bool:
-        """Tell whether two recordings are the same, to the last bit of every value."""
+        """Return whether two recordings are the same, to the last bit of every value."""
         from elevon.recording.header import Header
 
         return (
@@ -330,8 +330,8 @@ class Recording:
             ``.png``, ``.svg`` or ``.pdf`` for a picture, ``.html`` for one self-contained
             interactive page. Without it the matplotlib figure is returned and nothing written.
         units : mapping of str to str, optional
-            Channel name to the unit shown; default degrees, rpm and degC for angles, angular speeds
-            and temperatures, else SI.
+            Channel name to the unit displayed; default degrees, rpm and degC for angles, angular
+            speeds and temperatures, else SI.
         title : str, optional
             Title; default the actuator's name.
         compare : Recording or path, optional
@@ -424,8 +424,8 @@ class Recording:
         """
         from elevon.recording.formats import load
 
-        held = load(path, max_bytes=max_bytes)
+        loaded = load(path, max_bytes=max_bytes)
         try:
-            return cls(**vars(held))
+            return cls(**vars(loaded))
         except InputError as error:
             raise FormatError(f"{path}: {error}") from error

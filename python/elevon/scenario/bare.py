@@ -1,6 +1,6 @@
 """Numbers without a unit in files: refused where a person reads the place in another unit.
 
-In Python a number is SI; in a file nobody can tell ``amplitude = 7`` to be degrees or radians.
+In Python a number is SI; in a file ``amplitude = 7`` could be degrees or radians.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ def check_units(document: Document) -> None:
         With the place and both readings of each.
     """
     findings: list[str] = []
-    for location, number, units, shown in _numbers(document.data):
+    for location, number, units, display_units in _numbers(document.data):
         pairs = [
             (unit, other)
-            for unit, other in zip(units, shown, strict=True)
+            for unit, other in zip(units, display_units, strict=True)
             if is_ambiguous(float(number), unit, other)
         ]
         if pairs:
@@ -50,7 +50,7 @@ def check_units(document: Document) -> None:
 
 
 def with_texts(given: Any) -> Any:
-    """Return a file's parameters with their numbers as texts: the set knows which need a unit."""
+    """Return a file's parameters with numbers as texts: the actuator knows which need a unit."""
     if isinstance(given, dict):
         return {key: with_texts(item) for key, item in given.items()}
     return repr(given) if _is_number(given) else given
@@ -78,7 +78,7 @@ def _numbers(data: Mapping[str, Any]) -> Iterator[Finding]:
 
 
 def _of_terms(
-    sum_: Mapping[str, Any], place: tuple[str | int, ...], own: tuple[str, ...]
+    sum_: Mapping[str, Any], place: tuple[str | int, ...], port_units: tuple[str, ...]
 ) -> Iterator[Finding]:
     terms = sum_.get("terms")
     for index, term in enumerate(terms if isinstance(terms, list) else ()):
@@ -89,23 +89,25 @@ def _of_terms(
         for parameter in record.parameters:
             value = term.get(parameter.name)
             if _is_number(value):
-                units = tuple(unit_of(parameter, unit) or "1" for unit in own) or ("1",)
-                shown = tuple(unit_of(parameter, shown_unit(unit)) or "1" for unit in own) or ("1",)
+                units = tuple(unit_of(parameter, unit) or "1" for unit in port_units) or ("1",)
+                display_units = tuple(
+                    unit_of(parameter, shown_unit(unit)) or "1" for unit in port_units
+                ) or ("1",)
                 if parameter.unit == "rad":
-                    shown = ("deg",) * len(units)
-                yield (*at, parameter.name), value, units, shown
+                    display_units = ("deg",) * len(units)
+                yield (*at, parameter.name), value, units, display_units
         if record.kind == TABLE and not term.get("unit"):
-            yield from _of_table(term, at, own)
+            yield from _of_table(term, at, port_units)
 
 
 def _of_table(
-    term: Mapping[str, Any], at: tuple[str | int, ...], own: tuple[str, ...]
+    term: Mapping[str, Any], at: tuple[str | int, ...], port_units: tuple[str, ...]
 ) -> Iterator[Finding]:
     """Yield the first value of a table that is not zero: its unit is missing."""
     values = term.get("values")
     for value in values if isinstance(values, list) else ():
         if _is_number(value) and value:
-            yield (*at, "values"), value, own, tuple(shown_unit(unit) for unit in own)
+            yield (*at, "values"), value, port_units, tuple(shown_unit(unit) for unit in port_units)
             return
 
 

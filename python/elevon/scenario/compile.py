@@ -111,7 +111,7 @@ def compile_scenario(scenario: Scenario, wiring: str, fidelity: str) -> Compiled
 
 
 def _mode(scenario: Scenario, wiring: str) -> str:
-    """Return what the command asks for; when nothing is said, the first thing the wiring takes."""
+    """Return what the command demands; when nothing is given, the first thing the wiring takes."""
     modes: list[str] = wirings()[wiring]["modes"]
     command = scenario.command
     mode = command.mode if "mode" in command.model_fields_set else modes[0]
@@ -164,7 +164,7 @@ def _sequence(steps: Sequence[Action], wiring: str) -> dict[str, Any]:
             times, values = [], []
         times.append(time)
         number = float(actions.index(step.action))
-        # The same action again would not show in a held value: it stands a round higher.
+        # The same action again would not be seen in a held value: it is a round higher.
         repeats = index > 0 and steps[index - 1].action == step.action
         values.append(number + len(actions) if repeats and values[-1] == number else number)
     record = wave_records()[TABLE]
@@ -178,7 +178,7 @@ def _sequence(steps: Sequence[Action], wiring: str) -> dict[str, Any]:
     }
 
 
-def compile_term(term: Term, own: str, place: str) -> dict[str, Any]:
+def compile_term(term: Term, port_unit: str, place: str) -> dict[str, Any]:
     """Return one term in the core's form; `own` is the unit of the port it drives."""
     """Return one waveform as the core takes it, for a quantity in the SI unit `own`."""
     record = wave_records()[term.kind]
@@ -189,14 +189,14 @@ def compile_term(term: Term, own: str, place: str) -> dict[str, Any]:
             assert parameter.default is not None  # the model checked that it is given
             values[parameter.name] = float(parameter.default)
         else:
-            unit = unit_of(parameter, own) or "1"
+            unit = unit_of(parameter, port_unit) or "1"
             values[parameter.name] = _value(given, parameter.name, unit, place)
     check_values(record, values, place)
     return {
         "kind": term.kind,
         "enabled": term.enabled,
         "parameters": list(values.values()),
-        **_table(term, own, place),
+        **_table(term, port_unit, place),
     }
 
 
@@ -208,13 +208,13 @@ def _value(given: bool | float | str, name: str, unit: str, place: str) -> float
     return parse_quantity(given, unit, f"{place}: {name}")
 
 
-def _table(term: Term, own: str, place: str) -> dict[str, Any]:
+def _table(term: Term, port_unit: str, place: str) -> dict[str, Any]:
     if term.kind != TABLE:
         return {"times": (), "values": ()}
     times, values = term.points()
-    check_kind(term.unit or own, own, f"{place}: unit")
+    check_kind(term.unit or port_unit, port_unit, f"{place}: unit")
     check_kind(term.time_unit, "s", f"{place}: time_unit")
-    return {"times": to_si(times, term.time_unit), "values": to_si(values, term.unit or own)}
+    return {"times": to_si(times, term.time_unit), "values": to_si(values, term.unit or port_unit)}
 
 
 def _initial(scenario: Scenario, wiring: str, fidelity: str) -> dict[str, float]:

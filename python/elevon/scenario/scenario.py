@@ -118,7 +118,7 @@ class Action(_Frozen):
 
 
 class Command(Terms):
-    """What is asked: the output's position, the motor's speed or torque, or a sequence of actions.
+    """The command: the output's position, the motor's speed or torque, or a sequence of actions.
 
     Attributes
     ----------
@@ -214,7 +214,7 @@ class Scenario(_Frozen):
     loads : Load
         Key ``load`` of the file: loads on the motor shaft and the output side.
     supply : Terms
-        V; when empty, the set's own supply voltage.
+        V; when empty, the actuator file's supply voltage.
     fault : tuple of Fault
         What breaks. Texts of the fault grammar and tables are accepted.
     initial : mapping
@@ -294,7 +294,7 @@ class Scenario(_Frozen):
         return data
 
     def _repr_html_(self) -> str:
-        from elevon.scenario.shown import scenario_card
+        from elevon.scenario.notebook_card import scenario_card
 
         return scenario_card(self)
 

@@ -34,12 +34,12 @@ def run_loop(
     Parameters
     ----------
     session : Session
-        One lane or many; it stands at the end afterwards.
+        One run or a batch; it stands at the end afterwards.
     duration : float or str
         s, or with a unit: a whole number of periods.
     controller : callable, optional
         Called with the session at every tick, before the drive sees that instant. What it returns
-        is the command, in the SI unit of its mode (of many lanes shape (runs,)); or a mapping of
+        is the command, in the SI unit of its mode (of a batch shape (runs,)); or a mapping of
         inputs, as for `Session.set`; or None: nothing changes.
     period : float or str
         Of the ticks: a whole number of solver steps.
@@ -51,7 +51,7 @@ def run_loop(
     Returns
     -------
     list of Recording
-        One a lane, on one clock of that period, the last instant included.
+        One a run, on one clock of that period, the last instant included.
 
     Raises
     ------

@@ -40,7 +40,7 @@ class Session:
     Parameters
     ----------
     actuator : Actuator, str, path, or sequence of Run
-        What moves. A sequence of `elevon.Run` is a session of many lanes, one a run, all of one
+        What moves. A sequence of `elevon.Run` is a session of a batch, one run each, all of one
         wiring: every reading then is an array of shape (runs,), every value set may be one.
     scenario : Scenario, mapping or path, optional
         What acts at the start, such as waveforms of loads; its duration does not count. Without it
@@ -48,7 +48,7 @@ class Session:
     fidelity : str
         ``high`` or ``low``.
     mode : str, optional
-        Without a scenario: what the command asks for, ``position``, ``speed`` or ``torque``.
+        Without a scenario: what the command demands, ``position``, ``speed`` or ``torque``.
     seed : int
         Of the random numbers.
     tunable : iterable of str
@@ -100,7 +100,7 @@ class Session:
         runs = runs_of(actuator, scenario, mode, seed)
         self.many = not isinstance(actuator, (Actuator, str, os.PathLike))
         prepared = [prepare(run, fidelity, "output_position@every") for run in runs]
-        report([item.doubts for item in prepared], strict=False)
+        report([item.notices for item in prepared], strict=False)
         wirings = {item.actuator.wiring for item in prepared}
         if len(wirings) > 1:
             raise InputError(f"the runs of a session have one wiring; got {', '.join(wirings)}")
@@ -146,17 +146,17 @@ class Session:
 
     @property
     def status(self) -> str | list[str]:
-        """`ok`, `tripped` or `diverged`; of many lanes a list. A diverged lane stands still."""
+        """`ok`, `tripped` or `diverged`; of a batch a list. A diverged run stands still."""
         status = [self._core.status(run)[0] for run in range(len(self))]
         return status if self.many else str(status[0])
 
     @property
     def messages(self) -> list[str]:
-        """What there is to say of each lane's status; empty where it is `ok`."""
+        """The message of each run's status; empty where it is `ok`."""
         return [self._core.status(run)[1] for run in range(len(self))]
 
     def state_of(self, run: int) -> tuple[str, str]:
-        """Return status and message of one lane."""
+        """Return status and message of one run."""
         status, message = self._core.status(run)
         return status, message
 
@@ -196,7 +196,7 @@ class Session:
         self._core.advance(steps)
 
     def read(self, *names: str) -> dict[str, Any]:
-        """Return signals as they stand now, SI: name to a number, or to an array of many lanes.
+        """Return signals as they stand now, SI: name to a number, or to an array of a batch.
 
         Raises
         ------
@@ -340,7 +340,7 @@ class Session:
 
     @contextmanager
     def _whole(self) -> Iterator[None]:
-        """Undo what a change has done to some inputs or lanes when another one refuses it."""
+        """Undo what a change has done to some inputs or runs when another one refuses it."""
         state = self.save()
         try:
             yield

@@ -1,4 +1,4 @@
-"""Simulate one run, or many of them in lanes and threads, on the Rust core."""
+"""Simulate one run, or many of them in SIMD batches and threads, on the Rust core."""
 
 from elevon.simulate.batch import batch_bytes, simulate, simulate_batch
 from elevon.simulate.prepare import Run, check_fidelity, solver_step

@@ -1,4 +1,4 @@
-"""What the caller has set where it cannot act: said, never ignored."""
+"""What the caller has set where it has no effect: reported, never ignored."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from elevon.scenario import Scenario
 from elevon.scenario.compile import CompiledScenario, compile_scenario
 from elevon.units import format_quantity
 
-__all__ = ["Doubt", "check_values", "not_acting", "report", "together"]
+__all__ = ["Notice", "check_values", "not_acting", "report", "together"]
 
 
 @dataclass(frozen=True)
-class Doubt:
-    """Something to say about a run that can be simulated as it stands.
+class Notice:
+    """A notice about a run that can be simulated as it is.
 
     Attributes
     ----------
     category : type
-        `NotActingWarning`, or `FindingWarning` for a doubt of the core about values together.
+        `NotActingWarning`, or `FindingWarning` for a finding of the core about values together.
     text : str
         Names the path or the fault, its value and the reason.
     """
@@ -39,8 +39,8 @@ class Doubt:
     text: str
 
 
-def check_values(actuator: Actuator, fidelity: str) -> list[Doubt]:
-    """Return the core's doubts about the values together.
+def check_values(actuator: Actuator, fidelity: str) -> list[Notice]:
+    """Return the core's findings about the values together.
 
     Raises
     ------
@@ -53,24 +53,24 @@ def check_values(actuator: Actuator, fidelity: str) -> list[Doubt]:
     wrong = [item for item in findings if item.get("severity", "error") == "error"]
     if wrong:
         raise InputError("\n".join(str(finding["message"]) for finding in wrong))
-    return [Doubt(FindingWarning, str(finding["message"])) for finding in findings]
+    return [Notice(FindingWarning, str(finding["message"])) for finding in findings]
 
 
-def not_acting(actuator: Actuator, compiled: CompiledScenario, fidelity: str) -> list[Doubt]:
-    """Return what the caller set away from neutral where it cannot act in this run."""
-    doubts = _asked(actuator, compiled, fidelity)
+def not_acting(actuator: Actuator, compiled: CompiledScenario, fidelity: str) -> list[Notice]:
+    """Return what the caller set away from neutral where it has no effect in this run."""
+    notices = _reasons(actuator, compiled, fidelity)
     return [
-        Doubt(NotActingWarning, f"{name} does not act: {reason}")
-        for name, reason in doubts.items()
+        Notice(NotActingWarning, f"{name} has no effect: {reason}")
+        for name, reason in notices.items()
         if reason
     ]
 
 
-def _asked(actuator: Actuator, compiled: CompiledScenario, fidelity: str) -> dict[str, str]:
-    """Return what the caller set, each with the reason why it does not act; empty where it does.
+def _reasons(actuator: Actuator, compiled: CompiledScenario, fidelity: str) -> dict[str, str]:
+    """Return what the caller set, each with why it has no effect; empty where it has one.
 
-    Of the parameters those count that the caller changed, not what a set carries for another
-    drive; of the faults those of a severity other than zero.
+    Of the parameters those count that the caller changed, not what an actuator file carries for
+    another drive; of the faults those of a severity other than zero.
     """
     from elevon import _core
 
@@ -82,10 +82,10 @@ def _asked(actuator: Actuator, compiled: CompiledScenario, fidelity: str) -> dic
     paths = [*changed, *(path for fault in faults for path in _touched(fault, actuator.wiring))]
     rows = _core.not_acting(actuator.wiring, fidelity, vector, compiled.faults, paths)
     idle = {item["path"]: item["reason"] for item in rows}
-    asked = {f"{path} = {text}": idle.get(path, "") for path, text in changed.items()}
+    reasons = {f"{path} = {text}": idle.get(path, "") for path, text in changed.items()}
     for fault in faults:
-        asked.update(_of_fault(fault, actuator.wiring, idle))
-    return asked
+        reasons.update(_of_fault(fault, actuator.wiring, idle))
+    return reasons
 
 
 def _touched(fault: Mapping[str, Any], wiring: str) -> Iterator[str]:
@@ -109,7 +109,7 @@ def _with_mode(actuator: Actuator, mode: str) -> npt.NDArray[np.float64]:
 def _of_fault(
     fault: Mapping[str, Any], wiring: str, idle: Mapping[str, str]
 ) -> Iterator[tuple[str, str]]:
-    """Yield a fault and the attributes given with it, each with why it does not act."""
+    """Yield a fault and the attributes given with it, each with why it has no effect."""
     record = find_record(fault["kind"], fault["place"], wiring)
     name = f"fault {fault['kind']}@{fault['place']}"
     targets = record.targets[fault["place"]]
@@ -124,33 +124,35 @@ def _of_fault(
 
 @contextmanager
 def together(runs: Iterable[tuple[Actuator, Scenario, str]]) -> Iterator[None]:
-    """Doubt only what acts in none of several runs (actuator, scenario, fidelity) that set it.
+    """Report only what has an effect in none of several runs (actuator, scenario, fidelity).
 
-    Such runs are compared with each other: what one model alone carries is asked of that one.
+    Such runs are compared with each other: what one model alone carries concerns that one.
     """
     reasons: dict[str, list[str]] = {}
     for actuator, scenario, fidelity in runs:
         whole = actuator.with_values(scenario.parameters, place="scenario parameters")
         compiled = compile_scenario(scenario, actuator.wiring, fidelity)
-        for name, reason in _asked(whole, compiled, fidelity).items():
+        for name, reason in _reasons(whole, compiled, fidelity).items():
             reasons.setdefault(name, []).append(reason)
-    resting = [f"{name} does not act: {why[0]}" for name, why in reasons.items() if all(why)]
-    report([[Doubt(NotActingWarning, text) for text in resting]], strict=False, stacklevel=4)
+    resting = [f"{name} has no effect: {why[0]}" for name, why in reasons.items() if all(why)]
+    report([[Notice(NotActingWarning, text) for text in resting]], strict=False, stacklevel=4)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NotActingWarning)
         yield
 
 
-def report(doubts_by_run: Iterable[Sequence[Doubt]], *, strict: bool, stacklevel: int = 3) -> None:
-    """Warn of every doubt of a batch once, or refuse.
+def report(
+    notices_by_run: Iterable[Sequence[Notice]], *, strict: bool, stacklevel: int = 3
+) -> None:
+    """Warn of every notice of a batch once, or refuse.
 
     Raises
     ------
     NotActingError
-        `strict`, and there is a doubt; all of them are in the message.
+        `strict`, and there is a notice; all of them are in the message.
     """
-    doubts = dict.fromkeys(doubt for run in doubts_by_run for doubt in run)
-    if strict and doubts:
-        raise NotActingError("\n".join(doubt.text for doubt in doubts))
-    for doubt in doubts:
-        warnings.warn(doubt.text, doubt.category, stacklevel=stacklevel)
+    notices = dict.fromkeys(notice for run in notices_by_run for notice in run)
+    if strict and notices:
+        raise NotActingError("\n".join(notice.text for notice in notices))
+    for notice in notices:
+        warnings.warn(notice.text, notice.category, stacklevel=stacklevel)

@@ -24,14 +24,14 @@ def as_actuator(given: ActuatorLike, place: str = "actuator") -> Actuator:
     ArgumentTypeError
         Something else was given; the message says what is expected.
     InputError
-        No such set, or a wrong file.
+        No such actuator, or a wrong file.
     """
     if isinstance(given, Actuator):
         return given
     if isinstance(given, (str, os.PathLike)):
         return Actuator.load(given)
     raise ArgumentTypeError(
-        f"{place}: {_kind(given)} is no actuator; expected an Actuator, the name of a set "
+        f"{place}: {_kind(given)} is no actuator; expected an Actuator, a name "
         "('torino-rotary') or the path of a TOML file"
     )
 
@@ -49,7 +49,7 @@ def as_scenario(given: ScenarioLike, actuator: Actuator, place: str = "scenario"
     if isinstance(given, Scenario):
         return given
     if given is None:
-        return _own(actuator)
+        return _default(actuator)
     if isinstance(given, Mapping):
         return Scenario.from_dict(given, place)
     if isinstance(given, (str, os.PathLike)):
@@ -60,7 +60,7 @@ def as_scenario(given: ScenarioLike, actuator: Actuator, place: str = "scenario"
     )
 
 
-def _own(actuator: Actuator) -> Scenario:
+def _default(actuator: Actuator) -> Scenario:
     if actuator.default_scenario is None:
         raise InputError(
             f"{actuator.name} has no scenario of its own; give one (command line: --scenario FILE)"

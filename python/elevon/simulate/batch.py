@@ -1,4 +1,4 @@
-"""One run, or many in lanes and threads, on the Rust core."""
+"""One run, or many in SIMD batches and threads, on the Rust core."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def simulate(
         Vector width: ``auto``, ``single``, ``portable``, ``avx2``, ``avx512``, ... as this
         processor has them; the result does not depend on it.
     strict : bool
-        What is set where it cannot act is an error, not a warning.
+        What is set where it has no effect is an error, not a warning.
     progress : callable, optional
         Called some ten times a second with the done fraction; returning False interrupts.
 
@@ -77,7 +77,7 @@ def simulate(
     InputError
         Anything in actuator, scenario or record that cannot be; place, value, limit are named.
     NotActingError
-        `strict`, and something set does not act.
+        `strict`, and something set has no effect.
     DivergedError
         The run left the finite numbers; time and signal are named.
     Interrupted
@@ -86,13 +86,13 @@ def simulate(
     Warns
     -----
     NotActingWarning
-        A parameter or fault is set away from neutral where it cannot act.
+        A parameter or fault is set away from neutral where it has no effect.
     FindingWarning
-        The core doubts the values together.
+        The core questions the values together.
     """
     run = Run(actuator, scenario, seed, number=number)
     prepared = [prepare(run, fidelity, record, features)]
-    report([prepared[0].doubts], strict=strict)
+    report([prepared[0].notices], strict=strict)
     recording = _simulated(
         [run], prepared, fidelity=fidelity, threads=1, lanes=lanes, progress=progress
     )[0]
@@ -116,16 +116,16 @@ def simulate_batch(
     strict: bool = False,
     progress: Progress | None = None,
 ) -> list[Recording]:
-    """Simulate many runs, one a lane, on several threads.
+    """Simulate many runs, in SIMD batches on several threads.
 
-    The results are bit-identical to those of single runs, whatever the lanes and threads.
+    The results are bit-identical to those of single runs, whatever the batches and threads.
 
     Parameters
     ----------
     runs : sequence of Run
         Any mix of actuators and scenarios.
     fidelity, record, features, lanes, strict, progress
-        As for `simulate`; what does not act is said once, however many runs set it.
+        As for `simulate`; what has no effect is reported once, however many runs set it.
     threads : int, optional
         Default, and most: one a core.
 
@@ -152,7 +152,7 @@ def simulate_batch(
             )
     checked_threads(threads)
     prepared = [prepare_named(run, fidelity, record, len(runs) > 1, features) for run in runs]
-    report([item.doubts for item in prepared], strict=strict)
+    report([item.notices for item in prepared], strict=strict)
     return _simulated(
         runs, prepared, fidelity=fidelity, threads=threads, lanes=lanes, progress=progress
     )
@@ -239,7 +239,7 @@ def batch_bytes(
     """
     prepared = [prepare_named(run, fidelity, record, len(runs) > 1) for run in runs]
     if strict:
-        report([item.doubts for item in prepared], strict=True)
+        report([item.notices for item in prepared], strict=True)
     return sum(item.bytes for item in prepared)
 
 

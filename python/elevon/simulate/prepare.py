@@ -16,7 +16,7 @@ from elevon.parameters.records import wirings
 from elevon.record_plan import MOST_STEPS, ClockPlan, record_plan
 from elevon.scenario import Scenario, compile_scenario
 from elevon.scenario.compile import signal_records
-from elevon.simulate.acting import Doubt, check_values, not_acting
+from elevon.simulate.acting import Notice, check_values, not_acting
 from elevon.simulate.arguments import ActuatorLike, ScenarioLike, as_actuator, as_scenario
 from elevon.simulate.stroke import check_stroke
 
@@ -42,9 +42,9 @@ class Run:
     Attributes
     ----------
     actuator : Actuator
-        What moves; the name of a set or a path is loaded.
+        What moves; a name or a path is loaded.
     scenario : Scenario
-        What it is asked and what breaks; a dict or a path is read, None is the actuator's own.
+        What is commanded and what breaks; a dict or a path is read, None is the actuator's own.
     seed : int
         Of the random numbers.
     label : str
@@ -69,8 +69,8 @@ class Run:
         number: int = 0,
     ) -> None:
         loaded = as_actuator(actuator)
-        asked = as_scenario(scenario, loaded)
-        pairs = {"actuator": loaded, "scenario": asked, "seed": seed, "label": label}
+        given = as_scenario(scenario, loaded)
+        pairs = {"actuator": loaded, "scenario": given, "seed": seed, "label": label}
         for name, value in {**pairs, "number": number}.items():
             object.__setattr__(self, name, value)
 
@@ -85,7 +85,7 @@ class Prepared:
     step: float
     bytes: int
     command_unit: str
-    doubts: tuple[Doubt, ...] = ()
+    notices: tuple[Notice, ...] = ()
     features: tuple[FeaturePlan, ...] = ()
 
 
@@ -112,12 +112,12 @@ def prepare(
     record: Record,
     features: Features = None,
     *,
-    doubts: bool = True,
+    notices: bool = True,
 ) -> Prepared:
     """Check a run and bring it into the form the core takes.
 
-    With `features`, `record` may be empty: no raw signals are kept. Without `doubts` nobody asks
-    what does not act: whoever prepares many runs alike asks once.
+    With `features`, `record` may be empty: no raw signals are kept. Without `notices` it is not
+    checked what has no effect: whoever prepares many runs alike checks that once.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def prepare(
     actuator = actuator.with_values(
         run.scenario.parameters, source="scenario", place="scenario parameters"
     )
-    said = check_values(actuator, fidelity)
+    findings = check_values(actuator, fidelity)
     step = solver_step(actuator, fidelity)
     compiled = compile_scenario(run.scenario, actuator.wiring, fidelity)
     check_stroke(compiled, actuator)
@@ -171,7 +171,7 @@ def prepare(
         step,
         8 * sum(n * m for n, m in rows) + _RUN_BYTES,
         compiled.command_unit,
-        (*said, *(not_acting(actuator, compiled, fidelity) if doubts else ())),
+        (*findings, *(not_acting(actuator, compiled, fidelity) if notices else ())),
         summed,
     )
 
@@ -185,8 +185,8 @@ def check_fidelity(wiring: str, fidelity: str) -> None:
 
 def solver_step(actuator: Actuator, fidelity: str) -> float:
     """Return the step in s at which a fidelity is solved."""
-    own = f"{fidelity}.step"
-    path = own if own in records(actuator.wiring) else "solver.step"
+    path_of_fidelity = f"{fidelity}.step"
+    path = path_of_fidelity if path_of_fidelity in records(actuator.wiring) else "solver.step"
     return actuator.parameters.value(path)
 
 

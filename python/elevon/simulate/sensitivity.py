@@ -87,7 +87,7 @@ def sensitivities(
     from elevon import _core
 
     prepared = prepare(Run(actuator, scenario, seed), fidelity, record)
-    report([prepared.doubts], strict=strict)
+    report([prepared.notices], strict=strict)
     names = [*parameters, *(f"fault_{index + 1}" for index in faults)]
     _check(actuator, scenario, parameters, faults, names)
     clocks = [clock.to_core() for clock in prepared.plan]

@@ -83,14 +83,14 @@ def timeline(recording: Recording, wiring: str) -> list[Event]:
 def _since_command(events: list[Event]) -> list[Event]:
     """Return the events with, at each state, the time since the command."""
     dated: list[Event] = []
-    asked: Event | None = None
+    command: Event | None = None
     for event in events:
         text = event.text
         if event.signal == "command":
-            asked = event
-        elif event.signal == "state" and asked is not None and event.time > asked.time + 0.05:
-            action = asked.text.removeprefix("command: ")
-            text = f"{text} ({event.time - asked.time:.2f} s after {action})"
+            command = event
+        elif event.signal == "state" and command is not None and event.time > command.time + 0.05:
+            action = command.text.removeprefix("command: ")
+            text = f"{text} ({event.time - command.time:.2f} s after {action})"
         dated.append(Event(event.time, event.signal, text))
     return dated
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import InputError, RangeError, UnitError
-from elevon.units.table import KINDS, SHOWN
+from elevon.units.table import DISPLAY, KINDS
 from elevon.units.unit import Unit, parse_unit, unit_names
 
 __all__ = [
@@ -32,7 +32,7 @@ _LONGEST = 100
 
 
 def parse_quantity(
-    text: str | float, kind: str, place: str | None = None, shown: str | None = None
+    text: str | float, kind: str, place: str | None = None, display_unit: str | None = None
 ) -> float:
     """Read a quantity such as ``"45 deg"`` as an SI float.
 
@@ -45,7 +45,7 @@ def parse_quantity(
         kind is accepted.
     place : str, optional
         Where the quantity stands (``motor.inertia``); named in the errors.
-    shown : str, optional
+    display_unit : str, optional
         The unit in which a person reads the place. Where it is not `kind` itself, a text without
         a unit could mean either and is refused; a number is never.
 
@@ -78,29 +78,29 @@ def parse_quantity(
         raise _not_a_quantity(text, kind, place)
     number, unit_text = match[1], match[2]
     unit = check_kind(unit_text, kind, place) if unit_text else expected
-    if not unit_text and shown and is_ambiguous(float(number), kind, shown):
-        raise ambiguous(number, kind, shown, place)
-    _finite(float(number), place, shown=number)
-    return _finite(_exact_si(number, unit), place, shown=text)
+    if not unit_text and display_unit and is_ambiguous(float(number), kind, display_unit):
+        raise ambiguous(number, kind, display_unit, place)
+    _finite(float(number), place, written=number)
+    return _finite(_exact_si(number, unit), place, written=text)
 
 
-def is_ambiguous(number: float, kind: str, shown: str) -> bool:
+def is_ambiguous(number: float, kind: str, display_unit: str) -> bool:
     """Tell whether a number without a unit means different things in two units.
 
     Zero means the same in every unit but those of temperature.
     """
-    own, other = parse_unit(kind), parse_unit(shown)
-    same = (own.scale, own.pi, own.offset) == (other.scale, other.pi, other.offset)
+    own_unit, other = parse_unit(kind), parse_unit(display_unit)
+    same = (own_unit.scale, own_unit.pi, own_unit.offset) == (other.scale, other.pi, other.offset)
     if same or not math.isfinite(number):
         return False
-    return number != 0.0 or own.offset != other.offset
+    return number != 0.0 or own_unit.offset != other.offset
 
 
-def ambiguous(number: str, kind: str, shown: str, place: str | None = None) -> UnitError:
+def ambiguous(number: str, kind: str, display_unit: str, place: str | None = None) -> UnitError:
     """Return the error of a number without a unit, with both of its readings."""
     readings = [
         f"'{number} {unit}' ({format_quantity(parse_unit(unit).to_si(float(number)), other)})"
-        for unit, other in ((shown, kind), (kind, shown))
+        for unit, other in ((display_unit, kind), (kind, display_unit))
     ]
     return UnitError(f"{_at(place)}{number} has no unit; write {' or '.join(readings)}")
 
@@ -162,7 +162,7 @@ def si_unit(unit_text: str) -> str:
 
 def shown_unit(unit: str) -> str:
     """Return the unit in which a person reads an SI quantity: ``"deg"`` for ``"rad"``."""
-    return SHOWN.get(unit, unit)
+    return DISPLAY.get(unit, unit)
 
 
 @overload
@@ -224,10 +224,10 @@ def format_quantity(value: float, unit: str, digits: int = 6) -> str:
         in that unit is given in SI.
     """
     with np.errstate(over="ignore"):
-        shown = to_display(float(value), unit)
-    if math.isinf(shown) and math.isfinite(value):
+        displayed = to_display(float(value), unit)
+    if math.isinf(displayed) and math.isfinite(value):
         return f"{value:.{digits}g} (SI)"
-    number = f"{shown:.{digits}g}"
+    number = f"{displayed:.{digits}g}"
     return number if unit in {"", "1"} else f"{number} {unit}"
 
 
@@ -249,9 +249,9 @@ def _real(value: float, place: str | None) -> float:
         raise RangeError(f"{_at(place)}the value is too large for a float") from error
 
 
-def _finite(value: float, place: str | None, shown: str | None = None) -> float:
+def _finite(value: float, place: str | None, written: str | None = None) -> float:
     if not math.isfinite(value):
-        raise RangeError(f"{_at(place)}{shown or value} is not a finite number")
+        raise RangeError(f"{_at(place)}{written or value} is not a finite number")
     return value
 
 
@@ -260,10 +260,8 @@ def _not_a_quantity(text: str, kind: str, place: str | None) -> InputError:
     if word in {"nan", "inf", "infinity"}:
         return RangeError(f"{_at(place)}{text.strip()} is not a finite number")
     example = f"45 {kind}" if kind not in {"", "1"} else "0.5"
-    shown = text if len(text) <= _LONGEST else text[:40] + "..."
-    return InputError(
-        f"{_at(place)}{shown!r} is not a number with a unit; write it like {example!r}"
-    )
+    cut = text if len(text) <= _LONGEST else text[:40] + "..."
+    return InputError(f"{_at(place)}{cut!r} is not a number with a unit; write it like {example!r}")
 
 
 def _at(place: str | None) -> str:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from fractions import Fraction
 
 __all__ = [
+    "DISPLAY",
     "KINDS",
     "OFFSETS",
     "PREFIXED",
     "PREFIXES",
     "PRODUCTS",
-    "SHOWN",
     "SYMBOLS",
     "WORDS",
     "Dimension",
@@ -213,7 +213,7 @@ KINDS: tuple[tuple[str, str], ...] = (
 )
 
 PRODUCTS = ("kg cm2", "g cm2", "N/mm", "lbf in", "deg/s", "deg/s2", "mm/s", "mm/rev", "V/krpm")
-SHOWN = {
+DISPLAY = {
     "rad": "deg",
     "rad/s": "rpm",
     "rad/s2": "deg/s2",

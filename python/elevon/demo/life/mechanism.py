@@ -57,7 +57,7 @@ def motion(demo: LifeDemo, usage: float) -> Motion:
     scenario = demo_mission().scenarios().replaced(duration=2.0 * _SECONDS)
     scenario = scenario.with_faults(faults_at(demo.life, usage))
     record = f"output_position,motor_position,command@{_FRAMES / _SECONDS:g} Hz"
-    ready = prepare(Run(unit, scenario), "low", record, doubts=False)
+    ready = prepare(Run(unit, scenario), "low", record, notices=False)
     result = simulate_prepared([ready], fidelity="low")[0]
     rows = result["clocks"][ready.plan[0].name]["values"][_FRAMES : 2 * _FRAMES + 1]
     output, motor, command = rows[:, 0], rows[:, 1], rows[:, 2]

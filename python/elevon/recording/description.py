@@ -20,14 +20,21 @@ from elevon.errors import DamageError, FormatError, InputError
 from elevon.files import journal, write_text
 from elevon.recording.header import Header
 
-__all__ = ["Beside", "beside", "describes", "read_beside", "sha256_of", "write_beside"]
+__all__ = [
+    "TableDescription",
+    "describes",
+    "description_path",
+    "read_description",
+    "sha256_of",
+    "write_description",
+]
 
 _WHAT = "Elevon recording"
 _LARGEST = 256 * 2**20
 
 
 @dataclass(frozen=True)
-class Beside:
+class TableDescription:
     """What the file beside a CSV table says.
 
     Attributes
@@ -48,7 +55,7 @@ class Beside:
     files: list[str]
 
 
-def beside(table: Path) -> Path:
+def description_path(table: Path) -> Path:
     """Return the path of the description: ``run.csv.json`` beside ``run.csv``."""
     return table.with_name(f"{table.name}.json")
 
@@ -59,7 +66,7 @@ def sha256_of(path: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def write_beside(table: Path, about: Beside, *, keep_old: bool) -> Path:
+def write_description(table: Path, about: TableDescription, *, keep_old: bool) -> Path:
     """Write a description; `keep_old`: with the one it replaces, until the table is replaced."""
     content = _content(about)
     if keep_old:
@@ -68,7 +75,7 @@ def write_beside(table: Path, about: Beside, *, keep_old: bool) -> Path:
             old.pop("replaces", None)
             content["replaces"] = _matching(table) or old
     with journal():  # the table is what was written, not this
-        return write_text(beside(table), json.dumps(content, indent=1) + "\n", force=True)
+        return write_text(description_path(table), json.dumps(content, indent=1) + "\n", force=True)
 
 
 def describes(path: Path) -> bool:
@@ -80,7 +87,7 @@ def describes(path: Path) -> bool:
         return False
 
 
-def read_beside(table: Path) -> Beside | None:
+def read_description(table: Path) -> TableDescription | None:
     """Return the description that belongs to a table; None where no file stands beside it.
 
     Raises
@@ -90,27 +97,27 @@ def read_beside(table: Path) -> Beside | None:
     FormatError
         The file beside the table is no description.
     """
-    if not beside(table).exists():
+    if not description_path(table).exists():
         return None
     content = _matching(table)
     if content is None:
         raise DamageError(
-            f"{table}: damaged or changed: not the bytes that {beside(table).name} describes "
-            "(SHA-256); without that file the table is read as it is, with a warning"
+            f"{table}: damaged or changed: not the bytes that {description_path(table).name} "
+            "describes (SHA-256); without that file the table is read as it is, with a warning"
         )
     try:
-        header = Header.from_json(json.dumps(content["recording"]), str(beside(table)))
+        header = Header.from_json(json.dumps(content["recording"]), str(description_path(table)))
         names = content["files"]
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
             raise TypeError("files must be names")
-        return Beside(str(content["sha256"]), header, str(content["of"]), names)
+        return TableDescription(str(content["sha256"]), header, str(content["of"]), names)
     except (KeyError, TypeError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        raise FormatError(f"{beside(table)}: damaged: {error!r}") from error
+        raise FormatError(f"{description_path(table)}: damaged: {error!r}") from error
 
 
-def _content(about: Beside) -> dict[str, Any]:
+def _content(about: TableDescription) -> dict[str, Any]:
     return {
         "what": _WHAT,
         "sha256": about.sha256,
@@ -131,7 +138,7 @@ def _matching(table: Path) -> dict[str, Any] | None:
 
 
 def _document(table: Path) -> dict[str, Any]:
-    return _parsed(beside(table))
+    return _parsed(description_path(table))
 
 
 def _parsed(path: Path) -> dict[str, Any]:

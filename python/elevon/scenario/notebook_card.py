@@ -13,7 +13,7 @@ __all__ = ["scenario_card"]
 
 
 def scenario_card(scenario: Scenario) -> Html:
-    """Return the HTML view of a scenario: what is asked, what acts, what breaks, for how long."""
+    """Return the HTML view of a scenario: command, loads, faults, duration."""
     command, loads = scenario.command, scenario.loads
     rows: list[list[object]] = [[f"command ({command.mode})", _sum(command)]]
     rows += [["", f"{step.time}: {step.action}"] for step in command.steps]
