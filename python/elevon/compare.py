@@ -1,4 +1,4 @@
-"""The low fidelity model beside the high one: how far apart, and how much faster."""
+"""The reduced-order model beside the switching one: how far apart, and how much faster."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ Array = npt.NDArray[np.float64]
 ROLES = {"position": "output_position", "speed": "motor_speed", "q_current": "torque_current"}
 """What is compared, and the role that shows it."""
 SIGNALS = ("output_position", "motor_speed", "current_q")
-"""What backlashes these roles in a servo, true values before what the sensors show."""
+"""The channels of these roles in a servo, true values before what the sensors show."""
 RATES = {"high": "10 kHz", "low": "every"}
-"""The relays' ripple (1 to 5 kHz) must not alias; the low model is kept at each of its steps."""
+"""The relays' ripple (1 to 5 kHz) must not alias; the reduced-order one keeps its steps."""
 GRID_HZ = 400.0
 """Rate at which the filtered signals are compared: that of the bench's log."""
 START_S = 10.0
@@ -54,7 +54,7 @@ class Comparison:
     signals : mapping of str to str
         Position, speed and q_current: the signal compared.
     amplitude : float
-        Half the range of the high model's position, its normaliser [rad or m].
+        Half the range of the switching model's position, its normaliser [rad or m].
     recordings : (Recording, Recording)
         High and low, as recorded.
     start, cutoff : float
@@ -93,7 +93,7 @@ class Comparison:
 
     @property
     def speed_up(self) -> float:
-        """Wall time of the high model over that of the low one, integration alone."""
+        """Wall time of the switching model over that of the low one, integration alone."""
         high, low = (float(recording.meta["wall_s"]) for recording in self.recordings)
         return high / low if low > 0.0 else float("inf")
 
@@ -128,10 +128,10 @@ class Comparison:
 
 
 def default_scenario(actuator: Actuator) -> Scenario:
-    """Return what an actuator is compared on when nothing is asked for.
+    """Return what an actuator is compared on when nothing is given.
 
-    Its set's ``[compare]``, else its own scenario, else the ``[compare]`` of a set that comes with
-    the package and has the same wiring.
+    Its file's ``[compare]``, else its own scenario, else the ``[compare]`` of an actuator file that
+    comes with the package and has the same wiring.
 
     Raises
     ------
@@ -157,15 +157,15 @@ def _shipped(wiring: str) -> Mapping[str, Any] | None:
     return next((table["scenario"] for table in tables if table is not None), None)
 
 
-def default_start(actuator: Actuator, scenario: Scenario, *, own: bool) -> float:
+def default_start(actuator: Actuator, scenario: Scenario, *, default: bool) -> float:
     """Return what is left out at the beginning [s].
 
-    `own`: the scenario is the actuator's, not the caller's. What the set says; else 10 s, of an
-    actuator's own scenario a third at most.
+    `default`: the scenario is the actuator's, not the caller's. What the actuator file says; else
+    10 s, of an actuator's own scenario a third at most.
     """
     if actuator.compare is not None:
         return float(actuator.compare["after"])
-    return min(START_S, scenario.seconds / 3.0) if own else START_S
+    return min(START_S, scenario.seconds / 3.0) if default else START_S
 
 
 def compare(
@@ -205,9 +205,9 @@ def compare(
     SimulationError
         One of the runs did not reach its end.
     """
-    own = scenario is None
+    default = scenario is None
     scenario = default_scenario(actuator) if scenario is None else scenario
-    start = default_start(actuator, scenario, own=own) if start is None else start
+    start = default_start(actuator, scenario, default=default) if start is None else start
     if scenario.seconds <= start + 1.0 / cutoff:
         raise InputError(
             f"compare: the scenario lasts {scenario.seconds:g} s; what is compared begins at "

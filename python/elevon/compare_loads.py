@@ -41,7 +41,7 @@ def compare_loads(
     Parameters
     ----------
     load : quantity, optional
-        Size of the load [N or N m at the output]; default the set's ``[compare]``.
+        Size of the load [N or N m at the output]; default the actuator file's ``[compare]``.
     actuator, scenario, seed, start, cutoff, progress
         As for `elevon.compare.compare`.
 
@@ -57,9 +57,9 @@ def compare_loads(
     """
     from elevon.progress import part
 
-    own = scenario is None
+    default = scenario is None
     base = default_scenario(actuator) if scenario is None else scenario
-    start = default_start(actuator, base, own=own) if start is None else start
+    start = default_start(actuator, base, default=default) if start is None else start
     size = load_size(actuator, load)
     times, direction = _direction(actuator, base, seed)
     results = {}
@@ -73,7 +73,7 @@ def compare_loads(
 
 
 def load_size(actuator: Actuator, load: str | float | None = None) -> float:
-    """Return the size of the load [N or N m]: as given, else as the set says."""
+    """Return the size of the load [N or N m]: as given, else as the actuator file says."""
     from elevon import _core
     from elevon.units import parse_quantity
 

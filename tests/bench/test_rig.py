@@ -55,8 +55,8 @@ def test_loaded_runs_have_the_published_backlashes_and_brake(actuator):
     backlashes = [setup.actuator.parameters.value("backlash.total") for setup in found]
     assert backlashes == pytest.approx([INTRINSIC_BACKLASH + net for net in (0.0, 0.0145, 0.02335)])
     for setup in found:
-        assert setup.brake.asked[0] == pytest.approx(0.2)
-        assert setup.brake.asked[-1] == pytest.approx(2.0, abs=0.1)
+        assert setup.brake.target[0] == pytest.approx(0.2)
+        assert setup.brake.target[-1] == pytest.approx(2.0, abs=0.1)
 
 
 def test_it_writes_the_drives_columns_and_nothing_it_cannot_know(tmp_path, actuator):

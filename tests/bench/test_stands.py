@@ -5,7 +5,7 @@ import pytest
 
 from elevon import Actuator, Recording
 from elevon.bench.acquisition import acquire, internal_steps
-from elevon.bench.force_control import ForceLoop, asked_force
+from elevon.bench.force_control import ForceLoop, target_force
 from elevon.bench.procedure import ForceStep, Procedure, load_procedure, procedure_names
 from elevon.bench.run import run_procedure, stand_setups
 from elevon.bench.stand import stand_names, stand_of, stands
@@ -29,8 +29,8 @@ def test_each_shipped_actuator_has_a_stand_and_procedures_that_can_be_set_up():
         names = procedure_names(stand.name)
         assert names
         for item in names:
-            asked = load_procedure(item)
-            assert len(stand_setups(asked, actuator)) == len(asked.traces)
+            target = load_procedure(item)
+            assert len(stand_setups(target, actuator)) == len(target.traces)
     assert {stand_of(Actuator.load(n).wiring).name for n in set_names()} == set(stand_names())
 
 
@@ -44,8 +44,8 @@ def test_a_procedure_of_another_stand_is_refused_with_those_of_this_one():
 
 
 def test_a_step_of_force_rises_as_a_loop_of_second_order_does():
-    asked = np.where(TIME >= 1.0, 1000.0, 0.0)
-    force = LOOP.achieved(TIME, asked, np.zeros_like(TIME))
+    target = np.where(TIME >= 1.0, 1000.0, 0.0)
+    force = LOOP.achieved(TIME, target, np.zeros_like(TIME))
     t = TIME[TIME >= 1.0] - 1.0
     w, d = LOOP.omega, LOOP.damping
     r = w * np.sqrt(1.0 - d**2)
@@ -67,12 +67,12 @@ def test_more_than_the_load_actuator_has_is_refused():
         LOOP.achieved(TIME, np.full_like(TIME, 6e4), np.zeros_like(TIME))
 
 
-def test_asked_force_is_of_direction_spring_and_position():
+def test_target_force_is_of_direction_spring_and_position():
     step = ForceStep(
         kind="force", opposing="100 N", stiffness="2 N/mm", positions=(0.0, 0.1), forces=(0.0, 50.0)
     )
     position, speed = np.array([0.05, 0.05]), np.array([0.1, -0.1])
-    got = asked_force(step, np.array([10.0, 10.0]), position, speed)
+    got = target_force(step, np.array([10.0, 10.0]), position, speed)
     assert got == pytest.approx([10.0 + 100.0 + 100.0 + 25.0, 10.0 - 100.0 + 100.0 + 25.0])
 
 
@@ -102,9 +102,9 @@ def test_64_khz_is_resampled_behind_a_filter_and_says_so():
     assert np.diff(log["vibration"].time[:3]) == pytest.approx(1 / 64e3)
     assert keep[2e3] == pytest.approx(1.0, abs=0.01)
     assert keep[60e3] < 0.01  # would have folded onto 4 kHz
-    said = log.meta["acquisition"]
-    assert said["resampled"] is True
-    assert "25600 Hz" in said["anti_alias"]
+    origin = log.meta["acquisition"]
+    assert origin["resampled"] is True
+    assert "25600 Hz" in origin["anti_alias"]
     with pytest.raises(InputError, match="steps"):
         internal_steps(64e3, 1e-4)
 

@@ -26,7 +26,7 @@ CASES = {
     ),
 }  # fmt: skip
 
-#: Far from the set's values in everything that is estimated.
+#: Far from the actuator file's values in everything that is estimated.
 VALUES = {
     "drive.kind": "pwm",
     "solver.step": 2.5e-6,
@@ -122,12 +122,12 @@ def write_logs(truth, folder, *, seed=0, cell=True, encoder_gain=1.0, noted=1.0,
         number, unit = note["amplitude"].split()
         note["amplitude"] = f"{noted * float(number)!r} {unit}"
         if brake and cell:
-            own = np.arange(0.0, 20.0 - trigger, 1 / 80)
-            at = trigger + 1.0008 * own
+            cell_time = np.arange(0.0, 20.0 - trigger, 1 / 80)
+            at = trigger + 1.0008 * cell_time
             torque = np.interp(at, time, recording["brake_torque"].values)
             sign = np.sign(np.interp(at, time, recording["motor_speed"].values))
-            force = sign * torque * CHAIN / ARM + rng.normal(0, 0.3, len(own))
-            write_loadcell(folder / f"{name}_loadcell.csv", own, force, force=True)
+            force = sign * torque * CHAIN / ARM + rng.normal(0, 0.3, len(cell_time))
+            write_loadcell(folder / f"{name}_loadcell.csv", cell_time, force, force=True)
             note |= {"load_cell_arm": ARM, "chain_ratio": CHAIN}
         (folder / f"{name}_command.json").write_text(json.dumps(note))
     return paths

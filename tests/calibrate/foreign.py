@@ -159,8 +159,8 @@ def run(bench, sensors, trial, seed=0, duration=DURATION, start=None):
     where = float(rng.uniform(-1.0, 1.0))
     outer = bench.position_sample_time or bench.sample_time
     tick = np.arange(round(duration / outer) + 1) * outer
-    rest = output * sensors.encoder_gain + sensors.encoder_offset
-    command = np.where(tick < start, rest, trial.command(np.maximum(tick - start, 0.0)))
+    reading = output * sensors.encoder_gain + sensors.encoder_offset
+    command = np.where(tick < start, reading, trial.command(np.maximum(tick - start, 0.0)))
     brake = np.zeros_like(tick)
     if trial.brake:
         low, high = trial.brake
@@ -193,15 +193,15 @@ def run(bench, sensors, trial, seed=0, duration=DURATION, start=None):
 
 def truth(bench, sensors):
     """Return what a calibration is to find, SI; of two masses, what one mass sees of them."""
-    dragged = bench.output_dry / bench.ratio if bench.elastic else 0.0
+    friction = bench.output_dry / bench.ratio if bench.elastic else 0.0
     swung = bench.output_inertia / bench.ratio**2 if bench.elastic else 0.0
     wound = 2 * bench.output_dry / bench.stiffness if bench.elastic else 0.0
     zero = sensors.encoder_gain * sensors.motor_zero / bench.ratio
     return {
         "motor.emf_constant": bench.torque_constant / 1.5,
         "derived.inertia": bench.inertia + swung,
-        "friction.dynamic": bench.dry + dragged,
-        "friction.static": bench.stick + dragged,
+        "friction.dynamic": bench.dry + friction,
+        "friction.static": bench.stick + friction,
         "friction.viscous": bench.viscous,
         "backlash.total": bench.backlash + wound,
         "control.speed_gain": bench.speed_gain,
@@ -274,8 +274,8 @@ def draw_creeping(seed, bench=None):
 def unrest(bench, sensors, seed=0):
     """Return how the bench hunts under a command that stands still: RMS speed of the motor, and
     the output's travel in counts."""
-    still = Trial("sine", {"amplitude": 0.0, "bias": 5.0, "frequency": 1.0})
-    done = run(bench, sensors, still, seed, duration=6.0, start=0.2)
+    standing = Trial("sine", {"amplitude": 0.0, "bias": 5.0, "frequency": 1.0})
+    done = run(bench, sensors, standing, seed, duration=6.0, start=0.2)
     late = done.time > 3.0
     travel = np.ptp(done.rows["output"][late]) / COUNT
     return float(np.sqrt(np.mean(done.rows["speed"][late] ** 2))), float(travel)

@@ -70,13 +70,13 @@ def drive_columns(done, sensors, style, rng):
 def load_cell(done, sensors, rng):
     """Return time on the cell's own clock, zero at the trigger, and force [N]."""
     last = (done.time[-1] - done.trigger) / (1 + sensors.cell_clock)
-    own = np.arange(0.0, last, 1.0 / sensors.cell_rate)
-    at = done.trigger + (1 + sensors.cell_clock) * own
+    cell_time = np.arange(0.0, last, 1.0 / sensors.cell_rate)
+    at = done.trigger + (1 + sensors.cell_clock) * cell_time
     force = np.interp(at, done.time, done.rows["reaction"]) * sensors.chain / sensors.arm
     if sensors.cell == "positive":
         force = np.abs(force)
-    force = force + sensors.cell_offset + rng.normal(0, sensors.cell_noise, len(own))
-    return own, force
+    force = force + sensors.cell_offset + rng.normal(0, sensors.cell_noise, len(cell_time))
+    return cell_time, force
 
 
 def note(trial, sensors, style, cell):
@@ -123,10 +123,10 @@ def write_trial(path, done, sensors, style, seed=0):
     write_table(path, style.delimiter.join(names), values, style, formats)
     cell = bool(done.trial.brake) and sensors.cell != "none"
     if cell:
-        own, force = load_cell(done, sensors, rng)
+        cell_time, force = load_cell(done, sensors, rng)
         header = style.cell_header.replace(",", style.delimiter)
-        beside = path.with_name(f"{path.stem}_loadcell.csv")
-        write_table(beside, header, [own, force], style, ["%.5f", "%.4f"])
+        cell_file = path.with_name(f"{path.stem}_loadcell.csv")
+        write_table(cell_file, header, [cell_time, force], style, ["%.5f", "%.4f"])
     known = note(done.trial, sensors, style, cell)
     path.with_name(f"{path.stem}_command.json").write_text(json.dumps(known, indent=1))
     return path

@@ -21,11 +21,11 @@ def test_blocks_cover(rho):
         drive = rng.normal(0.0, np.sqrt(1 - rho**2), len(time) + 2000)
         noise = lfilter([1.0], [1.0, -rho], drive)[2000:]
         wrong = solver @ noise
-        rest = noise - design @ wrong
-        blocks = stroke_blocks(time, speed, rest, 0.0025)
-        covariance, degrees = block_covariance(normal, [design * rest[:, None]], [blocks])
+        residual = noise - design @ wrong
+        blocks = stroke_blocks(time, speed, residual, 0.0025)
+        covariance, degrees = block_covariance(normal, [design * residual[:, None]], [blocks])
         hits += int(np.sum(np.abs(wrong) < quantile(degrees) * np.sqrt(np.diag(covariance))))
-        plain = np.sqrt(np.diag(np.linalg.inv(normal)) * rest.var())
+        plain = np.sqrt(np.diag(np.linalg.inv(normal)) * residual.var())
         white += int(np.sum(np.abs(wrong) < 1.645 * plain))
     assert 0.83 <= hits / 450 <= 0.97
     if rho > 0.5:
@@ -35,8 +35,8 @@ def test_blocks_cover(rho):
 def test_blocks_are_whole_strokes_and_long_enough():
     time = np.arange(0.0, 20.0, 0.0025)
     speed = np.sin(2 * np.pi * 0.5 * time + 0.1)
-    rest = np.random.default_rng(1).normal(size=len(time))
-    blocks = stroke_blocks(time, speed, rest, 0.0025)
+    residual = np.random.default_rng(1).normal(size=len(time))
+    blocks = stroke_blocks(time, speed, residual, 0.0025)
     assert np.all(np.diff(blocks) >= 0)
     edges = np.flatnonzero(np.diff(blocks)) + 1
     assert np.all(np.sign(speed[edges]) != np.sign(speed[edges - 1]))

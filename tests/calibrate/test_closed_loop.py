@@ -80,13 +80,13 @@ def test_between_samples_the_demand_has_no_corners():
 def test_what_cannot_be_a_log_is_refused():
     time = 0.01 * np.arange(100)
     wave = np.sin(time)
-    for bad, said in (
+    for bad, message in (
         ((time[:20], wave[:20], {"position": wave[:20]}), "at least 50"),
         ((time[::-1], wave, {"position": wave}), "increase"),
         ((time, wave, {}), "nothing of the motion"),
         ((time, 0.0 * wave, {"position": wave}), "never changes"),
     ):
-        with pytest.raises(InputError, match=said):
+        with pytest.raises(InputError, match=message):
             LoopLog("log", *bad)
     with pytest.raises(UnknownNameError, match="position"):
         LoopLog("log", time, wave, {"postion": wave})
@@ -113,9 +113,9 @@ def test_from_a_good_start_a_short_log_is_followed():
     reasons = {row.free.path: row.reason for row in rows}
     assert not reasons["control.pid_derivative_time"]
     ratio = next(row for row in rows if row.free.path == "friction.reverse_scale")
-    assert ratio.std >= 1.0, "a constant load can take friction from one way to the other"
-    held = held_out_errors(fitted)
-    assert {error.signal for error in held.errors} == {"position", "speed", "current"}
+    assert ratio.std >= 1.0, "a constant load can take friction from one direction to the other"
+    validation = held_out_errors(fitted)
+    assert {error.signal for error in validation.errors} == {"position", "speed", "current"}
 
 
 def test_friction_grows_with_the_torque_unless_the_set_says_how_it_does(known_drive):
@@ -154,31 +154,31 @@ def test_a_filtered_speed_is_a_lag_and_not_only_a_delay(known_drive):
 def test_what_the_logger_adds_is_part_of_a_validation(known_drive):
     base, data = known_drive
     late = {"speed_delay": 0.012, "speed_lag": 0.015}
-    plain, shown = (
+    plain, channels = (
         {error.signal: error.rms for error in validate_loop([data], base, 0.0, given).errors}
         for given in ({}, late)
     )
-    assert shown["speed"] < 0.5 * plain["speed"]
-    assert shown["position"] == pytest.approx(plain["position"])
+    assert channels["speed"] < 0.5 * plain["speed"]
+    assert channels["position"] == pytest.approx(plain["position"])
 
 
 def test_gains_that_change_places_are_both_named():
-    """With a feed-forward of one, k_v/N = 30 and T_i = 1/40 s cannot be told from 40 and 1/30 s."""
+    """With a feed-forward of one, k_v/N = 30 and T_i = 1/40 s are ambiguous with 40 and 1/30 s."""
     base, data = datasheet(CASCADE), loop("sweep", log(CASCADE, sweep, 8.0))
     turns = CASCADE.per_metre
-    own = {"control.position_gain": 30.0 * turns, "control.integral_time": 1.0 / 40.0}
+    nominal = {"control.position_gain": 30.0 * turns, "control.integral_time": 1.0 / 40.0}
     drive = base.with_values(
-        {**own, "control.speed_feedforward": 1.0, "control.speed_gain": 0.01,
+        {**nominal, "control.speed_feedforward": 1.0, "control.speed_gain": 0.01,
          "control.structure": "cascade", "control.speed_limit": 1e3}
     )  # fmt: skip
-    free = asked_for(free_list(drive, [data], "cascade", {}), list(own))
-    free = [item for item in free if item.path in own]
-    shown = LoopModel(drive, [data], "cascade").simulate([own])[0][0]
-    objective = Objective(LoopModel(drive, [replace(data, signals=shown)], "cascade"), free)
+    free = asked_for(free_list(drive, [data], "cascade", {}), list(nominal))
+    free = [item for item in free if item.path in nominal]
+    channels = LoopModel(drive, [data], "cascade").simulate([nominal])[0][0]
+    objective = Objective(LoopModel(drive, [replace(data, signals=channels)], "cascade"), free)
     swapped = {"control.position_gain": 40.0 * turns, "control.integral_time": 1.0 / 30.0}
     settled, reasons = exchanged(Fitted(objective, inner(free, swapped)), drive)
-    assert settled.values == pytest.approx(own), "the pair nearer to the set"
-    assert reasons.keys() == own.keys()
+    assert settled.values == pytest.approx(nominal), "the pair nearer to the set"
+    assert reasons.keys() == nominal.keys()
     assert all("cannot be separated" in reason for reason in reasons.values())
     slow = drive.with_values({"control.speed_feedforward": 0.0})
     assert exchanged(settled, slow)[1] == {}
@@ -259,7 +259,7 @@ def test_everything_is_determined_or_listed_with_a_reason(short):
 @pytest.mark.long
 def test_the_calibrated_servo_predicts_its_own_log(short):
     data, result = short
-    rows, traces = predict([data], result.actuator, result.shown)
+    rows, traces = predict([data], result.actuator, result.channels)
     assert above(rows, BAR) == {}
     assert traces[0]["position"].shape == data.time.shape
 
@@ -279,7 +279,7 @@ def test_the_bar_of_a_fit_by_hand(bench, structure):
 def test_one_kind_of_test_predicts_the_other(bench, fitted, bar):
     data = both(bench)
     result = calibrate_loop([data[fitted]], datasheet(bench))
-    rows, _ = predict([data[1 - fitted]], result.actuator, result.shown)
+    rows, _ = predict([data[1 - fitted]], result.actuator, result.channels)
     assert above(rows, bar) == {}
 
 

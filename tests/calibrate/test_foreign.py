@@ -14,14 +14,14 @@ from tests.calibrate.foreign import run as carry_out
 from tests.calibrate.foreign_benches import CASES
 from tests.calibrate.foreign_files import CAMPAIGN, Style, write_campaign, write_trial
 
-#: What a campaign with a load cell must tell; the rest may be left out, but never be wrong.
-TOLD = {
+#: What a campaign with a load cell must determine; the rest may be left out, but never be wrong.
+DETERMINED = {
     "motor.emf_constant", "derived.inertia", "friction.dynamic", "friction.viscous",
     "backlash.total",
     "control.speed_gain", "control.integral_time", "control.position_gain",
     "sensor.speed_offset", "sensor.current_offset", "sensor.encoder.offset", "sensor.encoder.gain",
 }  # fmt: skip
-#: What the current alone tells only as a ratio to the torque constant.
+#: What the current alone determines only as a ratio to the torque constant.
 SCALED = ("derived.inertia", "friction.dynamic", "friction.static", "friction.viscous",
           "control.speed_gain")  # fmt: skip
 #: What ripple, ticks and filters of a drive hide: held to three of its own deviations where these
@@ -47,9 +47,9 @@ def allowed(path, true):
     return 0.02 * abs(true)
 
 
-def misses(parameters, true, told, rough=False):
+def misses(parameters, true, determined, rough=False):
     """Say what is missing or off: path, truth, estimate, interval."""
-    wrong = [f"{path}: missing" for path in sorted(told - parameters.keys())]
+    wrong = [f"{path}: missing" for path in sorted(determined - parameters.keys())]
     for path in sorted(true.keys() & parameters.keys()):
         item = parameters[path]
         limit = allowed(path, true[path])
@@ -99,8 +99,8 @@ def test_a_small_bench_from_end_to_end(small, tmp_path, capsys):
     options = ["--free", ",".join(free), "--out", str(out), "--json"]
     assert elevon(["calibrate", *logs, "--actuator", "torino-rotary", *options]) == 0
     document = json.loads(capsys.readouterr().out)
-    told = {*free, "sensor.speed_offset", "sensor.current_offset"}
-    assert misses(document["parameters"], true, told) == []
+    determined = {*free, "sensor.speed_offset", "sensor.current_offset"}
+    assert misses(document["parameters"], true, determined) == []
     before, after = (pooled(document["validation"][when]) for when in ("before", "after"))
     assert {signal: error for signal, error in after.items() if error > 0.5 * before[signal]} == {}
     assert elevon(["validate", logs[0], "--actuator", str(out), "--json"]) == 0
@@ -115,9 +115,9 @@ class Outcome:
 
     code: int
     document: dict
-    said: str
+    output: str
     true: dict
-    told: set
+    determined: set
     folder: Path
     comparable: tuple  # logs whose brake is known: the others' torque is in no file
     checks: dict
@@ -131,30 +131,30 @@ def outcome(request, tmp_path_factory):
     bench, sensors, style, trials = case.build()
     folder = tmp_path_factory.mktemp(request.param)
     paths, true = write_campaign(folder, bench, sensors, style, trials, seed=case.seed)
-    weighed = sensors.cell != "none" and style.noted_arm
-    back = HELD_BACK if weighed else replace(HELD_BACK, brake=())
+    with_cell = sensors.cell != "none" and style.noted_arm
+    back = HELD_BACK if with_cell else replace(HELD_BACK, brake=())
     back = carry_out(bench, sensors, back, seed=900 + case.seed)
-    held = write_trial(folder / "held.csv", back, sensors, style, 900 + case.seed)
+    validated = write_trial(folder / "held.csv", back, sensors, style, 900 + case.seed)
     out = folder / "found.toml"
     common = ["--actuator", "torino-rotary", "--out", str(out), "--json"]
-    code, said, text = _spoken(["calibrate", *map(str, paths), *common])
+    code, output, text = _spoken(["calibrate", *map(str, paths), *common])
     document = json.loads(text) if text else {}
-    told = set(TOLD)
-    if not weighed:
-        told.remove("motor.emf_constant")
+    determined = set(DETERMINED)
+    if not with_cell:
+        determined.remove("motor.emf_constant")
         scale = 1.5 * 0.900383 / bench.torque_constant
         true = {p: v * scale if p in SCALED else v for p, v in true.items()}
     if "current" in style.missing:
         del true["sensor.filter_cutoff"], true["sensor.current_offset"]
-        told.remove("sensor.current_offset")
+        determined.remove("sensor.current_offset")
     checks = {}
     for name, actuator in (("before", "torino-rotary"), ("after", str(out))):
         if code == 0:
-            _, _, found = _spoken(["validate", str(held), "--actuator", actuator, "--json"])
+            _, _, found = _spoken(["validate", str(validated), "--actuator", actuator, "--json"])
             checks[name] = json.loads(found)
-    names = tuple(path.name for path in paths if weighed or not trials[path.stem].brake)
+    names = tuple(path.name for path in paths if with_cell or not trials[path.stem].brake)
     rough = bench.cogging > 0.0 or bench.stribeck > 0.0
-    return Outcome(code, document, said, true, told, folder, names, checks, rough)
+    return Outcome(code, document, output, true, determined, folder, names, checks, rough)
 
 
 def _spoken(arguments):
@@ -170,21 +170,21 @@ def _spoken(arguments):
 
 @pytest.mark.long
 def test_every_foreign_bench_can_be_calibrated(outcome):
-    assert outcome.code == 0, outcome.said[-500:]
+    assert outcome.code == 0, outcome.output[-500:]
 
 
 @pytest.mark.long
 def test_foreign_parameters_are_found_within_2_percent(outcome):
-    assert outcome.code == 0, outcome.said[-500:]
+    assert outcome.code == 0, outcome.output[-500:]
     found = outcome.document["parameters"]
-    wrong = misses(found, outcome.true, outcome.told, rough=outcome.rough)
+    wrong = misses(found, outcome.true, outcome.determined, rough=outcome.rough)
     assert not wrong, "\n".join(wrong)
 
 
 @pytest.mark.long
 def test_a_torque_constant_is_not_told_without_a_measured_torque(outcome):
-    assert outcome.code == 0, outcome.said[-500:]
-    measured = "motor.emf_constant" in outcome.told
+    assert outcome.code == 0, outcome.output[-500:]
+    measured = "motor.emf_constant" in outcome.determined
     found = outcome.document["parameters"]
     assert ("motor.emf_constant" in found) == measured
     assert measured == (found["friction.dynamic"]["given"] == [])
@@ -195,7 +195,7 @@ def test_a_torque_constant_is_not_told_without_a_measured_torque(outcome):
 
 @pytest.mark.long
 def test_the_model_follows_its_logs_far_better_than_before(outcome):
-    assert outcome.code == 0, outcome.said[-500:]
+    assert outcome.code == 0, outcome.output[-500:]
     before, after = (
         pooled(outcome.document["validation"][when], outcome.comparable)
         for when in ("before", "after")
@@ -205,7 +205,7 @@ def test_the_model_follows_its_logs_far_better_than_before(outcome):
 
 @pytest.mark.long
 def test_a_log_kept_back_is_followed_too(outcome):
-    assert outcome.code == 0, outcome.said[-500:]
+    assert outcome.code == 0, outcome.output[-500:]
     before, after = (pooled(outcome.checks[when]) for when in ("before", "after"))
     # A loop this good hides the difference under the encoder's counts.
     assert after["encoder_position"] < max(0.5 * before["encoder_position"], COUNT)
@@ -237,7 +237,7 @@ LACKING = {
 @pytest.mark.long
 @pytest.mark.parametrize("name", LACKING)
 def test_what_a_campaign_lacks_is_not_made_up(name, tmp_path):
-    """What is told is right, and the model follows the logs far better than before."""
+    """What is determined is right, and the model follows the logs far better than before."""
     seed, changes, missing, logs = LACKING[name]
     bench, sensors = draw(seed, changes)
     trials = {trial: CAMPAIGN[trial] for trial in logs}
@@ -246,19 +246,19 @@ def test_what_a_campaign_lacks_is_not_made_up(name, tmp_path):
     )
     out = tmp_path / "found.toml"
     common = ["--actuator", "torino-rotary", "--out", str(out), "--json"]
-    code, said, text = _spoken(["calibrate", *map(str, paths), *common])
-    assert code == 0, said[-500:]
+    code, output, text = _spoken(["calibrate", *map(str, paths), *common])
+    assert code == 0, output[-500:]
     document = json.loads(text)
-    told = set(document["parameters"])
-    if "motor.emf_constant" not in told:
+    determined = set(document["parameters"])
+    if "motor.emf_constant" not in determined:
         scale = 1.5 * 0.900383 / bench.torque_constant
         true = {p: v * scale if p in SCALED else v for p, v in true.items()}
     if missing == ("current",):
-        assert "sensor.current_offset" not in told
+        assert "sensor.current_offset" not in determined
     wrong = misses(document["parameters"], true, set())
     assert not wrong, "\n".join(wrong)
     before, after = (pooled(document["validation"][when]) for when in ("before", "after"))
-    # A set point shows the derivative's spikes, which the low model has not.
+    # A set point shows the derivative's spikes, which the reduced-order model has not.
     share = {"current_q_meas": 1.0} if missing == ("current",) else {}
     assert {s: after[s] for s in after if after[s] > share.get(s, 0.5) * before[s]} == {}
 
@@ -275,7 +275,7 @@ def test_twenty_foreign_benches_and_their_intervals(tmp_path):
         bench, sensors = draw(seed, {"sample_time": (125e-6, 250e-6)[seed % 2]})
         paths, true = write_campaign(tmp_path / str(seed), bench, sensors, seed=seed)
         found = calibrate(read_logs(paths), base, model_runs=False, hold_out=False)
-        for path in TOLD:
+        for path in DETERMINED:
             item = found[path]
             off = abs(item.value - true[path])
             errors.setdefault(path, []).append(off / allowed(path, true[path]))

@@ -56,8 +56,8 @@ def test_every_way_of_writing_gives_the_same_numbers(name, trials, tmp_path, cap
     _, sensors, (_, braked) = trials
     style = SHAPES[name]
     path = write_trial(tmp_path / "braked.csv", braked, sensors, style)
-    code, report, said = imported(path, capsys)
-    assert code == 0, said
+    code, report, messages = imported(path, capsys)
+    assert code == 0, messages
     seen = Recording.load(report["recording"])
     np.testing.assert_allclose(
         seen["encoder_position"].values, braked.rows["output"], atol=1e-3 * COUNT
@@ -74,8 +74,8 @@ def test_every_way_of_writing_gives_the_same_numbers(name, trials, tmp_path, cap
     truth = np.interp(torque.time, braked.time, braked.rows["reaction"])
     middle = (torque.time > braked.trigger + 0.5) & (torque.time < 4.5)
     scale = sensors.arm / sensors.chain
-    rest = torque.values[middle] - truth[middle] - sensors.cell_offset * scale
-    assert np.median(np.abs(rest)) < 3 * sensors.cell_noise * scale
+    residual = torque.values[middle] - truth[middle] - sensors.cell_offset * scale
+    assert np.median(np.abs(residual)) < 3 * sensors.cell_noise * scale
 
 
 def test_what_was_seen_is_in_the_report(trials, tmp_path, capsys):
@@ -162,8 +162,8 @@ def test_a_wrong_sign_or_shaft_is_named(key, factor, names, trials, tmp_path, ca
         if command == "calibrate":
             tail = ["--actuator", "torino-rotary", "--out", str(tmp_path / "x.toml")]
         assert elevon([command, str(path), *tail, "--json"]) == 2
-        said = capsys.readouterr().err
-        assert all(name in said for name in names), said
+        messages = capsys.readouterr().err
+        assert all(name in messages for name in names), messages
 
 
 def test_a_stated_shaft_is_checked_against_the_log(log, tmp_path, capsys):
@@ -173,10 +173,10 @@ def test_a_stated_shaft_is_checked_against_the_log(log, tmp_path, capsys):
             f'[[column]]\nname = "{HEADERS["encoder"]}"\nsignal = "encoder_position"\n'
             f'unit = "deg"\nshaft = "{shaft}"\n'
         )
-        found, _, said = imported(log, capsys, "--map", str(stated))
-        assert found == code, said
-    assert HEADERS["encoder"] in said
-    assert "the other shaft" in said
+        found, _, messages = imported(log, capsys, "--map", str(stated))
+        assert found == code, messages
+    assert HEADERS["encoder"] in messages
+    assert "the other shaft" in messages
 
 
 def test_logs_of_two_rates_are_refused(trials, log, tmp_path, capsys):
@@ -207,10 +207,10 @@ def test_a_note_that_does_not_fit_is_named(log, capsys):
         ({"brake": "perhaps"}, "brake"),
     ):
         note.write_text(json.dumps(sound | change))
-        code, _, said = imported(log, capsys)
+        code, _, messages = imported(log, capsys)
         assert code == 2, change
-        assert note.name in said
-        assert name in said
+        assert note.name in messages
+        assert name in messages
     note.write_text(json.dumps(sound)[:-9])
     assert imported(log, capsys)[0] == 2
     note.write_text(json.dumps(sound | {"operator": "N. N."}))
@@ -231,19 +231,19 @@ def test_a_damaged_load_cell_file_is_refused(trials, tmp_path, capsys):
         ("\n".join([lines[0], *lines[60:], *lines[1:60]]) + "\n", "back"),
     ):
         cell.write_text(text)
-        code, _, said = imported(path, capsys)
+        code, _, messages = imported(path, capsys)
         assert code == 2
-        assert cell.name in said
-        assert name in said, said
+        assert cell.name in messages
+        assert name in messages, messages
 
 
 def test_gaps_and_repeated_rows_are_reported_and_not_repaired(log, capsys):
     lines = log.read_text().splitlines()
     gone = [*lines[:700], *lines[720:900], lines[899], *lines[900:]]
     log.write_text("\n".join(gone) + "\n")
-    code, report, said = imported(log, capsys)
+    code, report, messages = imported(log, capsys)
     assert code == 0
     assert report["clocks"]["drive"]["gaps"][0][2] == 20
     assert report["clocks"]["drive"]["duplicates"] == 1
-    assert "20 samples missing" in said
+    assert "20 samples missing" in messages
     assert len(Recording.load(report["recording"])["speed_ref"].values) == len(lines) - 1 - 20

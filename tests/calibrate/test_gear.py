@@ -1,4 +1,4 @@
-"""Landing gear: what was put in comes out of its logs, and the rest is said with a reason."""
+"""Landing gear: what was put in comes out of its logs, and the rest is reported with a reason."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ RIG = ("ff-extension-2", "ff-retraction-2", "ff-extension-10", "ff-retraction-10
        "ffm-extension-2", "ffm-retraction-2", "ffm-extension-10", "ffm-retraction-10",
        "brake-extension-2")  # fmt: skip
 FIRST, DRAWS, HIGH = 201, 20, 10  # none of these was looked at while the balances were written
-SHOWN = {"torque_current", "motor_speed", "output_position", "load", "command"}
+ROLES = {"torque_current", "motor_speed", "output_position", "load", "command"}
 
 
 @pytest.fixture(scope="module")
@@ -34,9 +34,9 @@ def test_what_the_logs_determine_is_recovered(one):
                  "control.gain_retraction", "control.zero_retraction",):  # fmt: skip
         assert errors[path] < max(0.02, 2.5 * result[path].std / values[path]), path
     for kind in ("ff", "ffm"):
-        for way in ("extension", "retraction"):
+        for direction in ("extension", "retraction"):
             for k in (2, 4):
-                assert errors[f"friction.{kind}_{way}_{k}"] < 0.05
+                assert errors[f"friction.{kind}_{direction}_{k}"] < 0.05
     covered = [e.interval[0] <= values[e.path] <= e.interval[1] for e in result.estimates]
     assert np.mean(covered) > 0.75
 
@@ -75,7 +75,7 @@ def few(logs, truth):
     ]
     model = Actuator.load("pisa-landing-gear").with_values({p: truth[p] for p in given})
     bare = [
-        replace(log, roles={role: v for role, v in log.roles.items() if role in SHOWN})
+        replace(log, roles={role: v for role, v in log.roles.items() if role in ROLES})
         for log in logs
         if "retraction" in log.name and log.moves
     ]

@@ -192,10 +192,10 @@ def test_three_logs_take_less_than_a_minute(logs):
 
 @pytest.mark.long
 def test_a_two_mass_bench_fitted_with_the_low_model(tmp_path, before):
-    """Elastic backlash and PWM drive against the low model: errors reported, absorbers named.
+    """Elastic backlash and PWM drive against the reduced-order model: absorbers are named.
 
     Nothing rubs on the output side of the two-mass model, so the output mass flies through the gap,
-    which no backlash operator does: within the gap the low model cannot know where it is.
+    which no backlash operator does: within the gap the reduced-order model cannot know where it is.
     """
     from elevon.calibrate import validate
 

@@ -1,4 +1,4 @@
-"""What cannot be calibrated is refused with its reason; what is asked for is never guessed."""
+"""What cannot be calibrated is refused with its reason; what is requested is never guessed."""
 
 import json
 
@@ -15,7 +15,7 @@ from elevon.errors import InputError, Interrupted, UnknownNameError
 from elevon.logs.formats.drive import write_drive_csv
 
 
-def still(folder, **changes):
+def standing(folder, **changes):
     """Write a log of a bench that does not move, or moves as `changes` say."""
     time = np.arange(0.0, 20.0, 0.0025)
     rng = np.random.default_rng(1)
@@ -34,12 +34,12 @@ def still(folder, **changes):
 
 
 def one_way(folder):
-    """Write a log of a bench that turns one way only."""
+    """Write a log of a bench that turns in one direction only."""
     time = np.arange(0.0, 20.0, 0.0025)
     speed = 10.0 + 0.5 * np.sin(time)
     motor = np.cumsum(speed) * 0.0025
     noise = np.random.default_rng(2).normal(0, 0.02, len(time))
-    return still(
+    return standing(
         folder, resolver_position=motor, encoder_position=motor / 124, speed_ref=speed + 0.3,
         motor_speed=speed, current_ref=0.3 + 0.003 * speed, current_q_meas=0.3 + noise,
     )  # fmt: skip
@@ -47,7 +47,7 @@ def one_way(folder):
 
 def test_a_log_at_rest_determines_nothing(tmp_path, before):
     with pytest.raises(InputError, match=r"determine|motion|excites"):
-        calibrate(read_logs([still(tmp_path)]), before)
+        calibrate(read_logs([standing(tmp_path)]), before)
 
 
 def test_backlash_without_a_reversal_is_refused(tmp_path, before):
@@ -78,10 +78,10 @@ def test_another_wiring_is_refused(logs):
 
 
 def test_missing_columns_are_named(tmp_path, logs):
-    with pytest.raises(InputError, match="no channel backlashes motor_speed"):
-        read_logs([still(tmp_path / "a", motor_speed=None)])
+    with pytest.raises(InputError, match="no channel has the role motor_speed"):
+        read_logs([standing(tmp_path / "a", motor_speed=None)])
     with pytest.raises(InputError, match="no torque current"):
-        read_logs([still(tmp_path / "b", current_ref=None, current_q_meas=None)])
+        read_logs([standing(tmp_path / "b", current_ref=None, current_q_meas=None)])
     with pytest.raises(InputError, match="at least one log"):
         read_logs([])
     assert logs[0].current_signal == "current_q_meas"

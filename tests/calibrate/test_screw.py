@@ -1,4 +1,4 @@
-"""Ballscrew: what was put in comes out of the stand's logs, and the rest is said with a reason."""
+"""Ballscrew: what was put in comes out of the stand's logs, the rest with a reason."""
 
 import numpy as np
 import pytest
@@ -103,10 +103,10 @@ def test_slopes_are_smoothed_as_the_values_are():
     time = np.arange(2000) * 2e-3
     ramp = np.abs((time / 0.8) % 2.0 - 1.0)
     log = ScrewLog("trapezoid", time, {"motor_speed": ramp})
-    shown = log.smooth
-    slope = np.gradient(shown["motor_speed"], 2e-3)
+    smoothed = log.smooth
+    slope = np.gradient(smoothed["motor_speed"], 2e-3)
     inner = slice(50, -50)
-    assert np.max(np.abs(shown["acceleration"] - slope)[inner]) < 0.02 * np.ptp(slope)
+    assert np.max(np.abs(smoothed["acceleration"] - slope)[inner]) < 0.02 * np.ptp(slope)
 
 
 @pytest.mark.long

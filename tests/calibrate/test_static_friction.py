@@ -16,7 +16,7 @@ BASE = Actuator.load("torino-rotary")
 
 
 def estimate(paths, constant=None):
-    """Return the static friction that logs show; the torque constant as given or as weighed."""
+    """Return the static friction that logs show; the torque constant as given or as measured."""
     logs = read_logs(paths)
     keeps = [log.good & (log.time >= 1.0) for log in logs]
     plant = torque_balance(logs, keeps)

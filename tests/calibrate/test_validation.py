@@ -122,8 +122,8 @@ def test_a_log_that_fits_badly_does_not_widen_the_thresholds():
 @pytest.mark.long
 def test_thresholds_come_from_logs_held_out(logs, result, before):
     after = validate(logs, result.actuator)
-    held = held_out_agreement(logs, before, None, after)
-    assert {row.log for row in held.errors} <= {log.name for log in logs}
+    validated = held_out_agreement(logs, before, None, after)
+    assert {row.log for row in validated.errors} <= {log.name for log in logs}
     pairs = {(row.log, row.signal): row.of_range for row in after.errors}
-    worse = [row.of_range >= 0.9 * pairs[row.log, row.signal] for row in held.errors]
+    worse = [row.of_range >= 0.9 * pairs[row.log, row.signal] for row in validated.errors]
     assert np.mean(worse) > 0.7

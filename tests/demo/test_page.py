@@ -9,7 +9,7 @@ import pytest
 
 from elevon import Actuator
 from elevon.calibrate.estimate import Estimate
-from elevon.calibrate.validation import SIGNALS, Trace
+from elevon.calibrate.validation import SIGNALS, ValidationTrace
 from elevon.demo import page
 from elevon.demo.page_parameters import errors_figure, parameters_section
 from elevon.demo.results import Recovered, Step
@@ -82,14 +82,14 @@ def test_values_stand_in_the_units_of_the_set_with_the_digits_of_their_interval(
 
 
 def test_nothing_of_the_errors_is_outside_the_figure(demo):
-    shown = [r for r in ROWS if "offset" not in r["path"]]
-    axes = errors_figure(shown).axes[0]
+    rows = [r for r in ROWS if "offset" not in r["path"]]
+    axes = errors_figure(rows).axes[0]
     low, high = axes.get_xlim()
     values = [x for line in axes.lines for x in np.atleast_1d(line.get_xdata())]
     assert low < min(values) < -40.0  # the published backlash
     assert max(values) < high
     labels = [text.get_text() for text in axes.get_yticklabels()]
-    assert labels == [r["path"] for r in reversed(shown)]
+    assert labels == [r["path"] for r in reversed(rows)]
     legend = [text.get_text() for text in axes.get_legend().get_texts()]
     assert [text.split(",")[0] for text in legend] == [
         "estimate",
@@ -101,7 +101,7 @@ def test_nothing_of_the_errors_is_outside_the_figure(demo):
 def test_both_sides_of_a_logs_figure_have_their_units(demo):
     time = np.linspace(0.0, 20.0, 200)
     signals = {name: np.sin(time) for name in SIGNALS}
-    trace = Trace("sine.csv", time, signals, signals, time >= 10.0)
+    trace = ValidationTrace("sine.csv", time, signals, signals, time >= 10.0)
     figure = page._trace_figure(trace, trace)
     units = [axes.get_ylabel()[axes.get_ylabel().index("[") :] for axes in figure.axes]
     assert units == ["[deg]", "[deg]", "[rpm]", "[rpm]", "[A]", "[A]"]

@@ -16,7 +16,7 @@ import elevon
 from elevon import Actuator
 from elevon.bench.procedure import load_procedure
 from elevon.calibrate.estimate import Estimate
-from elevon.calibrate.validation import SignalError, Trace, Validation
+from elevon.calibrate.validation import SignalError, Validation, ValidationTrace
 from elevon.cli import main
 from elevon.demo.finished import FinishedSteps, work_key
 from elevon.demo.hidden import RECOVERED, hidden_actuator
@@ -68,7 +68,7 @@ def validation(name, logs, factor):
         for signal in signals
     ]
     traces = [
-        Trace(
+        ValidationTrace(
             log,
             rng.normal(size=40),
             {s: rng.normal(size=40) for s in signals},
@@ -110,7 +110,7 @@ def test_values_that_do_not_give_the_actuator_are_not_taken(base):
         Recovered.from_json(data, base)
 
 
-def test_the_work_is_told_by_version_seed_and_sets(base, monkeypatch):
+def test_the_work_is_known_by_version_seed_and_actuator_files(base, monkeypatch):
     hidden = hidden_actuator(base, 0)
     keys = {
         work_key(0, base, hidden),

@@ -109,7 +109,7 @@ def test_companions_named_by_a_glob_are_read_with_their_log(tmp_path, capsys):
     named = sorted(logs.glob("stall*.csv"))
     assert len(named) == 2
     out = tmp_path / "one.parquet"
-    code, printed, said = run(capsys, "import", *named, "--out", out, "--json")
+    code, printed, messages = run(capsys, "import", *named, "--out", out, "--json")
     assert code == 0
-    assert "read with its log" in said
+    assert "read with its log" in messages
     assert len(json.loads(printed)["logs"]) == 1

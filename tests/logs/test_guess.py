@@ -125,7 +125,7 @@ def test_what_cannot_be_guessed_is_refused(tmp_path, capsys, motion):
 
 
 @pytest.mark.parametrize(
-    ("header", "unit", "said"),
+    ("header", "unit", "message"),
     [
         ("time,demand_mm,position_mm,speed_mm/s,current_A", "s", "the integral of its speed"),
         ("time_ms,demand_mm,position_mm,speed_mm/s,current_A", "s", "the motion contradicts it"),
@@ -133,7 +133,7 @@ def test_what_cannot_be_guessed_is_refused(tmp_path, capsys, motion):
         ("time,demand,position,speed,current", "s", "both are possible"),
     ],
 )
-def test_a_time_of_thousandths_is_no_ms_without_doubt(tmp_path, capsys, header, unit, said):
+def test_a_time_of_thousandths_is_no_ms_without_doubt(tmp_path, capsys, header, unit, message):
     t = np.round(np.arange(0.0, 4.0, 1e-3), 3)
     demand, position = (30.0 * np.sin(3.0 * (t - late)) for late in (0.0, 0.02))
     table = np.column_stack((t, demand, position, np.gradient(position, t), np.cos(3.0 * t)))
@@ -141,4 +141,4 @@ def test_a_time_of_thousandths_is_no_ms_without_doubt(tmp_path, capsys, header, 
     answer, _ = guessed(tmp_path, capsys, tmp_path / "log.csv")
     column = answer["columns"][0]
     assert column["unit"] == unit
-    assert any(said in reason for reason in column["reasons"]), column["reasons"]
+    assert any(message in reason for reason in column["reasons"]), column["reasons"]

@@ -23,8 +23,8 @@ def test_an_own_recording_needs_neither_map_nor_note(tmp_path, name):
     scenario = elevon.Scenario.from_dict({"duration": 0.2, "command": ACTUATORS[name]})
     run = elevon.simulate(elevon.Actuator.load(name), scenario, fidelity="low")
     log = import_log(run.save(tmp_path / "run.parquet"))
-    asked = {"command", "output_position", "motor_position", "motor_speed", "speed_ref"}
-    assert asked | {"torque_current"} <= log.recording.roles.keys()
+    expected = {"command", "output_position", "motor_position", "motor_speed", "speed_ref"}
+    assert expected | {"torque_current"} <= log.recording.roles.keys()
     assert log.recording.role("motor_speed").unit == "rad/s"
     assert log.scenario == scenario
     assert log.note.command == scenario.command
@@ -114,7 +114,7 @@ def without(text, *names):
 AGAINST = {
     "command": (("v", "n"), r"output_position moves -1 times command"),
     "speed": (("demand", "n"), r"output_position moves -1 times the integral of output_speed"),
-    "motor": (("demand", "v"), r"contradicts the log.*runs the other way"),
+    "motor": (("demand", "v"), r"contradicts the log.*runs in the other direction"),
 }
 
 
@@ -129,7 +129,7 @@ def test_a_position_of_the_wrong_sign_is_refused(tmp_path, left_out, message):
 def test_the_package_ships_three_layouts():
     assert shipped_maps() == ["cranfield", "pisa", "torino"]
     for name in shipped_maps():
-        assert {"command", "speed_ref"} & {entry.played for entry in shipped_map(name).column}
+        assert {"command", "speed_ref"} & {entry.role_name for entry in shipped_map(name).column}
 
 
 def test_a_column_that_is_subtracted(tmp_path):

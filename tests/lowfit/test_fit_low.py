@@ -1,4 +1,4 @@
-"""The fit of the low model's own numbers: recovers what is known, keeps what nothing determines."""
+"""The fit of the reduced-order model's own numbers: recovers the known, keeps the undetermined."""
 
 import json
 
@@ -8,7 +8,7 @@ import pytest
 import elevon
 from elevon.cli import main
 from elevon.errors import InputError
-from elevon.lowfit import Case, fit_low, named_cases
+from elevon.lowfit import FitCase, fit_low, named_cases
 
 MOVING = {
     "duration": "6 s",
@@ -23,7 +23,7 @@ def moving():
 
 def test_a_bad_number_is_fitted_and_the_errors_fall():
     actuator = elevon.Actuator.load("torino-rotary").with_values({"low.band_ratio": 0.95})
-    fit = fit_low(actuator, [Case("moving", moving())])
+    fit = fit_low(actuator, [FitCase("moving", moving())])
     assert fit.old == {"low.band_ratio": 0.95}
     assert fit.new["low.band_ratio"] < 0.8
     assert "low.voltage_ratio" in fit.unchanged
@@ -37,7 +37,7 @@ def test_a_bad_number_is_fitted_and_the_errors_fall():
 
 def test_the_pwm_drive_has_no_band():
     actuator = elevon.Actuator.load("torino-rotary").with_values({"drive.kind": "pwm"})
-    fit = fit_low(actuator, [Case("moving", moving())])
+    fit = fit_low(actuator, [FitCase("moving", moving())])
     assert not fit.new
     assert fit.unchanged["low.band_ratio"] == "no case depends on it with this drive"
 
@@ -48,9 +48,9 @@ def test_refusals():
         fit_low(rotary, [])
     short = elevon.Scenario.from_dict({"duration": "1 s"})
     with pytest.raises(InputError, match="lasts 1 s"):
-        fit_low(rotary, [Case("short", short)])
+        fit_low(rotary, [FitCase("short", short)])
     with pytest.raises(InputError, match="nothing to fit"):
-        fit_low(elevon.Actuator.load("pisa-landing-gear"), [Case("moving", moving())])
+        fit_low(elevon.Actuator.load("pisa-landing-gear"), [FitCase("moving", moving())])
 
 
 def test_named_cases_are_healthy_and_each_fault_alone():
@@ -72,7 +72,7 @@ def test_command_writes_a_set_with_its_provenance(tmp_path, capsys):
     entry = elevon.Actuator.load(str(out)).parameters["low.band_ratio"]
     assert entry.value == pytest.approx(values["fitted"][0]["new"], rel=1e-3)
     assert entry.old == 0.9
-    assert entry.source.startswith("fitted to the high model over 2 cases")
+    assert entry.source.startswith("fitted to the switching model over 2 cases")
     assert report.is_file()
     assert main([*words, "--out", str(out)]) == 2
     assert main(["fit-low", "torino-rotary", "--fault", "friction@transmission=0.25"]) == 2

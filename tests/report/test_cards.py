@@ -48,7 +48,7 @@ def test_an_actuator_shows_every_parameter_with_its_unit_and_source():
     assert all(path in text and item.source in text for path, item in actuator.parameters.items())
 
 
-def test_a_scenario_shows_what_is_asked_what_acts_and_what_breaks():
+def test_a_scenario_shows_command_loads_and_faults():
     text = _text(elevon.Scenario.from_dict(SCENARIO)._repr_html_())
     for word in (
         "0.05 s",
@@ -86,7 +86,7 @@ def test_a_sparkline_keeps_its_extremes_and_its_gaps():
 
 def test_a_calibration_shows_its_intervals_and_what_it_cannot_tell():
     from elevon.calibrate.estimate import Estimate
-    from elevon.calibrate.shown import calibration_card
+    from elevon.calibrate.notebook_card import calibration_card
 
     actuator = elevon.Actuator.load("torino-rotary")
     value, interval = 7.913e-4, (7.85e-4, 7.98e-4)

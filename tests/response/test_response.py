@@ -107,7 +107,7 @@ def test_a_shaft_at_rest_has_no_linear_model():
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "message"),
     [
         ({"low": 3.0, "high": 2.0}, "no range"),
         ({"high": 1e6}, "resolves up to"),
@@ -121,9 +121,9 @@ def test_a_shaft_at_rest_has_no_linear_model():
         ({"fidelity": "middle"}, "high"),
     ],
 )
-def test_wrong_input_is_named(options, said):
+def test_wrong_input_is_named(options, message):
     given = {"low": 1.0, "high": 10.0, "amplitude": 0.01, "fidelity": "low", **options}
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(InputError, match=message):
         frequency_response("torino-rotary", **given)
 
 

@@ -31,9 +31,9 @@ def acquired_signals(wiring: str, fidelity: str, stand: Stand) -> dict[str, str]
     """Return role to signal, of the stand's channels that the model has; the sensor's, if any."""
     from elevon.scenario.compile import signal_records
 
-    played = {item["role"]: name for name, item in signal_records(wiring, fidelity).items()}
+    by_role = {item["role"]: name for name, item in signal_records(wiring, fidelity).items()}
     roles = [role for role in stand.channels if role != "load"]
-    return {role: played[role] for role in roles if role in played}
+    return {role: by_role[role] for role in roles if role in by_role}
 
 
 def internal_steps(rate: float, step: float, duration: float = 1.0) -> int:
@@ -90,20 +90,20 @@ def acquire(
         channel = run[name]
         digital = channel.unit == "1" or role.endswith(_DIGITAL)
         raw = np.asarray(channel.values, dtype=np.float64)
-        shown = _held(clock, raw, time) if digital else _filtered(clock, raw, time, rate)
-        values[name] = _sensed(shown, stand.channels[role], channel.unit, rate, rng)
+        sampled = _last_written(clock, raw, time) if digital else _filtered(clock, raw, time, rate)
+        values[name] = _sensed(sampled, stand.channels[role], channel.unit, rate, rng)
         units[name] = channel.unit
-    said = dict(roles)
+    names = dict(roles)
     if "load" in stand.channels:
         force = np.interp(time, *load)
         values[LOAD_CHANNEL] = _sensed(force, stand.channels["load"], "N", rate, rng)
         units[LOAD_CHANNEL] = "N"
-        said["load"] = LOAD_CHANNEL
-    meta = {"roles": said, "acquisition": _said(clock, rate)}
+        names["load"] = LOAD_CHANNEL
+    meta = {"roles": names, "acquisition": _origin(clock, rate)}
     return Recording.build(time, values, units, clock="stand", rate=rate, meta=meta)
 
 
-def _said(clock: Floats, rate: float) -> dict[str, Any]:
+def _origin(clock: Floats, rate: float) -> dict[str, Any]:
     """What a reader must know of how the log came about."""
     internal = float(1.0 / np.median(np.diff(clock)))
     whole = abs(internal / rate - round(internal / rate)) < 1e-6
@@ -112,12 +112,12 @@ def _said(clock: Floats, rate: float) -> dict[str, Any]:
         "simulated_hz": internal,
         "resampled": not whole,
         "cutoff_hz": _CUTOFF * rate,
-        "anti_alias": f"Butterworth, order {_ORDER}, both ways, {_CUTOFF * rate:.6g} Hz; "
+        "anti_alias": f"Butterworth, order {_ORDER}, in both directions, {_CUTOFF * rate:.6g} Hz; "
         "commands, set points, states and switches as they stood",
     }
 
 
-def _held(clock: Floats, values: Floats, time: Floats) -> Floats:
+def _last_written(clock: Floats, values: Floats, time: Floats) -> Floats:
     """What was written last: digital channels are not filtered."""
     at = np.searchsorted(clock, time + 1e-9, side="right") - 1
     return np.asarray(values[at.clip(0, len(values) - 1)], dtype=np.float64)

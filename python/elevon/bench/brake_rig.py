@@ -41,7 +41,7 @@ class BrakeRig:
     disk_torque : float
         Torque of the closed brake at the disk [N m]: the middle of the printed 20 to 30.
     proportional : float
-        Opening asked for, over the disk's torque, for an error of that size. ASSUMED.
+        Commanded opening, over the disk's torque, for an error of that size. ASSUMED.
     integral : float
         1/s, likewise. ASSUMED: its zero cancels the servo's lag.
     servo_lag : float
@@ -97,14 +97,14 @@ class BrakeRun:
     ----------
     time : ndarray, shape (n,)
         Seconds of the load cell's clock, from the trigger.
-    asked, torque : ndarray, shape (n,)
+    target, torque : ndarray, shape (n,)
         Set point, and what the brake can oppose, on the motor shaft [N m].
     noise : ndarray, shape (n,)
         Disturbance of each sample of the cell [N], offset and drift included.
     """
 
     time: Floats
-    asked: Floats
+    target: Floats
     torque: Floats
     noise: Floats
 
@@ -175,29 +175,31 @@ def brake_loop(
     """
     converter = converter or Hx711()
     time = np.arange(int(duration * converter.rate) + 1) / converter.rate
-    asked = set_point(terms, time)
-    if asked.min(initial=0.0) < 0.0 or asked.max(initial=0.0) > rig.limit:
+    target = set_point(terms, time)
+    if target.min(initial=0.0) < 0.0 or target.max(initial=0.0) > rig.limit:
         raise RangeError(
-            f"brake: set point from {asked.min():.4g} to {asked.max():.4g} N m is outside 0 to "
+            f"brake: set point from {target.min():.4g} to {target.max():.4g} N m is outside 0 to "
             f"{rig.limit:.4g} N m ({rig.disk_torque:g} N m at the disk over {rig.chain_ratio:g})"
         )
     noise = cell.offset + cell.drift * time + cell.noise * rng.standard_normal(len(time))
-    torque = _loop(rig, cell, asked, noise, converter)
-    return BrakeRun(time, asked, torque, noise)
+    torque = _loop(rig, cell, target, noise, converter)
+    return BrakeRun(time, target, torque, noise)
 
 
-def _loop(rig: BrakeRig, cell: CellState, asked: Floats, noise: Floats, converter: Hx711) -> Floats:
+def _loop(
+    rig: BrakeRig, cell: CellState, target: Floats, noise: Floats, converter: Hx711
+) -> Floats:
     """Return the torque on the motor shaft, sample by sample; as fractions of the disk's torque."""
     period = 1.0 / converter.rate
     newtons = rig.disk_torque / rig.arm
-    torque = np.empty_like(asked)
+    torque = np.empty_like(target)
     position = integral = 0.0
-    targets = (asked / rig.limit).tolist()
-    for k, (target, disturbance) in enumerate(zip(targets, noise.tolist(), strict=True)):
+    targets = (target / rig.limit).tolist()
+    for k, (goal, disturbance) in enumerate(zip(targets, noise.tolist(), strict=True)):
         fraction = cell.pad * position
         torque[k] = fraction * rig.limit
         seen = float(converter.convert(fraction * newtons + disturbance)) / newtons
-        error = target - seen
+        error = goal - seen
         wish = rig.proportional * error + integral
         opening = min(max(wish, 0.0), 1.0)
         if opening == wish or (wish - opening) * error < 0.0:  # no windup against the end stops

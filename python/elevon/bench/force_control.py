@@ -1,4 +1,4 @@
-"""A load actuator in force control: what it is asked for and what the rod gets.
+"""A load actuator in force control: what it is commanded and what the rod gets.
 
 The closed loop is of second order, T(s) = w^2 / (s^2 + 2 d w s + w^2). What moves with the rod but
 is no load (friction and mass of the load actuator) is rejected by 1 - T. It is computed before the
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from elevon.bench.procedure import ForceStep
     from elevon.bench.stand import ForceSpec
 
-__all__ = ["ForceLoop", "asked_force"]
+__all__ = ["ForceLoop", "target_force"]
 
 _AT_REST = 1e-3  # m/s below which a direction fades: rest has none
 
@@ -47,21 +47,21 @@ class ForceLoop:
             parse_quantity(spec.mass, "kg", "force.mass"),
         )
 
-    def achieved(self, time: Floats, asked: Floats, speed: Floats) -> Floats:
-        """Return the force on the rod [N] for what is asked and the rod's speed, on one clock.
+    def achieved(self, time: Floats, target: Floats, speed: Floats) -> Floats:
+        """Return the force on the rod [N] for a commanded force and the rod's speed.
 
         Raises
         ------
         InputError
-            More is asked than the load actuator has.
+            More is commanded than the load actuator has.
         """
-        most = float(np.abs(asked).max())
+        most = float(np.abs(target).max())
         if most > self.limit:
             raise InputError(f"force of {most:.5g} N: the load actuator has {self.limit:.5g} N")
         period = float(time[1] - time[0])
         acceleration = np.gradient(speed, period)
         other = self.friction * np.tanh(speed / _AT_REST) + self.mass * acceleration
-        return self._closed(asked, period) + other - self._closed(other, period)
+        return self._closed(target, period) + other - self._closed(other, period)
 
     def _closed(self, values: Floats, period: float) -> Floats:
         """Return what the closed loop makes of a signal that was steady before."""
@@ -73,8 +73,8 @@ class ForceLoop:
         return np.asarray(lfilter(numerator, denominator, values, zi=state)[0], dtype=np.float64)
 
 
-def asked_force(step: ForceStep, terms: Floats, position: Floats, speed: Floats) -> Floats:
-    """Return the force asked for [N]: of time, direction and position.
+def target_force(step: ForceStep, terms: Floats, position: Floats, speed: Floats) -> Floats:
+    """Return the commanded force [N]: of time, direction and position.
 
     Parameters
     ----------

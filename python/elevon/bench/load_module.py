@@ -21,7 +21,7 @@ _BEARING = 0.015 * 0.020  # m, friction radius of the guide's bearing. ASSUMED: 
 
 @dataclass(frozen=True, slots=True)
 class Springs:
-    """Two traction springs that pull the same way round.
+    """Two traction springs that pull in the same direction.
 
     Attributes
     ----------

@@ -11,7 +11,7 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.bench.acquisition import acquire, acquired_signals, internal_steps
-from elevon.bench.force_control import ForceLoop, asked_force
+from elevon.bench.force_control import ForceLoop, target_force
 from elevon.bench.procedure import ForceStep, Procedure, RigStep, SettingsStep, TraceStep
 from elevon.bench.rig import Conditions, draw_conditions, moved
 from elevon.errors import DivergedError, InputError
@@ -32,7 +32,7 @@ __all__ = ["LoadedSetup", "loaded_setups", "run_loaded", "run_loaded_batch", "wr
 
 _GRID = 1e-3  # s of the force table
 _FINE = 0.25  # of it between two samples of the motion
-_PASSES = 2  # runs of the low model from which the force is computed
+_PASSES = 2  # runs of the reduced-order model from which the force is computed
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class LoadedSetup:
     stand : Stand
         Where it stands.
     force : ForceStep or None
-        What the load actuator is asked for; None: nothing, or the rig moves the output.
+        What the load actuator is commanded; None: nothing, or the rig moves the output.
     settings : dict
         What the operator set, by parameter.
     """
@@ -66,7 +66,7 @@ class LoadedSetup:
     settings: dict[str, Any]
 
     def truth(self) -> dict[str, Any]:
-        """Return what the log's reader is not told."""
+        """Return what the log does not state."""
         parameters = self.actuator.parameters
         return {
             "name": self.trace.name,
@@ -110,9 +110,9 @@ def loaded_setups(
             conditions = draw_conditions(seed, len(logs))
             ready = actuator.with_values(settings, source="set on the bench", place=step.name)
             scenario = _scenario(step, ready, rig, conditions, faults)
-            asked = None if rig else force
+            force_step = None if rig else force
             logs.append(
-                LoadedSetup(step, ready, scenario, conditions, stand, asked, dict(settings))
+                LoadedSetup(step, ready, scenario, conditions, stand, force_step, dict(settings))
             )
         else:
             raise InputError(
@@ -179,7 +179,7 @@ def run_loaded(
 def run_loaded_batch(
     setups: Sequence[LoadedSetup], fidelity: str, progress: Progress | None = None
 ) -> list[tuple[Recording, Recording]]:
-    """Carry out several logs of one stand and rate together, in lanes; each as alone.
+    """Carry out several logs of one stand and rate together, as a batch; each as alone.
 
     Raises
     ------
@@ -286,8 +286,8 @@ def _force(setup: LoadedSetup, run: Recording, times: Floats) -> Floats:
         np.interp(times, clock, run[name].values) for name in ("output_position", "output_speed")
     )
     terms = _values(setup.force.terms, times, setup.conditions.start)
-    asked = asked_force(setup.force, terms, position, speed)
-    return ForceLoop.of(setup.stand.force).achieved(times, asked, speed)
+    force_step = target_force(setup.force, terms, position, speed)
+    return ForceLoop.of(setup.stand.force).achieved(times, force_step, speed)
 
 
 def _values(terms: Sequence[Term], times: Floats, start: float, unit: str = "N") -> Floats:

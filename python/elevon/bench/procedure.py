@@ -1,6 +1,6 @@
 """What is done on the bench: typed steps, read from TOML.
 
-The package's own procedures (`procedures/*.toml`) and a user's are the same kind of file. Steps
+The package's own procedures (`procedures/*.toml`) and your own are the same kind of file. Steps
 change the bench one after the other; each ``trace`` step records one log with the bench as it
 stands.
 """
@@ -119,7 +119,7 @@ class BacklashStep(_Frozen):
 
 
 class BrakeStep(_Frozen):
-    """Set what the brake's loop is asked for; no terms: the brake is off.
+    """Set the command of the brake's loop; no terms: the brake is off.
 
     Attributes
     ----------
@@ -212,7 +212,7 @@ class WeightsStep(_Frozen):
 
 
 class ForceStep(_Frozen):
-    """Set what the load actuator is asked for; parts add up, positive opposes positive motion.
+    """Set the load actuator's command; parts add up, positive opposes positive motion.
 
     Attributes
     ----------

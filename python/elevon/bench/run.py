@@ -173,7 +173,7 @@ def run_procedure(
     seed : int
         Of chance: command start, zero in the backlash, load cell, noise.
     fidelity : str
-        ``high`` or ``low``; the low model has no d current, so its column is left out.
+        ``high`` or ``low``; the reduced-order model has no d current, so its column is left out.
     layout : DriveFormat, optional
         How the trace is written; default: degrees, encoder on the motor shaft, rms.
     truth : path, optional

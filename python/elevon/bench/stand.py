@@ -28,7 +28,7 @@ class ForceSpec(_Frozen):
     Attributes
     ----------
     limit : quantity
-        Largest force asked for, N.
+        Largest force commanded, N.
     bandwidth, damping : quantity, float
         Of the closed force loop, of second order.
     friction, mass : quantity
@@ -61,7 +61,7 @@ class Stand(_Frozen):
     ports : dict of str to str
         Ports that an actuator must have, with their units.
     rate, fastest : quantity
-        Samples a second when nothing is asked for, and at most.
+        Samples a second when nothing is given, and at most.
     force : ForceSpec or None
         The load actuator.
     settings : dict
@@ -80,13 +80,13 @@ class Stand(_Frozen):
     settings: dict[StrictStr, Quantity] = Field(default_factory=dict)
     channels: dict[StrictStr, ChannelSpec] = Field(default_factory=dict)
 
-    def hertz(self, asked: Quantity | None) -> float:
+    def hertz(self, requested: Quantity | None) -> float:
         """Return the rate of a log in Hz; `InputError` above what the stand records."""
-        rate = parse_quantity(self.rate if asked is None else asked, "Hz", "rate")
+        rate = parse_quantity(self.rate if requested is None else requested, "Hz", "rate")
         most = parse_quantity(self.fastest, "Hz", "fastest")
         if rate > most * (1.0 + 1e-9):
             raise InputError(
-                f"rate = {asked}: the stand {self.name} records {self.fastest} at most"
+                f"rate = {requested}: the stand {self.name} records {self.fastest} at most"
             )
         return rate
 

@@ -122,10 +122,10 @@ def _reaction(setup: Setup, recording: Recording, index: npt.NDArray[np.intp]) -
     shaft; how, statics cannot tell: ASSUMED in the ratio of what each could oppose.
     """
     speed = np.asarray(recording["motor_speed"].values, dtype=np.float64)[index]
-    held = np.asarray(recording["friction_torque"].values, dtype=np.float64)[index]
+    friction = np.asarray(recording["friction_torque"].values, dtype=np.float64)[index]
     assert setup.brake is not None
     able = setup.brake.torque + setup.actuator.parameters.value("friction.static")
-    share = np.clip(held / np.maximum(able, 1e-12), -1.0, 1.0)
+    share = np.clip(friction / np.maximum(able, 1e-12), -1.0, 1.0)
     return np.where(speed == 0.0, share, np.sign(speed))
 
 
@@ -137,9 +137,11 @@ def _note(setup: Setup, layout: DriveFormat) -> dict[str, Any]:
     if mode == "position" and len(terms) == 1 and terms[0].kind in FREE:
         note |= _waveform(terms[0])
     elif terms:
-        own = wirings()[setup.actuator.wiring]["mode_units"][mode]
+        default_unit = wirings()[setup.actuator.wiring]["mode_units"][mode]
         note["command"] = setup.trace.command.model_dump(exclude_unset=True, mode="json")
-        note["command"]["terms"] = [_stated(term, own) for term in note["command"]["terms"]]
+        note["command"]["terms"] = [
+            _stated(term, default_unit) for term in note["command"]["terms"]
+        ]
     note["brake"] = "on" if setup.brake is not None else "off"
     rig = setup.rig
     if setup.brake is not None:
@@ -151,7 +153,7 @@ def _note(setup: Setup, layout: DriveFormat) -> dict[str, Any]:
     return note
 
 
-def _stated(term: dict[str, Any], own: str) -> dict[str, Any]:
+def _stated(term: dict[str, Any], default_unit: str) -> dict[str, Any]:
     """Return a term with the units of its numbers, which a note must not leave open."""
     from elevon.waveforms import TABLE, unit_of, wave_records
 
@@ -159,11 +161,11 @@ def _stated(term: dict[str, Any], own: str) -> dict[str, Any]:
     stated = dict(term)
     for parameter in record.parameters:
         value = term.get(parameter.name)
-        unit = unit_of(parameter, own)
+        unit = unit_of(parameter, default_unit)
         if isinstance(value, (int, float)) and not isinstance(value, bool) and unit != "1":
             stated[parameter.name] = f"{value!r} {unit}"
     if record.kind == TABLE and not term.get("unit"):
-        stated["unit"] = own
+        stated["unit"] = default_unit
     return stated
 
 
@@ -178,7 +180,7 @@ def _waveform(term: Any) -> dict[str, Any]:
         if given is None or name in {"start", "end", "time", "phase", "repeat", "hold"}:
             continue
         unit = unit_of(parameter, "rad")
-        shown = unit.replace("rad", "deg")
+        label = unit.replace("rad", "deg")
         value = parse_quantity(given, unit, name)
-        shape[name] = format_quantity(value, shown, 12)
+        shape[name] = format_quantity(value, label, 12)
     return shape

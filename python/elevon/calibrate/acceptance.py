@@ -1,4 +1,4 @@
-"""Which estimates the set accepts, and which must be refused or explained."""
+"""Which estimates the actuator file accepts, and which must be refused or explained."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["accept", "missing", "shortened", "undetermined", "with_values"]
 
-#: Offsets of sensors, which no parameter holds: they go with the set's promises on logs.
+#: Offsets of sensors, which no parameter holds: they go with the actuator file's promises on logs.
 _OFFSETS = {
     "sensor.speed_offset": "motor_speed",
     "sensor.current_offset": "current_q_meas",
@@ -32,7 +32,7 @@ _LOOSEST = 0.25  # of the value, or of the one before: a larger deviation determ
 def accept(
     estimates: Sequence[Estimate], free: Sequence[str] | None, actuator: Actuator
 ) -> list[Estimate]:
-    """Keep what was asked for, what no set holds, and only what a set can hold."""
+    """Keep what was requested, what no actuator file holds, and only what it can hold."""
     accepted = []
     for item in estimates:
         if item.in_set and free is not None and item.path not in free:
@@ -53,15 +53,15 @@ def accept(
 
 
 def missing(free: Sequence[str] | None, estimates: Sequence[Estimate], torque: Torque) -> None:
-    """Raise `InputError` for a path that was asked for and is not estimated."""
+    """Raise `InputError` for a path that was requested and is not estimated."""
     known = {item.path for item in estimates}
     for path in free or ():
         if path in known:
             continue
         if path == "motor.emf_constant" and not torque.measured:
             raise InputError(
-                "--free motor.emf_constant: without a load cell the logs tell only the ratio of "
-                "inertia and friction to the torque constant; add --loadcell, or leave it out"
+                "--free motor.emf_constant: without a load cell the logs determine only the ratio "
+                "of inertia and friction to the torque constant; add --loadcell, or leave it out"
             )
         raise InputError(
             f"--free {path}: nothing in the logs excites it enough; leave it out or add a log "
@@ -110,7 +110,7 @@ def with_values(
 
 
 def shortened(actuator: Actuator, estimates: Sequence[Estimate]) -> list[str]:
-    """Say so where the set cannot hold the derivative time as estimated."""
+    """Say so where the actuator file cannot hold the derivative time as estimated."""
     values: dict[str, str | float] = {item.path: item.value for item in estimates if item.in_set}
     if "control.derivative_time" not in within_inertia(actuator, values):
         return []

@@ -1,6 +1,6 @@
 """Backlash, encoder gain and offset from the two positions alone.
 
-The encoder shows the motor's angle over the ratio, dragged through the backlash: one equation, no
+The encoder shows the motor's angle over the ratio, after the backlash: one equation, no
 friction, inertia or controller in it. All samples count, those inside the gap too.
 """
 
@@ -19,8 +19,8 @@ from elevon.calibrate.log import BenchLog
 
 __all__ = ["BacklashFit", "fit_backlash", "median_width", "through_backlash"]
 
-_TRAVEL = 3.0  # backlashes (or counts) of travel both ways that a log must have
-_FLOATS = 3.0  # counts of residual that no rounding leaves: the output is not dragged
+_TRAVEL = 3.0  # backlashes (or counts) of travel in both directions that a log must have
+_FLOATS = 3.0  # counts of residual that no rounding leaves: the output is free
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class BacklashFit:
     logs : tuple of str
         Logs used.
     floats : bool
-        The output is not dragged: it moves on its own within the backlash. Only the span of the two
+        The output is free: it moves on its own within the backlash. Only the span of the two
         positions' difference is known then; gain and delay are not.
     """
 
@@ -68,7 +68,7 @@ def through_backlash(driver: Floats, width: float) -> Floats:
 
 
 def fit_backlash(logs: Sequence[BenchLog], ratio: float, count: float) -> BacklashFit | None:
-    """Fit backlash, offset, gain and delay to every log that moves both ways.
+    """Fit backlash, offset, gain and delay to every log that moves in both directions.
 
     Parameters
     ----------
@@ -90,19 +90,19 @@ def fit_backlash(logs: Sequence[BenchLog], ratio: float, count: float) -> Backla
     from scipy.optimize import least_squares
 
     drivers = [log.motor / ratio for log in used if log.motor is not None]
-    users = [log.output for log in used if log.output is not None]
-    width, centre = _start(used, drivers, users)
+    outputs = [log.output for log in used if log.output is not None]
+    width, centre = _start(used, drivers, outputs)
     keeps = [_after_reversal(x, width) for x in drivers]
     speeds = [log.speed / ratio for log in used]
     scale = np.array([count, count, 1e-4, 1e-3])
 
     def residual(p: Floats) -> Floats:
         parts = []
-        for x, y, v, keep in zip(drivers, users, speeds, keeps, strict=True):
-            dragged = through_backlash(x, abs(float(p[0])))
-            moving = np.gradient(dragged) / np.maximum(np.abs(np.gradient(x)), 1e-15)
+        for x, y, v, keep in zip(drivers, outputs, speeds, keeps, strict=True):
+            following = through_backlash(x, abs(float(p[0])))
+            moving = np.gradient(following) / np.maximum(np.abs(np.gradient(x)), 1e-15)
             follows = v * np.clip(np.abs(moving), 0.0, 1.0)
-            parts.append(((p[2] * dragged + p[1] - p[3] * follows) - y)[keep])
+            parts.append(((p[2] * following + p[1] - p[3] * follows) - y)[keep])
         return np.concatenate(parts) / count
 
     def jacobian(p: Floats) -> Floats:
@@ -123,7 +123,7 @@ def fit_backlash(logs: Sequence[BenchLog], ratio: float, count: float) -> Backla
     value[0] = abs(value[0])
     rms = count * float(np.sqrt(np.mean(residual(best.x) ** 2)))
     if rms > _FLOATS * count:
-        return _spanned(used, drivers, users, keeps, count=count, rms=rms)
+        return _spanned(used, drivers, outputs, keeps, count=count, rms=rms)
     pairs = [(float(v), float(s)) for v, s in zip(value, std, strict=True)]
     return BacklashFit(
         backlash=pairs[0],
@@ -140,7 +140,7 @@ def fit_backlash(logs: Sequence[BenchLog], ratio: float, count: float) -> Backla
 def _spanned(
     logs: Sequence[BenchLog],
     drivers: Sequence[Floats],
-    users: Sequence[Floats],
+    outputs: Sequence[Floats],
     keeps: Sequence[npt.NDArray[np.bool_]],
     *,
     count: float,
@@ -149,12 +149,12 @@ def _spanned(
     """Backlash of an output that flies from one end of the gap to the other.
 
     The difference of the two positions piles up at both ends. What it leaves out at either side
-    within twenty to one is on the way or not yet in contact; what lies beyond two hundred to one
-    is the give of the contacts: the backlash is between the two spans, less the count of the
-    rounding.
+    within twenty to one crosses the backlash or is not yet in contact; what lies beyond two hundred
+    to one is the compliance of the contacts: the backlash is between the two spans, less the count
+    of the rounding.
     """
     inner, outer, middles = [], [], []
-    for x, y, keep in zip(drivers, users, keeps, strict=True):
+    for x, y, keep in zip(drivers, outputs, keeps, strict=True):
         edges = np.percentile((y - x)[keep], [0.5, 5.0, 95.0, 99.5])
         inner.append(edges[2] - edges[1])
         outer.append(edges[3] - edges[0])
@@ -200,11 +200,11 @@ def median_width(log: BenchLog, ratio: float, count: float) -> float | None:
 
 
 def _start(
-    logs: Sequence[BenchLog], drivers: Sequence[Floats], users: Sequence[Floats]
+    logs: Sequence[BenchLog], drivers: Sequence[Floats], outputs: Sequence[Floats]
 ) -> tuple[float, float]:
     """Median lag of each direction, away from reversals: half a backlash either side of centre."""
     ahead, behind = [], []
-    for log, x, y in zip(logs, drivers, users, strict=True):
+    for log, x, y in zip(logs, drivers, outputs, strict=True):
         fast = 0.3 * np.abs(log.speed).max()
         lag = y - x
         ahead.append(np.median(lag[log.speed > fast]))

@@ -17,14 +17,14 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.calibrate.log import BenchLog
-from elevon.calibrate.motion import Motion, delayed, dilated, lagged, motion_of, smoothed
+from elevon.calibrate.motion import SmoothedMotion, delayed, dilated, lagged, motion_of, smoothed
 from elevon.calibrate.regression import Regression, robust_cost, robust_regression, with_deviations
 
 __all__ = ["torque_balance"]
 
 Bools = npt.NDArray[np.bool_]
 _SLOW = 0.05  # of the highest speed: below it friction may stick
-_CLEARER = 0.2  # of the highest speed: the same, asked more strictly
+_CLEARER = 0.2  # of the highest speed: the same, stricter
 _CLEAR = 0.01  # s around a reversal and a slow sample that are left out too
 _LAGS = (-0.005, 0.02)  # s searched for the current's lag behind the motion
 
@@ -45,7 +45,7 @@ def torque_balance(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
         Coefficients ``inertia``, ``viscous``, ``dry``, ``brake`` (with a load cell), ``cell`` (its
         offset, where another log shows the friction alone), ``offset`` (of the current's sensor;
         ``constant`` where only the set point is logged), ``lag`` [s]; None without enough motion
-        both ways.
+        in both directions.
     """
     clean = [k for k, log in enumerate(logs) if log.brake.known in {"off", "torque"}]
     chosen = clean or list(range(len(logs)))
@@ -71,7 +71,7 @@ def torque_balance(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
     design = np.column_stack((answer.design, problem.slope(answer)))
     times = [(log.time[m], log.speed[m], log.period) for log, m in zip(used, masks, strict=True)]
     value = np.append(answer.beta, answer.lag)
-    regression = with_deviations(names, value, design, answer.rest, answer.weight, times=times)
+    regression = with_deviations(names, value, design, answer.residual, answer.weight, times=times)
     if not np.isfinite(regression.covariance).all():
         return regression
     covariance = regression.covariance
@@ -87,7 +87,7 @@ class _Solved:
 
     beta: Floats
     lag: float
-    rest: Floats
+    residual: Floats
     weight: Floats
     design: Floats
 
@@ -97,7 +97,7 @@ class _Balance:
     """The torque balance of several logs, ready to be solved in more than one way."""
 
     logs: Sequence[BenchLog]
-    motions: Sequence[Motion]
+    motions: Sequence[SmoothedMotion]
     masks: Sequence[Bools]
     cell: bool
     both: bool
@@ -126,7 +126,7 @@ class _Balance:
         from scipy.optimize import minimize_scalar
 
         least = minimize_scalar(
-            lambda lag: robust_cost(self.at(lag, delay=delay).rest),
+            lambda lag: robust_cost(self.at(lag, delay=delay).residual),
             bounds=_LAGS,
             method="bounded",
             options={"xatol": 1e-5},
@@ -158,8 +158,8 @@ class _Balance:
         return solved
 
 
-def _moving(log: BenchLog, motion: Motion, keep: Bools) -> Bools:
-    """Samples well inside a stretch of motion one way."""
+def _moving(log: BenchLog, motion: SmoothedMotion, keep: Bools) -> Bools:
+    """Samples well inside a stretch of motion in one direction."""
     slow = np.abs(motion.speed) < _SLOW * np.abs(motion.speed).max()
     ends = np.zeros(len(slow), dtype=np.bool_)
     margin = max(4, round(4.0 * motion.sigma))
@@ -168,13 +168,13 @@ def _moving(log: BenchLog, motion: Motion, keep: Bools) -> Bools:
     return np.asarray(keep & log.good & ~near & ~ends, dtype=np.bool_)
 
 
-def _both_ways(motions: Sequence[Motion], masks: Sequence[Bools]) -> bool:
+def _both_ways(motions: Sequence[SmoothedMotion], masks: Sequence[Bools]) -> bool:
     speed = np.concatenate([m.speed[k] for m, k in zip(motions, masks, strict=True)])
     return bool(min(np.mean(speed > 0.0), np.mean(speed < 0.0)) > 0.02)
 
 
 def _balance_columns(
-    log: BenchLog, motion: Motion, cell: bool, both: bool, *, drift: float = 0.0
+    log: BenchLog, motion: SmoothedMotion, cell: bool, both: bool, *, drift: float = 0.0
 ) -> Floats:
     sign = np.sign(motion.speed)
     dry = [sign]
@@ -183,9 +183,10 @@ def _balance_columns(
         level = np.interp(log.time, at, log.brake.level) if log.brake.measured else 0.0
         dry.append(sign * level)
     if both:
-        # A cell that turns with the motion shows its offset against it; one pulled one way, along.
-        shown = log.brake.turning if log.brake.turning else sign
-        dry.append(-shown * float(log.brake.measured) * np.ones_like(sign))
+        # A cell that turns with the motion shows its offset against it; one pulled always the same,
+        # along.
+        direction = log.brake.turning if log.brake.turning else sign
+        dry.append(-direction * float(log.brake.measured) * np.ones_like(sign))
     # What jumps at a reversal is smoothed as the current is, so that a lag passes it alike.
     jumps = [smoothed(column, motion.sigma) for column in dry]
     return np.column_stack((motion.acceleration, motion.speed, *jumps, np.ones_like(sign)))

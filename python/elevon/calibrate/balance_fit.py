@@ -87,45 +87,47 @@ def fit_balance(
     x = np.ones(len(sought.names))
     prior = np.diag(sought.belief**-2.0)
     for number in range(_ROUNDS):
-        rest = data - model(x * sought.first)
+        misfit = data - model(x * sought.first)
         if number > 2:
-            scale = max(1.4826 * float(np.median(np.abs(rest))), 1e-12)
+            scale = max(1.4826 * float(np.median(np.abs(misfit))), 1e-12)
         slope = _slope(sought, model, x)
-        weight = 1.0 / np.maximum(1.0, np.abs(rest) / (_SOFT * scale))
+        weight = 1.0 / np.maximum(1.0, np.abs(misfit) / (_SOFT * scale))
         heavy = slope * (weight / scale**2)[:, None]
-        step = np.linalg.solve(heavy.T @ slope + prior, heavy.T @ rest - prior @ (x - 1.0))
+        step = np.linalg.solve(heavy.T @ slope + prior, heavy.T @ misfit - prior @ (x - 1.0))
         x = np.maximum(x + np.clip(step, -_STEP, _STEP), sought.least)
         if number > 3 and np.max(np.abs(step)) < 1e-8:
             break
-    rest = data - model(x * sought.first)
+    misfit = data - model(x * sought.first)
     slope = _slope(sought, model, x)
     # Huber's score stands still for outliers: they carry no information.
-    inner = slope[np.abs(rest) <= _SOFT * scale]
+    inner = slope[np.abs(misfit) <= _SOFT * scale]
     inverse = np.linalg.inv(inner.T @ inner / scale**2 + prior)
-    clipped = np.clip(rest, -_SOFT * scale, _SOFT * scale)
-    total = _block_sums(slope * (clipped / scale**2)[:, None], rest, times)
+    clipped = np.clip(misfit, -_SOFT * scale, _SOFT * scale)
+    total = _block_sums(slope * (clipped / scale**2)[:, None], misfit, times)
     degrees = float(max(len(total) - 3, 2))
     meat = total.T @ total * (len(total) / degrees) + prior
-    return Balanced(x, inverse @ meat @ inverse, degrees, float(np.std(rest)))
+    return Balanced(x, inverse @ meat @ inverse, degrees, float(np.std(misfit)))
 
 
 def _slope(sought: Sought, model: Callable[[Floats], Floats], x: Floats) -> Floats:
     """Derivatives by the shares, shape (n, p), by central differences."""
     columns = []
     for unit in np.eye(len(x)):
-        up, down = (model((x + way * _SMALL * unit) * sought.first) for way in (1.0, -1.0))
+        up, down = (
+            model((x + direction * _SMALL * unit) * sought.first) for direction in (1.0, -1.0)
+        )
         columns.append((up - down) / (2.0 * _SMALL))
     return np.stack(columns, axis=1)
 
 
 def _block_sums(
-    score: Floats, rest: Floats, times: Sequence[tuple[Floats, Floats, float]]
+    score: Floats, misfit: Floats, times: Sequence[tuple[Floats, Floats, float]]
 ) -> Floats:
     rows, at = [], 0
     for time, speed, period in times:
         part = slice(at, at + len(time))
         at += len(time)
-        block = stroke_blocks(time, speed, rest[part], period)
+        block = stroke_blocks(time, speed, misfit[part], period)
         total = np.zeros((int(block.max()) + 1, score.shape[1]))
         np.add.at(total, block, score[part])
         rows.append(total[np.bincount(block, minlength=len(total)) > 0])

@@ -1,4 +1,4 @@
-"""What a log tells of the brake: its torque, a force without an arm, or only that it was on."""
+"""What a log determines of the brake: its torque, a force without an arm, or that it was on."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Brake:
         Relative deviation of the load cell's clock.
     turning : float
         1 or -1 where the cell's sign turns with the motion (-1: against it), 0 where it is pulled
-        one way only: tells how the cell's own offset enters `level`.
+        in one direction only: states how the cell's own offset enters `level`.
     """
 
     known: Known
@@ -61,7 +61,7 @@ def brake_of(
     start: float,
     speed: Floats,
 ) -> Brake:
-    """Return what a log tells of its brake.
+    """Return what a log determines of its brake.
 
     Parameters
     ----------
@@ -112,11 +112,11 @@ def _level(
     size = float(np.mean(np.abs(value)))
     turning = float(np.mean(value * direction))
     signed = size > 0.0 and abs(turning) > _SIGNED * size and direction.std() > 0.0
-    # One sign throughout, whichever way the shaft turns, is a cell that is pulled one way only.
+    # One sign throughout, however the shaft turns, is a cell that is pulled in one direction only.
     steady = abs(float(value.mean())) > 0.9 * size
     turns = float(np.sign(turning)) if signed and not steady else 0.0
-    way = float(np.sign(value.mean())) or 1.0
-    level = value * direction * turns if turns else value * way
+    pull = float(np.sign(value.mean())) or 1.0
+    level = value * direction * turns if turns else value * pull
     width = max(1, round(_SMOOTHING / max(float(np.median(np.diff(at))), 1e-6)))
     smooth = _by_stretches(at, np.asarray(level, dtype=np.float64), width, uniform_filter1d)
     return at, np.maximum(smooth, 0.0), turns

@@ -1,7 +1,7 @@
 """Static friction from the instants at which the shaft breaks away.
 
 After a reversal of the torque the shaft sticks, the current climbs, and the shaft moves off when
-the torque exceeds the static friction and the brake. The motor's angle tells the instant to a
+the torque exceeds the static friction and the brake. The motor's angle shows the instant to a
 fraction of a sample, the current its torque.
 """
 
@@ -25,7 +25,7 @@ _STUCK = 0.02  # s that the shaft stands still at least
 _CLIMB = 0.04  # s of the climb before the instant that are used, at most
 _TAIL = 5  # samples of the set point that are as good as straight
 _NOISY_TAIL = 0.02  # s of a measured current that are as good as straight: its noise averages out
-_SURE = 5.0  # deviations of the angle's noise that are motion
+_MOTION = 5.0  # deviations of the angle's noise that are motion
 _FINEST = 1e-6  # rad: motion smaller than this is none
 _AWAY = 0.05  # s after the instant in which the motion must have become clear
 _CLEAR = 0.02  # of the highest speed
@@ -94,8 +94,8 @@ def breakaway_torque(
     scatter = 1.4826 * float(np.median(np.abs(torque - middle)))
     period = max(log.period for log in logs)
     climb = constant * float(np.median(every.slope)) * period / np.sqrt(3.0)
-    own = _MEDIAN * scatter / np.sqrt(count)
-    std = float(np.sqrt(own**2 + climb**2 + (constant * every.behind) ** 2))
+    noise_part = _MEDIAN * scatter / np.sqrt(count)
+    std = float(np.sqrt(noise_part**2 + climb**2 + (constant * every.behind) ** 2))
     return middle, std, count - 1.0
 
 
@@ -104,7 +104,7 @@ class _Event:
     """One breakaway: its instant, and set point and measured current while the shaft stuck."""
 
     when: float
-    way: float
+    direction: float
     brake: float
     time: Floats
     target: Floats
@@ -114,7 +114,7 @@ class _Event:
     def climbs(self) -> bool:
         """Whether the set point climbs towards the motion, over the standstill that is used."""
         slope = np.polyfit(self.time - self.when, self.target, 1)[0]
-        return bool(slope * self.way > 0.0)
+        return bool(slope * self.direction > 0.0)
 
     def line(self) -> tuple[float, float]:
         """Slope and level at the instant of the set point's last stretch."""
@@ -149,26 +149,26 @@ def breakaways(
         for event in _events(log, log.motor, keep & log.good, slow)
     ]
     lines = np.array([event.line() for event in events], dtype=np.float64).reshape(-1, 2)
-    way = np.array([event.way for event in events], dtype=np.float64)
+    direction = np.array([event.direction for event in events], dtype=np.float64)
     climbing = np.array([event.climbs() for event in events], dtype=np.bool_)
     events = [event for event, up in zip(events, climbing, strict=True) if up]
-    lines, way = lines[climbing], way[climbing]
+    lines, direction = lines[climbing], direction[climbing]
     gap, offset, behind = _behind(events)
-    current = lines[:, 1] - offset - gap * way + lag * lines[:, 0]
+    current = lines[:, 1] - offset - gap * direction + lag * lines[:, 0]
     brake = np.array([event.brake for event in events], dtype=np.float64)
-    return Breakaways(current, brake, way, lines[:, 0] * way, behind)
+    return Breakaways(current, brake, direction, lines[:, 0] * direction, behind)
 
 
 def _behind(events: Sequence[_Event]) -> tuple[float, float, float]:
     """How far the current stays behind its set point in a climb, its offset, a deviation [A]."""
     if not events:
         return 0.0, 0.0, 0.0
-    rest = np.concatenate([e.target - e.current for e in events])
-    way = np.concatenate([np.full(len(e.time), e.way) for e in events])
-    columns = np.column_stack((way, np.ones_like(way)))
-    (gap, offset), *_ = np.linalg.lstsq(columns, rest, rcond=None)
+    deficit = np.concatenate([e.target - e.current for e in events])
+    direction = np.concatenate([np.full(len(e.time), e.direction) for e in events])
+    columns = np.column_stack((direction, np.ones_like(direction)))
+    (gap, offset), *_ = np.linalg.lstsq(columns, deficit, rcond=None)
     # One climb is one observation.
-    means = [float(np.mean(e.target - e.current)) - gap * e.way - offset for e in events]
+    means = [float(np.mean(e.target - e.current)) - gap * e.direction - offset for e in events]
     return float(gap), float(offset), float(np.std(means) / np.sqrt(len(means)))
 
 
@@ -202,8 +202,8 @@ def stuck_stretches(motor: Floats, least: int, small: float) -> list[tuple[int, 
     jumps = np.abs(np.diff(motor, 3))
     noise = 1.4826 * float(np.median(jumps[jumps > 0.0])) / np.sqrt(20.0) if jumps.any() else 0.0
     # The noise of a smooth motion's third differences is far below its first ones.
-    still = np.concatenate(([False], moved <= max(_SURE * noise, _FINEST, small), [False]))
-    edges = np.flatnonzero(np.diff(still.astype(np.int8)))
+    standing = np.concatenate(([False], moved <= max(_MOTION * noise, _FINEST, small), [False]))
+    edges = np.flatnonzero(np.diff(standing.astype(np.int8)))
     pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
     return [(begin, end) for begin, end in pairs if end - begin >= least and end < len(motor) - 3]
 
@@ -215,12 +215,12 @@ def _instant(log: BenchLog, motor: Floats, end: int) -> tuple[float, float] | No
     at the instant.
     """
     ahead = motor[end + 1 : end + 1 + max(3, round(_AWAY / log.period))] - motor[end]
-    way = float(np.sign(ahead[-1]))
+    direction = float(np.sign(ahead[-1]))
     top = float(np.abs(log.speed).max())
-    if way == 0.0 or abs(ahead[-1] - ahead[-2]) < _CLEAR * top * log.period:
+    if direction == 0.0 or abs(ahead[-1] - ahead[-2]) < _CLEAR * top * log.period:
         return None
-    first, second = way * float(ahead[0]), way * float(ahead[1])
+    first, second = direction * float(ahead[0]), direction * float(ahead[1])
     if not 0.0 < first < second:
         return None
     back = np.sqrt(first) / (np.sqrt(second) - np.sqrt(first))
-    return float(log.time[end + 1]) - min(max(float(back), 0.0), 1.0) * log.period, way
+    return float(log.time[end + 1]) - min(max(float(back), 0.0), 1.0) * log.period, direction

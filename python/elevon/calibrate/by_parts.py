@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from elevon.calibrate.estimate import Estimate
 from elevon.calibrate.level import Level
 from elevon.calibrate.outcome import Outcome, log_facts
-from elevon.calibrate.role_log import RoleLog
+from elevon.calibrate.role_log import CalibrationRoleLog
 from elevon.errors import InputError, Interrupted
 from elevon.parameters.records import record_of
 
@@ -28,13 +28,13 @@ class PartsCalibration(Outcome):
 
     Attributes
     ----------
-    logs : tuple of RoleLog
+    logs : tuple of CalibrationRoleLog
         The data.
     facts : mapping of str to object
         What else is known of the fit, plain types.
     """
 
-    logs: tuple[RoleLog, ...]
+    logs: tuple[CalibrationRoleLog, ...]
     facts: Mapping[str, Any]
 
     def to_dict(self) -> dict[str, Any]:
@@ -89,12 +89,12 @@ class Parts:
         return self.actuator.with_values(values, source="calibration")
 
     def answer(self, free: Sequence[str] | None) -> tuple[list[Estimate], dict[str, str]]:
-        """Return the estimates, those asked for only, and the rest with its reasons.
+        """Return the estimates, those requested only, and the rest with its reasons.
 
         Raises
         ------
         InputError
-            Nothing is determined, or not what was asked for.
+            Nothing is determined, or not what was requested.
         """
         estimates = []
         for path, level in self.levels.items():
@@ -102,9 +102,9 @@ class Parts:
                 self.reasons[path] = "the logs' noise is larger than its effect"
             elif free is None or path in free:
                 estimates.append(self._estimate(path, level))
-        shown = {item.path for item in estimates}
+        present = {item.path for item in estimates}
         for path in free or ():
-            if path not in shown:
+            if path not in present:
                 why = self.reasons.get(path, "nothing in the logs speaks of it")
                 raise InputError(f"--free {path}: {why}")
         if not estimates:

@@ -22,7 +22,7 @@ from elevon.calibrate.log import BenchLog
 from elevon.calibrate.outcome import Outcome, log_facts
 from elevon.calibrate.plant import Torque
 from elevon.calibrate.regression import Regression
-from elevon.calibrate.signals import Signals, signal_stage
+from elevon.calibrate.signals import CalibrationSignals, signal_stage
 from elevon.errors import InputError, Interrupted, unknown
 from elevon.parameters.records import record_of
 from elevon.progress import Progress, part
@@ -65,7 +65,7 @@ class Calibration(Outcome):
     held_out : tuple of HeldOut
         Errors on data that were kept from the fit.
     findings : tuple of str
-        What the user should know, in words.
+        What the caller should know, in words.
     """
 
     logs: tuple[BenchLog, ...]
@@ -163,7 +163,7 @@ def calibrate(
     Raises
     ------
     InputError
-        No log, an unknown path, or a path asked for that the logs do not determine.
+        No log, an unknown path, or a path requested that the logs do not determine.
     Interrupted
         `progress` returned False.
     """
@@ -207,7 +207,7 @@ class _Task:
     logs: Sequence[BenchLog]
     keeps: Sequence[Bools]
     actuator: Actuator
-    signals: Signals
+    signals: CalibrationSignals
     free: Sequence[str] | None
 
 
@@ -256,7 +256,9 @@ def _findings(
     )
 
 
-def _started(actuator: Actuator, signals: Signals, estimates: Sequence[Estimate]) -> Actuator:
+def _started(
+    actuator: Actuator, signals: CalibrationSignals, estimates: Sequence[Estimate]
+) -> Actuator:
     """Return what model runs start from: what followed, and branches the signals do not show."""
     none = {item.path: 0.0 for item in estimates if item.in_set and item.value == 0.0}
     return actuator.with_values({**signals.followed, **none}, source="calibration")
@@ -295,11 +297,11 @@ def _run_in(log: BenchLog, transient: float | None) -> float:
             raise InputError(f"transient of {transient:g} s: {log.name} lasts {log.duration:g} s")
         return transient
     limit = 0.999 * saturated_speed(log)
-    held = np.abs(log.speed_ref) >= limit
-    early = np.flatnonzero(held[: len(held) // 2])
+    limited = np.abs(log.speed_ref) >= limit
+    early = np.flatnonzero(limited[: len(limited) // 2])
     first = 0.0
     if early.size:
-        after = np.flatnonzero(~held[early[0] :])
+        after = np.flatnonzero(~limited[early[0] :])
         first = float(log.time[early[0] + after[0]]) + _SETTLED if after.size else 0.0
     return min(max(first, _RUN_IN), 0.5 * log.duration)
 

@@ -1,4 +1,4 @@
-"""What can be freed: parameters of the model, and quantities of the sensors that no set holds."""
+"""What can be freed: parameters of the model, and sensor quantities that no actuator file holds."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from elevon.parameters.relations import emf_constant, motor_torque_constant, sta
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["AUTO", "Candidate", "candidates", "start_values", "within_inertia"]
+__all__ = ["AUTO", "ParameterCandidate", "candidates", "start_values", "within_inertia"]
 
 #: What `auto` tries to free in the dynamic fit, in the model's own parameters.
 AUTO = (
@@ -38,7 +38,7 @@ _KNOTS = 4  # of an unknown brake's level over a log
 
 
 @dataclass(frozen=True)
-class Candidate:
+class ParameterCandidate:
     """One number that the dynamic fit may free.
 
     Attributes
@@ -83,8 +83,8 @@ class Candidate:
 
 def candidates(
     actuator: Actuator, logs: Sequence[BenchLog], free: Sequence[str] | None
-) -> list[Candidate]:
-    """List what may be freed: the user's paths, or those of `AUTO` that the logs could tell.
+) -> list[ParameterCandidate]:
+    """List what may be freed: the caller's paths, or those of `AUTO` that the logs could determine.
 
     Raises
     ------
@@ -109,27 +109,27 @@ def candidates(
     if all(log.current_signal == "current_q_meas" for log in logs):
         offsets.insert(0, ("sensor.current_offset", "A", current, 0.01 * current))
     items += [
-        Candidate(path, "output", "sensor", unit, False, -reach, reach, size)
+        ParameterCandidate(path, "output", "sensor", unit, False, -reach, reach, size)
         for path, unit, reach, size in offsets
     ]
     return items + _brakes(logs)
 
 
-def _brakes(logs: Sequence[BenchLog]) -> list[Candidate]:
+def _brakes(logs: Sequence[BenchLog]) -> list[ParameterCandidate]:
     """Offset of the load cell where another log shows the friction alone; unknown brakes."""
     items = []
     measured = [log for log in logs if log.brake.measured]
     if measured and any(log.brake.known == "off" for log in logs):
         top = max(float(log.brake.level.max()) for log in measured)
         items.append(
-            Candidate(
+            ParameterCandidate(
                 "sensor.load_cell_offset", "input", "sensor", "N m", False, -top, top, 0.01 * top
             )
         )
     for k, log in enumerate(logs):
         if log.brake.known in {"on", "force"}:
             items += [
-                Candidate(
+                ParameterCandidate(
                     f"load.brake[{log.name}][{j}]",
                     "input",
                     "load",
@@ -155,7 +155,7 @@ def _sensible(path: str, actuator: Actuator, logs: Sequence[BenchLog]) -> bool:
     return path in actuator.parameters
 
 
-def _parameter(path: str, actuator: Actuator) -> Candidate:
+def _parameter(path: str, actuator: Actuator) -> ParameterCandidate:
     record = record_of(actuator.wiring, path, "--free")
     if record.choices is not None:
         raise InputError(f"--free {path}: is a choice, not a number")
@@ -163,14 +163,20 @@ def _parameter(path: str, actuator: Actuator) -> Candidate:
         raise InputError(f"--free {path}: belongs to the model's making, not to a log")
     value = actuator.parameters.value(path)
     if path == "sensor.filter_cutoff":
-        return Candidate(path, "parameter", record.register, record.unit, True, *_FILTER, 0.3)
+        return ParameterCandidate(
+            path, "parameter", record.register, record.unit, True, *_FILTER, 0.3
+        )
     if value > 0.0 and record.minimum >= 0.0:
         low = max(record.minimum, 1e-3 * value)
         high = min(record.maximum, 1e3 * value)
-        return Candidate(path, "parameter", record.register, record.unit, True, low, high, 0.1)
+        return ParameterCandidate(
+            path, "parameter", record.register, record.unit, True, low, high, 0.1
+        )
     span = max(1.0, 10.0 * abs(value))
     low, high = max(record.minimum, value - span), min(record.maximum, value + span)
-    return Candidate(path, "parameter", record.register, record.unit, False, low, high, 0.01 * span)
+    return ParameterCandidate(
+        path, "parameter", record.register, record.unit, False, low, high, 0.01 * span
+    )
 
 
 def start_values(actuator: Actuator, logs: Sequence[BenchLog]) -> dict[str, float]:
@@ -186,9 +192,9 @@ def start_values(actuator: Actuator, logs: Sequence[BenchLog]) -> dict[str, floa
         values["friction.static"] = static_following(actuator.parameters, kt * starts.dry)
     if starts.viscous > 0.0:
         values["friction.viscous"] = kt * starts.viscous
-    rest = _other_inertia(actuator)
-    if kt * starts.inertia > 1.05 * rest:
-        values["motor.inertia"] = kt * starts.inertia - rest
+    other = _other_inertia(actuator)
+    if kt * starts.inertia > 1.05 * other:
+        values["motor.inertia"] = kt * starts.inertia - other
     values |= _controller(actuator, starts, kt)
     old = actuator.parameters.value
     near = {p: v for p, v in values.items() if 1.0 / _FAR < v / max(old(p), 1e-12) < _FAR}

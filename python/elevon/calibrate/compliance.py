@@ -89,11 +89,13 @@ def calibrate_compliance(
     _check(x, y, blocks, groups)
     labels = [label for label in np.unique(groups) if label != 0]
     design = np.column_stack((x, np.ones_like(x), *[(groups == k) * 1.0 for k in labels]))
-    beta, rest, trust, _ = robust_regression(design, y)
+    beta, misfit, trust, _ = robust_regression(design, y)
     if not beta[0] > 0.0:
         raise RangeError("compliance: the loss does not grow with the load: no stiffness")
     covariance, degrees = block_covariance(
-        design.T @ ((trust >= 1.0)[:, None] * design), [design * (trust * rest)[:, None]], [blocks]
+        design.T @ ((trust >= 1.0)[:, None] * design),
+        [design * (trust * misfit)[:, None]],
+        [blocks],
     )
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     half = quantile(degrees) * std
@@ -131,7 +133,7 @@ def calibrate_compliance(
         for k, (name, b, s, h) in enumerate(zip(names, beta[1:], std[1:], half[1:], strict=True))
     ]
     outliers = tuple(int(k) for k in np.flatnonzero(trust < 0.5))
-    return ComplianceCalibration(tuple(estimates), rest, outliers)
+    return ComplianceCalibration(tuple(estimates), misfit, outliers)
 
 
 def _check(

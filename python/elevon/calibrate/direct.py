@@ -1,7 +1,7 @@
 """First values straight from the signals: torque balance and speed controller by regression.
 
-These start the fit and rank what a log can tell; they carry no interval of their own (noise in the
-derivatives biases them a little).
+These start the fit and rank what a log can determine; they carry no interval of their own (noise in
+the derivatives biases them a little).
 """
 
 from __future__ import annotations
@@ -71,9 +71,9 @@ def robust_lines(design: Floats, target: Floats) -> Floats:
         root = np.sqrt(weight)
         solved, *_ = np.linalg.lstsq(scaled * root[:, None], target * root, rcond=1e-9)
         fresh = np.asarray(solved, dtype=np.float64)
-        rest = target - scaled @ fresh
-        spread = 1.4826 * float(np.median(np.abs(rest))) or 1e-300
-        weight = np.minimum(1.0, 1.345 * spread / np.maximum(np.abs(rest), 1e-300))
+        residual = target - scaled @ fresh
+        spread = 1.4826 * float(np.median(np.abs(residual))) or 1e-300
+        weight = np.minimum(1.0, 1.345 * spread / np.maximum(np.abs(residual), 1e-300))
         if np.abs(fresh - beta).max() <= 1e-8 * (np.abs(fresh).max() or 1.0):
             beta = fresh
             break

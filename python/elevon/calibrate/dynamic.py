@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.calibrate.candidates import Candidate, candidates, start_values, within_inertia
+from elevon.calibrate.candidates import ParameterCandidate, candidates, start_values, within_inertia
 from elevon.calibrate.estimate import Estimate, quantile
 from elevon.calibrate.fit import (
     DynamicFit,
@@ -175,7 +175,7 @@ def dynamic_stage(
 
 
 def _point(
-    free: Sequence[Candidate], start: dict[str, float], actuator: Actuator
+    free: Sequence[ParameterCandidate], start: dict[str, float], actuator: Actuator
 ) -> npt.NDArray[np.float64]:
     x = []
     for item in free:
@@ -193,15 +193,15 @@ def _best_drive(
     logs: Sequence[BenchLog],
     keeps: Sequence[Bools],
     actuator: Actuator,
-    free: Sequence[Candidate],
+    free: Sequence[ParameterCandidate],
     start: dict[str, float],
     *,
     fidelity: str,
     check: Any,
 ) -> Problem:
-    """The set's drive, or the carrier PWM of a real one, whichever explains the logs better."""
-    own = str(actuator.parameters["drive.kind"].value)
-    kinds = [own, *(kind for kind in ("pwm",) if kind != own)]
+    """The file's drive, or the carrier PWM of a real one, whichever explains the logs better."""
+    nominal = str(actuator.parameters["drive.kind"].value)
+    kinds = [nominal, *(kind for kind in ("pwm",) if kind != nominal)]
     problems = []
     for kind in kinds:
         changed = actuator.with_values({**_fixed(start, actuator, free), "drive.kind": kind})
@@ -214,15 +214,15 @@ def _best_drive(
             masks=[keep.copy() for keep in keeps],
         )
         values = values_of(free, _point(free, start, changed))
-        rest = problem.residual(problem.simulate([values])[0])
-        cost = sum(float(np.sum(np.minimum(np.abs(r), 10.0))) for r in rest)
+        misfit = problem.residual(problem.simulate([values])[0])
+        cost = sum(float(np.sum(np.minimum(np.abs(r), 10.0))) for r in misfit)
         problems.append((cost, problem))
     best, other = problems[0], problems[-1]
     return other[1] if other[0] < best[0] else best[1]
 
 
 def _fixed(
-    start: dict[str, float], actuator: Actuator, free: Sequence[Candidate]
+    start: dict[str, float], actuator: Actuator, free: Sequence[ParameterCandidate]
 ) -> dict[str, str | float]:
     """Known values of parameters the model runs keep fixed."""
     taken = {item.path for item in free}

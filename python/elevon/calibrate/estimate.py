@@ -18,7 +18,7 @@ class Estimate:
     Attributes
     ----------
     path : str
-        Parameter path, or a name such as ``sensor.speed_offset`` for what no set holds.
+        Parameter path, or a name such as ``sensor.speed_offset`` for what no actuator file holds.
     value : float
         SI.
     std : float
@@ -34,11 +34,11 @@ class Estimate:
     method : str
         ``simulation`` or ``direct``.
     given : tuple of str
-        Values of the set it stands on: only the ratio to these is determined.
+        Values of the actuator file it stands on: only the ratio to these is determined.
     note : str
         What else to know.
     in_set : bool
-        Whether a parameter set has a place for it.
+        Whether an actuator file has a place for it.
     """
 
     path: str

@@ -37,8 +37,8 @@ def plant_findings(
     says = []
     if plant is None:
         says.append(
-            "no log moves both ways long enough for a torque balance: friction and inertia "
-            "come from model runs alone, or stay as they were"
+            "no log moves in both directions long enough for a torque balance: friction and "
+            "inertia come from model runs alone, or stay as they were"
         )
     elif plant.explained < _POOR:
         says.append(
@@ -49,7 +49,7 @@ def plant_findings(
         says += _convention(torque, actuator)
     else:
         says.append(
-            "no load cell: the logs tell inertia, friction and speed gain only as ratios to "
+            "no load cell: the logs determine inertia, friction and speed gain only as ratios to "
             "the torque constant; motor.emf_constant is kept as given and the values scale "
             "with it"
         )
@@ -62,9 +62,9 @@ def plant_findings(
         if log.brake.known in {"on", "force"}
     ]
     if dynamic is not None:
-        own = actuator.parameters["drive.kind"].value
-        if dynamic.drive != own:
-            says.append(f"drive.kind {dynamic.drive!r} explains the logs better than {own!r}")
+        nominal = actuator.parameters["drive.kind"].value
+        if dynamic.drive != nominal:
+            says.append(f"drive.kind {dynamic.drive!r} explains the logs better than {nominal!r}")
         says += [
             f"{path} absorbs what the model lacks ({_percent(a, b)}): model runs want {a:.5g}, "
             f"the signals themselves say {b:.5g}"
@@ -91,8 +91,8 @@ def _convention(torque: Torque, actuator: Actuator) -> list[str]:
     for factor, name in ((math.sqrt(2.0), "peak"), (1.0 / math.sqrt(2.0), "rms")):
         if abs(ratio / factor - 1.0) < _CONVENTION:
             return [
-                f"the torque constant is {ratio:.3f} times the set's: the logged currents may "
-                f"be {name} values taken for the other convention"
+                f"the torque constant is {ratio:.3f} times the file's: the logged currents "
+                f"may be {name} values taken for the other convention"
             ]
     return []
 
@@ -107,7 +107,7 @@ def amplitude_findings(commands: Sequence[CommandFit], estimates: Sequence[Estim
             "on its own (its inertia "
             "is not small against its friction): backlash.total comes from the span of the two "
             "positions' difference and holds the give of the contacts; encoder gain and delay "
-            "cannot be told; a model whose output has no inertia will miss the output's "
+            "cannot be determined; a model whose output has no inertia will miss the output's "
             "position by "
             "up to half the backlash"
         )

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.calibrate.blocks import block_covariance, block_length
-from elevon.calibrate.candidates import Candidate
+from elevon.calibrate.candidates import ParameterCandidate
 from elevon.calibrate.problem import Problem, values_of
 from elevon.parameters.relations import TORQUE_PER_FLUX
 
@@ -51,7 +51,7 @@ class DynamicFit:
         Parameters that ended at a bound.
     """
 
-    free: tuple[Candidate, ...]
+    free: tuple[ParameterCandidate, ...]
     x: Floats
     covariance: Floats
     degrees: float
@@ -67,7 +67,7 @@ class DynamicFit:
         return values_of(self.free, self.x)
 
 
-def step_sizes(free: Sequence[Candidate]) -> Floats:
+def step_sizes(free: Sequence[ParameterCandidate]) -> Floats:
     """Return the steps of central differences: wide enough to average over switching instants."""
     return np.array([_STEP if item.log_scale else 0.1 * item.size for item in free])
 
@@ -75,8 +75,8 @@ def step_sizes(free: Sequence[Candidate]) -> Floats:
 def blocks_of(problem: Problem, residual: Sequence[Floats]) -> list[npt.NDArray[np.int64]]:
     """Number the blocks of each log's samples, longer than the residual's memory."""
     blocks = []
-    for log, rest, mask in zip(problem.logs, residual, problem.masks, strict=True):
-        used = rest[mask]
+    for log, misfit, mask in zip(problem.logs, residual, problem.masks, strict=True):
+        used = misfit[mask]
         lengths = [block_length(np.clip(used[:, c], -_SOFT, _SOFT), log.period) for c in range(2)]
         blocks.append(np.floor(log.time / max(lengths)).astype(np.int64))
     return blocks
@@ -91,15 +91,15 @@ def refresh_scales(problem: Problem, values: dict[str, float]) -> None:
         pairs = ((run.speed, log.speed), (run.current, log.current))
         spread = []
         for (model, data), old in zip(pairs, problem.scales[k], strict=True):
-            rest = (model - data)[mask]
-            value = 1.4826 * float(np.median(np.abs(rest - np.median(rest))))
+            misfit = (model - data)[mask]
+            value = 1.4826 * float(np.median(np.abs(misfit - np.median(misfit))))
             spread.append(max(value, 1e-6 * float(np.abs(data).max()), 1e-12) if value else old)
         problem.scales[k] = (spread[0], spread[1])
 
 
 def fit_dynamic(
     problem: Problem,
-    free: Sequence[Candidate],
+    free: Sequence[ParameterCandidate],
     x0: Floats,
     *,
     most: int = 25,
@@ -180,32 +180,34 @@ def fit_dynamic(
     )
 
 
-def _at_bound(free: Sequence[Candidate], x: Floats, low: Floats, high: Floats) -> tuple[str, ...]:
+def _at_bound(
+    free: Sequence[ParameterCandidate], x: Floats, low: Floats, high: Floats
+) -> tuple[str, ...]:
     """Paths that ended at a bound."""
     close = 1e-3 * np.array([item.size for item in free])
     ends = (x - low < close) | (high - x < close)
     return tuple(item.path for item, end in zip(free, ends, strict=True) if end)
 
 
-def _bound(item: Candidate, value: float) -> float:
+def _bound(item: ParameterCandidate, value: float) -> float:
     return item.inner(max(value, 1e-300) if item.log_scale else value)
 
 
 def _explains(problem: Problem, values: dict[str, float]) -> float:
     """Share of the current's variance that a point explains, over all logs."""
-    rest = total = 0.0
+    misfit = total = 0.0
     for run, log, mask in zip(
         problem.simulate([values])[0], problem.logs, problem.masks, strict=True
     ):
         if run is None:
             return -np.inf
-        rest += float(np.sum((run.current - log.current)[mask] ** 2))
+        misfit += float(np.sum((run.current - log.current)[mask] ** 2))
         total += float(np.sum((log.current - log.current[mask].mean())[mask] ** 2))
-    return 1.0 - rest / total if total > 0.0 else -np.inf
+    return 1.0 - misfit / total if total > 0.0 else -np.inf
 
 
 def _global_start(
-    problem: Problem, free: Sequence[Candidate], start: Floats, low: Floats, high: Floats
+    problem: Problem, free: Sequence[ParameterCandidate], start: Floats, low: Floats, high: Floats
 ) -> Floats:
     """Keep the start where it explains the current; else try a cloud around it, in one batch."""
     if _explains(problem, values_of(free, start)) > _EXPLAINED:
@@ -228,7 +230,7 @@ def _global_start(
 
 
 def _exact_columns(
-    problem: Problem, free: Sequence[Candidate], x: Floats, finite: Sequence[Floats] | None
+    problem: Problem, free: Sequence[ParameterCandidate], x: Floats, finite: Sequence[Floats] | None
 ) -> tuple[int, ...]:
     """Candidates whose exact derivatives agree with differences over the switching instants."""
     if problem.fidelity != "low":
@@ -239,28 +241,28 @@ def _exact_columns(
     if finite is None:
         finite = problem.jacobian(free, x, step_sizes(free))
     dual = _exact(problem, free, x, chosen)
-    held = []
+    agreeing = []
     for j, k in enumerate(chosen):
         a = np.concatenate([part[:, :, k].ravel() for part in finite])
         b = np.concatenate([part[:, :, j].ravel() for part in dual])
         if float(np.linalg.norm(a - b)) <= _AGREE * float(np.linalg.norm(a)):
-            held.append(k)
-    return tuple(held)
+            agreeing.append(k)
+    return tuple(agreeing)
 
 
 def _exact(
-    problem: Problem, free: Sequence[Candidate], x: Floats, chosen: Sequence[int]
+    problem: Problem, free: Sequence[ParameterCandidate], x: Floats, chosen: Sequence[int]
 ) -> list[Floats]:
     """Exact derivatives of the residual by the chosen candidates, (n, 2, len(chosen)) a log."""
     values = values_of(free, x)
     paths = [free[k].path for k in chosen]
     tied = "control.torque_constant"
-    asked = [*paths, tied] if problem.tied and "motor.emf_constant" in paths else paths
+    wanted = [*paths, tied] if problem.tied and "motor.emf_constant" in paths else paths
     jacobians = []
     for index, (log, scale, mask) in enumerate(
         zip(problem.logs, problem.scales, problem.masks, strict=True)
     ):
-        by = problem.exact(index, values, asked)
+        by = problem.exact(index, values, wanted)
         part = np.empty((len(log.time), 2, len(paths)))
         for j, path in enumerate(paths):
             column = by[path] + (
@@ -274,40 +276,46 @@ def _exact(
 
 
 def _mixed(
-    problem: Problem, free: Sequence[Candidate], x: Floats, exact: Sequence[int]
+    problem: Problem, free: Sequence[ParameterCandidate], x: Floats, exact: Sequence[int]
 ) -> list[Floats]:
-    """Exact columns where they hold, differences over lanes for the others."""
-    rest = [k for k in range(len(free)) if k not in exact]
+    """Exact columns where they hold, differences over a batch for the others."""
+    others = [k for k in range(len(free)) if k not in exact]
     parts = [np.empty((len(log.time), 2, len(free))) for log in problem.logs]
     if exact:
         for part, dual in zip(parts, _exact(problem, free, x, exact), strict=True):
             part[:, :, list(exact)] = dual
-    if rest:
+    if others:
         steps = step_sizes(free)
-        for part, finite in zip(parts, _partial(problem, free, x, rest, steps), strict=True):
-            part[:, :, rest] = finite
+        for part, finite in zip(parts, _partial(problem, free, x, others, steps), strict=True):
+            part[:, :, others] = finite
     return parts
 
 
 def _partial(
-    problem: Problem, free: Sequence[Candidate], x: Floats, rest: Sequence[int], steps: Floats
+    problem: Problem,
+    free: Sequence[ParameterCandidate],
+    x: Floats,
+    others: Sequence[int],
+    steps: Floats,
 ) -> list[Floats]:
     points = []
-    for k in rest:
+    for k in others:
         for sign in (1.0, -1.0):
             moved = x.copy()
             moved[k] += sign * steps[k]
             points.append(values_of(free, moved))
     runs = problem.simulate(points)
-    parts = [np.empty((len(log.time), 2, len(rest))) for log in problem.logs]
-    for j, k in enumerate(rest):
+    parts = [np.empty((len(log.time), 2, len(others))) for log in problem.logs]
+    for j, k in enumerate(others):
         up, down = problem.residual(runs[2 * j]), problem.residual(runs[2 * j + 1])
         for part, a, b in zip(parts, up, down, strict=True):
             part[:, :, j] = (a - b) / (2.0 * steps[k])
     return parts
 
 
-def _covariance(problem: Problem, free: Sequence[Candidate], x: Floats) -> tuple[Floats, float]:
+def _covariance(
+    problem: Problem, free: Sequence[ParameterCandidate], x: Floats
+) -> tuple[Floats, float]:
     jac = problem.jacobian(free, x, step_sizes(free))
     residual = problem.residual(problem.simulate([values_of(free, x)])[0])
     blocks = blocks_of(problem, residual)
@@ -315,9 +323,9 @@ def _covariance(problem: Problem, free: Sequence[Candidate], x: Floats) -> tuple
     normal = np.zeros((size, size))
     scores: list[Floats] = []
     inner: list[Any] = []
-    for part, rest, block, mask in zip(jac, residual, blocks, problem.masks, strict=True):
-        weight = 1.0 / np.sqrt(1.0 + (rest / _SOFT) ** 2)
+    for part, misfit, block, mask in zip(jac, residual, blocks, problem.masks, strict=True):
+        weight = 1.0 / np.sqrt(1.0 + (misfit / _SOFT) ** 2)
         normal += np.einsum("ncp,nc,ncq->pq", part, weight**3, part)
-        scores.append(np.einsum("ncp,nc->np", part, weight * rest)[mask])
+        scores.append(np.einsum("ncp,nc->np", part, weight * misfit)[mask])
         inner.append(block[mask] - block[mask].min())
     return block_covariance(normal, scores, inner)

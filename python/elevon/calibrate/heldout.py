@@ -96,8 +96,8 @@ def _one(
     before: Actuator,
     fitted: Actuator,
 ) -> HeldOut | None:
-    rest = [j for j in range(len(logs)) if train[j].any()]
-    some, masks = [logs[j] for j in rest], [train[j] for j in rest]
+    others = [j for j in range(len(logs)) if train[j].any()]
+    some, masks = [logs[j] for j in others], [train[j] for j in others]
     plant = torque_balance(some, masks)
     law = controller_law(some, masks, 0.0 if plant is None else plant["lag"])
     if plant is None or law is None:
@@ -112,8 +112,8 @@ def _one(
     values["friction.static"] = static_following(fitted.parameters, dynamic)
     values["control.torque_constant"] = torque.believed
     offsets = {i.path: i.value for i in estimates if i.path == "sensor.current_offset"}
-    shown = (fitted.validation or {}).get("offsets", {})
-    offsets["sensor.speed_offset"] = shown.get("motor_speed", 0.0)
+    known = (fitted.validation or {}).get("offsets", {})
+    offsets["sensor.speed_offset"] = known.get("motor_speed", 0.0)
     problem = Problem(fitted, [logs[k]], tied=False, masks=[test])
     runs = problem.simulate([values | offsets, offsets])
     pairs = []

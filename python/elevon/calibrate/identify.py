@@ -1,4 +1,4 @@
-"""What the logs can tell, before anything is fitted: sensitivities ranked, pairs named."""
+"""What the logs can determine, before anything is fitted: sensitivities ranked, pairs named."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.calibrate.blocks import block_covariance
-from elevon.calibrate.candidates import Candidate
+from elevon.calibrate.candidates import ParameterCandidate
 from elevon.errors import InputError
 
 __all__ = ["Identifiability", "choose", "rank"]
 
 _CORRELATED = 0.95
 _LOOSEST = 0.25  # relative deviation (or of the size of an offset's meaning) still worth freeing
-_HOPELESS = 1.0  # the same, above which a parameter asked for is refused
+_HOPELESS = 1.0  # the same, above which a requested parameter is refused
 _SAME = 0.995  # correlation at which two parameters are one
 
 
@@ -59,7 +59,7 @@ class Identifiability:
 
 
 def rank(
-    free: Sequence[Candidate],
+    free: Sequence[ParameterCandidate],
     jac: Sequence[Floats],
     residual: Sequence[Floats],
     blocks: Sequence[npt.NDArray[np.int64]],
@@ -83,7 +83,7 @@ def rank(
 
 
 def choose(
-    free: Sequence[Candidate],
+    free: Sequence[ParameterCandidate],
     jac: Sequence[Floats],
     residual: Sequence[Floats],
     blocks: Sequence[npt.NDArray[np.int64]],
@@ -96,12 +96,13 @@ def choose(
     free, jac, residual, blocks
         As `rank`.
     required : sequence of str
-        Paths the user asked for: never dropped.
+        Paths requested: never dropped.
 
     Raises
     ------
     InputError
-        A required parameter that nothing in the logs excites, or that cannot be told from others.
+        A required parameter that nothing in the logs excites, or that cannot be determined from
+        others.
     """
     left = list(range(len(free)))
     dropped: dict[str, str] = {}
@@ -120,7 +121,7 @@ def choose(
         covariance = _covariance([part[:, :, left] for part in jac], residual, blocks)
         loose = _looseness([free[k] for k in left], covariance)
         optional = [j for j, k in enumerate(left) if free[k].path not in required]
-        # Of two that cannot be told apart, the looser one goes, even where both look tight.
+        # Of two that cannot be determined apart, the looser one goes, even where both look tight.
         blind = np.array([_twin(covariance, j) > _SAME for j in range(len(left))])
         worst = max(optional, key=lambda j: (blind[j], loose[j]), default=None)
         if worst is None or not (blind[worst] or loose[worst] > _LOOSEST):
@@ -139,7 +140,7 @@ def choose(
 
 
 def _refuse(
-    free: Sequence[Candidate],
+    free: Sequence[ParameterCandidate],
     left: Sequence[int],
     jac: Sequence[Floats],
     residual: Sequence[Floats],
@@ -167,23 +168,23 @@ def _twin(covariance: Floats, j: int) -> float:
     return float(correlation.max())
 
 
-def _looseness(free: Sequence[Candidate], covariance: Floats) -> Floats:
+def _looseness(free: Sequence[ParameterCandidate], covariance: Floats) -> Floats:
     """Relative deviation; offsets and delays count in ten meaningful changes."""
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     unit = np.array([1.0 if item.log_scale else 10.0 * item.size for item in free])
     return np.asarray(np.where(np.isfinite(std), std / unit, np.inf), dtype=np.float64)
 
 
-def _reason(free: Sequence[Candidate], covariance: Floats, j: int, loose: float) -> str:
+def _reason(free: Sequence[ParameterCandidate], covariance: Floats, j: int, loose: float) -> str:
     text = f"its deviation would be {100.0 * loose:.0f} %" if np.isfinite(loose) else "no effect"
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     if not np.isfinite(std).all() or std[j] == 0.0:
-        return "it cannot be told from the others"
+        return "it cannot be determined from the others"
     correlation = covariance[j] / (std[j] * np.where(std > 0.0, std, 1.0))
     correlation[j] = 0.0
     other = int(np.argmax(np.abs(correlation)))
     if abs(correlation[other]) > _CORRELATED:
-        text += f", and it cannot be told from {free[other].path} ({correlation[other]:+.3f})"
+        text += f", and it cannot be determined from {free[other].path} ({correlation[other]:+.3f})"
     return text
 
 
@@ -195,10 +196,10 @@ def _covariance(
     size = jac[0].shape[2]
     normal = np.zeros((size, size))
     scores = []
-    for part, rest in zip(jac, residual, strict=True):
+    for part, misfit in zip(jac, residual, strict=True):
         flat = part.reshape(-1, size)
         normal += flat.T @ flat
-        bounded = np.clip(rest, -3.0, 3.0)
+        bounded = np.clip(misfit, -3.0, 3.0)
         scores.append(np.einsum("ncp,nc->np", part, bounded))
     return block_covariance(normal, scores, blocks)[0]
 

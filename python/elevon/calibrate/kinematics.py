@@ -49,7 +49,7 @@ class CommandFit:
     log : str
         The log.
     waveform : WaveformFit
-        With the gain of the set.
+        With the gain of the actuator file.
     gain, gain_std : float
         Position gain [1/s].
     amplitude, amplitude_std : float
@@ -138,11 +138,11 @@ def _noted_with_gain(
     design = np.column_stack((ref, slope))
     data = noted.values[inside] - output
     (inverse, shift), *_ = np.linalg.lstsq(design, data, rcond=None)
-    rest = data - design @ np.array([inverse, shift])
-    if float(rest.std()) > _SMALL * float(np.std(output)) or not inverse > 0.0:
+    misfit = data - design @ np.array([inverse, shift])
+    if float(misfit.std()) > _SMALL * float(np.std(output)) or not inverse > 0.0:
         return None
-    std = np.sqrt(np.maximum(np.diag(robust_covariance(design, rest)), 0.0))
-    start, rms = noted.start + float(shift), float(np.sqrt(np.mean(rest**2)))
+    std = np.sqrt(np.maximum(np.diag(robust_covariance(design, misfit)), 0.0))
+    start, rms = noted.start + float(shift), float(np.sqrt(np.mean(misfit**2)))
     waveform = WaveformFit(
         "noted", {"start": start}, {"start": float(std[1])}, np.array([[std[1] ** 2]]), rms,
         len(t), (noted.start, float(log.time[-1])), True,
@@ -178,10 +178,10 @@ def _with_gain(log: BenchLog, fit: WaveformFit, gain: float, limit: float) -> Co
     best = least_squares(residual, start, x_scale=scale * 1e-2, jac="3-point", max_nfev=100)
     if not best.success:
         return None
-    rest = np.asarray(best.fun)
-    if float(rest.std()) > _SMALL * float(np.std(output)):
+    misfit = np.asarray(best.fun)
+    if float(misfit.std()) > _SMALL * float(np.std(output)):
         return None
-    covariance = robust_covariance(np.asarray(best.jac), rest)
+    covariance = robust_covariance(np.asarray(best.jac), misfit)
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     inverse, inverse_std = float(best.x[-1]), float(std[-1])
     if not inverse > 0.0:
@@ -229,8 +229,8 @@ def speed_sensor(logs: Sequence[BenchLog]) -> dict[str, tuple[float, float]] | N
     if np.linalg.cond(normal / np.outer(*[np.sqrt(np.diag(normal))] * 2)) > 1e12:
         return None
     beta = np.linalg.solve(normal, design.T @ target)
-    rest = target - design @ beta
-    parts = np.split(rest[:, None] * design, np.cumsum([len(d) for d in data])[:-1])
+    misfit = target - design @ beta
+    parts = np.split(misfit[:, None] * design, np.cumsum([len(d) for d in data])[:-1])
     covariance, _ = block_covariance(normal, parts, blocks)
     std = np.sqrt(np.diag(covariance))
     return {"gain": (float(beta[0]), float(std[0])), "offset": (float(beta[1]), float(std[1]))}

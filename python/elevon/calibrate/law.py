@@ -49,8 +49,8 @@ class _Law:
 
     def without(self, column: int) -> Floats:
         """Solve without one column; its coefficient comes back as zero."""
-        rest = [np.delete(c, column, axis=1) for c in self.columns]
-        return np.insert(self._solve(rest, self.targets)[0], column, 0.0)
+        residual = [np.delete(c, column, axis=1) for c in self.columns]
+        return np.insert(self._solve(residual, self.targets)[0], column, 0.0)
 
     def joint(self) -> Floats:
         """Solve with one derivative gain for both slopes; coefficients in the common order."""
@@ -110,8 +110,8 @@ def controller_law(
     if np.linalg.matrix_rank(design / size) < design.shape[1]:
         return None
     names = (*_TERMS, *(f"start[{k}]" for k in present))
-    beta, rest, weight, design = law.set_point()
-    regression = with_deviations(names, beta, design, rest, weight, times=times)
+    beta, residual, weight, design = law.set_point()
+    regression = with_deviations(names, beta, design, residual, weight, times=times)
     if not np.isfinite(regression.covariance).all():
         return regression
     sloped = np.isin(names, ("derivative", "slope"))

@@ -147,8 +147,9 @@ def bench_log(imported: ImportedLog) -> BenchLog:
     for needed in _NEEDED:
         if needed not in recording.roles:
             raise InputError(
-                f"{name}: no channel backlashes {needed}; calibration needs a speed set point, the "
-                f"motor's speed and a torque current; roles: {', '.join(recording.roles) or 'none'}"
+                f"{name}: no channel has the role {needed}; calibration needs a speed set point, "
+                f"the motor's speed and a torque current; roles: "
+                f"{', '.join(recording.roles) or 'none'}"
             )
     current_role = next((r for r in _CURRENTS if r in recording.roles), None)
     if current_role is None:

@@ -16,7 +16,7 @@ from elevon.arrays import Floats
 from elevon.calibrate.log import BenchLog
 
 __all__ = [
-    "Motion",
+    "SmoothedMotion",
     "acceleration_of",
     "delayed",
     "dilated",
@@ -35,7 +35,7 @@ _SIGMAS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)  # samples: kernels tried, narrowe
 
 
 @dataclass(frozen=True)
-class Motion:
+class SmoothedMotion:
     """Speed and acceleration of one log, smoothed as its current is, and what may be used."""
 
     speed: Floats
@@ -44,10 +44,10 @@ class Motion:
     sigma: float
 
 
-def motion_of(log: BenchLog) -> Motion:
+def motion_of(log: BenchLog) -> SmoothedMotion:
     """Speed, acceleration and current through one kernel and its derivatives."""
     sigma = kernel(log)
-    return Motion(*acceleration_of(log, sigma), smoothed(log.current, sigma), sigma)
+    return SmoothedMotion(*acceleration_of(log, sigma), smoothed(log.current, sigma), sigma)
 
 
 def acceleration_of(log: BenchLog, sigma: float) -> tuple[Floats, Floats]:

@@ -63,13 +63,13 @@ class Outcome:
         raise unknown("estimate", path, [item.path for item in self.estimates])
 
     def _repr_html_(self) -> str:
-        from elevon.calibrate.shown import calibration_card
+        from elevon.calibrate.notebook_card import calibration_card
 
         names = [log.name for log in self.logs]
         return calibration_card(self.before, names, self.estimates, self.undetermined)
 
     def head(self, logs: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-        """Return the first fields of the JSON form, with what is to be said of each log."""
+        """Return the first fields of the JSON form, with what is to be reported of each log."""
         return {
             "status": "ok",
             "actuator": self.before.name,

@@ -1,4 +1,4 @@
-"""How well values determined without a log predict it: where a set's thresholds come from."""
+"""How well values determined without a log predict it: the source of thresholds."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ __all__ = [
 ]
 
 _TIED = 0.01  # relative: closer than this the controller is taken to know the motor
-_SEEN = 3.0  # deviations a controller branch must stand off zero to exist
+_SEEN = 3.0  # deviations from zero of a controller branch that exists
 _GIVEN = ("motor.emf_constant",)
 #: Path, value, deviation, what it stands on, note.
 _Row = tuple[str, float, float, tuple[str, ...], str]
@@ -59,16 +59,16 @@ class Torque:
 
 
 def torque_scale(actuator: Actuator, plant: Regression | None) -> Torque:
-    """Return the torque constant: from the load cell where there is one, else the set's."""
+    """Return the torque constant: from the load cell if there is one, else the actuator file's."""
     value = actuator.parameters.value
     old = motor_torque_constant(actuator.parameters)
-    own = value("control.torque_constant")
+    nominal = value("control.torque_constant")
     tied = constant_is_tied(actuator.parameters, _TIED)
     if plant is not None and "brake" in plant.names and plant["brake"] > _SEEN * plant.std("brake"):
         constant = 1.0 / plant["brake"]
         relative = plant.std("brake") / plant["brake"]
-        return Torque(constant, relative, True, tied, constant if tied else own)
-    return Torque(old, 0.0, False, tied, own)
+        return Torque(constant, relative, True, tied, constant if tied else nominal)
+    return Torque(old, 0.0, False, tied, nominal)
 
 
 @dataclass
@@ -263,17 +263,17 @@ def static_estimate(
 def _inertia(sheet: _Sheet, scale: Callable[[Floats], float], total: float) -> dict[str, float]:
     """The motor's own inertia carries the sum, unless the others alone exceed it."""
     value = sheet.actuator.parameters.value
-    rest = value("gear.inertia") + value("load.inertia") / value("gear.ratio") ** 2
-    if total > 1.05 * rest:
+    inertia = value("gear.inertia") + value("load.inertia") / value("gear.ratio") ** 2
+    if total > 1.05 * inertia:
         sheet.add(
             "motor.inertia",
             "kg m2",
-            lambda b: scale(b) * b[0] - rest,
+            lambda b: scale(b) * b[0] - inertia,
             "only its sum with gear.inertia (and the load's) is determined: the others are kept",
             floor=0.0,
         )
         return {}
-    share = value("motor.inertia") / (value("motor.inertia") + rest)
+    share = value("motor.inertia") / (value("motor.inertia") + inertia)
     sheet.add(
         "motor.inertia",
         "kg m2",
@@ -281,7 +281,7 @@ def _inertia(sheet: _Sheet, scale: Callable[[Floats], float], total: float) -> d
         "the sum is less than the other inertias alone: all are scaled alike",
         floor=0.0,
     )
-    factor = total / (value("motor.inertia") + rest)
+    factor = total / (value("motor.inertia") + inertia)
     return {path: factor * value(path) for path in ("gear.inertia", "load.inertia")}
 
 

@@ -1,6 +1,6 @@
 """Static friction of a shaft that creeps before it slides.
 
-A contact on bristles (LuGre; Canudas de Wit, Olsson, Astrom and Lischinsky 1995) gives way
+A contact on bristles (LuGre; Canudas de Wit, Olsson, Astrom and Lischinsky 1995) deflects
 elastically: there is no instant at which the shaft breaks away, and the torque of the instant at
 which it seems to depends on how fast the torque climbs. The friction is therefore followed through
 each reversal along the motion as measured,
@@ -60,7 +60,7 @@ class _Windows:
     steps: Floats  # (n, m * _FINE): rad a part of a sample
     torque: Floats  # (n, m): N m that the friction has to explain, as late as the current
     brake: Floats  # (n, m): N m of the brake
-    way: Floats  # (n,): of the motion before, 1 or -1
+    direction: Floats  # (n,): of the motion before, 1 or -1
     counts: Bools  # (n, m): samples that count
     period: float
     sigma: float
@@ -124,7 +124,7 @@ def usable_logs(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> list[tuple[
 
 
 def reversals(log: BenchLog, keep: Bools) -> list[tuple[int, int]]:
-    """Last sample that slides one way and first one that slides the other, of every reversal."""
+    """Last sample of sliding before, and first of sliding after, every reversal."""
     speed = motion_of(log).speed
     at = np.flatnonzero(np.abs(speed) > _CLEAR * float(np.abs(speed).max()))
     around, longest = round((_AFTER + _MARGIN) / log.period), round(_LONGEST / log.period)
@@ -156,8 +156,10 @@ def _windows(
     sigma = max(kernel(log) for log, _ in used)
     balance = _Known(plant, constant, sigma, length)
     rows = [balance.rows(log, turn) for (log, _), turn in zip(used, turns, strict=True) if turn]
-    steps, torque, brake, way, counts = (np.concatenate([row[k] for row in rows]) for k in range(5))
-    return _Windows(steps, torque, brake, way, counts > 0.0, period, sigma, plant["lag"])
+    steps, torque, brake, direction, counts = (
+        np.concatenate([row[k] for row in rows]) for k in range(5)
+    )
+    return _Windows(steps, torque, brake, direction, counts > 0.0, period, sigma, plant["lag"])
 
 
 @dataclass(frozen=True)
@@ -213,7 +215,7 @@ class _Fit:
     x: Floats
     exponent: float
     cost: float
-    rest: Floats  # (n, m), zero where nothing counts
+    misfit: Floats  # (n, m), zero where nothing counts
     jac: Floats  # (n, m, 6)
 
     @property
@@ -222,15 +224,15 @@ class _Fit:
 
     def variance(self, windows: _Windows) -> tuple[float, float]:
         """Variance of the static friction from the reversals' scores, and degrees of freedom."""
-        jac, rest = self.jac[windows.counts], self.rest[windows.counts]
+        jac, misfit = self.jac[windows.counts], self.misfit[windows.counts]
         # A small excess does not show at which speed it is gone.
         active = [k for k in range(6) if k != 2 or self.x[1] > _SMALL * self.x[4]]
         jac = jac[:, active]
-        spread = 1.4826 * float(np.median(np.abs(rest))) or 1e-300
-        weight = 1.0 / np.sqrt(1.0 + (rest / (_SCALE * spread)) ** 2)
+        spread = 1.4826 * float(np.median(np.abs(misfit))) or 1e-300
+        weight = 1.0 / np.sqrt(1.0 + (misfit / (_SCALE * spread)) ** 2)
         events = np.nonzero(windows.counts)[0]
         covariance, degrees = block_covariance(
-            (jac * weight[:, None] ** 3).T @ jac, [jac * (weight * rest)[:, None]], [events]
+            (jac * weight[:, None] ** 3).T @ jac, [jac * (weight * misfit)[:, None]], [events]
         )
         gradient = np.isin(active, (1, 4)).astype(np.float64)
         return float(gradient @ covariance @ gradient), degrees
@@ -246,8 +248,8 @@ def _fit(windows: _Windows, dry: float, exponent: float, start: Floats | None = 
     high = np.array([np.log(1e7 * dry), 2.0 * dry, np.log(1e1), 1e2 * dry, 1.5 * dry, 0.2 * dry])
 
     def residual(x: Floats) -> Floats:
-        rest: Floats = _residual(windows, x[None], exponent)[0][windows.counts]
-        return rest
+        misfit: Floats = _residual(windows, x[None], exponent)[0][windows.counts]
+        return misfit
 
     def jacobian(x: Floats) -> Floats:
         return _slopes(windows, x, exponent, dry)
@@ -263,10 +265,10 @@ def _fit(windows: _Windows, dry: float, exponent: float, start: Floats | None = 
         f_scale=_SCALE * max(scale, 1e-6),
         max_nfev=40,
     )
-    rest = np.zeros(windows.counts.shape)
-    jac = np.zeros((*rest.shape, 6))
-    rest[windows.counts], jac[windows.counts] = residual(best.x), jacobian(best.x)
-    return _Fit(best.x, exponent, float(np.sum(np.abs(rest))), rest, jac)
+    misfit = np.zeros(windows.counts.shape)
+    jac = np.zeros((*misfit.shape, 6))
+    misfit[windows.counts], jac[windows.counts] = residual(best.x), jacobian(best.x)
+    return _Fit(best.x, exponent, float(np.sum(np.abs(misfit))), misfit, jac)
 
 
 def _coarse(windows: _Windows, dry: float, exponent: float) -> Floats:
@@ -311,7 +313,7 @@ def _bristles(windows: _Windows, x: Floats, exponent: float) -> Floats:
     end = np.sign(steps) * level / stiffness
     left = np.exp(-stiffness * size / level)
     z = np.empty((len(steps) + 1, *level.shape[1:]))
-    z[0] = windows.way * (dry + windows.brake[:, 0]) / stiffness
+    z[0] = windows.direction * (dry + windows.brake[:, 0]) / stiffness
     for k in range(len(steps)):
         z[k + 1] = end[k] + (z[k] - end[k]) * left[k]
     rate = (z[_FINE::_FINE] - z[_FINE - 1 :: _FINE][: len(z[_FINE::_FINE])]) / part

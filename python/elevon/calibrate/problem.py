@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.calibrate.candidates import Candidate
+from elevon.calibrate.candidates import ParameterCandidate
 from elevon.calibrate.log import BenchLog
 from elevon.errors import InputError, Interrupted
 from elevon.parameters.records import positions
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Problem", "Simulated"]
 
-_STEP = 1e-4  # s: the low model's own 0.25 ms costs half a per cent of damping
+_STEP = 1e-4  # s: the reduced-order model's own 0.25 ms costs half a per cent of damping
 _BIG = 1e3  # residual of a run that left the finite numbers, in deviations
 
 
@@ -52,7 +52,7 @@ class Problem:
     fidelity : str
         ``low`` or ``high``.
     check : callable
-        Asked between runs; raises `Interrupted` when the user stops.
+        Called between runs; raises `Interrupted` when the caller stops.
     tied : bool
         Whether the controller's torque constant follows the motor's.
     scales : list of (float, float)
@@ -138,9 +138,9 @@ class Problem:
         log = self.logs[index]
         offset = values.get("sensor.load_cell_offset", 0.0)
         if log.brake.measured and offset:
-            way = np.sign(np.interp(log.brake.time, log.time, log.speed))
-            shown = offset * (log.brake.turning * way if log.brake.turning else 1.0)
-            return log.brake.time, np.maximum(log.brake.level - shown, 0.0)
+            direction = np.sign(np.interp(log.brake.time, log.time, log.speed))
+            cell_offset = offset * (log.brake.turning * direction if log.brake.turning else 1.0)
+            return log.brake.time, np.maximum(log.brake.level - cell_offset, 0.0)
         knots = [v for p, v in values.items() if p.startswith(f"load.brake[{log.name}]")]
         if not knots:
             return None
@@ -150,7 +150,7 @@ class Problem:
         return at, np.array(knots)
 
     def simulate(self, points: Sequence[Mapping[str, float]]) -> list[list[Simulated | None]]:
-        """Run every log at every point, all in one batch of lanes; result[point][log]."""
+        """Run every log at every point, all in one batch; result[point][log]."""
         from elevon import _core
 
         if not self.check():
@@ -210,9 +210,9 @@ class Problem:
         return parts
 
     def jacobian(
-        self, free: Sequence[Candidate], x: Floats, steps: Floats
+        self, free: Sequence[ParameterCandidate], x: Floats, steps: Floats
     ) -> list[npt.NDArray[np.float64]]:
-        """Central differences over lanes; one array (n, 2, p) a log."""
+        """Central differences over a batch; one array (n, 2, p) a log."""
         points = []
         for k, step in enumerate(steps):
             for sign in (1.0, -1.0):
@@ -260,7 +260,7 @@ class Problem:
         return columns
 
 
-def values_of(free: Sequence[Candidate], x: Floats) -> dict[str, float]:
+def values_of(free: Sequence[ParameterCandidate], x: Floats) -> dict[str, float]:
     """Return paths and values of a point of the fit."""
     return {item.path: item.outer(float(v)) for item, v in zip(free, x, strict=True)}
 

@@ -1,4 +1,4 @@
-"""What a set promises of its agreement with a log: from healthy data held out of the fit."""
+"""What an actuator file promises of its agreement with a log: from healthy held-out data."""
 
 from __future__ import annotations
 
@@ -58,16 +58,16 @@ def held_out_agreement(
     if len(logs) < 2:
         return None
     for k, log in enumerate(logs):
-        rest = [other for j, other in enumerate(logs) if j != k]
+        others = [other for j, other in enumerate(logs) if j != k]
         share = part(progress, k / len(logs), (k + 1) / len(logs))
         try:
             fitted = calibrate(
-                rest, before, free=free, hold_out=False, model_runs=False, progress=share
+                others, before, free=free, hold_out=False, model_runs=False, progress=share
             )
-            held = validate([log], fitted.actuator, transient=like.transient)
+            validated = validate([log], fitted.actuator, transient=like.transient)
         except InputError:
             continue
-        rows += held.errors
+        rows += validated.errors
     return replace(like, errors=tuple(rows)) if rows else None
 
 

@@ -55,7 +55,7 @@ def with_deviations(
     names: tuple[str, ...],
     value: Floats,
     design: Floats,
-    rest: Floats,
+    residual: Floats,
     weight: Floats,
     *,
     times: Sequence[tuple[Floats, Floats, float]],
@@ -70,7 +70,7 @@ def with_deviations(
         Their values.
     design : ndarray, shape (n, p)
         Derivatives of the prediction.
-    rest, weight : ndarray, shape (n,)
+    residual, weight : ndarray, shape (n,)
         Residuals and robust weights.
     times : sequence of (ndarray, ndarray, float)
         Instants and speeds of each log's samples in their order, and its period.
@@ -81,7 +81,7 @@ def with_deviations(
         at += len(time)
         if not len(time):
             continue
-        clipped = rest[part] * weight[part]
+        clipped = residual[part] * weight[part]
         scores.append(design[part] * clipped[:, None])
         blocks.append(stroke_blocks(time, speed, clipped, period))
     # Huber's score stands still for outliers: they carry no information.
@@ -90,10 +90,10 @@ def with_deviations(
     covariance, degrees = block_covariance(normal, scores, blocks)
     # Columns beyond the linear ones (the lag's) move nothing at the solution.
     linear = len(value) - int("lag" in names)
-    data = rest + design[:, :linear] @ value[:linear]
+    data = residual + design[:, :linear] @ value[:linear]
     spread = float(np.sum((data - data.mean()) ** 2))
-    explained = 1.0 - float(rest @ rest) / spread if spread > 0.0 else 0.0
-    return Regression(names, value, covariance, degrees, explained, len(rest))
+    explained = 1.0 - float(residual @ residual) / spread if spread > 0.0 else 0.0
+    return Regression(names, value, covariance, degrees, explained, len(residual))
 
 
 def robust_regression(design: Floats, data: Floats) -> tuple[Floats, Floats, Floats, Floats]:
@@ -106,9 +106,9 @@ def robust_regression(design: Floats, data: Floats) -> tuple[Floats, Floats, Flo
     for _ in range(20):
         heavy = weight[:, None] * scaled
         fresh, *_ = np.linalg.lstsq(heavy.T @ scaled, heavy.T @ data, rcond=1e-12)
-        rest = data - scaled @ fresh
-        spread = 1.4826 * float(np.median(np.abs(rest))) or 1e-300
-        weight = np.minimum(1.0, _HUBER * spread / np.maximum(np.abs(rest), 1e-300))
+        residual = data - scaled @ fresh
+        spread = 1.4826 * float(np.median(np.abs(residual))) or 1e-300
+        weight = np.minimum(1.0, _HUBER * spread / np.maximum(np.abs(residual), 1e-300))
         done = np.abs(fresh - beta).max() <= 1e-7 * max(float(np.abs(fresh).max()), 1e-300)
         beta = fresh
         if done:
@@ -116,9 +116,9 @@ def robust_regression(design: Floats, data: Floats) -> tuple[Floats, Floats, Flo
     return beta / scale, data - scaled @ beta, weight, design
 
 
-def robust_cost(rest: Floats) -> float:
+def robust_cost(residual: Floats) -> float:
     """Huber's cost at a fixed fraction of the spread: smooth in whatever moves the residual."""
-    bound = _HUBER * 1.4826 * float(np.median(np.abs(rest)))
-    size = np.abs(rest)
+    bound = _HUBER * 1.4826 * float(np.median(np.abs(residual)))
+    size = np.abs(residual)
     inner = size <= bound
     return float(np.sum(np.where(inner, 0.5 * size**2, bound * (size - 0.5 * bound))))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.calibrate.validation import SignalError, Trace, Validation
+from elevon.calibrate.validation import SignalError, Validation, ValidationTrace
 from elevon.errors import InputError, SimulationError, unknown
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def validate_replay(
     fidelity : str
         Of the runs.
     transient : float, optional
-        Left out at the beginning [s]; default the set's, else 0.
+        Left out at the beginning [s]; default the actuator file's, else 0.
     progress : callable, optional
         As for `elevon.simulate`.
 
@@ -91,7 +91,7 @@ def replay_scenario(
     roles = recording.roles
     for role in ("command", "output_position"):
         if role not in roles:
-            raise InputError(f"{name}: no channel backlashes {role!r}; roles: {', '.join(roles)}")
+            raise InputError(f"{name}: no channel has the role {role!r}; roles: {', '.join(roles)}")
     stand = _stand(recording)
     position = recording.role("output_position")
     time = np.asarray(position.time - position.time[0], dtype=np.float64)
@@ -158,24 +158,24 @@ def _trace(
     transient: float,
     *,
     progress: Progress | None,
-) -> tuple[Trace, dict[str, str]]:
+) -> tuple[ValidationTrace, dict[str, str]]:
     from elevon.scenario.compile import signal_records
     from elevon.simulate import simulate
 
     ready, scenario = replay_scenario(recording, actuator, name)
     if not transient < scenario.seconds:
         raise InputError(f"transient of {transient:g} s: {name} lasts {scenario.seconds:g} s")
-    shown = {item["role"]: key for key, item in signal_records(actuator.wiring, fidelity).items()}
+    names = {item["role"]: key for key, item in signal_records(actuator.wiring, fidelity).items()}
     roles = [
         role
         for role in recording.roles
-        if role in shown and role not in _INPUTS and recording.role(role).unit != "1"
+        if role in names and role not in _INPUTS and recording.role(role).unit != "1"
     ]
     moved = bool(scenario.loads.rig_speed.terms)
     roles = [role for role in roles if moved or role != "load_cell"]
     if not roles:
         raise InputError(f"{name}: shows nothing that the model has; roles: {recording.roles}")
-    signals = ",".join(dict.fromkeys(shown[role] for role in roles))
+    signals = ",".join(dict.fromkeys(names[role] for role in roles))
     run = simulate(ready, scenario, fidelity=fidelity, record=f"{signals}@every", progress=progress)
     if run.status == "diverged":
         raise SimulationError(f"{name}: {run.meta['message']}", run.status)
@@ -183,12 +183,12 @@ def _trace(
     time = np.asarray(base.time - base.time[0], dtype=np.float64)
     measured, simulated = {}, {}
     for role in roles:
-        channel, model = recording.role(role), run[shown[role]]
+        channel, model = recording.role(role), run[names[role]]
         measured[role] = np.interp(base.time, channel.time, channel.values)
         simulated[role] = np.interp(time, model.time, as_recorded(recording, model))
     units = {role: recording.role(role).unit for role in roles}
     used = (time >= transient) & (time <= float(run.meta["sim_s"]))
-    return Trace(name, time, measured, simulated, used), units
+    return ValidationTrace(name, time, measured, simulated, used), units
 
 
 def as_recorded(recording: Recording, model: Channel) -> Floats:
@@ -196,8 +196,8 @@ def as_recorded(recording: Recording, model: Channel) -> Floats:
     from scipy.signal import butter, sosfiltfilt
 
     values = np.asarray(model.values, dtype=np.float64)
-    said = recording.meta.get("acquisition")
-    cutoff = float(said.get("cutoff_hz", 0.0)) if isinstance(said, Mapping) else 0.0
+    acquisition = recording.meta.get("acquisition")
+    cutoff = float(acquisition.get("cutoff_hz", 0.0)) if isinstance(acquisition, Mapping) else 0.0
     rate = float(1.0 / np.median(np.diff(model.time)))
     if not 0.0 < cutoff < 0.5 * rate or len(values) < 64:
         return values
@@ -206,7 +206,7 @@ def as_recorded(recording: Recording, model: Channel) -> Floats:
 
 
 def _error(
-    trace: Trace,
+    trace: ValidationTrace,
     role: str,
     unit: str,
     offsets: Mapping[str, float],

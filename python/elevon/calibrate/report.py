@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from elevon.calibrate.calibration import Calibration
-    from elevon.calibrate.validation import Trace, Validation
+    from elevon.calibrate.validation import Validation, ValidationTrace
 
 __all__ = ["calibration_report", "validation_report"]
 
-_SHOWN = {
+_AXES = {
     "encoder_position": (180.0 / math.pi, "deg"),
     "motor_speed": (30.0 / math.pi, "rpm"),
     "current_q_meas": (1.0, "A"),
@@ -108,7 +108,7 @@ def validation_report(
         if e.limit is not None
     ]
     if checks:
-        report.section("Thresholds of the set").checks(checks)
+        report.section("Thresholds of the actuator file").checks(checks)
     if provenance:
         report.provenance(provenance)
     return report
@@ -118,7 +118,7 @@ def _parameters(report: Report, result: Calibration, truth: Mapping[str, float])
     section = report.section(
         "Parameters",
         f"Intervals hold {100 * LEVEL:.0f} % of the time for coloured residuals. Plant, controller "
-        "and sensor are kept apart; what no set has a place for is marked.",
+        "and sensor are kept apart; what no actuator file has a place for is marked.",
     )
     columns = ["Parameter", "Before", "After", "Interval", "Unit", "Register", "From", "Holds for"]
     if truth:
@@ -141,7 +141,7 @@ def _parameters(report: Report, result: Calibration, truth: Mapping[str, float])
     figure = forest(result.estimates, truth)
     if figure is not None:
         section.figure(figure, "Estimates over the old values, with their intervals.")
-    section.table(Table(columns, rows, "* not part of the set", digits=5))
+    section.table(Table(columns, rows, "* not part of the actuator file", digits=5))
 
 
 def _ranking(report: Report, result: Calibration) -> None:
@@ -149,7 +149,7 @@ def _ranking(report: Report, result: Calibration) -> None:
         return
     ranking = result.dynamic.ranking
     section = report.section(
-        "What the logs can tell",
+        "What the logs can determine",
         "Sensitivities of speed and current of the model runs, scaled by a meaningful change of "
         "each parameter and by the residual's spread. Small singular values are directions that "
         "the logs do not see.",
@@ -226,7 +226,7 @@ def _agreement(report: Report, before: Validation | None, after: Validation) -> 
     ]
     rows = []
     for e in after.errors:
-        factor, unit = _SHOWN[e.signal]
+        factor, unit = _AXES[e.signal]
         row: list[object] = [
             e.log,
             _LABELS[e.signal],
@@ -249,12 +249,12 @@ def _agreement(report: Report, before: Validation | None, after: Validation) -> 
         )
 
 
-def _traces(trace: Trace, before: Trace | None, transient: float) -> Figure:
+def _traces(trace: ValidationTrace, before: ValidationTrace | None, transient: float) -> Figure:
     with new_figure(3, 3, width=9.5, height=7.0, width_ratios=[2, 2, 1.4]) as (figure, axes):
         keep = trace.used
         time = trace.time[keep]
         for row, name in enumerate(SIGNALS):
-            factor, unit = _SHOWN[name]
+            factor, unit = _AXES[name]
             data, model = factor * trace.measured[name], factor * trace.simulated[name]
             left, middle, right = axes[row]
             thin = slice(None, None, max(1, len(time) // 3000))
@@ -262,12 +262,14 @@ def _traces(trace: Trace, before: Trace | None, transient: float) -> Figure:
             left.plot(time[thin], model[keep][thin], color=COLOURS["orange"], lw=0.9, label="model")
             left.set(ylabel=f"{_LABELS[name]} [{unit}]")
             if before is not None:
-                rest = factor * (before.simulated[name] - before.measured[name])[keep]
-                middle.plot(time[thin], rest[thin], color=COLOURS["blue"], lw=0.7, label="before")
-            rest = (model - data)[keep]
-            middle.plot(time[thin], rest[thin], color=COLOURS["orange"], lw=0.7, label="after")
+                residual = factor * (before.simulated[name] - before.measured[name])[keep]
+                middle.plot(
+                    time[thin], residual[thin], color=COLOURS["blue"], lw=0.7, label="before"
+                )
+            residual = (model - data)[keep]
+            middle.plot(time[thin], residual[thin], color=COLOURS["orange"], lw=0.7, label="after")
             middle.set(ylabel=f"model less log [{unit}]")
-            frequency, density = _spectrum(trace.time[keep], rest)
+            frequency, density = _spectrum(trace.time[keep], residual)
             right.loglog(frequency, density, color=COLOURS["orange"], lw=0.9)
             right.set(ylabel=f"{unit}/\N{SQUARE ROOT}Hz")
         axes[0][0].legend(loc="upper right")
@@ -278,9 +280,9 @@ def _traces(trace: Trace, before: Trace | None, transient: float) -> Figure:
     return figure
 
 
-def _spectrum(time: Any, rest: Any) -> tuple[Any, Any]:
+def _spectrum(time: Any, residual: Any) -> tuple[Any, Any]:
     from scipy.signal import welch
 
     rate = 1.0 / float(np.median(np.diff(time)))
-    frequency, power = welch(rest, rate, nperseg=min(1024, len(rest)))
+    frequency, power = welch(residual, rate, nperseg=min(1024, len(residual)))
     return frequency[1:], np.sqrt(np.maximum(power[1:], 1e-300))

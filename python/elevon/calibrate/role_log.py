@@ -15,13 +15,13 @@ from elevon.errors import InputError
 if TYPE_CHECKING:
     from elevon.recording import Recording
 
-__all__ = ["RoleLog", "role_channels"]
+__all__ = ["CalibrationRoleLog", "role_channels"]
 
 _FEWEST = 100  # samples
 
 
 @dataclass(frozen=True)
-class RoleLog:
+class CalibrationRoleLog:
     """A log, SI, on one clock.
 
     Attributes
@@ -31,7 +31,7 @@ class RoleLog:
     time : ndarray, shape (n,)
         s, from zero.
     roles : mapping of str to ndarray, shape (n,)
-        What was shown.
+        What was recorded.
     stand : mapping of str to object
         Parameters that the stand set (`brake.powered` and the like), as they were written.
     total_load : bool
@@ -67,7 +67,7 @@ class RoleLog:
 
 
 def role_channels(recording: Recording, name: str, needed: Sequence[str]) -> dict[str, Any]:
-    """Return the arguments of a `RoleLog`, on the clock of the first role that is needed.
+    """Return the arguments of a `CalibrationRoleLog`, on the clock of the first role needed.
 
     Raises
     ------
@@ -77,25 +77,25 @@ def role_channels(recording: Recording, name: str, needed: Sequence[str]) -> dic
     roles = recording.roles
     for role in needed:
         if role not in roles:
-            raise InputError(f"{name}: no channel backlashes {role!r}; roles: {', '.join(roles)}")
+            raise InputError(f"{name}: no channel has the role {role!r}; roles: {', '.join(roles)}")
     clock = np.asarray(recording.role(needed[0]).time, dtype=np.float64)
     if len(clock) < _FEWEST:
         raise InputError(f"{name}: {len(clock)} samples; at least {_FEWEST}")
-    shown = {}
+    present = {}
     for role in roles:
         channel = recording.role(role)
         values = np.asarray(channel.values, dtype=np.float64)
         if channel.unit == "1":
             at = np.searchsorted(channel.time, clock + 1e-9, side="right") - 1
-            shown[role] = values[at.clip(0)]
+            present[role] = values[at.clip(0)]
         else:
-            shown[role] = np.interp(clock, channel.time, values)
+            present[role] = np.interp(clock, channel.time, values)
     stand = recording.meta.get("stand")
     settings = stand.get("parameters", {}) if isinstance(stand, Mapping) else {}
     return {
         "name": name,
         "time": clock - clock[0],
-        "roles": shown,
+        "roles": present,
         "stand": dict(settings),
         "total_load": not isinstance(stand, Mapping) and "scenario" in recording.meta,
     }

@@ -1,4 +1,4 @@
-"""The stage of the signals: everything that regressions and positions tell, without model runs."""
+"""The stage of the signals: what regressions and positions determine, without model runs."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from elevon.calibrate.zeros import encoder_count, gain_estimate, position_estima
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["Signals", "signal_stage"]
+__all__ = ["CalibrationSignals", "signal_stage"]
 
 Bools = npt.NDArray[np.bool_]
 _DOUBTFUL = 0.2  # share of the current below which a regression explains nothing
 
 
 @dataclass(frozen=True)
-class Signals:
+class CalibrationSignals:
     """Result of the stage.
 
     Attributes
@@ -69,8 +69,8 @@ def signal_stage(
     actuator: Actuator,
     advance: Callable[[float], object] = lambda _f: None,
     per_log: Sequence[str] = (),
-) -> Signals:
-    """Estimate what the signals themselves tell.
+) -> CalibrationSignals:
+    """Estimate what the signals themselves determine.
 
     Parameters
     ----------
@@ -106,7 +106,9 @@ def signal_stage(
         estimates += controller_estimates(actuator, law, torque, [log.name for log in logs])
     commands = _commands(logs, actuator, estimates)
     advance(1.0)
-    return Signals(tuple(estimates), followed, torque, plant, law, tuple(commands), findings)
+    return CalibrationSignals(
+        tuple(estimates), followed, torque, plant, law, tuple(commands), findings
+    )
 
 
 def _explaining(regression: Regression | None) -> Regression | None:
@@ -121,7 +123,7 @@ def _sampled(
 
     Samples in step with the drive catch the derivative's spikes too often or too seldom. The
     controller's law shows how much of that goes with the motion; friction would take it up, the
-    viscous part one way and the dry part the other.
+    viscous part in one direction and the dry part in the other.
     """
     speeds = [log.speed[keep & log.good] for log, keep in zip(logs, keeps, strict=True)]
     spread = float(np.sqrt(np.mean(np.concatenate(speeds) ** 2)))

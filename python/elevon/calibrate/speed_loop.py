@@ -21,7 +21,7 @@ __all__ = ["Stretch", "gain_and_zero", "speed_loop", "stretches"]
 Bools = npt.NDArray[np.bool_]
 _COLUMNS = ("gain", "integral", "set_point", "ramp")
 _FEWEST = 100  # samples of a stretch
-_READING = 2.5e-4  # s between the speed that the unit has read and the one that is shown
+_READING = 2.5e-4  # s between the speed that the unit has read and the one that is recorded
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,8 @@ def speed_loop(parts: Sequence[Stretch], tick: float) -> Regression | None:
     scaled, *_ = np.linalg.lstsq(design / scale, values, rcond=None)
     value = np.asarray(scaled / scale, dtype=np.float64)
     names = (*_COLUMNS, *(f"start{k}" for k in range(len(rows))))
-    rest = values - design @ value
-    return with_deviations(names, value, design, rest, np.ones(len(rest)), times=times)
+    residual = values - design @ value
+    return with_deviations(names, value, design, residual, np.ones(len(residual)), times=times)
 
 
 def gain_and_zero(fit: Regression) -> tuple[Level, Level]:
@@ -78,7 +78,8 @@ def gain_and_zero(fit: Regression) -> tuple[Level, Level]:
     slope = np.zeros(len(fit.value))
     slope[0], slope[1] = -integral / gain**2, 1.0 / gain
     spread = float(np.sqrt(max(float(slope @ fit.covariance @ slope), 0.0)))
-    # A speed read earlier or later than it is shown adds to the gain what the integral makes of it.
+    # A speed read earlier or later than it is recorded adds to the gain what the integral makes of
+    # it.
     late = abs(integral) * _READING
     return (
         Level(gain, fit.std("gain"), fit.degrees).widened(late),

@@ -2,7 +2,7 @@
 
 A shaft that is held moves off at an instant, and the torque of that instant is the static friction
 (`elevon.calibrate.breakaway`). A shaft on bristles creeps from the reversal on, and its friction is
-followed through the creep (`elevon.calibrate.presliding`). How far the shaft gives way while the
+followed through the creep (`elevon.calibrate.presliding`). How far the shaft deflects while the
 torque turns decides.
 """
 
@@ -87,36 +87,36 @@ def static_friction(
         if creep is None:
             return None
         how = (
-            "peak of the friction that the creep before sliding shows; the shaft gives way as "
+            "peak of the friction that the creep before sliding shows; the shaft deflects as "
             f"bristles of {creep.stiffness:.2g} N m/rad, and how friction falls from there is open"
         )
         return StaticFriction(creep.static, creep.std, creep.degrees, 0.0, how)
     offset = plant["offset" if "offset" in plant.names else "constant"]
-    held = breakaway_torque(
+    torque_level = breakaway_torque(
         logs, keeps, constant=constant, offset=offset, lag=plant["lag"], slow=slow
     )
-    if held is None:
+    if torque_level is None:
         return None
     how = "torque at which the shaft breaks away; ripple that the log does not show lowers it"
-    return StaticFriction(*held, _RIPPLE * held[0], how)
+    return StaticFriction(*torque_level, _RIPPLE * torque_level[0], how)
 
 
 def _gives(
     logs: Sequence[BenchLog], keeps: Sequence[Bools], plant: Regression, slow: float
 ) -> bool:
-    """Return whether the shaft gives way further than rounding while its torque turns.
+    """Return whether the shaft deflects further than rounding while its torque turns.
 
-    Reversals without a standstill say nothing either way; where there are no others the give is
-    followed.
+    Reversals without a standstill say nothing in either direction; where there are no others the
+    deflection is followed.
     """
     lengths = []
     for log, keep in usable_logs(logs, keeps):
         assert log.motor is not None
         current = motion_of(log).current
         small = slow * log.period
-        still = stuck_stretches(log.motor, max(2, round(_STUCK / log.period)), small)
+        stuck = stuck_stretches(log.motor, max(2, round(_STUCK / log.period)), small)
         for before, after in reversals(log, keep):
-            for a, b in ((a, b) for a, b in still if before <= a and b <= after):
+            for a, b in ((a, b) for a, b in stuck if before <= a and b <= after):
                 turn = abs(float(current[b] - current[a])) / (2.0 * plant["dry"])
                 if turn > 0.2:
                     lengths.append(abs(float(log.motor[b] - log.motor[a])) / (turn * small))

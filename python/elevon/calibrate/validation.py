@@ -49,7 +49,7 @@ class SignalError:
     largest_of_range : float
         Maximum error in percent of the range.
     limit : float or None
-        Largest `of_range` allowed by the set.
+        Largest `of_range` allowed by the actuator file.
     """
 
     log: str
@@ -84,7 +84,7 @@ class SignalError:
 
 
 @dataclass(frozen=True)
-class Trace:
+class ValidationTrace:
     """Measured and simulated signals of one log on its clock, for plots."""
 
     log: str
@@ -101,7 +101,7 @@ class Validation:
     Attributes
     ----------
     actuator : str
-        The set.
+        The actuator.
     fidelity : str
         Of the runs.
     transient : float
@@ -110,10 +110,10 @@ class Validation:
         One a log and signal.
     commands : mapping of str to str
         How each log's command was found.
-    traces : tuple of Trace
+    traces : tuple of ValidationTrace
         For plots.
     offsets : mapping of str to float
-        Taken off the logs: what the set says its sensors add (SI).
+        Taken off the logs: what the actuator file says its sensors add (SI).
     notes : mapping of str to str
         What to know of a log.
     """
@@ -123,13 +123,13 @@ class Validation:
     transient: float
     errors: tuple[SignalError, ...]
     commands: Mapping[str, str]
-    traces: tuple[Trace, ...]
+    traces: tuple[ValidationTrace, ...]
     offsets: Mapping[str, float] = field(default_factory=dict)
     notes: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def status(self) -> str:
-        """``pass``, ``fail``, or ``measured`` where the set has no thresholds."""
+        """``pass``, ``fail``, or ``measured`` where the actuator file has no thresholds."""
         judged = [error.passed for error in self.errors if error.passed is not None]
         if not judged:
             return "measured"
@@ -168,7 +168,7 @@ def validate(
     fidelity : str
         ``low`` or ``high``.
     transient : float, optional
-        Seconds left out; default: the set's, else 10 s (half of a shorter log).
+        Seconds left out; default: the actuator file's, else 10 s (half of a shorter log).
     progress : callable, optional
         Told the done fraction; returns False to stop.
 
@@ -205,7 +205,7 @@ def validate(
 
 
 def _promised(actuator: Actuator, key: str) -> dict[str, float]:
-    """One table of the set's ``[validation]``, its signals checked."""
+    """One table of the actuator file's ``[validation]``, its signals checked."""
     limits = dict((actuator.validation or {}).get(key, {}))
     for name in limits:
         if name not in SIGNALS:
@@ -219,7 +219,7 @@ def _trace(
     fidelity: str,
     transient: float,
     offsets: Mapping[str, float],
-) -> tuple[Trace, str]:
+) -> tuple[ValidationTrace, str]:
     from elevon.scenario import Scenario
     from elevon.simulate import simulate
 
@@ -278,7 +278,7 @@ def _trace(
     }
     measured = {name: values - offsets.get(name, 0.0) for name, values in logged.items()}
     used = log.good & (log.time >= transient)
-    return Trace(log.name, log.time, measured, simulated, used), how
+    return ValidationTrace(log.name, log.time, measured, simulated, used), how
 
 
 def _record(actuator: Actuator, fidelity: str, rate: str) -> str:
@@ -297,10 +297,10 @@ def _start(log: BenchLog, offset: float, middle: float, actuator: Actuator) -> f
     What noise and errors of the sensors add beyond the backlash is nowhere an actuator can stand.
     """
     assert log.output is not None
-    shown = float(log.output[0]) - offset if np.isfinite(log.output[0]) else middle
+    first = float(log.output[0]) - offset if np.isfinite(log.output[0]) else middle
     value = actuator.parameters.value
     half = 0.5 * (value("backlash.total") + value("backlash.extra"))
-    return float(np.clip(shown, middle - half, middle + half))
+    return float(np.clip(first, middle - half, middle + half))
 
 
 def _command(log: BenchLog, actuator: Actuator) -> tuple[Floats, str]:
@@ -331,7 +331,7 @@ def _command(log: BenchLog, actuator: Actuator) -> tuple[Floats, str]:
     return np.where(inside | saturated, wave, known), f"{fit.waveform.kind} fitted to the log"
 
 
-def _errors(trace: Trace, limits: Mapping[str, float]) -> list[SignalError]:
+def _errors(trace: ValidationTrace, limits: Mapping[str, float]) -> list[SignalError]:
     errors = []
     for name, unit in SIGNALS.items():
         data, model = trace.measured[name][trace.used], trace.simulated[name][trace.used]

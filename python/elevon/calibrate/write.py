@@ -75,7 +75,7 @@ def _followed(path: str) -> str:
 
 
 def set_text(result: Answer, *, name: str, base: str, validation: Validation | None) -> str:
-    """Return the TOML text of the calibrated set."""
+    """Return the TOML text of the calibrated actuator file."""
     import tomlkit
 
     head = tomlkit.document()
@@ -107,16 +107,16 @@ def write_calibration(
     validation: Validation | None = None,
     force: bool = False,
 ) -> Path:
-    """Write the set, whole or not at all; errors as `elevon.files.write_text`.
+    """Write the actuator file, whole or not at all; errors as `elevon.files.write_text`.
 
     Parameters
     ----------
     path : path
-        The TOML file; the set is named after it.
+        The TOML file; the actuator is named after it.
     result : Calibration
         What was found.
     validation : Validation, optional
-        On data held out of the fit, where there are any: gives the set its thresholds.
+        On data held out of the fit, where there are any: gives the actuator file its thresholds.
     force : bool
         Whether an existing file may be replaced.
     """
@@ -134,7 +134,7 @@ def write_values(
     *,
     force: bool = False,
 ) -> Path:
-    """Write a set that changes the estimated values alone, with their intervals."""
+    """Write an actuator file that changes the estimated values alone, with their intervals."""
     import tomlkit
 
     target = Path(path).expanduser()
@@ -157,11 +157,11 @@ def write_values(
 
 def _name(stem: str) -> str:
     plain = "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in stem)
-    return plain if plain and plain[0].isalnum() else f"set-{plain.strip('-._')}"
+    return plain if plain and plain[0].isalnum() else f"actuator-{plain.strip('-._')}"
 
 
 def _base(before: Actuator, target: Path) -> str:
-    """Name of a set of the package, else the way from the new file to the old one."""
+    """Name of an actuator file of the package, else the path from the new file to the old one."""
     from elevon.parameters.find import find_set
 
     path, name = before.path, before.name

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["gain_estimate", "position_estimates"]
 
-_OTHER = 0.005  # relative: a limit nearer the set's than this is the set's
+_OTHER = 0.005  # relative: a limit nearer the actuator file's than this is the actuator file's
 _ROUNDED = 0.1  # counts: what rounding to counts may shift where every stroke turns alike
 _TURNS = 0.2  # share of that in the encoder's gain
 _FLAT = 0.25  # counts: the same where the output stands still in the backlash, long at one count
@@ -55,16 +55,16 @@ def _backlash_estimates(
         return [], ()
     estimates = _backlash(backlash, count, actuator)
     estimates += [_initial(log, backlash, count, ratio) for log in logs if _both_positions(log)]
-    own = backlashes
+    fitted = backlashes
     if each and not backlashes:
         fits = {log.name: fit_backlash([log], ratio, count) for log in logs}
-        own = {name: fit for name, fit in fits.items() if fit is not None}
+        fitted = {name: fit for name, fit in fits.items() if fit is not None}
     if each:
-        estimates += [_own_backlash(name, fit, count, actuator) for name, fit in own.items()]
+        estimates += [_own_backlash(name, fit, count, actuator) for name, fit in fitted.items()]
     if not backlashes:
         return estimates, ()
-    rest = [item for item in estimates if item.path != "backlash.total"]
-    return rest, (backlashes_differ(backlashes, value("backlash.extra")),)
+    others = [item for item in estimates if item.path != "backlash.total"]
+    return others, (backlashes_differ(backlashes, value("backlash.extra")),)
 
 
 def _own_backlash(name: str, backlash: BacklashFit, count: float, actuator: Actuator) -> Estimate:
@@ -93,7 +93,7 @@ def _speed_estimates(logs: Sequence[BenchLog]) -> list[Estimate]:
 
 
 def _limit_estimates(logs: Sequence[BenchLog], actuator: Actuator) -> list[Estimate]:
-    """Limit of the speed, where a log holds it and it is not the set's."""
+    """Limit of the speed, where a log holds it and it is not the actuator file's."""
     old = actuator.parameters.value("control.speed_limit")
     limit = speed_limit(logs)
     if limit is None or abs(limit / old - 1.0) <= _OTHER:
@@ -184,7 +184,7 @@ def _initial(log: BenchLog, backlash: BacklashFit, count: float, ratio: float) -
 
 def _encoder(backlash: BacklashFit, actuator: Actuator, rounded: float) -> list[Estimate]:
     """Delay and gain of the encoder against the motor's sensor."""
-    # All counts between the turns tell the gain, only those at the turns are rounded alike.
+    # All counts between the turns determine the gain, only those at the turns are rounded alike.
     gain, std = backlash.gain[0], math.hypot(backlash.gain[1], _TURNS * rounded / backlash.reach)
     seen = abs(gain - 1.0) > max(3.0 * std, 1e-4)
     return [

@@ -15,7 +15,7 @@ from elevon.number_text import estimate_row
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.calibrate.by_parts import PartsCalibration
-    from elevon.calibrate.role_log import RoleLog
+    from elevon.calibrate.role_log import CalibrationRoleLog
     from elevon.calibrate.screw import ScrewLog
     from elevon.calibrate.validation import Validation
     from elevon.progress import Progress
@@ -107,7 +107,7 @@ def _screw_way(recordings: Mapping[str, Recording], model: Actuator) -> Way:
     ) -> Validation:
         return validate_loop([loop_log(item, name) for name, item in some.items()], model)
 
-    def predicted(log: RoleLog) -> bool:
+    def predicted(log: CalibrationRoleLog) -> bool:
         return log.has("command") and log.duration < _LONG
 
     def read(recording: Recording, name: str) -> ScrewLog:
@@ -155,7 +155,7 @@ def _promise(
     result: PartsCalibration,
     free: Sequence[str] | None,
 ) -> Validation | None:
-    """Thresholds of the set, from motions held out where there are several."""
+    """Thresholds of the actuator file, from motions held out where there are several."""
     from elevon.calibrate.parts_held_out import held_out_logs
 
     names = [name for name, log in logs.items() if way.predicted(log)]
@@ -164,8 +164,8 @@ def _promise(
         return None
 
     def without(name: str) -> Actuator:
-        rest = [log for other, log in logs.items() if other != name and log.duration < _LONG]
-        return way.calibrate(rest, model, free=free).actuator
+        others = [log for other, log in logs.items() if other != name and log.duration < _LONG]
+        return way.calibrate(others, model, free=free).actuator
 
     def validate(name: str, fitted: Actuator, progress: Progress | None) -> Validation:
         return way.validate({name: way.recordings[name]}, fitted, progress)
@@ -184,8 +184,8 @@ def _page(result: PartsCalibration, date: str | None, path: Path, *, force: bool
     import elevon
     from elevon.calibrate.parts_page import parts_report
 
-    shown = parts_report(result, provenance={"Elevon": elevon.__version__}, date=date)
-    return shown.save(path, force=force)
+    page = parts_report(result, provenance={"Elevon": elevon.__version__}, date=date)
+    return page.save(path, force=force)
 
 
 def _print(result: PartsCalibration) -> None:
@@ -195,5 +195,5 @@ def _print(result: PartsCalibration) -> None:
     )
     for reason in dict.fromkeys(result.undetermined.values()):
         names = [path for path, why in result.undetermined.items() if why == reason]
-        shown = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
-        say(f"not determined: {shown}: {reason}")
+        text = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
+        say(f"not determined: {text}: {reason}")

@@ -43,7 +43,8 @@ def compare(
         bool, typer.Option("--loads", help="Repeat it under opposing and aiding load.")
     ] = False,
     load: Annotated[
-        str | None, typer.Option(help="Size of that load, such as '500 N'; default the set's.")
+        str | None,
+        typer.Option(help="Size of that load, such as '500 N'; default the actuator file's."),
     ] = None,
     faults_table: Annotated[
         bool, typer.Option("--faults-table", help="What each fault changes in either model.")
@@ -68,21 +69,29 @@ def compare(
     page = None if out is None else out / "report.html"
     check_outputs([page], force=force)
     model = read_actuator(actuator, settings)
-    own = scenario is None
-    asked = default_scenario(model) if scenario is None else Scenario.load(scenario)
-    asked = asked.with_faults(fault or [])
-    start = default_start(model, asked, own=own) if after is None else after
+    by_default = scenario is None
+    run_scenario = default_scenario(model) if scenario is None else Scenario.load(scenario)
+    run_scenario = run_scenario.with_faults(fault or [])
+    start = default_start(model, run_scenario, default=by_default) if after is None else after
     if faults_table:
-        return _faults_table(model, asked, start, seed, json)
+        return _faults_table(model, run_scenario, start, seed, json)
     results = {}
     with progress_bar("comparing") as advance:
         if loads:
             results = compare_loads(
-                model, asked, load=load, seed=seed, start=start, cutoff=cutoff, progress=advance
+                model,
+                run_scenario,
+                load=load,
+                seed=seed,
+                start=start,
+                cutoff=cutoff,
+                progress=advance,
             )
             result = results["as given"]
         else:
-            result = run(model, asked, seed=seed, start=start, cutoff=cutoff, progress=advance)
+            result = run(
+                model, run_scenario, seed=seed, start=start, cutoff=cutoff, progress=advance
+            )
     values = result.to_dict()
     if loads:
         values["loads"] = {name: item.to_dict() for name, item in results.items()}
@@ -109,26 +118,31 @@ def _print(values: dict[str, Any]) -> None:
             "torque current",
             *(f"{100 * r['q_current_nrmse']:.3f} % of its RMS" for r in runs.values()),
         ],
-        ["low model", *(f"{r['low_realtime_factor']:.0f} times real time" for r in runs.values())],
-        ["speed-up", *(f"{r['speed_up']:.0f} times the high model" for r in runs.values())],
+        [
+            "reduced-order model",
+            *(f"{r['low_realtime_factor']:.0f} times real time" for r in runs.values()),
+        ],
+        ["speed-up", *(f"{r['speed_up']:.0f} times the switching model" for r in runs.values())],
     ]
     print_table(["RMS of low less high", *runs], rows)
     say(f"after {values['start_s']:g} s; {values['filter']}")
 
 
-def _faults_table(model: Actuator, asked: Scenario, after: float, seed: int, as_json: bool) -> int:
+def _faults_table(
+    model: Actuator, run_scenario: Scenario, after: float, seed: int, as_json: bool
+) -> int:
     from elevon.reproduce.fault_sensitivity import fault_sensitivity
 
     with progress_bar("healthy and faulty runs") as advance:
-        rows = fault_sensitivity(model, asked, start=after, seed=seed, progress=advance)
+        rows = fault_sensitivity(model, run_scenario, start=after, seed=seed, progress=advance)
     values = {"actuator": model.name, "rows": [row.to_dict() for row in rows]}
     if as_json:
         print_json(values)
         return 0
-    shown = [
+    table = [
         [row.fault, row.feature, f"{row.high:+.4g}", f"{row.low:+.4g}", f"{row.floor:.2g}",
          f"{row.ratio:+.2f}", row.verdict]
         for row in rows
     ]  # fmt: skip
-    print_table(["fault", "seen in", "high", "low", "floor", "low/high", ""], shown)
+    print_table(["fault", "seen in", "high", "low", "floor", "low/high", ""], table)
     return 0

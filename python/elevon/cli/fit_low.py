@@ -1,4 +1,4 @@
-"""`elevon fit-low`: tune the low model against the high one."""
+"""`elevon fit-low`: tune the reduced-order model against the switching one."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from elevon.errors import InputError
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.lowfit import Case, LowFit
+    from elevon.lowfit import FitCase, LowFit
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -46,14 +46,14 @@ def fit_low(
     force: ForceOption = False,
     date: Annotated[str | None, typer.Option(help="Date printed in the report.")] = None,
 ) -> int:
-    """Fit the low model's free numbers to the high model over scenarios and faults."""
+    """Fit the reduced-order model's free numbers to the switching model over scenarios, faults."""
     from elevon.lowfit import fit_low as run
     from elevon.lowfit import write_fit
 
     check_outputs([out, report], force=force)
     model = read_actuator(actuator, settings)
     cases = _cases(model, scenario, fault)
-    with progress_bar("high model, then the fit") as advance:
+    with progress_bar("switching model, then the fit") as advance:
         fit = run(model, cases, seed=seed, progress=advance)
     if out is not None:
         say(f"set: {write_fit(out, fit, force=force)}")
@@ -68,7 +68,7 @@ def fit_low(
     return 0
 
 
-def _cases(model: Actuator, files: list[Path] | None, faults: list[str] | None) -> list[Case]:
+def _cases(model: Actuator, files: list[Path] | None, faults: list[str] | None) -> list[FitCase]:
     from elevon.lowfit import default_cases, named_cases
     from elevon.scenario import Scenario
 

@@ -18,12 +18,12 @@ from elevon.reproduce.provenance import provenance
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from elevon.calibrate.validation import Trace
+    from elevon.calibrate.validation import ValidationTrace
     from elevon.demo.run import Demo
 
 __all__ = ["demo_report"]
 
-_SHOWN = {
+_DISPLAYED = {
     "encoder_position": ("encoder", 180.0 / math.pi, "deg"),
     "motor_speed": ("motor speed", 30.0 / math.pi, "rpm"),
     "current_q_meas": ("torque current", 1.0, "A"),
@@ -114,14 +114,14 @@ def _bench(report: Report, demo: Demo) -> None:
 def _agreement(report: Report, demo: Demo) -> None:
     section = report.section(
         "Logs against the model, before and after",
-        f"The low model run in closed loop on each log's own rebuilt command; the first "
+        f"The reduced-order model run in closed loop on each log's own rebuilt command; the first "
         f"{demo.after.transient:g} s are left out. The last log was kept from the calibration. "
         f"One count of the encoder is {math.degrees(encoder_count(demo.base)):.4f} deg.",
     )
     old = {(e.log, e.signal): e for e in demo.before.errors}
     rows = []
     for e in demo.after.errors:
-        label, factor, unit = _SHOWN[e.signal]
+        label, factor, unit = _DISPLAYED[e.signal]
         before = old[e.log, e.signal]
         cells = [factor * before.rms, factor * e.rms, before.of_range, e.of_range]
         rows.append([e.log, label, unit, *cells])
@@ -145,7 +145,7 @@ def _agreement(report: Report, demo: Demo) -> None:
         )
     held_out = demo.after.traces[-1]
     for name in ("motor_speed", "current_q_meas"):
-        label, factor, unit = _SHOWN[name]
+        label, factor, unit = _DISPLAYED[name]
         section.chart(
             f"{held_out.log}, the log kept back: {label}",
             held_out.time[held_out.used],
@@ -159,21 +159,21 @@ def _agreement(report: Report, demo: Demo) -> None:
         )
 
 
-def _trace_figure(trace: Trace, before: Trace) -> Figure:
+def _trace_figure(trace: ValidationTrace, before: ValidationTrace) -> Figure:
     keep = trace.used
     time = trace.time[keep]
     thin = slice(None, None, max(1, len(time) // 2000))
     with new_figure(3, 2, width=9.5, height=6.2, sharex=True) as (figure, axes):
         for (left, right), name in zip(axes, SIGNALS, strict=True):
-            label, factor, unit = _SHOWN[name]
+            label, factor, unit = _DISPLAYED[name]
             log, new = factor * trace.measured[name][keep], factor * trace.simulated[name][keep]
             old = factor * before.simulated[name][keep]
             # Colours as in the charts below.
             left.plot(time[thin], log[thin], color=COLOURS["blue"], lw=2.4, label="log")
             left.plot(time[thin], new[thin], color=COLOURS["orange"], lw=0.9, label="model, after")
             for label_, model, colour in (("before", old, "green"), ("after", new, "orange")):
-                rest = (model - log)[thin]
-                right.plot(time[thin], rest, color=COLOURS[colour], lw=0.7, label=label_)
+                residual = (model - log)[thin]
+                right.plot(time[thin], residual, color=COLOURS[colour], lw=0.7, label=label_)
             left.set(ylabel=f"{label} [{unit}]")
             right.set(ylabel=f"[{unit}]")
         axes[0][0].set(title="Log and model")

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.calibrate.estimate import Estimate
-from elevon.calibrate.validation import SignalError, Trace, Validation
+from elevon.calibrate.validation import SignalError, Validation, ValidationTrace
 from elevon.errors import unknown
 from elevon.report.checks import Check
 from elevon.reproduce.backlash.campaign import RowResult
@@ -166,7 +166,7 @@ def validation_to_json(result: Validation) -> dict[str, Any]:
 def validation_from_json(data: Any) -> Validation:
     """Return the validation again."""
     traces = (
-        Trace(
+        ValidationTrace(
             item["log"],
             _array(item["time"]),
             _arrays(item["measured"]),

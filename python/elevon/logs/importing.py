@@ -26,8 +26,8 @@ from elevon.logs.maps.column_map import ColumnMap, find_map, shipped_map
 from elevon.logs.maps.columns import looks_like_drive
 from elevon.logs.report import ImportReport
 from elevon.recording import Recording
-from elevon.recording.beside import beside, describes
 from elevon.recording.csv import joined_tables
+from elevon.recording.description import describes, description_path
 from elevon.scenario import Scenario
 
 __all__ = ["ImportedLog", "find_sidecars", "import_log", "same_rate"]
@@ -45,7 +45,7 @@ class ImportedLog:
 
     @property
     def scenario(self) -> Scenario | None:
-        """What was asked, where the log is a simulation's own recording."""
+        """The command, where the log is a simulation's own recording."""
         return _scenario(self.recording, self.report.source)
 
 
@@ -193,7 +193,9 @@ def _scenario(recording: Recording, source: str) -> Scenario | None:
 
 def _is_saved(file: Path) -> bool:
     try:
-        if file.suffix.lower() == ".csv" and (describes(beside(file)) or joined_tables(file)):
+        if file.suffix.lower() == ".csv" and (
+            describes(description_path(file)) or joined_tables(file)
+        ):
             return True
         with file.open("rb") as stream:
             if stream.read(9) == b"# elevon ":
@@ -253,14 +255,16 @@ def _currents(
     note: CommandNote | None,
     report: ImportReport,
 ) -> str:
-    """Settle the convention of the drive's currents: what is said twice must agree."""
-    said = {c for c in (mapped.current if mapped else None, note.current if note else None) if c}
-    if len(said) > 1:
+    """Settle the convention of the drive's currents: what is stated twice must agree."""
+    conventions = {
+        c for c in (mapped.current if mapped else None, note.current if note else None) if c
+    }
+    if len(conventions) > 1:
         raise InputError(
             f"{report.source}: the column map and the command note disagree on the currents "
             "(rms, peak)"
         )
-    convention = said.pop() if said else "rms"
+    convention = conventions.pop() if conventions else "rms"
     changed = rms_to_peak(assigned) if convention == "rms" else []
     if changed and not (mapped and mapped.current) and not (note and note.current):
         report.warn(

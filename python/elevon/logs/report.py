@@ -56,7 +56,7 @@ class ImportReport:
         self.findings.append(Finding("info", place, code, text))
 
     def warn(self, place: str, code: str, text: str) -> None:
-        """Add something the user should look at."""
+        """Add something the caller should look at."""
         self.findings.append(Finding("warning", place, code, text))
 
     def has(self, code: str) -> bool:

@@ -1,12 +1,12 @@
-"""Fit the low model's few free numbers to the high model over scenarios and faults."""
+"""Fit the reduced-order model's free numbers to the switching model over scenarios and faults."""
 
-from elevon.lowfit.cases import Case, default_cases, named_cases
+from elevon.lowfit.cases import FitCase, default_cases, named_cases
 from elevon.lowfit.fit import FREE, LowFit, fit_low
 from elevon.lowfit.write import fitted_parameters, write_fit
 
 __all__ = [
     "FREE",
-    "Case",
+    "FitCase",
     "LowFit",
     "default_cases",
     "fit_low",

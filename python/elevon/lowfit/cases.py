@@ -1,4 +1,4 @@
-"""The scenarios and faults over which the low model is fitted."""
+"""The scenarios and faults over which the reduced-order model is fitted."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from elevon.scenario import Scenario
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["Case", "default_cases", "named_cases"]
+__all__ = ["FitCase", "default_cases", "named_cases"]
 
 ROTARY_FAULTS = (
     "short@motor.phase_a=0.1",
@@ -25,8 +25,8 @@ ROTARY_FAULTS = (
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
-    """One comparison: a name for people and what is asked of both models.
+class FitCase:
+    """One comparison: a name for people and what both models run.
 
     Attributes
     ----------
@@ -40,8 +40,8 @@ class Case:
     scenario: Scenario
 
 
-def default_cases(actuator: Actuator) -> list[Case]:
-    """Return the cases of an actuator when none are asked for.
+def default_cases(actuator: Actuator) -> list[FitCase]:
+    """Return the cases of an actuator when none are given.
 
     A rotary actuator: one cycle of the loaded campaign's motion (faster, under 0.5 and 1.5 N m of
     brake), healthy under both loads and with each of four faults under the larger one, and a
@@ -58,11 +58,11 @@ def default_cases(actuator: Actuator) -> list[Case]:
         raise InputError(
             f"fit-low: {actuator.name} has no scenario of its own; give some with --scenario"
         )
-    own = Scenario.from_dict(actuator.default_scenario, f"{actuator.name}: scenario")
-    return [Case("its own scenario", own)]
+    default = Scenario.from_dict(actuator.default_scenario, f"{actuator.name}: scenario")
+    return [FitCase("its own scenario", default)]
 
 
-def named_cases(scenarios: Sequence[tuple[str, Scenario]], faults: Sequence[str]) -> list[Case]:
+def named_cases(scenarios: Sequence[tuple[str, Scenario]], faults: Sequence[str]) -> list[FitCase]:
     """Return every scenario healthy and with each of the faults alone.
 
     Parameters
@@ -80,20 +80,20 @@ def named_cases(scenarios: Sequence[tuple[str, Scenario]], faults: Sequence[str]
     parsed = [Fault.parse(text) for text in faults]
     cases = []
     for name, scenario in scenarios:
-        cases.append(Case(f"{name}, as given", scenario))
-        cases += [Case(f"{name}, {fault}", scenario.with_faults([fault])) for fault in parsed]
+        cases.append(FitCase(f"{name}, as given", scenario))
+        cases += [FitCase(f"{name}, {fault}", scenario.with_faults([fault])) for fault in parsed]
     return cases
 
 
-def _rotary() -> list[Case]:
+def _rotary() -> list[FitCase]:
     light, heavy = (_motion(brake) for brake in ("0.5 N m", "1.5 N m"))
     loaded = named_cases([("1.5 N m of brake", heavy)], ROTARY_FAULTS)
     starved = [
-        Case(f"{volts:g} V, {brake:g} N m of brake", _starved(volts, brake))
+        FitCase(f"{volts:g} V, {brake:g} N m of brake", _starved(volts, brake))
         for volts in (45.0, 55.0)
         for brake in (0.5, 1.5)
     ]
-    return [Case("0.5 N m of brake, as given", light), *loaded, *starved]
+    return [FitCase("0.5 N m of brake, as given", light), *loaded, *starved]
 
 
 def _motion(brake: str) -> Scenario:

@@ -1,4 +1,4 @@
-"""Least squares of the low model's own numbers against runs of the high model."""
+"""Least squares of the reduced-order model's own numbers against runs of the switching model."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from elevon.parameters.records import records
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.lowfit.cases import Case
+    from elevon.lowfit.cases import FitCase
     from elevon.progress import Progress
     from elevon.recording import Recording
 
@@ -36,13 +36,13 @@ SEEN = 1e-4
 
 @dataclass(frozen=True)
 class LowFit:
-    """What was fitted, and how far the low model was and is from the high one.
+    """What was fitted, and how far the reduced-order model was and is from the high one.
 
     Attributes
     ----------
     before, actuator : Actuator
         As given; with the fitted numbers.
-    cases : tuple of Case
+    cases : tuple of FitCase
         Over which the fit ran.
     old, new : mapping of str to float
         Value of every number that was fitted [SI].
@@ -57,7 +57,7 @@ class LowFit:
 
     before: Actuator
     actuator: Actuator
-    cases: tuple[Case, ...]
+    cases: tuple[FitCase, ...]
     old: Mapping[str, float]
     new: Mapping[str, float]
     deviation: Mapping[str, float]
@@ -90,19 +90,19 @@ class LowFit:
 
 def fit_low(
     actuator: Actuator,
-    cases: Sequence[Case],
+    cases: Sequence[FitCase],
     *,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> LowFit:
-    """Fit the low model's free numbers to the high model.
+    """Fit the reduced-order model's free numbers to the switching model.
 
     Parameters
     ----------
     actuator : Actuator
         Its drive kind as set: the numbers belong to it.
-    cases : sequence of Case
-        At least one; the high model runs each once.
+    cases : sequence of FitCase
+        At least one; the switching model runs each once.
     seed : int
         Of every run.
     progress : callable, optional
@@ -129,7 +129,7 @@ def fit_low(
 
 def _fitted(
     actuator: Actuator,
-    cases: Sequence[Case],
+    cases: Sequence[FitCase],
     free: Sequence[str],
     seed: int,
     progress: Progress | None,
@@ -143,22 +143,24 @@ def _fitted(
     rows = range(len(cases))
     new = problem.solve(seen, rows)
     deviation = problem.jackknife(seen, new, progress)
-    after = actuator.with_values(new, source="fitted to the high model", asked=False)
+    after = actuator.with_values(new, source="fitted to the switching model", request=False)
     errors = [problem.errors(values) for values in (old, new)]
     return LowFit(actuator, after, tuple(cases), old, new, deviation, unchanged, *errors)
 
 
 @dataclass(frozen=True)
 class _Problem:
-    """The high model's signals, and the low model's distance from them."""
+    """The switching model's signals, and the reduced-order model's distance from them."""
 
     actuator: Actuator
-    cases: tuple[Case, ...]
+    cases: tuple[FitCase, ...]
     high: tuple[Mapping[str, Array], ...]
     seed: int
 
     def low(self, values: Mapping[str, float], rows: Sequence[int]) -> list[Mapping[str, Array]]:
-        changed = self.actuator.with_values(dict(values), asked=False) if values else self.actuator
+        changed = (
+            self.actuator.with_values(dict(values), request=False) if values else self.actuator
+        )
         return _signals(changed, [self.cases[row] for row in rows], "low", self.seed, None)
 
     def errors(
@@ -232,7 +234,7 @@ class _Problem:
 
 def _signals(
     actuator: Actuator,
-    cases: Sequence[Case],
+    cases: Sequence[FitCase],
     fidelity: str,
     seed: int,
     progress: Progress | None,
@@ -245,7 +247,7 @@ def _signals(
     return [_filtered(run, case) for run, case in zip(recordings, cases, strict=True)]
 
 
-def _filtered(run: Recording, case: Case) -> Mapping[str, Array]:
+def _filtered(run: Recording, case: FitCase) -> Mapping[str, Array]:
     if run.status != "ok":
         message = f"fit-low: {case.name}: the {run.meta['fidelity']} model ended as {run.status}"
         raise SimulationError(f"{message}: {run.meta['message']}", run.status)
@@ -258,13 +260,13 @@ def _free(actuator: Actuator) -> list[str]:
     free = [path for path in FREE if path in known]
     if not free:
         raise InputError(
-            f"fit-low: the low model of {actuator.name} ({actuator.wiring}) has none of "
+            f"fit-low: the reduced-order model of {actuator.name} ({actuator.wiring}) has none of "
             f"{', '.join(FREE)}: there is nothing to fit"
         )
     return free
 
 
-def _check(cases: Sequence[Case]) -> None:
+def _check(cases: Sequence[FitCase]) -> None:
     if not cases:
         raise InputError("fit-low: there is no case to fit to")
     for case in cases:

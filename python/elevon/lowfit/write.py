@@ -24,14 +24,14 @@ def fitted_parameters(fit: LowFit) -> list[Parameter]:
     for path, value in fit.new.items():
         spread = fit.deviation[path]
         note = f"For drive.kind = {drive}. Standard deviation over the cases {spread:.2g}."
-        source = f"fitted to the high model over {len(fit.cases)} cases: {names}"
+        source = f"fitted to the switching model over {len(fit.cases)} cases: {names}"
         rounded = float(f"{value:.4g}")
         entries.append(Parameter(path, rounded, "", source, note, "calibrated", fit.old[path]))
     return entries
 
 
 def write_fit(path: str | os.PathLike[str], fit: LowFit, *, force: bool = False) -> Path:
-    """Write a set that changes the fitted numbers alone; errors as `elevon.files.write_text`."""
+    """Write the fitted numbers as an actuator file; errors as `elevon.files.write_text`."""
     target = Path(path).expanduser()
     return write_set(
         target,
@@ -45,11 +45,11 @@ def write_fit(path: str | os.PathLike[str], fit: LowFit, *, force: bool = False)
 
 def _name(stem: str) -> str:
     plain = "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in stem)
-    return plain if plain and plain[0].isalnum() else f"set-{plain.strip('-._')}"
+    return plain if plain and plain[0].isalnum() else f"actuator-{plain.strip('-._')}"
 
 
 def _base(fit: LowFit, target: Path) -> str:
-    """Name of a set of the package, else the way from the new file to the old one."""
+    """Name of an actuator file of the package, else the path from the new file to the old one."""
     path, name = fit.before.path, fit.before.name
     if path is None:
         return name

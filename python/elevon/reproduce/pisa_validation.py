@@ -16,14 +16,14 @@ from elevon.reproduce.pisa_gear import ACTUATOR, CONDITIONS, Condition
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.calibrate.validation import Trace, Validation
+    from elevon.calibrate.validation import Validation, ValidationTrace
     from elevon.progress import Progress
     from elevon.recording import Recording
 
-__all__ = ["SHOWN", "ValidationResult", "reproduce_validation"]
+__all__ = ["DISPLAYED", "ValidationResult", "reproduce_validation"]
 
 SECONDS = {"extend": 14.0, "retract": 16.0}
-SHOWN = ("output_position", "motor_speed", "torque_current")
+DISPLAYED = ("output_position", "motor_speed", "torque_current")
 """What the thesis compares: position, speed, current."""
 POSITION_LIMIT = 2.0
 """Percent of range allowed to the position: a hundredth of a stroke and the timing; ASSUMED."""
@@ -48,11 +48,11 @@ class ValidationResult:
              "max": error.largest, "percent_of_rms": error.of_rms,
              "percent_of_range": error.of_range, "published": None}
             for error in self.validation.errors
-            if error.signal in SHOWN
+            if error.signal in DISPLAYED
         ]  # fmt: skip
 
     @property
-    def traces(self) -> tuple[Trace, ...]:
+    def traces(self) -> tuple[ValidationTrace, ...]:
         """Measured and simulated signals by stroke."""
         return self.validation.traces
 
@@ -135,7 +135,7 @@ def _unit(model: Actuator) -> Actuator:
             for knot in range(1, 9):
                 path = f"friction.{kind}_{way}_{knot}"
                 values[path] = max(value(path) + min(0.0, value(path) - first), 0.5 * first)
-    return model.with_values(values, source="unit on the virtual rig", asked=False)
+    return model.with_values(values, source="unit on the virtual rig", request=False)
 
 
 def _log(

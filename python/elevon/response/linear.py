@@ -193,12 +193,12 @@ def _impulse(
     """Return the response of the outputs to a unit pulse of one period, shape (count, outputs)."""
     step, count, pulse = sampling
     state = session.save()
-    held = at.get(name, 0.0)
+    level = at.get(name, 0.0)
     answers = []
     for sign in (1.0, -1.0):
         rows = []
         for k in range(count):
-            session.set(**{name: held + (sign * pulse if k == 0 else 0.0)})
+            session.set(**{name: level + (sign * pulse if k == 0 else 0.0)})
             rows.append(list(session.read(*outputs).values()))
             session.advance(step)
         answers.append(np.array(rows))

@@ -176,20 +176,20 @@ def square(t):
 def sampled(*, late=0.0, drift=0.0, offset=1.5, noise=0.02, rival=0.0, seed=0):
     rng = np.random.default_rng(seed)
     drive = np.arange(0.0, 20.0, 1 / 400)
-    own = np.arange(0.0, 18.0, 1 / 80)
+    cell_time = np.arange(0.0, 18.0, 1 / 80)
     signal = square(drive) + noise * rng.standard_normal(len(drive))
-    true = offset + (1.0 + drift) * own - late
-    value = 40.0 * square(true) + rival * np.cumsum(rng.standard_normal(len(own)))
-    value += 40.0 * noise * rng.standard_normal(len(own))
-    return drive, signal, own, value, find_trigger(drive, drive >= offset)
+    true = offset + (1.0 + drift) * cell_time - late
+    value = 40.0 * square(true) + rival * np.cumsum(rng.standard_normal(len(cell_time)))
+    value += 40.0 * noise * rng.standard_normal(len(cell_time))
+    return drive, signal, cell_time, value, find_trigger(drive, drive >= offset)
 
 
 @pytest.mark.parametrize("late", [0.0, 0.02, 0.035])
 def test_a_late_converter_is_no_drift(late):
     errors = []
     for seed in range(6):
-        drive, signal, own, value, edge = sampled(late=late, drift=-8e-4, seed=seed)
-        fit = align_clocks(drive, signal, own, value, edge=edge)
+        drive, signal, cell_time, value, edge = sampled(late=late, drift=-8e-4, seed=seed)
+        fit = align_clocks(drive, signal, cell_time, value, edge=edge)
         assert abs(fit.offset - 1.5) < 3.0 * fit.offset_std
         assert fit.residual == pytest.approx(-late, abs=3.0 * fit.residual_std)
         assert fit.residual_std < 0.01
@@ -198,77 +198,77 @@ def test_a_late_converter_is_no_drift(late):
 
 
 def test_without_a_trigger_the_offset_holds_the_delay_it_cannot_tell():
-    drive, signal, own, value, _ = sampled(late=0.03)
-    fit = align_clocks(drive, signal, own, value)
+    drive, signal, cell_time, value, _ = sampled(late=0.03)
+    fit = align_clocks(drive, signal, cell_time, value)
     assert abs(fit.offset - 1.5) < 2.0 * fit.offset_std
     assert abs(fit.offset - 1.5) > 0.02
 
 
 def test_dependent_and_silent_signals_change_nothing():
-    drive, signal, own, value, edge = sampled(seed=2)
-    alone = align_clocks(drive, signal, own, value, edge=edge)
+    drive, signal, cell_time, value, edge = sampled(seed=2)
+    alone = align_clocks(drive, signal, cell_time, value, edge=edge)
     more = np.column_stack([signal, 2.0 * signal - 1.0, np.full_like(drive, 0.3)])
-    fit = align_clocks(drive, more, own, value, edge=edge)
+    fit = align_clocks(drive, more, cell_time, value, edge=edge)
     for name in ("offset", "offset_std", "drift", "drift_std", "residual_std"):
         assert getattr(fit, name) == pytest.approx(getattr(alone, name), rel=1e-3, abs=1e-7)
 
 
 def test_two_sets_that_disagree_are_refused_without_a_trigger():
     """Each explains the load cell, at offsets of its own: which one it follows is not known."""
-    drive, signal, own, value, edge = sampled(seed=4)
+    drive, signal, cell_time, value, edge = sampled(seed=4)
     late = np.interp(drive - 0.3, drive, signal)
     with pytest.raises(InputError, match="two sets of signals disagree"):
-        align_clocks(drive, signal, own, value, alternatives=[late])
-    fit = align_clocks(drive, signal, own, value, edge=edge, alternatives=[late])
-    assert fit == align_clocks(drive, signal, own, value, edge=edge)
+        align_clocks(drive, signal, cell_time, value, alternatives=[late])
+    fit = align_clocks(drive, signal, cell_time, value, edge=edge, alternatives=[late])
+    assert fit == align_clocks(drive, signal, cell_time, value, edge=edge)
 
 
 def test_a_set_of_missing_values_is_passed_over():
-    drive, signal, own, value, edge = sampled(seed=1)
+    drive, signal, cell_time, value, edge = sampled(seed=1)
     lost = np.full_like(drive, math.nan)
-    fit = align_clocks(drive, signal, own, value, edge=edge, alternatives=[lost])
-    assert fit == align_clocks(drive, signal, own, value, edge=edge)
+    fit = align_clocks(drive, signal, cell_time, value, edge=edge, alternatives=[lost])
+    assert fit == align_clocks(drive, signal, cell_time, value, edge=edge)
     with pytest.raises(InputError, match="0 and 1440 samples"):
-        align_clocks(drive, lost, own, value, edge=edge, alternatives=[lost])
+        align_clocks(drive, lost, cell_time, value, edge=edge, alternatives=[lost])
 
 
 def test_a_clock_that_stands_still_is_refused():
-    drive, signal, own, value, edge = sampled()
-    own[100] = own[99]
+    drive, signal, cell_time, value, edge = sampled()
+    cell_time[100] = cell_time[99]
     with pytest.raises(InputError, match=r"load cell's time does not increase at 1\.2375 s"):
-        align_clocks(drive, signal, own, value, edge=edge)
+        align_clocks(drive, signal, cell_time, value, edge=edge)
 
 
 def test_signals_that_explain_less_than_half_leave_the_trigger_alone():
-    drive, signal, own, value, edge = sampled(rival=12.0, seed=5)
-    fit = align_clocks(drive, signal, own, value, edge=edge)
+    drive, signal, cell_time, value, edge = sampled(rival=12.0, seed=5)
+    fit = align_clocks(drive, signal, cell_time, value, edge=edge)
     assert fit.method == "trigger"
     assert fit.drift == 0.0
     with pytest.raises(InputError, match="50 % needed"):
-        align_clocks(drive, signal, own, value)
+        align_clocks(drive, signal, cell_time, value)
 
 
 def test_a_clock_beyond_any_resonator_is_still_followed_when_it_is_seen():
-    drive, signal, own, value, edge = sampled(drift=0.012)
-    fit = align_clocks(drive, signal, own, value, edge=edge)
+    drive, signal, cell_time, value, edge = sampled(drift=0.012)
+    fit = align_clocks(drive, signal, cell_time, value, edge=edge)
     assert fit.drift == pytest.approx(0.012, abs=3.0 * fit.drift_std)
     assert fit.drift - 2.0 * fit.drift_std > RESONATOR_TOLERANCE
 
 
 def test_the_set_of_signals_that_explains_more_is_taken():
-    drive, signal, own, value, edge = sampled(seed=1)
+    drive, signal, cell_time, value, edge = sampled(seed=1)
     other = np.random.default_rng(9).standard_normal(len(drive))
-    one = align_clocks(drive, other, own, value, edge=edge, alternatives=[signal])
-    assert one == align_clocks(drive, signal, own, value, edge=edge)
+    one = align_clocks(drive, other, cell_time, value, edge=edge, alternatives=[signal])
+    assert one == align_clocks(drive, signal, cell_time, value, edge=edge)
 
 
 def test_half_a_period_before_the_trace_is_set_aside():
-    """A cosine and its half period: the load cell began within the trace, and that is said."""
+    """A cosine and its half period: the load cell began within the trace, and that is reported."""
     drive = np.arange(0.0, 20.0, 1 / 400)
-    own = np.arange(0.0, 19.0, 1 / 80)
-    noise = 0.02 * np.random.default_rng(3).standard_normal(len(own))
+    cell_time = np.arange(0.0, 19.0, 1 / 80)
+    noise = 0.02 * np.random.default_rng(3).standard_normal(len(cell_time))
     wave = np.cos(2.0 * math.pi * 0.05 * drive)
-    value = np.cos(2.0 * math.pi * 0.05 * (own + 0.7)) + noise
-    fit = align_clocks(drive, wave, own, value)
+    value = np.cos(2.0 * math.pi * 0.05 * (cell_time + 0.7)) + noise
+    fit = align_clocks(drive, wave, cell_time, value)
     assert abs(fit.offset - 0.7) < 3.0 * fit.offset_std
     assert fit.set_aside == pytest.approx(-9.3, abs=0.1)

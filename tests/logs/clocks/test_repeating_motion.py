@@ -1,4 +1,4 @@
-"""Synchronisation of braked sines from a bench that is not in the project: nothing false is told.
+"""Synchronisation of braked sines from a bench that is not in the project: no false report.
 
 A sine shifted by its period, or turned round by half of it, fits almost as well; and a brake that
 turns its sign with the motion looks early beside a current that also accelerates the shaft.
@@ -36,9 +36,9 @@ def test_a_repeating_sine_without_a_trigger_is_refused_or_right(tmp_path, seed, 
     found, trigger, _ = report(tmp_path, seed, SINE, duration, BLIND)
     sync = found.synchronisation
     if sync["method"] == "none":
-        (said,) = (f.text for f in found.findings if f.code == "not-synchronised")
-        assert "cannot be distinguished" in said
-        assert "independent samples" in said
+        (message,) = (f.text for f in found.findings if f.code == "not-synchronised")
+        assert "cannot be distinguished" in message
+        assert "independent samples" in message
     else:
         assert abs(sync["offset_s"] - trigger) < 3.0 * sync["offset_std_s"]
 
@@ -68,9 +68,9 @@ def test_a_sweep_gives_no_false_drift(tmp_path):
 def pair(shape, *, seconds=16.0, width=0.0125):
     """Two logs that saw one shape, the second from 2 s on."""
     rng = np.random.default_rng(7)
-    drive, own = np.arange(0.0, seconds, 0.0025), np.arange(0.0, seconds - 4.0, 0.0125)
-    value = shape(own + 2.0) + 1e-3 * rng.standard_normal(len(own))
-    return SharedLogs(drive, shape(drive)[:, None], own, value, 0.0125, width)
+    drive, cell_time = np.arange(0.0, seconds, 0.0025), np.arange(0.0, seconds - 4.0, 0.0125)
+    value = shape(cell_time + 2.0) + 1e-3 * rng.standard_normal(len(cell_time))
+    return SharedLogs(drive, shape(drive)[:, None], cell_time, value, 0.0125, width)
 
 
 def sweep(t):

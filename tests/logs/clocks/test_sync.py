@@ -25,12 +25,14 @@ def pair(seed, *, offset=2.3456, drift=1.5e-3, noise=0.05, rate=80.0, seconds=16
     rng = np.random.default_rng(seed)
     drive = np.arange(0.0, 20.0, 1 / 400)
     signal = shared_motion(drive) + rng.normal(0, noise, len(drive))
-    own = np.arange(0.0, seconds, 1 / rate)
+    cell_time = np.arange(0.0, seconds, 1 / rate)
     value = (
-        30 + 25 * shared_motion(offset + (1 + drift) * own) + rng.normal(0, 25 * noise, len(own))
+        30
+        + 25 * shared_motion(offset + (1 + drift) * cell_time)
+        + rng.normal(0, 25 * noise, len(cell_time))
     )
     trigger = (drive >= offset).astype(float)
-    return drive, signal, own, value, trigger
+    return drive, signal, cell_time, value, trigger
 
 
 def test_the_trigger_is_known_to_a_sample():
@@ -47,9 +49,9 @@ def test_the_trigger_is_known_to_a_sample():
 def test_offset_and_drift_are_recovered_with_honest_intervals(with_edge):
     scores = []
     for seed in range(12):
-        drive, signal, own, value, trigger = pair(seed)
+        drive, signal, cell_time, value, trigger = pair(seed)
         edge = find_trigger(drive, trigger) if with_edge else None
-        fit = align_clocks(drive, signal, own, value, edge=edge)
+        fit = align_clocks(drive, signal, cell_time, value, edge=edge)
         assert abs(fit.offset - 2.3456) < 0.01
         assert abs(fit.drift - 1.5e-3) < 1e-3
         scores.append((fit.offset - 2.3456) / fit.offset_std)
@@ -59,10 +61,10 @@ def test_offset_and_drift_are_recovered_with_honest_intervals(with_edge):
 
 
 def test_the_edge_sharpens_the_offset():
-    drive, signal, own, value, trigger = pair(3, noise=0.3)
-    blind = align_clocks(drive, signal, own, value)
+    drive, signal, cell_time, value, trigger = pair(3, noise=0.3)
+    blind = align_clocks(drive, signal, cell_time, value)
     edge = find_trigger(drive, trigger)
-    sharp = align_clocks(drive, signal, own, value, edge=edge)
+    sharp = align_clocks(drive, signal, cell_time, value, edge=edge)
     assert sharp.offset_std < blind.offset_std
     assert sharp.offset_std <= 1.05 * edge.std
     assert sharp.method == "trigger and correlation"
@@ -70,21 +72,21 @@ def test_the_edge_sharpens_the_offset():
 
 def test_a_periodic_motion_without_trigger_is_refused_as_ambiguous():
     drive = np.arange(0.0, 20.0, 1 / 400)
-    own = np.arange(0.0, 12.0, 1 / 80)
+    cell_time = np.arange(0.0, 12.0, 1 / 80)
     wave = lambda t: np.sin(2 * math.pi * 0.5 * t)  # noqa: E731
-    noise = np.random.default_rng(4).normal(0, 0.05, len(own))
+    noise = np.random.default_rng(4).normal(0, 0.05, len(cell_time))
     with pytest.raises(InputError, match="repeats"):
-        align_clocks(drive, wave(drive), own, wave(own + 3.1) + noise)
+        align_clocks(drive, wave(drive), cell_time, wave(cell_time + 3.1) + noise)
 
 
 def test_no_motion_in_common_leaves_the_trigger_alone():
-    drive, signal, own, _, trigger = pair(0)
-    silent = np.random.default_rng(1).normal(0, 0.1, len(own))
-    fit = align_clocks(drive, signal, own, silent, edge=find_trigger(drive, trigger))
+    drive, signal, cell_time, _, trigger = pair(0)
+    silent = np.random.default_rng(1).normal(0, 0.1, len(cell_time))
+    fit = align_clocks(drive, signal, cell_time, silent, edge=find_trigger(drive, trigger))
     assert fit.method == "trigger"
     assert math.isinf(fit.drift_std)
     with pytest.raises(InputError, match="variance"):
-        align_clocks(drive, signal, own, silent)
+        align_clocks(drive, signal, cell_time, silent)
 
 
 @pytest.mark.parametrize("text", [
@@ -139,12 +141,12 @@ def test_torques_of_cells():
 def test_a_load_cell_beside_the_log_is_joined(tmp_path, truth):
     signals = dict(truth.signals)
     write_drive_csv(tmp_path / "run.csv", signals)
-    own = np.arange(0.0, 17.0, 1 / 80)
+    cell_time = np.arange(0.0, 17.0, 1 / 80)
     drive = signals["time"]
-    moved = truth.trigger + (1 + 8e-4) * own
+    moved = truth.trigger + (1 + 8e-4) * cell_time
     force = 40 * np.sign(np.interp(moved, drive, signals["motor_speed"]))
-    force += np.random.default_rng(2).normal(0, 1.0, len(own))
-    write_loadcell(tmp_path / "run_loadcell.csv", own, force)
+    force += np.random.default_rng(2).normal(0, 1.0, len(cell_time))
+    write_loadcell(tmp_path / "run_loadcell.csv", cell_time, force)
     (tmp_path / "run_command.toml").write_text(
         'waveform = "sine"\namplitude = "7 deg"\nfrequency = 0.2\nbrake = "on"\narm = 0.1\n'
         'chain_ratio = 4\ncurrent = "rms"\nnote_by = "somebody"\n'
@@ -165,8 +167,10 @@ def test_a_load_cell_beside_the_log_is_joined(tmp_path, truth):
 def test_an_unsynchronised_load_cell_is_kept_and_said(tmp_path, truth):
     signals = {k: v for k, v in truth.signals.items() if k != "trigger"}
     write_drive_csv(tmp_path / "run.csv", signals)
-    own = np.arange(0.0, 17.0, 1 / 80)
-    write_loadcell(tmp_path / "x.csv", own, np.random.default_rng(2).normal(0, 1.0, len(own)))
+    cell_time = np.arange(0.0, 17.0, 1 / 80)
+    write_loadcell(
+        tmp_path / "x.csv", cell_time, np.random.default_rng(2).normal(0, 1.0, len(cell_time))
+    )
     log = import_log(tmp_path / "run.csv", loadcell=tmp_path / "x.csv")
     assert log.report.has("not-synchronised")
     assert "load_cell_force" in log.recording

@@ -150,10 +150,10 @@ def test_intervals_cover_under_coloured_residuals(rho):
     for _ in range(200):
         noise = coloured(rng, len(t), rho, 1.0)
         wrong = solver @ noise
-        rest = noise - jacobian @ wrong
-        std = np.sqrt(np.diag(robust_covariance(jacobian, rest)))
+        residual = noise - jacobian @ wrong
+        std = np.sqrt(np.diag(robust_covariance(jacobian, residual)))
         hits += int(np.sum(np.abs(wrong) < 1.645 * std))
-        textbook = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)) * rest.var())
+        textbook = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)) * residual.var())
         white += int(np.sum(np.abs(wrong) < 1.645 * textbook))
     assert 0.84 <= hits / 800 <= 0.95
     if rho > 0.5:

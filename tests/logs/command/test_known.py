@@ -72,7 +72,7 @@ REFUSED = {
     "kind": ('[[command.terms]]\nkind = "sinus"', "sine"),
     "both": (
         'waveform = "sine"\n[[command.terms]]\nkind = "constant"\nvalue = "1 deg"',
-        "both say",
+        "both state",
     ),
     "elsewhere": ('[[command.terms]]\nkind = "table"\nfile = "/etc/passwd"', "beside the note"),
     "many": (

@@ -76,7 +76,7 @@ def test_currents_are_peak_inside(tmp_path, truth):
     path = write_drive_csv(
         tmp_path / "log.csv", truth.signals, layout=DriveFormat(current_convention="peak")
     )
-    log = import_log(path)  # nothing is stated: rms assumed, and said
+    log = import_log(path)  # nothing is stated: rms assumed, and stated
     assert log.report.has("convention-assumed")
     np.testing.assert_allclose(
         log.recording["current_ref"].values, math.sqrt(2) * truth.signals["current_ref"], rtol=1e-7
@@ -217,9 +217,9 @@ def test_a_map_mends_what_the_log_cannot_say(tmp_path, truth):
 
 
 def test_a_log_at_rest_says_that_units_are_not_confirmed(tmp_path, truth):
-    still = {k: np.full(500, float(v[0])) for k, v in truth.signals.items()}
-    still["time"] = truth.signals["time"][:500]
-    log = import_log(write_drive_csv(tmp_path / "still.csv", still))
+    standing = {k: np.full(500, float(v[0])) for k, v in truth.signals.items()}
+    standing["time"] = truth.signals["time"][:500]
+    log = import_log(write_drive_csv(tmp_path / "still.csv", standing))
     assert {f.place for f in log.report.findings if f.code == "unit-unconfirmed"} == {
         "resolver_position",
         "encoder_position",

@@ -26,7 +26,7 @@ _WHOLE = 0.02  # of one: a feed-forward that is nearer counts as one
 
 
 def exchanged(fitted: Fitted, given: Actuator) -> tuple[Fitted, dict[str, str]]:
-    """Return the fit with both gains near to the set's, and why they are unsettled.
+    """Return the fit with both gains near to the actuator file's, and why they are unsettled.
 
     Where the logs are followed alike with both gains in each other's place, the pair nearer to the
     values `given` is taken, and both are named with the other pair; else nothing changes.
@@ -67,11 +67,11 @@ def _swapped(fitted: Fitted) -> Floats:
 
 
 def _distance(values: dict[str, float], given: Actuator) -> float:
-    """How far a pair is from the set's own, in logarithms."""
+    """How far a pair is from the actuator file's own, in logarithms."""
     total = 0.0
     for path in (GAIN, TIME):
-        own = given.parameters.value(path)
-        total += abs(math.log(values[path] / own)) if own > 0.0 else 0.0
+        previous = given.parameters.value(path)
+        total += abs(math.log(values[path] / previous)) if previous > 0.0 else 0.0
     return total
 
 

@@ -101,7 +101,7 @@ def search(
 
 
 def as_given(actuator: Actuator, logs: Sequence[LoopLog], names: Sequence[str]) -> Searched:
-    """Begin at the set's own values, with its own structure: what some numbers are fitted from."""
+    """Begin at the actuator file's values and structure: what some numbers are fitted from."""
     structure = str(actuator.parameters["control.structure"].value)
     free = asked_for(free_list(actuator, logs, structure, {}), names)
     return Searched(structure, tuple(free), inner(free), math.nan, 0)
@@ -145,15 +145,15 @@ def _likelihood(objective: Objective, x: Floats) -> float:
     independent sample a memory of fixed length, so that structures are compared alike.
     """
     total = 0.0
-    shown = objective.runs(x)[0]
+    predicted = objective.runs(x)[0]
     for k, name in objective.keys:
         log = objective.model.logs[k]
-        run, mask = shown[k], objective.masks[k, name]
+        run, mask = predicted[k], objective.masks[k, name]
         if run is None:
             return -np.inf
-        rest = ((run[name] - log.signals[name])[mask]) / log.sigma(name)
-        typical = float(np.median(np.abs(rest))) + 1e-9
-        spread = float(np.sqrt(np.mean(np.minimum(rest**2, (5.0 * typical) ** 2))))
+        residual = ((run[name] - log.signals[name])[mask]) / log.sigma(name)
+        typical = float(np.median(np.abs(residual))) + 1e-9
+        spread = float(np.sqrt(np.mean(np.minimum(residual**2, (5.0 * typical) ** 2))))
         total -= mask.sum() * log.period / _MEMORY * np.log(spread + 1e-4)
     return float(total)
 

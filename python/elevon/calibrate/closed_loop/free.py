@@ -93,25 +93,25 @@ def outer(free: Sequence[Free], x: Floats) -> dict[str, float]:
 
 
 def in_set(path: str) -> bool:
-    """Whether a parameter set has a place for it."""
+    """Whether an actuator file has a place for it."""
     return not path.startswith("sensor.") or not path.endswith(("_delay", "_offset", "_lag"))
 
 
 def free_list(
     actuator: Actuator, logs: Sequence[LoopLog], structure: str, starts: Mapping[str, float]
 ) -> list[Free]:
-    """List what the logs may tell of a servo under one structure of its controller.
+    """List what the logs may determine of a servo under one structure of its controller.
 
-    `starts` are first values from the signals; what is not there starts from the set.
+    `starts` are first values from the signals; what is not there starts from the actuator file.
     """
     channels = {name for log in logs for name in log.signals}
     items = [*_plant(actuator), *_controller(actuator, structure)]
     items += [*_current_loop(actuator), *_limits(channels)]
-    return [_started(item, actuator, starts) for item in items] + _shown(logs, channels)
+    return [_started(item, actuator, starts) for item in items] + _logger_rows(logs, channels)
 
 
 def asked_for(free: Sequence[Free], names: Sequence[str]) -> list[Free]:
-    """Return what was asked for by name, with the logger's own delays and offsets.
+    """Return what was requested by name, with the logger's own delays and offsets.
 
     Static friction is fitted as its share of the dynamic one, which goes with it.
 
@@ -171,12 +171,12 @@ def _controller(actuator: Actuator, structure: str) -> list[Free]:
 
 def _current_loop(actuator: Actuator) -> list[Free]:
     """How late the drive acts (reads, waits, holds), as the lag of its current loop."""
-    own = actuator.parameters.value(CURRENT_GAIN)
+    nominal = actuator.parameters.value(CURRENT_GAIN)
     slowest = actuator.parameters.value("motor.winding_inductance") / _LATEST
-    if str(actuator.parameters["drive.kind"].value) != "pwm" or not own > slowest:
+    if str(actuator.parameters["drive.kind"].value) != "pwm" or not nominal > slowest:
         return []
     # What waits only adds to the lag that the loop has of its own.
-    return [_row(CURRENT_GAIN, "V/A", "controller", 1.0, (slowest, own))]
+    return [_row(CURRENT_GAIN, "V/A", "controller", 1.0, (slowest, nominal))]
 
 
 def _limits(channels: set[str]) -> list[Free]:
@@ -187,7 +187,7 @@ def _limits(channels: set[str]) -> list[Free]:
     return rows
 
 
-def _shown(logs: Sequence[LoopLog], channels: set[str]) -> list[Free]:
+def _logger_rows(logs: Sequence[LoopLog], channels: set[str]) -> list[Free]:
     period = max(log.period for log in logs)
     late = max(1.5 * period, 2e-3)
     units = {"position": "", "motor_position": "rad", "speed": "", "motor_speed": "rad/s",

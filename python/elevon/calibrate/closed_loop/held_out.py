@@ -1,4 +1,4 @@
-"""How well values fitted without a log predict it: where a set's thresholds come from."""
+"""How well values fitted without a log predict it: the source of thresholds."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from elevon.calibrate.closed_loop.model import LoopModel
 from elevon.calibrate.closed_loop.objective import Objective
 from elevon.calibrate.closed_loop.predict import predict
 from elevon.calibrate.closed_loop.solve import solve
-from elevon.calibrate.validation import SignalError, Trace, Validation
+from elevon.calibrate.validation import SignalError, Validation, ValidationTrace
 from elevon.errors import InputError, unknown
 
 if TYPE_CHECKING:
@@ -52,17 +52,17 @@ def held_out_errors(fitted: Fitted, transient: float = TRANSIENT) -> Validation:
         for log, run in zip(outside, other.runs(x)[0], strict=True):
             if run is None:
                 raise InputError(f"{log.name}: predicted from the others, the run diverges")
-            trace = Trace(log.name, log.time, log.signals, run, log.used)
+            trace = ValidationTrace(log.name, log.time, log.signals, run, log.used)
             traces.append(trace)
             errors += _errors(trace, {}, model.actuator.wiring)
-    shown = {
+    logger = {
         path.removeprefix("sensor."): value
         for path, value in fitted.values.items()
         if not in_set(path)
     }
     return Validation(
         objective.model.actuator.name, "low", transient, tuple(errors),
-        {log.name: "as logged" for log in logs}, tuple(traces), shown,
+        {log.name: "as logged" for log in logs}, tuple(traces), logger,
     )  # fmt: skip
 
 
@@ -79,7 +79,7 @@ def validate_loop(
     logs: Sequence[LoopLog],
     actuator: Actuator,
     transient: float | None = None,
-    shown: Mapping[str, float] | None = None,
+    logger: Mapping[str, float] | None = None,
 ) -> Validation:
     """Hold a servo against logs in its own closed loop on the recorded demand.
 
@@ -90,9 +90,9 @@ def validate_loop(
     actuator : Actuator
         Its ``[validation]`` table has the thresholds, and the logger's delays and offsets.
     transient : float, optional
-        Seconds left out; default: the set's, else one.
-    shown : mapping of str to float, optional
-        The logger's delays, lags and offsets (`Validation.offsets`); default: the set's.
+        Seconds left out; default: the actuator file's, else one.
+    logger : mapping of str to float, optional
+        The logger's delays, lags and offsets (`Validation.offsets`); default: the actuator file's.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def validate_loop(
     """
     promised = actuator.validation or {}
     limits = dict(promised.get("limits", {}))
-    offsets = dict(promised.get("offsets", {}) if shown is None else shown)
+    offsets = dict(promised.get("offsets", {}) if logger is None else logger)
     for name in limits:
         if name not in _UNITS:
             raise unknown("signal", name, _UNITS, f"{actuator.name}: validation.limits")
@@ -112,7 +112,7 @@ def validate_loop(
     late = [log.restricted(log.time >= given) for log in logs]
     _, runs = predict(late, actuator, {f"sensor.{name}": v for name, v in offsets.items()})
     traces = [
-        Trace(log.name, log.time, log.signals, run, log.used)
+        ValidationTrace(log.name, log.time, log.signals, run, log.used)
         for log, run in zip(late, runs, strict=True)
     ]
     errors = [row for trace in traces for row in _errors(trace, limits, actuator.wiring)]
@@ -122,7 +122,7 @@ def validate_loop(
     )  # fmt: skip
 
 
-def _errors(trace: Trace, limits: Mapping[str, float], wiring: str) -> list[SignalError]:
+def _errors(trace: ValidationTrace, limits: Mapping[str, float], wiring: str) -> list[SignalError]:
     """Error of every channel of one log, in percent as elsewhere."""
     errors = []
     for name, simulated in trace.simulated.items():

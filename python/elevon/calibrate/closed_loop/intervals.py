@@ -16,7 +16,7 @@ from elevon.calibrate.closed_loop.objective import Objective
 from elevon.calibrate.closed_loop.refine import FALL
 from elevon.calibrate.closed_loop.solve import Point, jacobian
 
-__all__ = ["SILENT", "Known", "known"]
+__all__ = ["SILENT", "Knowledge", "known"]
 
 _SHARE = 0.2  # of a logarithm: a deviation above which a number is not determined
 _TENTH = 0.5  # of its meaningful size, for an offset or a delay
@@ -42,7 +42,7 @@ _LIMITS = ("control.current_limit", "control.speed_limit", "inverter.supply_volt
 
 
 @dataclass(frozen=True)
-class Known:
+class Knowledge:
     """What is known of one number.
 
     Attributes
@@ -78,7 +78,7 @@ class Known:
         return max(low, self.free.low), min(high, self.free.high)
 
 
-def known(fitted: Fitted) -> tuple[list[Known], float]:
+def known(fitted: Fitted) -> tuple[list[Knowledge], float]:
     """Return what is known of each number, and the degrees of freedom of the intervals."""
     objective, x = fitted.objective, fitted.x
     residual = objective.residual(x[None, :])[0]
@@ -96,7 +96,7 @@ def known(fitted: Fitted) -> tuple[list[Known], float]:
     covariance = covariance + _directions(objective, x) + _lagged(objective, x)
     strength = np.sqrt(np.einsum("np,n,np->p", jac, weight, jac))
     return [
-        Known(f, float(x[k]), float(np.sqrt(covariance[k, k])), reason)
+        Knowledge(f, float(x[k]), float(np.sqrt(covariance[k, k])), reason)
         for k, (f, reason) in enumerate(
             zip(objective.free, _reasons(objective, x, covariance, strength), strict=True)
         )
@@ -167,8 +167,8 @@ def _choices(objective: Objective, point: Point, gain: Floats) -> Floats:
     total = np.zeros((gain.shape[0], gain.shape[0]))
     for changes in _alternatives(objective, point.x):
         other = model.actuator.with_values(changes, source="calibration")
-        beside = LoopModel(other, model.logs, model.structure, model.check)
-        run = Objective(beside, objective.free)
+        changed = LoopModel(other, model.logs, model.structure, model.check)
+        run = Objective(changed, objective.free)
         run.scales = objective.scales
         x = _hastened(objective, point.x, 0.5 * later) if "low.step" in changes else point.x
         moved = gain @ (run.residual(x[None, :])[0] - point.residual)
@@ -204,8 +204,9 @@ def _hastened(objective: Objective, x: Floats, by: float) -> Floats:
 def _directions(objective: Objective, x: Floats) -> Floats:
     """What a constant load may take from the friction of both directions.
 
-    Friction f and load L show as f + L one way and r f - L the other, whatever moves: two sums of
-    three numbers. The third comes from what is believed of the ratio r, and from laws of friction.
+    Friction f and load L show as f + L in one direction and r f - L in the other, whatever moves:
+    two sums of three numbers. The third comes from what is believed of the ratio r, and from laws
+    of friction.
     """
     values = outer(objective.free, x)
     total = np.zeros((len(x), len(x)))

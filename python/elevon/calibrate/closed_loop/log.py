@@ -1,4 +1,4 @@
-"""A log as the closed loop needs it: what was demanded, and whatever of the motion was shown."""
+"""A log as the closed loop needs it: what was demanded, and whatever of the motion was recorded."""
 
 from __future__ import annotations
 
@@ -118,8 +118,8 @@ class LoopLog:
         of them a current that steps in time with the log, always seen at the same place.
         """
         size = np.abs(np.diff(self.command))
-        beside = np.maximum(np.append(size[1:], 0.0), np.insert(size[:-1], 0, 0.0))
-        jump = (size > _JUMP * float(np.ptp(self.command))) & (size > _ALONE * beside)
+        neighbour = np.maximum(np.append(size[1:], 0.0), np.insert(size[:-1], 0, 0.0))
+        jump = (size > _JUMP * float(np.ptp(self.command))) & (size > _ALONE * neighbour)
         steps = np.flatnonzero(jump) + 1
         stretches = np.split(np.arange(len(self.time)), steps)
         ends = [*self.time[steps] - 1e-3 * np.diff(self.time)[steps - 1], None]
@@ -197,8 +197,8 @@ def loop_log(recording: Recording, name: str, *, magnitude: bool | None = None) 
     roles = roles if isinstance(roles, Mapping) else {}
 
     def channel(words: tuple[str, ...]) -> str | None:
-        played = (str(roles[word]) for word in words if word in roles)
-        return next((n for n in (*played, *words) if n in recording), None)
+        named = (str(roles[word]) for word in words if word in roles)
+        return next((n for n in (*named, *words) if n in recording), None)
 
     command = channel(("command", "position_ref"))
     if command is None:
@@ -224,7 +224,7 @@ def loop_log(recording: Recording, name: str, *, magnitude: bool | None = None) 
 
 
 def _unsigned(signals: Mapping[str, Floats]) -> bool:
-    """A current that is never below zero though the motion goes both ways has lost its sign."""
+    """A current that is never below zero though the motion reverses has lost its sign."""
     current = signals.get("current")
     if current is None:
         return False

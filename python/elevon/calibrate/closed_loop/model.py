@@ -1,4 +1,4 @@
-"""The servo's own closed loop on recorded demands: many parameter vectors, one batch of lanes."""
+"""The servo's own closed loop on recorded demands: many parameter vectors, one batch."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from elevon.parameters.records import positions
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["LoopModel", "Shown"]
+__all__ = ["Channels", "LoopModel"]
 
 #: Channels of one run on its log's clock; None where it left the finite numbers.
-Shown = dict[str, Floats] | None
+Channels = dict[str, Floats] | None
 
 _SOURCES = {
     "position": "output_position",
@@ -80,7 +80,7 @@ class LoopModel:
             }
         )
         names = ",".join(dict.fromkeys(_SOURCES[name] for name in self.channels))
-        # The gains of the set are another machine's, perhaps: the fit brings its own.
+        # The gains of the actuator file are another machine's, perhaps: the fit brings its own.
         calm = self.actuator.with_values({"control.speed_gain": 0.0}, source="calibration")
         prepared = prepare(Run(calm, zero), "low", f"{names}@every")
         self._names = list(prepared.plan[0].signals)
@@ -110,7 +110,7 @@ class LoopModel:
         return {**base, "inputs": inputs, "initial": initial, "duration": end}
 
     def _start(self, log: LoopLog) -> float:
-        """Where the output stood when the log began: as shown, else as demanded."""
+        """Where the output stood when the log began: as recorded, else as demanded."""
         first = slice(0, 3)
         if "position" in log.signals:
             return float(np.nanmean(log.signals["position"][first]))
@@ -119,16 +119,16 @@ class LoopModel:
         return float(log.command[0])
 
     def keep_gains(self, actuator: Actuator) -> None:
-        """Run with all of a set's own values: where nothing is searched."""
-        own = actuator.parameters.vector()
+        """Run with all of an actuator file's own values: where nothing is searched."""
+        nominal = actuator.parameters.vector()
         for core in self._cores:
-            core["parameters"] = own
+            core["parameters"] = nominal
 
     def vector(self, values: Mapping[str, float]) -> Floats:
         """Return the core's parameter vector with some values changed."""
         vector = np.array(self._cores[0]["parameters"])
         if "control.speed_gain" not in values:
-            # Not searched: the set's own.
+            # Not searched: the actuator file's own.
             vector[self._place["control.speed_gain"]] = self._own_gain
         for path, value in values.items():
             if path in self._place:
@@ -141,7 +141,7 @@ class LoopModel:
         vector[at["friction.static"]] = max(vector[at["friction.static"]], dynamic)
         return vector
 
-    def simulate(self, points: Sequence[Mapping[str, float]]) -> list[list[Shown]]:
+    def simulate(self, points: Sequence[Mapping[str, float]]) -> list[list[Channels]]:
         """Run every log at every point; result[point][log]."""
         from elevon import _core
 
@@ -161,16 +161,18 @@ class LoopModel:
             raise Interrupted("calibration stopped")
         width = len(self.logs)
         return [
-            [self._shown(results[k * width + i], log, point) for i, log in enumerate(self.logs)]
+            [self._traces(results[k * width + i], log, point) for i, log in enumerate(self.logs)]
             for k, point in enumerate(points)
         ]
 
-    def _shown(self, result: Mapping[str, Any], log: LoopLog, values: Mapping[str, float]) -> Shown:
+    def _traces(
+        self, result: Mapping[str, Any], log: LoopLog, values: Mapping[str, float]
+    ) -> Channels:
         """What the log would show of a run: delays, offsets, the current's sign."""
         rows = result["clocks"][self._clock]
         if result["status"] not in {"ok", "tripped"} or not np.isfinite(rows["values"]).all():
             return None
-        shown = {}
+        traces = {}
         for name in self.channels:
             if name not in log.signals:
                 continue
@@ -183,10 +185,10 @@ class LoopModel:
             if lag > 0.0:
                 fine = _late(fine, lag / float(np.median(np.diff(rows["time"]))))
             at = log.time - values.get(f"sensor.{name}_delay", 0.0)
-            shown[name] = np.interp(at, rows["time"], fine) + values.get(
+            traces[name] = np.interp(at, rows["time"], fine) + values.get(
                 f"sensor.{name}_offset", 0.0
             )
-        return shown
+        return traces
 
 
 def _late(values: Floats, lag: float) -> Floats:

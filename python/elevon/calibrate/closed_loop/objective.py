@@ -9,7 +9,7 @@ import numpy as np
 from elevon.arrays import Floats
 from elevon.calibrate.blocks import memory
 from elevon.calibrate.closed_loop.free import Free, outer
-from elevon.calibrate.closed_loop.model import LoopModel, Shown
+from elevon.calibrate.closed_loop.model import Channels, LoopModel
 
 __all__ = ["SOFT", "Objective", "robust"]
 
@@ -56,27 +56,27 @@ class Objective:
             self.scales[k, name] = max(_FIRST[name] * model.logs[k].sigma(name), 1e-12)
         self.share = np.ones(sum(int(mask.sum()) for mask in self.masks.values()))
 
-    def runs(self, x: Floats) -> list[list[Shown]]:
+    def runs(self, x: Floats) -> list[list[Channels]]:
         """Run points, shape (m, p)."""
         return self.model.simulate([outer(self.free, row) for row in np.atleast_2d(x)])
 
-    def parts(self, shown: Sequence[Shown]) -> dict[tuple[int, str], Floats]:
+    def parts(self, predicted: Sequence[Channels]) -> dict[tuple[int, str], Floats]:
         """Residual of each log and channel in deviations, samples that count only."""
         residuals = {}
         for k, name in self.keys:
-            mask, run = self.masks[k, name], shown[k]
+            mask, run = self.masks[k, name], predicted[k]
             if run is None:
                 residuals[k, name] = np.full(int(mask.sum()), _BIG)
                 continue
-            rest = (run[name] - self.model.logs[k].signals[name])[mask] / self.scales[k, name]
-            residuals[k, name] = np.clip(rest, -_BIG, _BIG)
+            deviation = (run[name] - self.model.logs[k].signals[name])[mask] / self.scales[k, name]
+            residuals[k, name] = np.clip(deviation, -_BIG, _BIG)
         return residuals
 
     def residual(self, x: Floats) -> Floats:
         """Stacked residuals of points, shape (m, n)."""
         rows = []
-        for shown in self.runs(x):
-            parts = self.parts(shown)
+        for predicted in self.runs(x):
+            parts = self.parts(predicted)
             rows.append(np.concatenate([parts[key] for key in self.keys]))
         return np.array(rows)
 
@@ -98,8 +98,8 @@ class Objective:
         The position remembers an integral action for a second, the current nothing: counted alike,
         the position would decide everything, down to single ticks of a saturated integrator.
         """
-        shown = self.runs(x)[0]
-        parts = self.parts(shown)
+        predicted = self.runs(x)[0]
+        parts = self.parts(predicted)
         for key in self.keys:
             rms = float(np.sqrt(np.mean(np.minimum(parts[key] ** 2, (2.0 * SOFT) ** 2))))
             k, name = key

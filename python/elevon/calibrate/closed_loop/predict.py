@@ -39,10 +39,10 @@ class Agreement:
         }
 
 
-def errors_of(log: LoopLog, shown: Mapping[str, Floats]) -> list[Agreement]:
+def errors_of(log: LoopLog, logger: Mapping[str, Floats]) -> list[Agreement]:
     """Return the error of each channel over the samples that count."""
     rows = []
-    for name, values in shown.items():
+    for name, values in logger.items():
         mask = log.used & np.isfinite(log.signals[name])
         data = log.signals[name][mask]
         rms = float(np.sqrt(np.mean((values[mask] - data) ** 2)))
@@ -56,7 +56,7 @@ def errors_of(log: LoopLog, shown: Mapping[str, Floats]) -> list[Agreement]:
 
 
 def predict(
-    logs: Sequence[LoopLog], actuator: Actuator, shown: Mapping[str, float] | None = None
+    logs: Sequence[LoopLog], actuator: Actuator, logger: Mapping[str, float] | None = None
 ) -> tuple[list[Agreement], list[dict[str, Floats]]]:
     """Run a servo on the demands of logs and compare.
 
@@ -66,8 +66,8 @@ def predict(
         Held-out data.
     actuator : Actuator
         Calibrated; its own `control.structure` holds.
-    shown : mapping of str to float, optional
-        Delays and offsets of the logger, `LoopCalibration.shown`.
+    logger : mapping of str to float, optional
+        Delays and offsets of the logger, `LoopCalibration.logger`.
 
     Returns
     -------
@@ -85,7 +85,7 @@ def predict(
     structure = str(actuator.parameters["control.structure"].value)
     model = LoopModel(actuator, logs, structure)
     model.keep_gains(actuator)
-    values = {path: value for path, value in (shown or {}).items() if path != STICK}
+    values = {path: value for path, value in (logger or {}).items() if path != STICK}
     errors, traces = [], []
     for log, run in zip(logs, model.simulate([values])[0], strict=True):
         if run is None:

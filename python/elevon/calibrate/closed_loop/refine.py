@@ -29,7 +29,7 @@ __all__ = ["FALL", "load_share", "refined", "steps"]
 #: Share of the highest speed over which friction falls from rest to motion. ASSUMED: no log at
 #: 100 Hz settles it; half and twice as much are part of the intervals.
 FALL = 0.02
-_TICKS = (1e-3, 2e-3, 3e-3)  # s, tried beside the set's own step
+_TICKS = (1e-3, 2e-3, 3e-3)  # s, tried beside the actuator file's own step
 _PERIODS = 0.25  # of the log, a step at most
 _ROUNDS = 6
 
@@ -73,13 +73,13 @@ def _cost(tried: tuple[Actuator, Point]) -> float:
 
 
 def steps(actuator: Actuator, logs: Sequence[LoopLog]) -> list[float]:
-    """Return the steps of the model that are tried, the set's own first, s."""
-    own = actuator.parameters.value("low.step")
+    """Return the steps of the model that are tried, the actuator file's own first, s."""
+    coarse = actuator.parameters.value("low.step")
     longest = _PERIODS * min(log.period for log in logs)
     if str(actuator.parameters["drive.kind"].value) == "pwm":
         # How late it acts is the current loop's lag, which is fitted: no step stands for it.
-        return [max(own, min(_TICKS[0], longest))]
-    return [own, *(tick for tick in _TICKS if own < tick <= longest)]
+        return [max(coarse, min(_TICKS[0], longest))]
+    return [coarse, *(tick for tick in _TICKS if coarse < tick <= longest)]
 
 
 def load_share(actuator: Actuator, logs: Sequence[LoopLog], structure: str) -> Actuator:

@@ -1,4 +1,4 @@
-"""Calibration in closed loop: from logs and datasheet numbers to a set with intervals."""
+"""Calibration in closed loop: logs and datasheet numbers to an actuator file with intervals."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from elevon.calibrate.closed_loop.fit import (
 )
 from elevon.calibrate.closed_loop.free import CURRENT_GAIN, STICK, STRUCTURES, in_set
 from elevon.calibrate.closed_loop.held_out import held_out_errors
-from elevon.calibrate.closed_loop.intervals import SILENT, Known, known
+from elevon.calibrate.closed_loop.intervals import SILENT, Knowledge, known
 from elevon.calibrate.closed_loop.log import LoopLog
 from elevon.calibrate.closed_loop.predict import Agreement, errors_of
 from elevon.calibrate.closed_loop.refine import refined
@@ -60,8 +60,9 @@ class LoopCalibration(Outcome):
         Each structure tried.
     agreement : tuple of Agreement
         Errors of the fit.
-    shown : mapping of str to float
-        Delays and offsets of the log, and `friction.stick`: what is no parameter of a set.
+    logger : mapping of str to float
+        Delays and offsets of the log, and `friction.stick`: what is no parameter of an actuator
+        file.
     held_out : Validation
         Errors of each log under values fitted to the others.
     """
@@ -71,7 +72,7 @@ class LoopCalibration(Outcome):
     why: str
     searched: tuple[Searched, ...]
     agreement: tuple[Agreement, ...]
-    shown: Mapping[str, float]
+    logger: Mapping[str, float]
     held_out: Validation
 
     def to_dict(self) -> dict[str, Any]:
@@ -105,7 +106,7 @@ def calibrate_loop(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> LoopCalibration:
-    """Estimate what recorded demands and whatever was shown of the motion determine.
+    """Estimate what recorded demands and whatever was recorded of the motion determine.
 
     Parameters
     ----------
@@ -116,8 +117,9 @@ def calibrate_loop(
     structure : str, optional
         ``cascade`` or ``pid``; default: whichever predicts held-out data better.
     free : sequence of str, optional
-        Parameter paths to estimate, from the set's values and under the set's structure; all others
-        stay as given. Default: everything, searched over all bandwidths, and ranked.
+        Parameter paths to estimate, from the actuator file's values and under the actuator file's
+        structure; all others stay as given. Default: everything, searched over all bandwidths, and
+        ranked.
     transient : float, optional
         Seconds at the beginning of each log that do not count; default: none.
     seed : int
@@ -129,7 +131,7 @@ def calibrate_loop(
     ------
     InputError
         No log, an actuator that is no servo, a transient longer than a log, a path that the closed
-        loop does not free, or nothing determined (of what was asked for).
+        loop does not free, or nothing determined (of what was requested).
     Interrupted
         `progress` returned False.
     """
@@ -147,7 +149,7 @@ def calibrate_loop(
         servo, chosen = refined(actuator, logs, chosen, check=say.go)
     fitted = final_fit(servo, logs, chosen, check=say.go, advance=lambda f: say(0.6 + 0.35 * f))
     fitted, unsettled = exchanged(fitted, actuator)
-    held = held_out_errors(fitted)
+    validated = held_out_errors(fitted)
     estimates, missing = _settled(fitted, logs, actuator, unsettled, free)
     say(1.0)
     return LoopCalibration(
@@ -160,8 +162,8 @@ def calibrate_loop(
         why=why,
         searched=tuple(searched),
         agreement=tuple(agreement(fitted)),
-        shown={p: v for p, v in fitted.values.items() if not in_set(p) or p == STICK},
-        held_out=held,
+        logger={p: v for p, v in fitted.values.items() if not in_set(p) or p == STICK},
+        held_out=validated,
         wall_s=clock.perf_counter() - begin,
     )
 
@@ -173,7 +175,7 @@ def _settled(
     unsettled: Mapping[str, str],
     free: Sequence[str] | None,
 ) -> tuple[list[Estimate], dict[str, str]]:
-    """What the logs determine (of what was asked for), and what they do not."""
+    """What the logs determine (of what was requested), and what they do not."""
     estimates, missing = _estimates(*known(fitted), actuator)
     more = dict(unsettled)
     if free is None:
@@ -181,7 +183,7 @@ def _settled(
     estimates = [item for item in estimates if item.path not in more]
     missing |= more
     if free is not None:
-        estimates = _asked(estimates, missing, free)
+        estimates = _requested(estimates, missing, free)
     if not estimates:
         raise InputError("the logs determine no parameter: nothing in them moves enough")
     return estimates, missing
@@ -234,10 +236,10 @@ def _searched(
     ]
 
 
-def _asked(
+def _requested(
     estimates: Sequence[Estimate], missing: Mapping[str, str], free: Sequence[str]
 ) -> list[Estimate]:
-    """Return what was asked for, and what no set holds."""
+    """Return what was requested, and what no actuator file holds."""
     for path in free:
         if path in missing:
             raise InputError(f"--free {path}: {missing[path]}")
@@ -245,7 +247,7 @@ def _asked(
 
 
 class _Reporter:
-    """Progress that can be asked whether to go on."""
+    """Progress that decides whether to go on."""
 
     def __init__(self, progress: Progress | None) -> None:
         self.progress = progress
@@ -273,7 +275,7 @@ def _check(logs: Sequence[LoopLog], actuator: Actuator, structure: str | None) -
 
 
 def _estimates(
-    rows: Sequence[Known], degrees: float, actuator: Actuator
+    rows: Sequence[Knowledge], degrees: float, actuator: Actuator
 ) -> tuple[list[Estimate], dict[str, str]]:
     width = quantile(degrees)
     estimates, missing = [], {}
@@ -299,14 +301,14 @@ def _estimates(
     return estimates, missing
 
 
-def _static(stick: Known, dynamic: Known) -> Known:
+def _static(stick: Knowledge, dynamic: Knowledge) -> Knowledge:
     """Static friction from its share of the dynamic one; their deviations add."""
     from dataclasses import replace
 
     spread = stick.free.spread
     std = float(np.hypot(stick.std * spread, dynamic.std * dynamic.free.spread)) / spread
     free = replace(dynamic.free, path="friction.static", spread=spread, low=dynamic.free.low)
-    return Known(free, free.inner(stick.value * dynamic.value), std, "")
+    return Knowledge(free, free.inner(stick.value * dynamic.value), std, "")
 
 
 def _with(
@@ -339,10 +341,10 @@ def _loops(structure: str) -> tuple[str, ...]:
 def agreement(fitted: Fitted) -> list[Agreement]:
     """Return the RMS errors of a fit by log and channel."""
     model = fitted.objective.model
-    shown = fitted.objective.runs(fitted.x)[0]
+    logger = fitted.objective.runs(fitted.x)[0]
     return [
         row
-        for log, run in zip(model.logs, shown, strict=True)
+        for log, run in zip(model.logs, logger, strict=True)
         if run is not None
         for row in errors_of(log, run)
     ]

@@ -1,4 +1,4 @@
-"""Levenberg and Marquardt from several starts at once: the runs of a step are lanes of a batch."""
+"""Levenberg and Marquardt from several starts at once: the runs of a step are one batch."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def steps(objective: Objective) -> Floats:
 
 
 def jacobian(objective: Objective, points: list[Point], *, central: bool = False) -> list[Floats]:
-    """Return derivatives of the residuals, one array (n, p) a point, by differences over lanes."""
+    """Return derivatives of the residuals by differences over a batch, one array (n, p) a point."""
     h = steps(objective)
     size = len(h)
     # Away from a bound that is near.

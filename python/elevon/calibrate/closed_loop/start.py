@@ -55,16 +55,16 @@ def first_values(model: LoopModel) -> dict[str, float]:
 
 
 def _friction(model: LoopModel, constant: float) -> dict[str, float]:
-    """Dry friction and a constant load, from the current while it moves either way."""
+    """Dry friction and a constant load, from the current while it moves in either direction."""
     levels: dict[int, list[Floats]] = {1: [], -1: []}
     for log in model.logs:
         if "current" not in log.signals:
             continue
         speed = log.motion(model.per_output)[0]
         slow = 0.05 * float(np.nanmax(np.abs(speed)))
-        for way, level in levels.items():
-            level.append(log.signals["current"][log.used & (way * speed > slow)])
-    forth, back = (np.concatenate(levels[way]) for way in (1, -1))
+        for direction, level in levels.items():
+            level.append(log.signals["current"][log.used & (direction * speed > slow)])
+    forth, back = (np.concatenate(levels[direction]) for direction in (1, -1))
     if len(forth) < 10 or len(back) < 10:
         return {}
     a, b = constant * float(np.nanmedian(forth)), constant * float(np.nanmedian(back))

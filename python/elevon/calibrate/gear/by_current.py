@@ -143,8 +143,8 @@ def _demand(log: GearLog, actuator: Actuator, motor: Motor) -> tuple[Floats, Flo
     demand = emf
     for _ in range(_ROUNDS):
         duty = np.clip(demand / link, 0.0, 1.0)
-        beside = 0.0 if motor.third is None else motor.third.means(speed, duty, link)[0]
-        pair = current - beside
+        third_mean = 0.0 if motor.third is None else motor.third.means(speed, duty, link)[0]
+        pair = current - third_mean
         demand = emf + (resistance + commutation * speed) * pair + (1.0 - duty) * drop
     return np.asarray(demand + 2.0 * inductance * slope), np.asarray(link)
 
@@ -167,7 +167,7 @@ def _integral(ramps: Sequence[_Ramp], actuator: Actuator, zero: float) -> Level 
     first = actuator.parameters.value(PATHS[0]) * zero
     scale = np.concatenate([[first], np.full(2 * len(ramps), 0.1)])
 
-    def rest(x: Floats) -> Floats:
+    def residual(x: Floats) -> Floats:
         integral, *shifts = x * scale
         parts = []
         for ramp, begin, slows in zip(ramps, shifts[::2], shifts[1::2], strict=True):
@@ -180,16 +180,16 @@ def _integral(ramps: Sequence[_Ramp], actuator: Actuator, zero: float) -> Level 
     reach = np.concatenate([[20.0], *([10.0 * ramp.open, 10.0 * _LATE] for ramp in ramps)])
     start = np.concatenate([[1.0], np.zeros(2 * len(ramps))])
     lowest = np.concatenate([[1e-3], -reach[1:]])
-    fit = least_squares(rest, start, bounds=(lowest, reach), loss="soft_l1", f_scale=_VOLTS)
+    fit = least_squares(residual, start, bounds=(lowest, reach), loss="soft_l1", f_scale=_VOLTS)
     x = np.asarray(fit.x)
     # What lies at its bound is known, what no sample feels changes nothing.
     jacobian = np.asarray(fit.jac, dtype=np.float64)
     inside = (x > lowest + 1e-6) & (x < reach - 1e-6) & np.any(jacobian, axis=0)
     if not inside[0]:
         return None
-    slope, ends = jacobian[:, inside], rest(x)
+    slope, ends = jacobian[:, inside], residual(x)
     times = [(r.log.time[r.used], np.ones(int(r.used.sum())), r.log.period) for r in ramps]
     names = tuple(f"x{k}" for k in range(int(inside.sum())))
-    shown = with_deviations(names, x[inside], slope, ends, np.ones(len(ends)), times=times)
-    spread = shown.std(names[0])
-    return Level(x[0] * first, spread * first, shown.degrees) if np.isfinite(spread) else None
+    fitted = with_deviations(names, x[inside], slope, ends, np.ones(len(ends)), times=times)
+    spread = fitted.std(names[0])
+    return Level(x[0] * first, spread * first, fitted.degrees) if np.isfinite(spread) else None

@@ -38,21 +38,21 @@ def lock_travels(
             continue
         for move in log.moves:
             inside = (log.time >= move.begin) & (log.time <= move.end + 0.1)
-            shown = _beyond(log, move, actuator)
-            if shown is None:
+            beyond = _beyond(log, move, actuator)
+            if beyond is None:
                 continue
             changed = np.flatnonzero(inside[1:] & (switch[1:] != switch[:-1])) + 1
             if len(changed):
                 (engaged if move.extending else released).append(
-                    _at_switch(log, shown, int(changed[0]), actuator)
+                    _at_switch(log, beyond, int(changed[0]), actuator)
                 )
     levels, reasons = {}, {}
     for path, rows in (("lock.engage_travel", engaged), ("lock.release_travel", released)):
         if rows:
             levels[path] = _joined(rows)
         else:
-            way = "extension to" if "engage" in path else "retraction from"
-            reasons[path] = f"no {way} the lock with its switch shown"
+            direction = "extension to" if "engage" in path else "retraction from"
+            reasons[path] = f"no {direction} the lock with its switch recorded"
     return levels, reasons
 
 
@@ -86,32 +86,34 @@ def _beyond(log: GearLog, move: Move, actuator: Actuator) -> tuple[Floats, Float
     # The instant at which the ram rests at its stop, or leaves it.
     edge = float(log.time[inside][-1 if move.extending else 0])
     toward = edge - log.time if move.extending else log.time - edge
-    held = inside & (toward > near) & (toward < far)
+    seated_samples = inside & (toward > near) & (toward < far)
     switch = _lock_switch(log)
     seat = moving & (toward < -near)
     seat &= True if switch is None else ~switch
-    if held.sum() < 20:
+    if seated_samples.sum() < 20:
         return None
     seated = ram[seat] if seat.sum() > 5 else np.array([stroke])
-    rest, open_ = float(np.mean(seated)), float(np.std(seated)) / np.sqrt(len(seated))
+    base, open_ = float(np.mean(seated)), float(np.std(seated)) / np.sqrt(len(seated))
     # A speed from Hall edges comes late, so that its integral lags with the speed itself.
     speed = log["motor_speed"] / per_travel(actuator)
     design = np.stack([np.ones(len(speed)), speed], axis=1)
-    steady = float(np.ptp(speed[held])) < 0.2 * float(np.max(np.abs(speed[held])))
+    steady = float(np.ptp(speed[seated_samples])) < 0.2 * float(
+        np.max(np.abs(speed[seated_samples]))
+    )
     if log.has("motor_position") or steady:
         design = design[:, :1]
-    shift, *_ = np.linalg.lstsq(design[held], (ram - nut)[held], rcond=None)
-    noise = float(np.std((ram - nut)[held] - design[held] @ shift))
-    inverse = noise**2 * np.linalg.inv(design[held].T @ design[held])
+    shift, *_ = np.linalg.lstsq(design[seated_samples], (ram - nut)[seated_samples], rcond=None)
+    noise = float(np.std((ram - nut)[seated_samples] - design[seated_samples] @ shift))
+    inverse = noise**2 * np.linalg.inv(design[seated_samples].T @ design[seated_samples])
     std = np.sqrt(np.einsum("ij,jk,ik->i", design, inverse, design) + open_**2)
-    return np.asarray(nut + design @ shift - rest), np.asarray(std)
+    return np.asarray(nut + design @ shift - base), np.asarray(std)
 
 
 def _at_switch(
-    log: GearLog, shown: tuple[Floats, Floats], k: int, actuator: Actuator
+    log: GearLog, beyond: tuple[Floats, Floats], k: int, actuator: Actuator
 ) -> tuple[float, float]:
     """Place at which a switch acted, less its response, and what clocks and noise leave open."""
-    place, open_ = shown
+    place, open_ = beyond
     value = actuator.parameters.value
     # The unit counts whole ticks, the first of them when it first sees the change: half a tick less
     # than the delay on the mean, and half of what a sample is apart from a tick more.
@@ -141,8 +143,8 @@ def brake_torque(
     `friction` is the train's own at each test's speed.
     """
     rows = []
-    for test, own in zip(tests, friction, strict=True):
-        force = test.way * (test.level + mass * GRAVITY) - own
+    for test, dry in zip(tests, friction, strict=True):
+        force = test.direction * (test.level + mass * GRAVITY) - dry
         rows.append((force / per_travel(actuator), max(test.level_std, 1.0) / per_travel(actuator)))
     if not rows:
         return None
@@ -157,7 +159,7 @@ def brake_torque(
 def brake_delays(
     logs: Sequence[GearLog], actuator: Actuator
 ) -> tuple[dict[str, Level], dict[str, str]]:
-    """Return the brake's delays from the unit's state to the brake's own switch, if shown."""
+    """Return the brake's delays from the unit's state to the brake's own switch, if recorded."""
     tick = actuator.parameters.value("control.period")
     delays: dict[str, list[float]] = {"brake.release_delay": [], "brake.engage_delay": []}
     period = tick
@@ -171,12 +173,12 @@ def brake_delays(
                 later = [float(log.time[k]) - at for k in changes if log.time[k] >= at]
                 if later and later[0] < _DELAY:
                     delays[path].append(later[0])
-    # Both ends are shown at a sample, and the coil counts whole ticks from the first.
+    # Both ends are recorded at a sample, and the coil counts whole ticks from the first.
     std = float(np.hypot(period / np.sqrt(6.0), tick / np.sqrt(12.0)))
     levels = {
         path: Level(float(np.mean(rows)) + 0.5 * tick, std / np.sqrt(len(rows)))
         for path, rows in delays.items()
         if rows
     }
-    why = "no switch of the brake is shown, and the ram runs on by less than half a millimetre"
+    why = "no switch of the brake is recorded, and the ram runs on by less than half a millimetre"
     return levels, {path: why for path in delays if path not in levels}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elevon.calibrate.role_log import RoleLog, role_channels
+from elevon.calibrate.role_log import CalibrationRoleLog, role_channels
 
 if TYPE_CHECKING:
     from elevon.recording import Recording
@@ -36,13 +36,13 @@ class Move:
     after: int | None
 
     @property
-    def way(self) -> float:
+    def direction(self) -> float:
         """1 extending, -1 retracting."""
         return 1.0 if self.extending else -1.0
 
 
 @dataclass(frozen=True)
-class GearLog(RoleLog):
+class GearLog(CalibrationRoleLog):
     """A log on the clock of the output's position; the whole load is positive towards extension.
 
     Attributes
@@ -55,7 +55,7 @@ class GearLog(RoleLog):
 
     @cached_property
     def moves(self) -> tuple[Move, ...]:
-        """Motions under drive, by the unit's state; where it is not shown, by speed and current."""
+        """Motions under drive, by the unit's state if recorded, else by speed and current."""
         if "state" not in self.roles:
             return self._by_speed()
         state = np.rint(self["state"]).astype(int)
@@ -81,8 +81,8 @@ class GearLog(RoleLog):
             long = time[last - 1] - time[first] > _SHORTEST
             driven = np.median(np.abs(self["torque_current"][first:last])) > _DRIVEN
             if moving[first] and long and driven:
-                way = bool(np.mean(speed[first:last]) > 0.0)
-                moves.append(Move(way, float(time[first]), float(time[last - 1]), None))
+                direction = bool(np.mean(speed[first:last]) > 0.0)
+                moves.append(Move(direction, float(time[first]), float(time[last - 1]), None))
         return tuple(moves)
 
     @cached_property

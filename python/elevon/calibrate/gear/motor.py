@@ -1,9 +1,9 @@
 """Motor constants while the drive pushes: balance of voltage, or of power.
 
 ``V = 2 k w + (2 (R + R_on) + c p |w| L) i + (1 - d) V_f`` between the demanded voltage and the
-current of the pair, the commutations a resistance that grows with speed. Where no voltage is shown,
-``P = 2 k w i + 2 (R + R_on) i^2 + (1 - d) V_f |i|`` between the link's power and the same current.
-The pair's current is the line's less what the third phase draws (`third_phase`).
+current of the pair, the commutations a resistance that grows with speed. Where no voltage is
+recorded, ``P = 2 k w i + 2 (R + R_on) i^2 + (1 - d) V_f |i|`` between the link's power and the same
+current. The pair's current is the line's less what the third phase draws (`third_phase`).
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _FEWEST = 300  # samples
 _CARRIES = 0.7  # of the nut's speed: the ram goes with it
 _PATHS = ("motor.emf_constant", "motor.winding_resistance", "motor.winding_inductance")
 _ROUNDS = 3  # of the third phase's part, which needs what the balance determines
-_INDUCTANCE = (0.3, 3.0)  # of the set's, for that part
+_INDUCTANCE = (0.3, 3.0)  # of the actuator file's, for that part
 _OPEN = 0.1  # of the third phase's part: ASSUMED, its form agrees with three phases to a fiftieth
 _LEAST_STD = 5e-4  # relative
 
@@ -84,7 +84,7 @@ class Motor:
     third : ThirdPhase or None
         What the phase that is not used draws; None: nothing shows the share of the time off.
     given : bool
-        Whether the torque is the set's own: nothing showed it.
+        Whether the torque is the actuator file's own: nothing showed it.
     """
 
     levels: dict[str, Level]
@@ -96,13 +96,13 @@ class Motor:
 
     def torque_of(self, part: Driving, scale: float = 1.0, third: float = 1.0) -> Floats:
         """Electromagnetic torque of samples [N m], with a share of the third phase's part."""
-        beside, brakes = _beside(part, self.third)
-        way = np.sign(part["speed"])
-        pair = part["current"] - third * way * beside
-        return np.asarray(scale * (self.torque * pair - third * way * brakes))
+        braking, brakes = _third_phase(part, self.third)
+        direction = np.sign(part["speed"])
+        pair = part["current"] - third * direction * braking
+        return np.asarray(scale * (self.torque * pair - third * direction * brakes))
 
 
-def _beside(part: Driving, third: ThirdPhase | None) -> tuple[Floats, Floats]:
+def _third_phase(part: Driving, third: ThirdPhase | None) -> tuple[Floats, Floats]:
     """Third phase's part of the line current and of the torque, as sizes."""
     if third is None or "link" not in part.channels:
         nothing = np.zeros(len(part["speed"]))
@@ -155,10 +155,10 @@ def _channels(log: GearLog, actuator: Actuator) -> dict[str, Floats]:
 def _used(
     log: GearLog, move: Move, channels: dict[str, Floats], actuator: Actuator
 ) -> npt.NDArray[np.bool_]:
-    """The motor pushes the way it turns; where the demand is shown, in continuous current."""
+    """The motor pushes as it turns; where the demand is recorded, in continuous current."""
     used = (log.time > move.begin + _START) & (log.time < move.end - _END)
-    used &= move.way * channels["speed"] > _SLOWEST
-    used &= move.way * channels["current"] > _LEAST
+    used &= move.direction * channels["speed"] > _SLOWEST
+    used &= move.direction * channels["current"] > _LEAST
     # Where the lock is worked the nut moves alone.
     ram = _smooth(log["output_position"], log.period, slope=True)
     used &= np.abs(ram) * per_travel(actuator) > _CARRIES * np.abs(channels["speed"])
@@ -182,7 +182,7 @@ def motor_constants(parts: Sequence[Driving], actuator: Actuator) -> Motor:
     else:
         result = _by_power(by_power, actuator, given)
     if result is None:
-        why = "no motion in which the motor drives with its current and the voltage or supply shown"
+        why = "no motion in which the motor drives with its current and voltage or supply recorded"
         return replace(believed, reasons=dict.fromkeys(_PATHS, why))
     return result
 
@@ -258,8 +258,8 @@ def _duty(part: Driving) -> Floats:
 
 
 def _pair(part: Driving, third: ThirdPhase, share: float) -> Floats:
-    beside, _ = _beside(part, third)
-    return np.asarray(np.abs(part["current"]) - share * beside)
+    braking, _ = _third_phase(part, third)
+    return np.asarray(np.abs(part["current"]) - share * braking)
 
 
 def _voltage_balance(
@@ -269,7 +269,7 @@ def _voltage_balance(
     for part in parts:
         speed, current = np.abs(part["speed"]), _pair(part, third, share)
         rows.append(np.stack([speed, current, speed * current], axis=1))
-        data.append(part.move.way * part["voltage"] - (1.0 - _duty(part)) * third.drop)
+        data.append(part.move.direction * part["voltage"] - (1.0 - _duty(part)) * third.drop)
     return _fitted(parts, rows, data, ("constant", "resistance", "commutation"))
 
 
@@ -288,8 +288,8 @@ def _fitted(
     if not parts:
         return None
     design = np.vstack(rows)
-    value, rest, weight, _ = robust_regression(design, np.concatenate(data))
+    value, residual, weight, _ = robust_regression(design, np.concatenate(data))
     times = [(p.log.time[p.used], np.ones(int(p.used.sum())), p.log.period) for p in parts]
-    fit = with_deviations(names, value, design, rest, weight, times=times)
+    fit = with_deviations(names, value, design, residual, weight, times=times)
     sound = fit["constant"] > 0.0 and fit["resistance"] > 0.0
     return fit if sound and np.isfinite(fit.covariance).all() else None

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from elevon.calibrate.gear.by_current import gains_by_current
 from elevon.calibrate.gear.log import GearLog
 from elevon.calibrate.gear.motor import Motor, driving, motor_constants
-from elevon.calibrate.gear.train import Balance, Known, torque_balance
+from elevon.calibrate.gear.train import Balance, Constants, torque_balance
 from elevon.calibrate.level import Level, as_values
 
 if TYPE_CHECKING:
@@ -59,12 +59,12 @@ class Reader:
         """Return what the logs show."""
         parts = driving(logs, self.actuator)
         motor = motor_constants(parts, self.actuator)
-        known = Known(self.settled, motor, self.friction, self.inertia)
+        known = Constants(self.settled, motor, self.friction, self.inertia)
         balance = torque_balance(parts, known)
         levels, reasons = {**motor.levels, **balance.levels}, {**motor.reasons, **balance.reasons}
         if self.gains:
             values: dict[str, str | float] = {**as_values(motor.levels)}
             ready = self.settled.with_values(values, source="calibration")
-            shown, missing = gains_by_current(logs, ready, motor)
-            levels, reasons = levels | shown, reasons | missing
+            found, missing = gains_by_current(logs, ready, motor)
+            levels, reasons = levels | found, reasons | missing
         return Reading(levels, reasons, motor, balance)

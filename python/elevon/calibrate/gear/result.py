@@ -52,7 +52,7 @@ _NEVER = {
 }
 _ROUNDS = 3  # of runs that correct the balances, at most
 _NOISES = 4  # draws of a run's noise, over which its readings are averaged
-_STILL = 0.25  # deviations: a change from which no further round is made
+_SETTLED = 0.25  # deviations: a change from which no further round is made
 _GIVEN = {
     "lock.engage_travel": ("proximity.delay",),
     "lock.release_travel": ("proximity.delay",),
@@ -89,7 +89,7 @@ def calibrate_gear(
     Raises
     ------
     InputError
-        No log, nothing determined, or a path asked for that the logs do not determine.
+        No log, nothing determined, or a path requested that the logs do not determine.
     Interrupted
         `progress` returned False.
     """
@@ -152,7 +152,7 @@ class _Work(Parts):
             self.logs, self.actuator, per_travel=per_travel(self.actuator), pitch=pitch
         )
         mass = hanging_mass([t for t in self.tests if t.kind != "brake"])
-        why = "too few rig tests both ways at different levels of friction"
+        why = "too few rig tests in both directions at different levels of friction"
         self.add({} if mass is None else {"screw.moving_mass": mass}, {"screw.moving_mass": why})
         weight = mass or Level(value("screw.moving_mass"), 0.1 * value("screw.moving_mass"))
         self.add(*friction_knots(self.tests, self.actuator, weight))
@@ -160,13 +160,13 @@ class _Work(Parts):
         self._detent()
 
     def _detent(self) -> None:
-        shown = [t for t in self.tests if t.detent is not None and t.detent_std is not None]
+        detents = [t for t in self.tests if t.detent is not None and t.detent_std is not None]
         why = "no slow rig test with the motor connected shows it below the recorder's filter"
-        if not shown:
+        if not detents:
             self.add({}, {"motor.detent_torque": why})
             return
-        sizes = np.array([t.detent or 0.0 for t in shown]) / per_travel(self.actuator)
-        deviations = np.array([t.detent_std or 0.0 for t in shown]) / per_travel(self.actuator)
+        sizes = np.array([t.detent or 0.0 for t in detents]) / per_travel(self.actuator)
+        deviations = np.array([t.detent_std or 0.0 for t in detents]) / per_travel(self.actuator)
         spread = float(np.std(sizes)) / np.sqrt(max(len(sizes) - 1, 1)) if len(sizes) > 1 else 0.0
         std = float(np.hypot(np.mean(deviations) / np.sqrt(len(sizes)), spread))
         self.add(
@@ -177,7 +177,7 @@ class _Work(Parts):
         """Evaluate the unit's gains, the motor and the train from motions; runs correct them."""
         self.add(*unit.gains(self.logs, self.actuator))
         points = unit.set_points(self.logs)
-        why = "no motion with the set point of the speed shown"
+        why = "no motion with the set point of the speed recorded"
         paths = ("control.acceleration_limit", "control.speed_high", "control.speed_low")
         self.add(points, {path: why for path in paths if path not in points})
         known = {p: v for p, v in as_values(self.levels).items() if p.startswith("friction.ffm_")}
@@ -205,12 +205,12 @@ class _Work(Parts):
             if not again:
                 return
             noisy = [with_noise(again, self.logs, seed) for seed in range(_NOISES)]
-            shown = [reader(logs).levels for logs in noisy]
-            self.add(corrected(first.levels, shown, ran), {})
+            detents = [reader(logs).levels for logs in noisy]
+            self.add(corrected(first.levels, detents, ran), {})
             moved = [
                 abs(self.levels[p].value - before[p]) / self.levels[p].std for p in first.levels
             ]
-            if max(moved, default=0.0) < _STILL:
+            if max(moved, default=0.0) < _SETTLED:
                 return
 
     def ends(self) -> None:
@@ -218,16 +218,16 @@ class _Work(Parts):
         self.add(*events.lock_travels(self.logs, self.actuator))
         braked = [t for t in self.tests if t.kind == "brake"]
         mass = self.value("screw.moving_mass")
-        own = [self._friction(t) for t in braked]
-        held = events.brake_torque(braked, own, mass, self.actuator)
+        friction = [self._friction(t) for t in braked]
+        brake = events.brake_torque(braked, friction, mass, self.actuator)
         why = "no rig test against the set brake, and a stop is too short for its slope"
-        self.add({} if held is None else {"brake.torque": held}, {"brake.torque": why})
+        self.add({} if brake is None else {"brake.torque": brake}, {"brake.torque": why})
         self.add(*events.brake_delays(self.logs, self.actuator))
 
     def _friction(self, test: RigTest) -> float:
         """Return the whole train's friction at a test's speed, without the brake [N]."""
-        way = "extension" if test.way > 0.0 else "retraction"
-        table = [self.value(f"friction.ffm_{way}_{k}") for k in range(1, 9)]
+        direction = "extension" if test.direction > 0.0 else "retraction"
+        table = [self.value(f"friction.ffm_{direction}_{k}") for k in range(1, 9)]
         return float((hats(np.array([test.speed]), knots(self.actuator)) @ np.array(table))[0])
 
 

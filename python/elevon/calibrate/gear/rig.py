@@ -1,8 +1,8 @@
 """Friction from a rig that moves the ram: means over speed, harmonics of the pitch, detent.
 
-At a constant speed the load cell shows ``way F(v) - m g``, and what repeats over the pitch. Free
-fall (the stages apart) shows the screw side, modified free fall (the motor turns, its brake open)
-the whole train, and a set brake what it holds.
+At a constant speed the load cell shows ``d F(v) - m g`` (d: direction), and what repeats over the
+pitch. Free fall (the stages apart) shows the screw side, modified free fall (the motor turns, its
+brake open) the whole train, and a set brake what it holds.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class RigTest:
     detent_std: float | None
 
     @property
-    def way(self) -> float:
+    def direction(self) -> float:
         """1 extending, -1 retracting."""
         return float(np.sign(self.speed))
 
@@ -95,19 +95,19 @@ def _test(log: GearLog, actuator: Actuator, per_travel: float, pitch: float) -> 
     time, force = log.time[used], log["load_cell"][used]
     # The rig's speed is constant: a straight line is quieter than the position itself.
     slope, offset = np.polyfit(time, log["output_position"][used], 1)
-    way = float(np.sign(slope))
+    direction = float(np.sign(slope))
     turn = 2.0 * np.pi * (slope * time + offset) / pitch
     columns = [np.ones_like(time)]
-    columns += [way * np.cos(n * turn) for n in range(1, HARMONICS + 1)]
+    columns += [direction * np.cos(n * turn) for n in range(1, HARMONICS + 1)]
     frequency = actuator.parameters.value("motor.detent_periods") * abs(slope) * per_travel
-    shown = kind != "ff" and 0.0 < frequency / (2.0 * np.pi) < _BAND / log.period
-    if shown:
+    visible = kind != "ff" and 0.0 < frequency / (2.0 * np.pi) < _BAND / log.period
+    if visible:
         tone = _tone(time, force, np.stack(columns, axis=1), frequency)
         columns += [np.cos(tone * time), np.sin(tone * time)]
     design = np.stack(columns, axis=1)
-    value, rest, _, _ = robust_regression(design, force)
-    std = _deviations(design, rest)
-    size = (float(np.hypot(*value[-2:])), float(np.mean(std[-2:]))) if shown else (None, None)
+    value, residual, _, _ = robust_regression(design, force)
+    std = _deviations(design, residual)
+    size = (float(np.hypot(*value[-2:])), float(np.mean(std[-2:]))) if visible else (None, None)
     part = slice(1, HARMONICS + 1)
     return RigTest(
         log.name, kind, float(slope), float(value[0]), float(std[0]), value[part], std[part], *size
@@ -116,10 +116,10 @@ def _test(log: GearLog, actuator: Actuator, per_travel: float, pitch: float) -> 
 
 def _tone(time: Floats, force: Floats, design: Floats, frequency: float) -> float:
     """Frequency of the detent: what the line through the position leaves open decides the phase."""
-    rest = force - design @ np.linalg.lstsq(design, force, rcond=None)[0]
+    residual = force - design @ np.linalg.lstsq(design, force, rcond=None)[0]
     width = 2.0 * np.pi / float(np.ptp(time))
     tries = frequency + np.linspace(-width, width, _TRIES)
-    power = [abs(np.exp(-1j * w * time) @ rest) for w in tries]
+    power = [abs(np.exp(-1j * w * time) @ residual) for w in tries]
     best = int(np.argmax(power))
     if not 0 < best < _TRIES - 1:
         return float(tries[best])
@@ -127,10 +127,10 @@ def _tone(time: Floats, force: Floats, design: Floats, frequency: float) -> floa
     return float(tries[best] + 0.5 * (a - c) / (a - 2.0 * b + c) * (tries[1] - tries[0]))
 
 
-def _deviations(design: Floats, rest: Floats) -> Floats:
+def _deviations(design: Floats, residual: Floats) -> Floats:
     """Deviations of coefficients from the spread of the scores over blocks of time."""
     bread = np.linalg.inv(design.T @ design)
-    parts = np.array_split(np.arange(len(rest)), _BLOCKS)
-    sums = np.array([design[part].T @ rest[part] for part in parts])
+    parts = np.array_split(np.arange(len(residual)), _BLOCKS)
+    sums = np.array([design[part].T @ residual[part] for part in parts])
     meat = sums.T @ sums * (_BLOCKS / max(_BLOCKS - 1, 1))
     return np.asarray(np.sqrt(np.diag(bread @ meat @ bread)), dtype=np.float64)

@@ -31,7 +31,7 @@ _RATE = 25e3  # Hz at least of a run's channels, before the recorder's filter
 _SHARE = 0.1  # of a correction, as its deviation: ASSUMED, the model is not the machine
 _MOST = 0.3  # relative: a larger correction says that the run is another motion
 _INPUTS = ("command", "load", "load_cell")
-_HELD = ("_ref",)
+_SAMPLED = ("_ref",)
 
 
 def run_again(
@@ -65,12 +65,12 @@ def run_again(
     for number, log in enumerate(moving):
         share = part(progress, number / len(moving), (number + 1) / len(moving))
         try:
-            shown = _run(log, actuator, fidelity, share)
+            inputs = _run(log, actuator, fidelity, share)
         except ElevonError:
             return []
-        if [move.extending for move in shown.moves] != [move.extending for move in log.moves]:
+        if [move.extending for move in inputs.moves] != [move.extending for move in log.moves]:
             return []
-        again.append(shown)
+        again.append(inputs)
     return again
 
 
@@ -80,20 +80,20 @@ def _run(log: GearLog, actuator: Actuator, fidelity: str, progress: Progress | N
 
     assert log.recording is not None
     model, scenario = replay_scenario(log.recording, actuator, log.name)
-    played = {item["role"]: name for name, item in signal_records(model.wiring, fidelity).items()}
-    roles = [role for role in log.roles if role in played and role not in _INPUTS]
+    by_role = {item["role"]: name for name, item in signal_records(model.wiring, fidelity).items()}
+    roles = [role for role in log.roles if role in by_role and role not in _INPUTS]
     step = solver_step(model, fidelity)
     every = max(1, int(1.0 / (_RATE * step))) * step
-    names = ",".join(dict.fromkeys(played[role] for role in roles))
+    names = ",".join(dict.fromkeys(by_role[role] for role in roles))
     run = simulate(
         model, scenario, fidelity=fidelity, record=f"{names}@{1.0 / every:.12g} Hz",
         progress=progress,
     )  # fmt: skip
-    shown = {role: log[role] for role in log.roles if role in _INPUTS}
+    inputs = {role: log[role] for role in log.roles if role in _INPUTS}
     for role in roles:
-        held = role.endswith(_HELD) or run[played[role]].unit == "1"
-        shown[role] = (_last if held else _recorded)(log, run[played[role]])
-    return replace(log, roles=shown)
+        stepped = role.endswith(_SAMPLED) or run[by_role[role]].unit == "1"
+        inputs[role] = (_last if stepped else _recorded)(log, run[by_role[role]])
+    return replace(log, roles=inputs)
 
 
 def _last(log: GearLog, channel: Channel) -> Floats:
@@ -115,9 +115,9 @@ def with_noise(again: Sequence[GearLog], logs: Sequence[GearLog], seed: int) -> 
     by_name = {log.name: log for log in logs}
     result = []
     for run in again:
-        rest = {role: by_name[run.name][role] - values for role, values in run.roles.items()}
+        noise = {role: by_name[run.name][role] - values for role, values in run.roles.items()}
         # Third differences of both, outliers (edges) aside.
-        sizes = {role: float(np.median(np.abs(np.diff(d, 3)))) for role, d in rest.items()}
+        sizes = {role: float(np.median(np.abs(np.diff(d, 3)))) for role, d in noise.items()}
         scale = 1.4826 / np.sqrt(20.0)
         result.append(
             replace(

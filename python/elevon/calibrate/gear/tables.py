@@ -54,7 +54,7 @@ def hats(speed: Floats, at: Floats) -> Floats:
 
 
 def hanging_mass(tests: Sequence[RigTest]) -> Level | None:
-    """Mass that hangs from the cell, from tests both ways at several levels of friction.
+    """Mass that hangs from the cell, from tests in both directions at several levels of friction.
 
     Half the sum of both directions is the weight, and half of what friction differs: that part
     grows with the friction, the weight does not.
@@ -74,9 +74,9 @@ def hanging_mass(tests: Sequence[RigTest]) -> Level | None:
         return None
     design = np.stack([np.ones_like(size), size], axis=1)
     value, *_ = np.linalg.lstsq(design, middle, rcond=None)
-    rest = middle - design @ value
+    residual = middle - design @ value
     degrees = len(pairs) - 2
-    spread = float(rest @ rest) / degrees
+    spread = float(residual @ residual) / degrees
     std = float(np.sqrt(spread * np.linalg.inv(design.T @ design)[0, 0]))
     return Level(-float(value[0]) / GRAVITY, max(std / GRAVITY, 1e-3), degrees)
 
@@ -88,9 +88,9 @@ def friction_knots(
     determined: Knot = {}
     reasons: dict[str, str] = {}
     for kind in ("ff", "ffm"):
-        for name, way in (("extension", 1.0), ("retraction", -1.0)):
-            mine = [t for t in tests if t.kind == kind and t.way == way]
-            forces = np.array([t.way * (t.level + mass.value * GRAVITY) for t in mine])
+        for name, direction in (("extension", 1.0), ("retraction", -1.0)):
+            mine = [t for t in tests if t.kind == kind and t.direction == direction]
+            forces = np.array([t.direction * (t.level + mass.value * GRAVITY) for t in mine])
             deviation = np.array([np.hypot(t.level_std, _SHAPE * abs(t.level)) for t in mine])
             paths = [f"friction.{kind}_{name}_{k}" for k in range(1, KNOTS + 1)]
             levels, missing = _table(paths, mine, forces, deviation, actuator)
@@ -126,7 +126,7 @@ def _table(
     deviation: Floats,
     actuator: Actuator,
 ) -> tuple[Knot, dict[str, str]]:
-    """Weighted least squares over the knots, each held weakly by the value of the set."""
+    """Weighted least squares over the knots, each held weakly by the value of the actuator file."""
     if not tests:
         return {}, dict.fromkeys(paths, "no rig test of this kind and direction")
     at = knots(actuator)
@@ -137,9 +137,9 @@ def _table(
     inverse = np.linalg.inv(normal + np.diag(belief**-2.0))
     value = prior + inverse @ (design.T @ (values / deviation - design @ prior))
     seen = np.diag(inverse @ normal)
-    rest = values / deviation - design @ value
+    residual = values / deviation - design @ value
     degrees = max(len(tests) - int(np.sum(seen > _SEEN)), 1)
-    inflation = max(1.0, float(rest @ rest) / degrees)
+    inflation = max(1.0, float(residual @ residual) / degrees)
     levels, missing = {}, {}
     for k, path in enumerate(paths):
         if seen[k] > _SEEN:

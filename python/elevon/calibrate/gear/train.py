@@ -1,7 +1,7 @@
 """Torque balance while the motor drives: inertia, friction at working speeds, efficiency.
 
-``(k_T i - J dw/dt)/r + F = way F(v) + way (1/eta(F) - 1)|F|`` with the axial load ``F`` towards
-extension; ``eta`` is the gear's times the screw's, which falls with the load.
+``(k_T i - J dw/dt)/r + F = d F(v) + d (1/eta(F) - 1)|F|`` with the direction ``d`` and the axial
+load ``F`` towards extension; ``eta`` is the gear's times the screw's, which falls with the load.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from elevon.calibrate.level import Level
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["Balance", "Known", "torque_balance"]
+__all__ = ["Balance", "Constants", "torque_balance"]
 
 _INERTIA, _UNLOADED, _LOADED = (
     "motor.inertia", "screw.efficiency_unloaded", "screw.efficiency_loaded",
 )  # fmt: skip
-#: What is believed before the logs, as a share of the set's value.
+#: What is believed before the logs, as a share of the actuator file's value.
 _BELIEF = {_INERTIA: 0.5, _UNLOADED: 0.15, _LOADED: 0.15}
 _TABLE = 0.5  # the same, of a knot of the friction
-_SURE = 0.15  # of the belief: a deviation below which the logs have determined a number
+_DETERMINED = 0.15  # of the belief: a deviation below which the logs have determined a number
 _NUDGE = 1e-3  # of the torque, for what its deviation moves
 _OPEN = 0.1  # of the third phase's part, as in the motor's balance
 _REACH = 0.3  # weight of a knot in the samples that come nearest to it
@@ -52,7 +52,7 @@ class _Samples:
     data: Floats
     acceleration: Floats
     axial: Floats
-    way: Floats
+    direction: Floats
     tables: Floats
     gear: float
     force: float
@@ -62,12 +62,12 @@ class _Samples:
         inertia, unloaded, loaded = value[:3]
         size = np.abs(self.axial)
         eta = self.gear * (loaded + (unloaded - loaded) * np.exp(-size / self.force))
-        lost = self.way * (1.0 / eta - 1.0) * size
+        lost = self.direction * (1.0 / eta - 1.0) * size
         return np.asarray(inertia * self.acceleration + lost + self.tables @ value[3:])
 
 
 @dataclass(frozen=True)
-class Known:
+class Constants:
     """What the balance takes as it is.
 
     Attributes
@@ -88,18 +88,18 @@ class Known:
     inertia: tuple[Floats, Floats]
 
 
-def torque_balance(parts: Sequence[Driving], known: Known) -> Balance:
+def torque_balance(parts: Sequence[Driving], known: Constants) -> Balance:
     """Fit the train to the samples in which the motor drives under a known load."""
-    ways = ("extension", "retraction")
-    paths = [f"friction.ffm_{way}_{k}" for way in ways for k in range(1, KNOTS + 1)]
+    moves = ("extension", "retraction")
+    paths = [f"friction.ffm_{direction}_{k}" for direction in moves for k in range(1, KNOTS + 1)]
     open_paths = [path for path in paths if path not in known.friction]
     loaded = [part for part in parts if _knows_load(part, known.actuator)]
     if not loaded:
         why = "no motion in which the motor drives under a known load"
         return Balance({}, dict.fromkeys((_INERTIA, _UNLOADED, _LOADED, *open_paths), why), np.nan)
     # A direction that no sample shows is not free.
-    shown = {_way(part) for part in loaded}
-    free = [path for path in open_paths if path.split("_")[1] in shown]
+    directions = {_direction(part) for part in loaded}
+    free = [path for path in open_paths if path.split("_")[1] in directions]
     sought = _sought(known.actuator, free)
     fit = _fitted(loaded, known, sought)
     spread = np.hypot(fit.std, _choices(loaded, known, sought, fit.x))
@@ -121,7 +121,7 @@ def _sought(actuator: Actuator, free: Sequence[str]) -> Sought:
 
 def _fitted(
     parts: Sequence[Driving],
-    known: Known,
+    known: Constants,
     sought: Sought,
     *,
     scale: float = 1.0,
@@ -132,7 +132,7 @@ def _fitted(
     return fit_balance(sought, samples.data, samples.model, times, scale=_FORCE)
 
 
-def _choices(parts: Sequence[Driving], known: Known, sought: Sought, x: Floats) -> Floats:
+def _choices(parts: Sequence[Driving], known: Constants, sought: Sought, x: Floats) -> Floats:
     """Deviation of a point from the scale of the torque, and from the third phase's part."""
     motor = known.motor
     nudged = _fitted(parts, known, sought, scale=1.0 + _NUDGE).x - x
@@ -141,7 +141,7 @@ def _choices(parts: Sequence[Driving], known: Known, sought: Sought, x: Floats) 
     return np.asarray(np.hypot(scale, third))
 
 
-def _way(part: Driving) -> str:
+def _direction(part: Driving) -> str:
     return "extension" if part.move.extending else "retraction"
 
 
@@ -167,7 +167,7 @@ def _plain(setting: object, default: float) -> float:
 
 def _samples(
     parts: Sequence[Driving],
-    known: Known,
+    known: Constants,
     free: Sequence[str],
     scale: float = 1.0,
     third: float = 1.0,
@@ -175,17 +175,17 @@ def _samples(
     value = known.actuator.parameters.value
     travel = 1.0 / per_travel(known.actuator)
     data, tables = [], []
-    stacked: dict[str, list[Floats]] = {"acceleration": [], "axial": [], "way": []}
+    stacked: dict[str, list[Floats]] = {"acceleration": [], "axial": [], "direction": []}
     for part in parts:
         axial = axial_load(part, known.actuator)
-        held, row = _friction(part, known, free)
-        beside = np.interp(part["position"], *known.inertia)
-        torque = known.motor.torque_of(part, scale, third) - beside * part["acceleration"]
-        data.append(torque / travel + axial - held)
+        known_part, row = _friction(part, known, free)
+        reflected = np.interp(part["position"], *known.inertia)
+        torque = known.motor.torque_of(part, scale, third) - reflected * part["acceleration"]
+        data.append(torque / travel + axial - known_part)
         tables.append(row)
         stacked["acceleration"].append(part["acceleration"] / travel)
         stacked["axial"].append(axial)
-        stacked["way"].append(np.full(len(axial), part.move.way))
+        stacked["direction"].append(np.full(len(axial), part.move.direction))
     joined = {name: np.concatenate(rows) for name, rows in stacked.items()}
     gear = value("gear.efficiency_first") * value("gear.efficiency_second")
     force = value("screw.efficiency_force")
@@ -193,18 +193,18 @@ def _samples(
     return _Samples(np.concatenate(data), tables=rows, gear=gear, force=force, **joined)
 
 
-def _friction(part: Driving, known: Known, free: Sequence[str]) -> tuple[Floats, Floats]:
+def _friction(part: Driving, known: Constants, free: Sequence[str]) -> tuple[Floats, Floats]:
     """Friction of the knots that are known [N], and the weights of those that are free."""
     speed = part["speed"] / per_travel(known.actuator)
-    weights = part.move.way * hats(speed, knots(known.actuator))
-    held, row = np.zeros(len(speed)), np.zeros((len(speed), len(free)))
+    weights = part.move.direction * hats(speed, knots(known.actuator))
+    known_part, row = np.zeros(len(speed)), np.zeros((len(speed), len(free)))
     for k in range(KNOTS):
-        path = f"friction.ffm_{_way(part)}_{k + 1}"
+        path = f"friction.ffm_{_direction(part)}_{k + 1}"
         if path in known.friction:
-            held += weights[:, k] * known.friction[path]
+            known_part += weights[:, k] * known.friction[path]
         else:
             row[:, list(free).index(path)] = weights[:, k]
-    return held, row
+    return known_part, row
 
 
 def _judged(
@@ -213,7 +213,7 @@ def _judged(
     levels, reasons = {}, {}
     why = "the drive's logs hardly pass the speeds or loads that would show it"
     for k, name in enumerate(sought.names):
-        if spread[k] > _SURE * sought.belief[k] or reach[k] < _REACH:
+        if spread[k] > _DETERMINED * sought.belief[k] or reach[k] < _REACH:
             reasons[name] = why
             continue
         first = float(sought.first[k])

@@ -22,7 +22,7 @@ _START = 0.15  # s after the drive begins, and ...
 _END = 0.05  # ... before it ends: filters of the recorder reach over both
 _LIMIT = 0.99  # of the supply, from which the demand is limited
 _SLOPE = 0.5  # of the usual change, about it: the set point is on its ramp
-_STILL = 1e-3  # of the ramp: the set point stands
+_STANDING = 1e-3  # of the ramp: the set point stands
 
 
 def gains(logs: Sequence[GearLog], actuator: Actuator) -> tuple[dict[str, Level], dict[str, str]]:
@@ -36,11 +36,11 @@ def gains(logs: Sequence[GearLog], actuator: Actuator) -> tuple[dict[str, Level]
     tick = actuator.parameters.value("control.period")
     for name, extending in (("extension", True), ("retraction", False)):
         paths = [f"control.gain_{name}", f"control.zero_{name}"]
-        shown = [log for log in logs if any(m.extending == extending for m in log.moves)]
-        usable = [log for log in shown if log.has(*NEEDS)]
+        complete = [log for log in logs if any(m.extending == extending for m in log.moves)]
+        usable = [log for log in complete if log.has(*NEEDS)]
         if not usable:
             why = f"no log of a motion in {name}"
-            if shown:
+            if complete:
                 why = "the logs show no set point of the speed, or no demanded voltage"
             reasons |= dict.fromkeys(paths, why)
             continue
@@ -53,7 +53,7 @@ def gains(logs: Sequence[GearLog], actuator: Actuator) -> tuple[dict[str, Level]
 
 
 def _parts(logs: Sequence[GearLog], *, extending: bool) -> list[Stretch]:
-    """Stretches of all motions one way in which the demand is not limited."""
+    """Stretches of all motions in one direction in which the demand is not limited."""
     parts = []
     for log in logs:
         for move in log.moves:
@@ -62,8 +62,8 @@ def _parts(logs: Sequence[GearLog], *, extending: bool) -> list[Stretch]:
             inside = (log.time > move.begin + _START) & (log.time < move.end - _END)
             if log.has("supply_voltage"):
                 inside &= np.abs(log["torque_voltage"]) < _LIMIT * log["supply_voltage"]
-            shown = (log["speed_ref"], log["motor_speed"], log["torque_voltage"])
-            parts += [Stretch(log.time, log.period, *shown, used) for used in stretches(inside)]
+            complete = (log["speed_ref"], log["motor_speed"], log["torque_voltage"])
+            parts += [Stretch(log.time, log.period, *complete, used) for used in stretches(inside)]
     return parts
 
 
@@ -86,11 +86,11 @@ def set_points(logs: Sequence[GearLog]) -> dict[str, Level]:
             # A jump (the unit starts afresh) is no ramp, a sample half on the ramp neither.
             typical = float(np.median(moving))
             slopes.append(float(np.median(moving[np.abs(moving - typical) < _SLOPE * typical])))
-            still = target[1:][np.abs(change) < _STILL * typical]
-            still = still[still > 0.0]
-            if len(still):
-                levels["high"].append(float(np.max(still)))
-                levels["low"].append(float(np.min(still)))
+            steady = target[1:][np.abs(change) < _STANDING * typical]
+            steady = steady[steady > 0.0]
+            if len(steady):
+                levels["high"].append(float(np.max(steady)))
+                levels["low"].append(float(np.min(steady)))
     if not slopes:
         return {}
     result = {"control.acceleration_limit": _level(slopes)}

@@ -29,7 +29,7 @@ _WINDOW = 20.0  # s of one reading of the resistance
 _SLOW = 0.2  # of the largest speed: a window reads the resistance in motion
 _LONGEST_STEP = 2.0  # s of the network's steps
 _RISE = 2.0  # K at least that a temperature must have changed
-_SURE = 0.15  # of the belief: a deviation below which a number is determined
+_DETERMINED = 0.15  # of the belief: a deviation below which a number is determined
 _HALF = 0.4  # of half the rate: half the band of a recorder that filters at 0.4 of the rate
 _RADIATION = 5.670374419e-8  # W/(m2 K4)
 _GUESS = 0.02  # of an efficiency that is given
@@ -72,7 +72,9 @@ def motor_heat(
     log = max(usable, key=lambda item: item.duration)
     windows = _windows(log)
     fit, sought = _motor_fit(log, windows, actuator, resistance.value)
-    levels, reasons = _judged(sought, fit, MOTOR, "the log is too short or too cool to tell it")
+    levels, reasons = _judged(
+        sought, fit, MOTOR, "the log is too short or too cool to determine it"
+    )
     # The heat is known to the resistance and to half of what its band missed.
     share = float(np.mean(_square(log)) / np.mean(log["torque_current"] ** 2)) - 1.0
     open_ = float(np.hypot(resistance.std / resistance.value, 0.5 * share))
@@ -132,11 +134,15 @@ def _flux(windows: _Windows, log: ScrewLog, actuator: Actuator) -> Level:
     rise = np.interp(windows.time, log.time, smooth) - reference
     design = np.stack([np.ones_like(rise), rise], axis=1)
     value, *_ = np.linalg.lstsq(design, windows.constant, rcond=None)
-    rest = windows.constant - design @ value
+    residual = windows.constant - design @ value
     # What is left is coloured: a tenth of the windows count.
-    covariance = np.linalg.inv(design.T @ design) * float(rest @ rest) / len(rest) * 10.0
+    covariance = (
+        np.linalg.inv(design.T @ design) * float(residual @ residual) / len(residual) * 10.0
+    )
     slope = float(value[1] / value[0])
-    return Level(slope, float(np.sqrt(covariance[1, 1])) / value[0], max(len(rest) / 10.0 - 2, 2))
+    return Level(
+        slope, float(np.sqrt(covariance[1, 1])) / value[0], max(len(residual) / 10.0 - 2, 2)
+    )
 
 
 def _motor_fit(
@@ -162,13 +168,13 @@ def _motor_fit(
     sought = Sought(names, np.array(first), belief, signed=("start", "reading"))
 
     def model(values: Floats) -> Floats:
-        winding, shown = _network(bins, values[:-1], actuator)
+        winding, sensed = _network(bins, values[:-1], actuator)
         if windows is None:
-            return shown
+            return sensed
         warm = np.interp(windows.time, bins.time, winding) + value("thermal.ambient")
         # The resistance of the other logs is known to a kelvin's worth.
         warm += values[-1] - value("motor.reference_temperature")
-        return np.concatenate([shown, weight * warm])
+        return np.concatenate([sensed, weight * warm])
 
     times = [(bins.time, np.ones(count), bins.step)]
     if windows is not None:
@@ -203,7 +209,7 @@ def _network(bins: _Bins, values: Floats, actuator: Actuator) -> tuple[Floats, F
     radiation = _RADIATION * value("thermal.emissivity") * area
     warmth = value("motor.temperature_coefficient")
     apart = ambient - value("motor.reference_temperature")
-    winding = surface = shown = start
+    winding = surface = sensed = start
     share, h = 1.0 - np.exp(-bins.step / max(lag, 1e-3)), bins.step
     rows = np.empty((len(bins.heat), 2))
     # Both nodes at once by the middle of the step, the air's loss as it stands.
@@ -218,8 +224,8 @@ def _network(bins: _Bins, values: Floats, actuator: Actuator) -> tuple[Floats, F
         before = surface
         winding += h * power / capacity - 2.0 * a * flow
         surface += 2.0 * b * flow - h * out / housing
-        shown += share * (0.5 * (before + surface) - shown)
-        rows[k] = winding, shown
+        sensed += share * (0.5 * (before + surface) - sensed)
+        rows[k] = winding, sensed
     return rows[:, 0], rows[:, 1]
 
 
@@ -248,9 +254,9 @@ def nut_heat(
     times = [(bins.time, np.ones(count), bins.step)]
     data = bins.surface - value("thermal.ambient")
     fit = fit_balance(sought, data, _single(bins), times, scale=_spread(bins.surface))
-    levels, reasons = _judged(sought, fit, NUT, "the log is too short or too cool to tell it")
+    levels, reasons = _judged(sought, fit, NUT, "the log is too short or too cool to determine it")
     open_ = _heat_open(log["motor_speed"], force, actuator, known)
-    if open_ > _SURE:
+    if open_ > _DETERMINED:
         why = "the screw's efficiencies as given leave too much of its heat open"
         return {}, dict.fromkeys(NUT, why)
     return {path: item.widened(open_ * item.value) for path, item in levels.items()}, reasons
@@ -295,7 +301,7 @@ def _judged(
 ) -> tuple[dict[str, Level], dict[str, str]]:
     levels, reasons = {}, {}
     for k, name in enumerate(names):
-        if fit.std[k] > _SURE * sought.belief[k]:
+        if fit.std[k] > _DETERMINED * sought.belief[k]:
             reasons[name] = why
             continue
         first = float(sought.first[k])

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.calibrate.role_log import RoleLog, role_channels
+from elevon.calibrate.role_log import CalibrationRoleLog, role_channels
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ _LIMIT = 0.98  # of the largest set point of the current: the drive is limited
 
 
 @dataclass(frozen=True)
-class ScrewLog(RoleLog):
+class ScrewLog(CalibrationRoleLog):
     """A log on the clock of the motor's speed."""
 
     @property
@@ -129,12 +129,12 @@ def screw_log(recording: Recording, name: str, ratio: float) -> ScrewLog:
     """
     parts = role_channels(recording, name, _NEEDED)
     roles, time = parts["roles"], parts["time"]
-    shown = next((role for role in MOTION if role in roles), None)
-    if shown is None:
+    motion = next((role for role in MOTION if role in roles), None)
+    if motion is None:
         raise InputError(f"{name}: nothing of the motion was recorded; one of {', '.join(MOTION)}")
-    if shown != "motor_speed":
-        scale = 1.0 if shown == "motor_position" else ratio
-        speed = np.gradient(roles[shown], time) if shown.endswith("position") else roles[shown]
+    if motion != "motor_speed":
+        scale = 1.0 if motion == "motor_position" else ratio
+        speed = np.gradient(roles[motion], time) if motion.endswith("position") else roles[motion]
         roles["motor_speed"] = scale * speed
     return ScrewLog(**parts)
 
@@ -146,7 +146,7 @@ def motor_ratio(actuator: Actuator) -> float:
 
 
 def preloaded(actuator: Actuator) -> bool:
-    """Whether the actuator has a preloaded screw with an efficiency each way."""
+    """Whether the actuator has a preloaded screw with an efficiency in each direction."""
     from elevon.parameters.records import records
 
     return {"screw.preload", "screw.efficiency_aiding"} <= records(actuator.wiring).keys()

@@ -53,7 +53,7 @@ def position_loop(
         return {}, dict.fromkeys(paths, why)
     design = np.vstack(rows)
     fit = _fit(design, np.concatenate(data), ("gain", "ahead", "bend", "offset"), times)
-    # A command read a tick earlier or later than it is shown moves the error.
+    # A command read a tick earlier or later than it is recorded moves the error.
     late = value("control.sample_time") * fit["gain"] * abs(1.0 - fit["ahead"])
     levels = {
         paths[0]: Level(fit["gain"], fit.std("gain"), fit.degrees).widened(1e-3 * fit["gain"]),
@@ -68,8 +68,8 @@ def _fit(
     design: Floats, data: Floats, names: tuple[str, ...],
     times: Sequence[tuple[Floats, Floats, float]],
 ) -> Regression:  # fmt: skip
-    value, rest, weight, _ = robust_regression(design, data)
-    return with_deviations(names, value, design, rest, weight, times=times)
+    value, residual, weight, _ = robust_regression(design, data)
+    return with_deviations(names, value, design, residual, weight, times=times)
 
 
 def _free(log: ScrewLog, role: str, limit: float) -> npt.NDArray[np.bool_]:
@@ -93,8 +93,8 @@ def speed_control(
         if not (log.quick and log.has("speed_ref", "current_ref")):
             continue
         inside = _free(log, "current_ref", value("control.current_limit"))
-        shown = (log["speed_ref"], log["motor_speed"], torque * log["current_ref"])
-        parts += [Stretch(log.time, log.period, *shown, used) for used in stretches(inside)]
+        signals = (log["speed_ref"], log["motor_speed"], torque * log["current_ref"])
+        parts += [Stretch(log.time, log.period, *signals, used) for used in stretches(inside)]
     fit = speed_loop(parts, tick)
     if fit is None:
         return {}, dict.fromkeys(paths, "needs the set points of speed and current")

@@ -30,12 +30,12 @@ PATHS = ("control.speed_gain", "control.position_gain", "control.integral_time")
 #: What they stand on.
 GIVEN = ("control.torque_constant", "control.speed_feedforward")
 _NEEDED = ("command", "motor_position", "torque_current")
-_CURRENT, _SPEED = 0.9, 0.8  # of the limits: the speed's set point is guessed with the set's gain
+_CURRENT, _SPEED = 0.9, 0.8  # of the limits: the speed's set point is guessed with the file's gain
 _APART = 0.06  # s from a limit
 _EDGE = 0.1  # s at both ends of a log
 _FEWEST = 300  # samples of a stretch
-_PARTED = 0.15  # of a root: a deviation from which the two are not told apart
-_CLEAR = 1.5  # ratio of the set's k and 1/T_i from which their order is taken as known
+_PARTED = 0.15  # of a root: a deviation from which the two are not separated
+_CLEAR = 1.5  # ratio of the actuator file's k and 1/T_i from which their order is taken as known
 
 
 @dataclass(frozen=True)
@@ -99,30 +99,30 @@ def _fitted(logs: Sequence[ScrewLog], actuator: Actuator, *, smooth: bool) -> Re
         ahead = ratio * slope(log["command"], h)
         total = np.cumsum(error) * h - 0.5 * (h - tick) * error
         columns = [ahead - log["motor_speed"], error, total, slope(log["torque_current"], h)]
-        asked = constant * log["torque_current"]
+        demand = constant * log["torque_current"]
         if smooth:
-            columns, asked = [smoothed(x, h) for x in columns], smoothed(asked, h)
+            columns, demand = [smoothed(x, h) for x in columns], smoothed(demand, h)
         for used in stretches(_unlimited(log, error, ahead, actuator)):
             if used.sum() >= _FEWEST:
                 rows.append(np.stack(columns, axis=1)[used])
-                data.append(asked[used])
+                data.append(demand[used])
                 times.append((log.time[used], log["motor_speed"][used], h))
     if not rows:
         return None
     start = np.repeat(np.eye(len(rows)), [len(row) for row in rows], axis=0)
     design = np.hstack([np.vstack(rows), start])
     names = ("rate", "error", "total", "lag", *(f"start{k}" for k in range(len(rows))))
-    values, rest, weight, _ = robust_regression(design, np.concatenate(data))
-    return with_deviations(names, values, design, rest, weight, times=times)
+    values, residual, weight, _ = robust_regression(design, np.concatenate(data))
+    return with_deviations(names, values, design, residual, weight, times=times)
 
 
 def _unlimited(
     log: ScrewLog, error: Floats, ahead: Floats, actuator: Actuator
 ) -> npt.NDArray[np.bool_]:
     value = actuator.parameters.value
-    asked = value("control.position_gain") / motor_ratio(actuator) * error + ahead
+    demand = value("control.position_gain") / motor_ratio(actuator) * error + ahead
     limited = np.abs(log["torque_current"]) > _CURRENT * value("control.current_limit")
-    limited |= np.abs(asked) > _SPEED * value("control.speed_limit")
+    limited |= np.abs(demand) > _SPEED * value("control.speed_limit")
     limited |= (log.time < _EDGE) | (log.time > log.time[-1] - _EDGE)
     width = 2 * round(_APART / log.period) + 1
     return np.convolve(limited.astype(float), np.ones(width), mode="same") < 0.5
@@ -148,7 +148,7 @@ def _ratios(fit: Regression) -> tuple[Level, Level, Level]:
 
 
 def _assigned(roots: _Roots, actuator: Actuator) -> dict[str, Level]:
-    """Give each loop its root, by the set's order; where that is not clear, both their middle."""
+    """Give each loop its root, by the actuator file's order; if unclear, both their middle."""
     value, ratio = actuator.parameters.value, motor_ratio(actuator)
     position, integral = value(PATHS[1]) / ratio, 1.0 / value(PATHS[2])
     fast, slow = roots.pair()

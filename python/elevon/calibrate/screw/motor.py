@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["load_side", "motor_constants"]
 
-_SURE = 5e-4  # relative: what rates and clocks of a stand leave open
+_RATE = 5e-4  # relative: what rates and clocks of a stand leave open
 _WARMTH = 1.0  # K of the winding over the surface that no log of seconds shows
 _FEWEST = 300  # samples
 
@@ -49,7 +49,7 @@ def motor_constants(
         return {}, dict.fromkeys((*paths, "motor.winding_inductance"), why)
     constant, resistance = fit["constant"], fit["resistance"]
     levels = {
-        paths[0]: Level(constant, fit.std("constant"), fit.degrees).widened(_SURE * constant),
+        paths[0]: Level(constant, fit.std("constant"), fit.degrees).widened(_RATE * constant),
         paths[1]: Level(resistance, fit.std("resistance"), fit.degrees).widened(
             _WARMTH * actuator.parameters.value("motor.temperature_coefficient") * resistance
         ),
@@ -109,11 +109,11 @@ def _fitted(
     if sum(len(row) for row in rows) < _FEWEST:
         return None
     design = np.vstack(rows)
-    value, rest, weight, _ = robust_regression(design, np.concatenate(data))
+    value, residual, weight, _ = robust_regression(design, np.concatenate(data))
     used = [log.apart(corner) for log in logs]
     times = [
         (log.time[u], log.smooth["motor_speed"][u], log.period)
         for log, u in zip(logs, used, strict=True)
     ]
-    fit = with_deviations(names, value, design, rest, weight, times=times)
+    fit = with_deviations(names, value, design, residual, weight, times=times)
     return fit if np.isfinite(fit.covariance).all() else None

@@ -32,7 +32,7 @@ __all__ = ["calibrate_screw"]
 _NEVER = {
     "friction.static": "a reversal breaks away within a sample or two",
     "backlash.total": "both positions are read on one side of the joint, or too coarsely",
-    "backlash.stiffness": "the joint gives by less than the corners' own error",
+    "backlash.stiffness": "the joint deflects by less than the corners' own error",
     "control.current_limit": "the logs do not reach this limit for long",
     "control.speed_limit": "the logs do not reach this limit",
     "inverter.supply_voltage": "the logs do not reach this limit",
@@ -81,7 +81,7 @@ def calibrate_screw(
     Raises
     ------
     InputError
-        No log, nothing determined, or a path asked for that the logs do not determine.
+        No log, nothing determined, or a path requested that the logs do not determine.
     Interrupted
         `progress` returned False.
     """

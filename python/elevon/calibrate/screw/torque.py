@@ -1,4 +1,4 @@
-"""Torque balance of a preloaded screw: friction, preload, efficiency each way, inertia.
+"""Torque balance of a preloaded screw: friction, preload, efficiency in each direction, inertia.
 
 ``k_T i = J dw/dt + C w + s (T_d + b(F) T_pr) + r F + s L(F)`` with ``s`` the sign of the motion,
 ``T_pr = F_pr r (1/eta - eta')``, ``L = (1/eta - 1) r |F|`` where the force ``F`` on the nut opposes
@@ -31,9 +31,9 @@ _NAMES = (
 )  # fmt: skip
 #: What the current's sensor adds: offset [A], and lag [s] behind the motion.
 _SENSOR = {"offset": 0.1, "lag": 1e-3}
-#: What is believed before the logs, as a share of the set's value or of `_SENSOR`.
+#: What is believed before the logs, as a share of the actuator file's value or of `_SENSOR`.
 _BELIEF = (0.7, 3.0, 1.0, 1.0, 0.15, 0.15, 1.0, 3.0)
-_SURE = 0.15  # of the belief: a deviation below which the logs have determined a number
+_DETERMINED = 0.15  # of the belief: a deviation below which the logs have determined a number
 _SPREAD = 0.05  # N m, first deviation of the residual
 _CLOSES = 5e-5  # of the torque: ASSUMED, to which smoothed channels' balance closes at any speed
 _NUDGE = 1e-3  # of the torque, for what its deviation moves
@@ -66,16 +66,16 @@ class _Samples:
     speed: Floats
     force: Floats
     travel: float
-    beside: float
+    other_inertia: float
 
     def torque(self, value: Floats) -> Floats:
         """Torque that the motor must make [N m], for values of `_NAMES` without the sensor's."""
         inertia, viscous, dry, preload, opposing, aiding = value[: len(_NAMES)]
-        way, load = np.sign(self.speed), np.abs(self.force) * self.travel
-        lost = np.where(way * self.force > 0.0, 1.0 / opposing - 1.0, 1.0 - aiding) * load
+        direction, load = np.sign(self.speed), np.abs(self.force) * self.travel
+        lost = np.where(direction * self.force > 0.0, 1.0 / opposing - 1.0, 1.0 - aiding) * load
         drag = preload * self.travel * (1.0 / opposing - aiding) * relieved(self.force, preload)
-        smooth = (inertia + self.beside) * self.acceleration + viscous * self.speed
-        return np.asarray(smooth + self.travel * self.force + way * (dry + drag + lost))
+        smooth = (inertia + self.other_inertia) * self.acceleration + viscous * self.speed
+        return np.asarray(smooth + self.travel * self.force + direction * (dry + drag + lost))
 
 
 def torque_balance(
@@ -90,7 +90,7 @@ def torque_balance(
     actuator : Actuator
         First values, and what is not free; the load side's numbers where no cell is.
     constant : Level or None
-        Torque of an ampere [N m/A]; None: as the set has it.
+        Torque of an ampere [N m/A]; None: as the actuator file has it.
     mass : float
         Of the load side [kg], as it counts where no cell measures the force on the nut.
     """
@@ -145,8 +145,8 @@ def _stacked(
         rows["force"].append(nut_force(log, actuator, mass)[used])
         times.append((log.time[used], s["motor_speed"][used], log.period))
     joined = {name: np.concatenate(parts) for name, parts in rows.items()}
-    beside = value("gear.inertia") + value("screw.inertia") / value("gear.ratio") ** 2
-    return _Samples(travel=travel, beside=beside, **joined), times
+    other_inertia = value("gear.inertia") + value("screw.inertia") / value("gear.ratio") ** 2
+    return _Samples(travel=travel, other_inertia=other_inertia, **joined), times
 
 
 def nut_force(log: ScrewLog, actuator: Actuator, mass: float) -> Floats:
@@ -186,7 +186,7 @@ def _judged(
             level = level.widened(
                 _CLOSES * _rms(samples.torque(fit.x * sought.first)) / _rms(samples.speed)
             )
-        if spread[k] > _SURE * sought.belief[k]:
+        if spread[k] > _DETERMINED * sought.belief[k]:
             reasons[name] = _why(name, samples)
             continue
         levels[name] = level
@@ -202,11 +202,11 @@ def _rms(values: Floats) -> float:
 
 
 def _why(name: str, samples: _Samples) -> str:
-    way = np.sign(samples.speed) * samples.force
-    if name == "screw.efficiency" and float(np.max(way)) < 500.0:
+    direction = np.sign(samples.speed) * samples.force
+    if name == "screw.efficiency" and float(np.max(direction)) < 500.0:
         return "no force that opposes the motion"
-    if name == "screw.efficiency_aiding" and float(np.min(way)) > -500.0:
+    if name == "screw.efficiency_aiding" and float(np.min(direction)) > -500.0:
         return "no force that aids the motion"
     if name in ("screw.preload", "friction.dynamic"):
-        return "drag and dry friction are told apart by forces on both sides of the relief only"
+        return "drag and dry friction are separated by forces on both sides of the relief only"
     return "the logs' noise is larger than its effect"

@@ -6,10 +6,10 @@ beside the logs and enter as observations: the trigger's edge, what a resonator 
 late one log may be against the other for reasons that are no clock's (a converter settles, a
 current passes a filter). Without the last the trigger would turn every such delay into a drift.
 
-The residuals of such a fit are anything but white: how much less the logs tell than white noise
-would let them is estimated, and both the weight against what is known beforehand and the deviations
-follow it. The weights and the clock take their share of the few independent samples that they are
-worth; where none are left there is no fit.
+The residuals of such a fit are anything but white: how much less the logs determine than white
+noise would let them is estimated, and both the weight against what is known beforehand and the
+deviations follow it. The weights and the clock take their share of the few independent samples that
+they are worth; where none are left there is no fit.
 """
 
 from __future__ import annotations
@@ -99,10 +99,10 @@ class SharedLogs:
         power = float(np.sum((target - target.mean()) ** 2))
         if power == 0.0:
             return 0.0
-        rest, _ = self.rest(offset, inside)
-        return 1.0 - float(rest @ rest) / power
+        misfit, _ = self.misfit(offset, inside)
+        return 1.0 - float(misfit @ misfit) / power
 
-    def rest(self, offset: float, among: npt.NDArray[np.bool_]) -> tuple[FloatArray, int]:
+    def misfit(self, offset: float, among: npt.NDArray[np.bool_]) -> tuple[FloatArray, int]:
         """Return what the signals leave of some samples for an offset [s], and their rank."""
         basis = self.basis(self.second[among] + offset)
         weights, _, rank, _ = np.linalg.lstsq(basis, self.value[among], rcond=_RANK)
@@ -113,9 +113,9 @@ class SharedLogs:
         step = float(np.median(np.diff(self.second)))
         return max(1.0, 2.0 * math.sqrt(math.pi) * self.width / step)
 
-    def independent(self, rest: FloatArray) -> float:
+    def independent(self, misfit: FloatArray) -> float:
         """Return how many independent samples residuals in the order of time are worth."""
-        return len(rest) / max(self.alike(), correlated(rest))
+        return len(misfit) / max(self.alike(), correlated(misfit))
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,16 +165,16 @@ class _Frame:
         at = self.second + unknown[0] + unknown[1] * turn + unknown[2]
         basis = self.logs.basis(at)
         space, weights = _range(basis, self.value)
-        rest = self.value - space @ (space.T @ self.value)
+        misfit = self.value - space @ (space.T @ self.value)
         rate = _columns(self.logs.time, self.rates, at, 0.0) @ weights
         jacobian = np.column_stack((rate, rate * turn))
-        return rest, jacobian - space @ (space.T @ jacobian), space.shape[1]
+        return misfit, jacobian - space @ (space.T @ jacobian), space.shape[1]
 
     def cost(self, unknown: FloatArray, noise: float) -> float:
         """Misfit to minimise, for a variance of the residuals."""
-        rest, *_ = self.linear(unknown)
+        misfit, *_ = self.linear(unknown)
         off = unknown - self.guess
-        return float(rest @ rest) / noise + float(off @ self.known @ off)
+        return float(misfit @ misfit) / noise + float(off @ self.known @ off)
 
 
 def fit_clock(
@@ -203,28 +203,28 @@ def fit_clock(
     unknown = frame.guess
     inflation, few = logs.alike(), 1.0  # of a guess that is off the residuals are no noise
     for _ in range(_ROUNDS):
-        rest, jacobian, rank = frame.linear(unknown)
+        misfit, jacobian, rank = frame.linear(unknown)
         normal = jacobian.T @ jacobian
         if not np.all(np.isfinite(normal)) or normal[0, 0] <= 0.0:
             return None
-        unknown = _descend(frame, unknown, _noise(frame, rest) * inflation)
-        rest, jacobian, rank = frame.linear(unknown)
-        worth = logs.independent(rest)
+        unknown = _descend(frame, unknown, _noise(frame, misfit) * inflation)
+        misfit, jacobian, rank = frame.linear(unknown)
+        worth = logs.independent(misfit)
         free = worth - rank - jacobian.shape[1] - _LEAST_FREEDOM
         if free <= 0.0:
             return None
         few = worth / free
-        inflation = few * max(len(rest) / worth, _coloured(jacobian, rest))
+        inflation = few * max(len(misfit) / worth, _coloured(jacobian, misfit))
     return _estimate(frame, unknown, inflation, few)
 
 
-def _coloured(jacobian: FloatArray, rest: FloatArray) -> float:
+def _coloured(jacobian: FloatArray, misfit: FloatArray) -> float:
     """How many times white noise's variance is theirs, of the residuals or of their scores."""
-    power = max(float(rest @ rest), 1e-300)
-    scores = long_run_covariance(jacobian * rest[:, None])
+    power = max(float(misfit @ misfit), 1e-300)
+    scores = long_run_covariance(jacobian * misfit[:, None])
     normal = np.linalg.pinv(jacobian.T @ jacobian, rcond=_RANK)
-    of_scores = 0.5 * float(np.trace(normal @ scores)) * len(rest) / power
-    return max(float(long_run_covariance(rest[:, None])[0, 0]) / power, of_scores)
+    of_scores = 0.5 * float(np.trace(normal @ scores)) * len(misfit) / power
+    return max(float(long_run_covariance(misfit[:, None])[0, 0]) / power, of_scores)
 
 
 def _frame(logs: SharedLogs, guess: float, edge: tuple[float, float] | None) -> _Frame | None:
@@ -248,18 +248,18 @@ def _lever(middle: float, half: float) -> FloatArray:
     return np.array([1.0, -middle / half, 0.0])
 
 
-def _noise(frame: _Frame, rest: FloatArray) -> float:
+def _noise(frame: _Frame, misfit: FloatArray) -> float:
     floor = (1e-9 * float(np.std(frame.value))) ** 2
-    return max(float(rest @ rest) / len(rest), floor, 1e-300)
+    return max(float(misfit @ misfit) / len(misfit), floor, 1e-300)
 
 
 def _descend(frame: _Frame, unknown: FloatArray, noise: float) -> FloatArray:
     """Gauss-Newton with halved steps."""
     cost = frame.cost(unknown, noise)
     for _ in range(_STEPS):
-        rest, jacobian, _ = frame.linear(unknown)
+        misfit, jacobian, _ = frame.linear(unknown)
         jacobian = jacobian[:, _TWICE]
-        pull = jacobian.T @ rest / noise - frame.known @ (unknown - frame.guess)
+        pull = jacobian.T @ misfit / noise - frame.known @ (unknown - frame.guess)
         step = np.linalg.solve(jacobian.T @ jacobian / noise + frame.known, pull)
         step *= min(1.0, _LONGEST / max(float(np.abs(step).max()), 1e-300))
         while float(np.abs(step).max()) > _DONE:
@@ -275,12 +275,12 @@ def _descend(frame: _Frame, unknown: FloatArray, noise: float) -> FloatArray:
 
 def _estimate(frame: _Frame, unknown: FloatArray, inflation: float, few: float) -> ClockEstimate:
     """Deviations: of the scores as they are, `few` times for so few, and of what was known."""
-    rest, two, _ = frame.linear(unknown)
-    noise = _noise(frame, rest) * inflation
+    misfit, two, _ = frame.linear(unknown)
+    noise = _noise(frame, misfit) * inflation
     jacobian = two[:, _TWICE]
     information = jacobian.T @ jacobian / noise + frame.known
     inverse = np.asarray(np.linalg.inv(information), dtype=np.float64)
-    scores = few * long_run_covariance(two * rest[:, None])[np.ix_(_TWICE, _TWICE)] / noise**2
+    scores = few * long_run_covariance(two * misfit[:, None])[np.ix_(_TWICE, _TWICE)] / noise**2
     misplaced = (information - frame.known) @ np.diag([0.0, _APART, _APART])
     covariance = inverse @ (scores + frame.known + misplaced @ misplaced.T) @ inverse
     drift = _pair(_DRIFT / frame.half, unknown, covariance)
@@ -294,7 +294,7 @@ def _estimate(frame: _Frame, unknown: FloatArray, inflation: float, few: float) 
         offset=_pair(_lever(frame.middle, frame.half), unknown, covariance),
         drift=drift,
         residual=_pair(_LATE, unknown, covariance),
-        explained=1.0 - float(rest @ rest) / float(spread @ spread),
+        explained=1.0 - float(misfit @ misfit) / float(spread @ spread),
         refused=refused,
     )
 

@@ -78,8 +78,8 @@ def join_loadcell(
     values, units = _channels(log, value, note, report)
     cell = Recording.build(moved, values, units, clock="load_cell", rate=quality.rate)
     both = recording.joined(cell)
-    shown = "load_cell_torque" if "load_cell_torque" in cell else "load_cell_force"
-    return both.with_meta(roles={**recording.roles, "load_cell": shown})
+    measured = "load_cell_torque" if "load_cell_torque" in cell else "load_cell_force"
+    return both.with_meta(roles={**recording.roles, "load_cell": measured})
 
 
 def _synchronise(
@@ -139,7 +139,7 @@ def _fit_findings(fit: ClockFit, report: ImportReport) -> None:
         report.note(
             "load_cell",
             "drift-unknown",
-            "nothing that both logs saw tells the clock's drift: the trigger gives the offset only",
+            "nothing that both logs saw determines the drift: the trigger fixes the offset only",
         )
     if abs(fit.drift) - 2.0 * fit.drift_std > RESONATOR_TOLERANCE:
         report.warn(

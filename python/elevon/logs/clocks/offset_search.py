@@ -12,7 +12,7 @@ import numpy.typing as npt
 from elevon.errors import InputError
 from elevon.logs.clocks.clock_fit import SharedLogs
 
-__all__ = ["LEAST_R2", "Guess", "search_offset"]
+__all__ = ["LEAST_R2", "OffsetGuess", "search_offset"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -33,7 +33,7 @@ _STEP = 1.5  # periods of the slower log: half the filter's width
 
 
 @dataclass(frozen=True, slots=True)
-class Guess:
+class OffsetGuess:
     """A first guess.
 
     Attributes
@@ -51,7 +51,7 @@ class Guess:
     set_aside: float | None = None
 
 
-def search_offset(choices: Sequence[SharedLogs]) -> Guess | None:
+def search_offset(choices: Sequence[SharedLogs]) -> OffsetGuess | None:
     """Find the offset that explains most, on a grid as fine as the filter makes sense of.
 
     The load cell's file begins at the trigger, which falls into the drive's trace: an offset that
@@ -99,7 +99,7 @@ def search_offset(choices: Sequence[SharedLogs]) -> Guess | None:
         raise InputError(
             f"synchronisation: the trigger never changes, and {search.ambiguity(best, other)}"
         )
-    return Guess(search.logs(best), float(offsets[best]), aside)
+    return OffsetGuess(search.logs(best), float(offsets[best]), aside)
 
 
 @dataclass(frozen=True)
@@ -167,9 +167,9 @@ class _Search:
             return 1.0, 1.0, 0.0, 0
         value = one.value[both] - one.value[both].mean()
         power = max(float(value @ value), _FLOOR)
-        (rest, rank), (more, _) = one.rest(start, both), two.rest(end, both)
-        shares = float(rest @ rest) / power, float(more @ more) / power
-        return *shares, one.independent(rest), rank + 1
+        (misfit, rank), (more, _) = one.misfit(start, both), two.misfit(end, both)
+        shares = float(misfit @ misfit) / power, float(more @ more) / power
+        return *shares, one.independent(misfit), rank + 1
 
 
 def _highest(scores: FloatArray, places: npt.NDArray[np.intp]) -> int:

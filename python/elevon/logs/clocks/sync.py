@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from elevon.errors import InputError
 from elevon.logs.clocks.clock_fit import ClockEstimate, SharedLogs, fit_clock
-from elevon.logs.clocks.offset_search import LEAST_R2, Guess, search_offset
+from elevon.logs.clocks.offset_search import LEAST_R2, OffsetGuess, search_offset
 
 __all__ = ["ClockFit", "TriggerEdge", "align_clocks", "find_trigger"]
 
@@ -30,7 +30,7 @@ _MOST_DRIFT = 0.02  # an RC oscillator's worst: a fit beyond it is none of two c
 _SMOOTHING = 3.0  # periods of the slower log
 _ENDS = 2.0  # of the filter's width: what it makes of a log's ends is not used
 _FEWEST = 20  # samples of each
-_STILL = 1e-12  # of a signal's size: rounding, no motion
+_CONSTANT = 1e-12  # of a signal's size: rounding, no motion
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,9 +61,9 @@ class ClockFit:
     offset, offset_std : float
         Seconds: where the second clock's zero lies on the first.
     drift, drift_std : float
-        Relative: 1e-3 is a second clock that loses 1 ms a second. Where the logs hardly tell it,
-        the drift is 0 with the deviation of a resonator; where they share nothing, with an infinite
-        one.
+        Relative: 1e-3 is a second clock that loses 1 ms a second. Where the logs hardly determine
+        it, the drift is 0 with the deviation of a resonator; where they share nothing, with an
+        infinite one.
     method : str
         ``trigger``, ``correlation`` or ``trigger and correlation``.
     explained : float
@@ -71,8 +71,8 @@ class ClockFit:
         alone.
     residual, residual_std : float
         Seconds: by how much the first log's signals are late against the second's value beside the
-        clocks' offset (filters, a converter that settles). Without a trigger it cannot be told
-        from the offset, whose deviation then holds it; NaN for the trigger alone.
+        clocks' offset (filters, a converter that settles). Without a trigger it cannot be
+        determined from the offset, whose deviation then holds it; NaN for the trigger alone.
     set_aside : float or None
         Without a trigger, an offset [s] that explains as much but has the second log begin before
         the first.
@@ -179,7 +179,7 @@ def align_clocks(
     )
 
 
-def _why_not(guess: Guess | None, fit: ClockEstimate | None) -> str:
+def _why_not(guess: OffsetGuess | None, fit: ClockEstimate | None) -> str:
     """Say why there is no offset to be had from what both logs saw."""
     seen = 0.0
     if fit is not None:
@@ -220,12 +220,12 @@ def _choices(
     return choices
 
 
-def _guess(choices: Sequence[SharedLogs], edge: TriggerEdge | None) -> Guess | None:
+def _guess(choices: Sequence[SharedLogs], edge: TriggerEdge | None) -> OffsetGuess | None:
     if not choices:
         return None
     if edge is None:
         return search_offset(choices)
-    return Guess(max(choices, key=lambda logs: logs.explained(edge.time)), edge.time)
+    return OffsetGuess(max(choices, key=lambda logs: logs.explained(edge.time)), edge.time)
 
 
 def _arrays(
@@ -250,7 +250,7 @@ def _arrays(
             at = float(clock[int(np.argmax(np.diff(clock) <= 0.0))])
             raise InputError(f"synchronisation: the {name}'s time does not increase at {at:g} s")
     spread = np.std(x, axis=0)
-    moves = spread > _STILL * np.abs(x).max(axis=0)
+    moves = spread > _CONSTANT * np.abs(x).max(axis=0)
     return t, np.where(moves, (x - x.mean(axis=0)) / np.where(moves, spread, 1.0), 0.0), s, y
 
 

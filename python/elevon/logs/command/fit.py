@@ -167,8 +167,8 @@ def best_waveform(
         inside = (t >= fit.window[0]) & (t <= fit.window[1])
         # Samples a kind leaves out are charged at the spread of the whole trace: a fit to a
         # fragment must not win against one that explains everything.
-        rest = np.where(inside, y - fit.at(t), y - y.mean())
-        power = max(float(np.mean(rest**2)), 1e-300)
+        misfit = np.where(inside, y - fit.at(t), y - y.mean())
+        power = max(float(np.mean(misfit**2)), 1e-300)
         scored.append((len(t) * math.log(power) + len(fit.std) * math.log(len(t)), kind))
     return fit_waveform(trace, min(scored)[1])
 

@@ -113,8 +113,8 @@ def _project(angle: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
     normal = basis @ basis.transpose(0, 2, 1) + 1e-9 * len(v) * np.eye(3)
     right = basis @ v
     weights = np.linalg.solve(normal, right[..., None])[..., 0]
-    rest = v - np.einsum("mk,mkn->mn", weights, basis)
-    return np.einsum("mn,mn->m", rest, rest), np.asarray(weights, dtype=np.float64)
+    residual = v - np.einsum("mk,mkn->mn", weights, basis)
+    return np.einsum("mn,mn->m", residual, residual), np.asarray(weights, dtype=np.float64)
 
 
 def _chirp(t: FloatArray, y: FloatArray, known: Mapping[str, float]) -> list[dict[str, float]]:

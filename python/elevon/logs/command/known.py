@@ -78,10 +78,10 @@ def align_noted(trace: CommandTrace, note: CommandNote, unit: str = "rad") -> No
     step = max(float(np.median(np.diff(trace.time))), 2.0 * span / _MOST)
     for _ in range(_REFINED):
         starts = begin + np.arange(-reach, reach + 0.5 * step, step)
-        rest = [float(np.mean((noted_values(note, unit, t - s) - y) ** 2)) for s in starts]
+        misfit = [float(np.mean((noted_values(note, unit, t - s) - y) ** 2)) for s in starts]
         # Of equals the one nearest the log's own zero: a constant fits anywhere.
-        least = min(rest)
-        ties = [s for s, r in zip(starts, rest, strict=True) if r <= least * (1.0 + 1e-9)]
+        least = min(misfit)
+        ties = [s for s, r in zip(starts, misfit, strict=True) if r <= least * (1.0 + 1e-9)]
         begin = float(min(ties, key=lambda s: abs(s - trace.time[0])))
         reach, step = 2.0 * step, 0.2 * step
     values = noted_values(note, unit, trace.time - begin)

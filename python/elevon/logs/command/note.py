@@ -162,7 +162,7 @@ def read_command_note(path: str | Path) -> CommandNote:
             values[name] = value
     note = _note(place, values, tuple(ignored))
     if command is not None and note.waveform is not None:
-        raise InputError(f"{place}: a waveform and a table [command] both say what was asked")
+        raise InputError(f"{place}: a waveform and a table [command] both state the command")
     return replace(note, command=command)
 
 

@@ -96,7 +96,9 @@ def _recording(table: RawTable, rows: slice, words: list[str], path: Path) -> Re
             "status": "measured",
             "log": path.name,
             "roles": {
-                e.played: e.channel for e in shipped_map("cranfield").column if e.played != "time"
+                e.role_name: e.channel
+                for e in shipped_map("cranfield").column
+                if e.role_name != "time"
             },
             "source": f"doi {DATA_DOI}; {PAPER_DOI}",
             "condition": condition,

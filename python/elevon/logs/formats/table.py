@@ -29,7 +29,7 @@ class RawTable:
     units : mapping of str to str
         Units the file itself states, by column.
     notes : tuple of str
-        What the reader saw and the user should know (encoding, decimal comma, skipped variables).
+        What the reader saw and the caller should know (encoding, decimal comma, skipped variables).
     file_format : str
         Which reader it was.
     attributes : mapping of str to str

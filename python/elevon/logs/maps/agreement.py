@@ -47,7 +47,7 @@ def check_agreement(
     report : ImportReport
         Findings are added to it.
     column_map : ColumnMap or None
-        What the user states: a contradiction is an error; without a map it is a warning.
+        What the caller states: a contradiction is an error; without a map it is a warning.
 
     Raises
     ------

@@ -28,7 +28,7 @@ __all__ = ["Assignment", "assign_columns", "playing", "rms_to_peak", "settle_pos
 class Assignment:
     """A signal: its column, its factor from the file to SI (offset for temperatures), its unit.
 
-    `role` is empty where it backlashes none; `subtract_from` names the column it is subtracted
+    `role` is empty where it has none; `subtract_from` names the column it is subtracted
     from.
     """
 
@@ -66,7 +66,7 @@ def assign_columns(
     table : RawTable
         The log.
     column_map : ColumnMap or None
-        What the user says; it wins over the headers.
+        What the caller stated; it wins over the headers.
     gear_ratio : float or None
         Motor over output, where it is known.
     report : ImportReport
@@ -122,7 +122,7 @@ def settle_positions(
     *,
     report: ImportReport,
 ) -> None:
-    """Give the positions their factors, and check those the user stated; errors as the settlers.
+    """Give the positions their factors, and check those the caller stated; errors as the settlers.
 
     `time` and `keep` are the clock's instants and the rows they stand in; `gear_ratio` in rad of
     the motor for one rad or m of the output, None where nobody says it.
@@ -185,7 +185,7 @@ def _mapped(entry: ColumnEntry, table: RawTable, gear_ratio: float | None) -> As
         factor,
         _si(expected),
         offset,
-        "" if entry.played == "time" else entry.played,
+        "" if entry.role_name == "time" else entry.role_name,
         entry.subtract_from,
     )
 
@@ -204,10 +204,10 @@ def _add_drive(assigned: dict[str, Assignment], table: RawTable) -> None:
     covered = {
         key
         for key, entry in entries.items()
-        if entry.channel in assigned or (entry.played and playing(assigned, entry.played))
+        if entry.channel in assigned or (entry.role_name and playing(assigned, entry.role_name))
     }
-    rest = RawTable(table.source, free or table.columns, table.units)
-    for key, name in find_drive_columns(rest, given=covered).items():
+    others = RawTable(table.source, free or table.columns, table.units)
+    for key, name in find_drive_columns(others, given=covered).items():
         entry = entries[key]
         if key in covered or name in used:
             continue

@@ -1,4 +1,4 @@
-"""A column map: what the columns of a log are, in a TOML file of the user or of this package."""
+"""A column map: what the columns of a log are, in a TOML file of yours or of this package."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class ColumnEntry(BaseModel):
         return value
 
     @model_validator(mode="after")
-    def _said(self) -> Self:
+    def _named(self) -> Self:
         if self.role is None and self.signal is None:
             raise ValueError(f"column {self.name!r}: needs a role or a signal")
         name, known = self.channel, known_signals()
@@ -84,8 +84,8 @@ class ColumnEntry(BaseModel):
         return self.signal or self.role or ""
 
     @property
-    def played(self) -> str:
-        """The role; empty where it backlashes none."""
+    def role_name(self) -> str:
+        """The role; empty where it has none."""
         if self.role is not None:
             return self.role
         known = known_signals().get(self.signal or "")
@@ -127,7 +127,7 @@ class ColumnMap(BaseModel):
     @field_validator("column")
     @classmethod
     def _once(cls, value: tuple[ColumnEntry, ...]) -> tuple[ColumnEntry, ...]:
-        for what in ("name", "channel", "played"):
+        for what in ("name", "channel", "role_name"):
             names = [getattr(entry, what) for entry in value]
             for name in names:
                 if name and names.count(name) > 1:

@@ -28,7 +28,7 @@ MOTOR_COUNTS = 2.0**24  # absolute encoder of the motor, counts a turn (test-ben
 ENCODER_COUNTS = 20_000.0  # 5000 pulses, four edges each, a turn of the encoder's own wheel
 ENCODER_WHEEL = 88.0 / 22.0  # turns of the encoder's wheel per turn of the output
 _TOLERANCE = 0.15
-_ENOUGH = 8.0  # travel over noise below which nothing is said
+_ENOUGH = 8.0  # travel over noise below which nothing is stated
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +154,6 @@ def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
     if power == 0.0:
         return 0.0, math.inf
     slope = float(dx @ dy) / power
-    rest = float(np.sqrt(np.mean((dy - slope * dx) ** 2)))
+    residual = float(np.sqrt(np.mean((dy - slope * dx) ** 2)))
     moved = abs(slope) * math.sqrt(power / len(dx))
-    return slope, rest / moved if moved > 0.0 else math.inf
+    return slope, residual / moved if moved > 0.0 else math.inf

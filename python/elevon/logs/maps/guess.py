@@ -1,6 +1,6 @@
 """A first column map of a foreign log, from its headers, its units and what fits together.
 
-Every entry carries its reason, for the user to correct: a header that says so, a column that is
+Every entry carries its reason, for you to correct: a header that says so, a column that is
 the integral of another, one that leads another, a size that only one unit explains.
 """
 
@@ -16,7 +16,7 @@ from elevon.logs.formats.table import FloatArray, RawTable
 from elevon.logs.maps.agreement import slope_and_fit
 from elevon.logs.maps.guess_column import GuessedColumn
 from elevon.logs.maps.hints import role_hint, unit_hint
-from elevon.logs.maps.motion import Motion, find_motion
+from elevon.logs.maps.motion import MotionColumns, find_motion
 from elevon.logs.maps.signals import known_roles
 from elevon.logs.maps.time_unit import TIME_UNITS, settle_time_unit
 from elevon.units import parse_unit
@@ -147,7 +147,7 @@ def _candidates(
     return chosen
 
 
-def _apply(motion: Motion, columns: Mapping[str, GuessedColumn]) -> None:
+def _apply(motion: MotionColumns, columns: Mapping[str, GuessedColumn]) -> None:
     for name, finding in motion.findings.items():
         item = columns[name]
         if finding.role and finding.role != item.role:
@@ -161,7 +161,7 @@ def _apply(motion: Motion, columns: Mapping[str, GuessedColumn]) -> None:
 
 
 def _current(
-    time: FloatArray, table: RawTable, columns: Mapping[str, GuessedColumn], motion: Motion
+    time: FloatArray, table: RawTable, columns: Mapping[str, GuessedColumn], motion: MotionColumns
 ) -> None:
     """Find the current among what is left: acceleration, friction and speed explain it."""
     if any(item.role in {"torque_current", "current_ref"} for item in columns.values()):

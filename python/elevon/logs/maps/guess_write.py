@@ -1,4 +1,4 @@
-"""A guessed column map as TOML, each entry with its reasons, for the user to correct."""
+"""A guessed column map as TOML, each entry with its reasons, for you to correct."""
 
 from __future__ import annotations
 

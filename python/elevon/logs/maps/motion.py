@@ -17,7 +17,7 @@ from elevon.logs.formats.table import FloatArray
 from elevon.logs.maps.agreement import slope_and_fit
 from elevon.units import parse_unit
 
-__all__ = ["Finding", "Motion", "find_motion"]
+__all__ = ["ColumnFinding", "MotionColumns", "find_motion"]
 
 Candidates = Mapping[str, tuple[str, str, FloatArray]]
 _INTEGRAL = 0.9  # share of a position that the integral of its speed explains
@@ -30,7 +30,7 @@ _MOST_LAGS = 200
 
 
 @dataclass(slots=True)
-class Finding:
+class ColumnFinding:
     """What the data say of one column."""
 
     role: str = ""
@@ -40,12 +40,12 @@ class Finding:
 
 
 @dataclass(slots=True)
-class Motion:
+class MotionColumns:
     """What moves in a log.
 
     Attributes
     ----------
-    findings : dict of str to Finding
+    findings : dict of str to ColumnFinding
         By column.
     position, speed : str or None
         The columns of the pair that fits best.
@@ -55,7 +55,7 @@ class Motion:
         Between the two, where they are on different shafts; m for one turn.
     """
 
-    findings: dict[str, Finding] = field(default_factory=dict)
+    findings: dict[str, ColumnFinding] = field(default_factory=dict)
     position: str | None = None
     speed: str | None = None
     smooth: FloatArray = field(default_factory=lambda: np.zeros(0))
@@ -63,7 +63,7 @@ class Motion:
     travel_per_turn: float | None = None
 
 
-def find_motion(time: FloatArray, candidates: Candidates) -> Motion:
+def find_motion(time: FloatArray, candidates: Candidates) -> MotionColumns:
     """Find positions, speeds and set points.
 
     Parameters
@@ -73,7 +73,7 @@ def find_motion(time: FloatArray, candidates: Candidates) -> Motion:
     candidates : mapping of str to (role, unit, values)
         Role and unit as the header says, empty where it does not; values without holes.
     """
-    motion = Motion()
+    motion = MotionColumns()
     pair = _best_pair(time, candidates)
     if pair is None:
         named = next((n for n, c in candidates.items() if c[0] == "output_position"), None)
@@ -108,11 +108,11 @@ def _best_pair(time: FloatArray, candidates: Candidates) -> tuple[str, str, floa
     return best
 
 
-def _settle(motion: Motion, candidates: Candidates, slope: float, explained: float) -> None:
+def _settle(motion: MotionColumns, candidates: Candidates, slope: float, explained: float) -> None:
     """Settle units, sign and ratio of the pair."""
     assert motion.position is not None
     assert motion.speed is not None
-    position, speed = Finding(), Finding()
+    position, speed = ColumnFinding(), ColumnFinding()
     motion.findings |= {motion.position: position, motion.speed: speed}
     position.reasons.append(
         f"the integral of {motion.speed!a} explains {100 * explained:.1f} % of it"
@@ -120,12 +120,12 @@ def _settle(motion: Motion, candidates: Candidates, slope: float, explained: flo
     speed.reasons.append(f"{motion.position!a} is its integral, times {slope:.4g}")
     if slope < 0.0:
         speed.sign = -1
-        speed.reasons.append("runs the other way")
+        speed.reasons.append("runs in the other direction")
     units = (candidates[motion.position][1], candidates[motion.speed][1])
     position.unit, speed.unit = _pair_units(*units, abs(slope), speed.reasons)
-    own = candidates[motion.position][0]
+    hint = candidates[motion.position][0]
     linear = parse_unit(position.unit).dimension[0] == 1
-    position.role = own if own == "motor_position" and not linear else "output_position"
+    position.role = hint if hint == "motor_position" and not linear else "output_position"
     factor = abs(slope) * parse_unit(position.unit).factor / parse_unit(speed.unit).factor
     if parse_unit(speed.unit).dimension[0] == 1:
         speed.role = "output_speed"
@@ -136,7 +136,7 @@ def _settle(motion: Motion, candidates: Candidates, slope: float, explained: flo
     else:
         speed.role = "motor_speed"
         if abs(math.log(factor)) < _SAME:
-            position.role = own or "motor_position"
+            position.role = hint or "motor_position"
         else:
             motion.gear_ratio = 1.0 / factor
             speed.reasons.append(f"turns {motion.gear_ratio:.5g} times as far as the output")
@@ -168,15 +168,15 @@ def _pair_units(position: str, speed: str, slope: float, reasons: list[str]) -> 
     return assumed
 
 
-def _unit_of_position(motion: Motion, name: str, candidates: Candidates) -> None:
+def _unit_of_position(motion: MotionColumns, name: str, candidates: Candidates) -> None:
     if not candidates[name][1]:
-        motion.findings[name] = Finding(
+        motion.findings[name] = ColumnFinding(
             "output_position", "mm", reasons=["unit not stated and no speed to tell: mm ASSUMED"]
         )
 
 
 def _set_point(
-    time: FloatArray, candidates: Candidates, motion: Motion, follower: str, role: str
+    time: FloatArray, candidates: Candidates, motion: MotionColumns, follower: str, role: str
 ) -> None:
     """Find what a signal follows: of its size, and earlier; a header that says so comes first."""
     output = candidates[follower][2]
@@ -185,22 +185,22 @@ def _set_point(
     )
     kind = {"command": "position", "speed_ref": "speed"}[role]
     best, most = None, _FOLLOWS
-    for name, (own, _, values) in candidates.items():
-        if name == follower or name in motion.findings or own not in {"", role}:
+    for name, (hint, _, values) in candidates.items():
+        if name == follower or name in motion.findings or hint not in {"", role}:
             continue
         lag, slope, explained = _lag(time, values, output)
-        if own != role and (lag < 0.0 or not 0.5 < slope < 2.0):
+        if hint != role and (lag < 0.0 or not 0.5 < slope < 2.0):
             continue
-        if own == role or explained > most:
+        if hint == role or explained > most:
             text = f"{follower!a} follows it {1e3 * lag:.3g} ms later, {slope:.3g} times its size"
             best, most = (name, text, explained), explained
-        if own == role:
+        if hint == role:
             break
     if best is None:
         return
     name, text, explained = best
     stated = candidates[name][1] or unit
-    finding = Finding(role, stated, reasons=[])
+    finding = ColumnFinding(role, stated, reasons=[])
     finding.reasons.append(text if explained > _FOLLOWS else f"the {kind} hardly follows it")
     motion.findings[name] = finding
 

@@ -27,7 +27,7 @@ _LEAST_TRAVEL = 0.5  # rad of the motor: less than that says nothing about a uni
 
 @dataclass(frozen=True, slots=True)
 class PositionStatement:
-    """What is said about a position column: file units per rad of the signal's own shaft, signed.
+    """What is stated about a position column: file units per rad of the signal's own shaft, signed.
 
     None where nothing is given. The own shaft is the motor's for the motor's position, the output's
     for the encoder's, whatever shaft the file refers it to.
@@ -59,7 +59,7 @@ def settle_motor(
     Parameters
     ----------
     statement : PositionStatement
-        What the user said, if anything.
+        What the caller stated, if anything.
     time : ndarray, shape (n,)
         Seconds.
     position : ndarray, shape (n,)
@@ -120,7 +120,7 @@ def settle_encoder(
     Parameters
     ----------
     statement : PositionStatement
-        What the user said, if anything.
+        What the caller stated, if anything.
     reference : ndarray, shape (n,)
         The motor's position [rad].
     position : ndarray, shape (n,)
@@ -181,9 +181,9 @@ def _against(reference: FloatArray, position: FloatArray) -> Fit:
         power = float(line @ line)
         dx, dy = dx - line * (dx @ line) / power, dy - line * (dy @ line) / power
     slope = float(dx @ dy) / float(dx @ dx)
-    rest = float(np.sqrt(np.mean((dy - slope * dx) ** 2)))
+    residual = float(np.sqrt(np.mean((dy - slope * dx) ** 2)))
     moved = abs(slope) * float(np.sqrt(np.mean(dx**2)))
-    return Fit(slope, 0.0, rest / moved if moved > 0.0 else math.inf, travel)
+    return Fit(slope, 0.0, residual / moved if moved > 0.0 else math.inf, travel)
 
 
 def _refuse_shaft(
@@ -216,7 +216,7 @@ def _check_stated(
     if slope * stated < 0.0:
         raise InputError(
             f"{statement.column}: the sign stated contradicts the log: against {against} it runs "
-            "the other way"
+            "in the other direction"
         )
     off = slope / stated
     if abs(math.log(off)) > 0.15:

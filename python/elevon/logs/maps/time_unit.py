@@ -1,4 +1,4 @@
-"""Unit of a time column: what else the log shows decides, else both readings are said."""
+"""Unit of a time column: what else the log shows decides, else both readings are stated."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ def settle_time_unit(
 
     A position and a speed whose headers state their units are consistent with one unit only. Where
     there are none the header counts, else the size of the steps; a reading that is not the only
-    possible one is said.
+    possible one is stated.
     """
     step = float(np.median(np.diff(table.columns[entry.name])))
-    shown = _by_motion(table.columns[entry.name], table, columns)
-    if shown is not None:
-        if entry.unit and entry.unit != shown:
+    consistent = _by_motion(table.columns[entry.name], table, columns)
+    if consistent is not None:
+        if entry.unit and entry.unit != consistent:
             entry.reasons.append(f"its header suggests {entry.unit}, and the motion contradicts it")
-        entry.unit = shown
-        entry.reasons.append(f"in {shown} a position is the integral of its speed")
+        entry.unit = consistent
+        entry.reasons.append(f"in {consistent} a position is the integral of its speed")
         return
     if not entry.unit:
         entry.unit = "ms" if step >= _COARSE else "s"
