@@ -58,7 +58,7 @@ def main(folder: str) -> int:
         run(elevon, "simulate", "torino-rotary", "--duration", "0.2", "--out", "run.csv")
         run(elevon, "bench", "run", "stall", "--actuator", "torino-rotary", "--out", "bench")
         run(python, "-c", SESSION)
-        said = run(
+        output = run(
             elevon,
             "simulate",
             "torino-rotary",
@@ -68,8 +68,8 @@ def main(folder: str) -> int:
             "run.parquet",
             fails=True,
         )
-        if "elevon[files]" not in said:
-            raise SystemExit(f"a command without its extra does not name it: {said}")
+        if "elevon[files]" not in output:
+            raise SystemExit(f"a command without its extra does not name it: {output}")
     print(
         "simulate, list, show, bench, sessions and CSV work without extras and without a compiler"
     )

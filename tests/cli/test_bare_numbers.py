@@ -18,7 +18,7 @@ def test_a_setting_without_a_unit_is_refused_with_both_readings(elevon_cli):
         assert part in result.err
 
 
-def test_every_change_is_said_on_stderr(elevon_cli):
+def test_every_change_is_reported_on_stderr(elevon_cli):
     changes = (
         "motor.inertia=8 kg m2",
         "friction.dynamic=0.6",
@@ -35,7 +35,7 @@ def test_every_change_is_said_on_stderr(elevon_cli):
     assert "backlash.total 0.365568 -> 0 deg, x 0" in lines
 
 
-def test_what_is_not_changed_is_not_said(elevon_cli):
+def test_what_is_not_changed_is_not_reported(elevon_cli):
     same = elevon_cli("show", "torino-rotary", "--set", "motor.inertia=7.7 kg cm2", "--json")
     assert same.err == ""
 

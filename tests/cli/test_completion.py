@@ -110,9 +110,9 @@ def test_groups_name_their_commands(capsys):
     from elevon.cli import main
 
     assert main(["reproduce", "xx"]) == 2
-    said = capsys.readouterr().err
-    assert "torino-backlash" in said
-    assert "nasa-baseline" in said
+    errors = capsys.readouterr().err
+    assert "torino-backlash" in errors
+    assert "nasa-baseline" in errors
     assert main(["reproduce", "nasa-basline"]) == 2
     assert "Did you mean nasa-baseline?" in capsys.readouterr().err
     assert main(["bench", "rnu"]) == 2

@@ -46,9 +46,9 @@ def test_waveforms(elevon_cli):
 
 
 def test_show_gives_every_number_with_its_source(elevon_cli):
-    shown = elevon_cli("show", "torino-rotary", "--json").json
-    assert len(shown["parameters"]) == len(_core.parameters("rotary"))
-    assert all(row["source"] for row in shown["parameters"])
+    listing = elevon_cli("show", "torino-rotary", "--json").json
+    assert len(listing["parameters"]) == len(_core.parameters("rotary"))
+    assert all(row["source"] for row in listing["parameters"])
     text = elevon_cli("show", "torino-rotary").out
     assert "7.7 kg cm2" in text
     assert "T1 Table 1" in text
@@ -56,8 +56,8 @@ def test_show_gives_every_number_with_its_source(elevon_cli):
 
 
 def test_show_follows_set(elevon_cli):
-    shown = elevon_cli("show", "torino-rotary", "--set", "motor.inertia=9 kg cm2", "--json").json
-    row = next(row for row in shown["parameters"] if row["path"] == "motor.inertia")
+    listing = elevon_cli("show", "torino-rotary", "--set", "motor.inertia=9 kg cm2", "--json").json
+    row = next(row for row in listing["parameters"] if row["path"] == "motor.inertia")
     assert row["value"] == 9e-4
     assert row["confidence"] == "override"
 
@@ -124,32 +124,32 @@ def test_places_that_nothing_reads_are_not_listed(elevon_cli):
     """Every shipped actuator lists a part of its wiring's catalogue."""
     every = elevon_cli("list", "faults", "--json").json["faults"]
     for name in ("torino-rotary", "nasa-ballscrew"):
-        own = elevon_cli("list", "faults", name, "--json").json["faults"]
+        faults = elevon_cli("list", "faults", name, "--json").json["faults"]
         whole = {
             (row["kind"], place)
             for row in every
-            if row["wiring"] == own[0]["wiring"]
+            if row["wiring"] == faults[0]["wiring"]
             for place in row["places"]
         }
-        shown = {(row["kind"], place) for row in own for place in row["places"]}
-        assert shown <= whole
-        assert ("short", "motor.phase_a") in shown
+        listed = {(row["kind"], place) for row in faults for place in row["places"]}
+        assert listed <= whole
+        assert ("short", "motor.phase_a") in listed
 
 
 @pytest.mark.parametrize("what", ["faults", "parameters"])
 def test_what_a_fidelity_carries_and_declines_are_the_whole(elevon_cli, what):
     """Split by --fidelity and --not-modelled, nothing is lost; every refusal has its reason."""
     whole = elevon_cli("list", what, "torino-rotary", "--json").json[what]
-    asked = ("list", what, "torino-rotary", "--fidelity", "low")
-    carried = elevon_cli(*asked, "--json").json[what]
-    not_modelled = elevon_cli(*asked, "--not-modelled", "--json").json[what]
+    words = ("list", what, "torino-rotary", "--fidelity", "low")
+    carried = elevon_cli(*words, "--json").json[what]
+    not_modelled = elevon_cli(*words, "--not-modelled", "--json").json[what]
     assert carried
     assert not_modelled
     assert all("low" in row["fidelities"] for row in carried)
     assert all(row["not_modelled"]["low"] for row in not_modelled)
     assert len(carried) + len(not_modelled) == len(whole)
     reason = not_modelled[0]["not_modelled"]["low"]
-    assert reason in elevon_cli(*asked, "--not-modelled").out
+    assert reason in elevon_cli(*words, "--not-modelled").out
 
 
 def test_faults_say_under_which_drives_they_act(elevon_cli):
@@ -168,8 +168,8 @@ def test_show_says_where_parameters_act(elevon_cli):
     """With which choice, at which fidelity and why not at the other."""
     text = elevon_cli("show", "torino-rotary").out
     assert "drive.kind = pwm" in text
-    asked = ("show", "torino-rotary", "--fidelity", "low", "--not-modelled")
-    rows = elevon_cli(*asked, "--json").json["parameters"]
+    words = ("show", "torino-rotary", "--fidelity", "low", "--not-modelled")
+    rows = elevon_cli(*words, "--json").json["parameters"]
     assert "solver.step" in [row["path"] for row in rows]
-    assert all(row["not_modelled"]["low"] in elevon_cli(*asked).out for row in rows[:1])
+    assert all(row["not_modelled"]["low"] in elevon_cli(*words).out for row in rows[:1])
     assert elevon_cli("show", "torino-rotary", "--fidelity", "lo").code == 2

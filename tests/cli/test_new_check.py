@@ -24,8 +24,8 @@ def test_the_new_file_is_its_base_until_a_line_is_changed(elevon_cli, tmp_path, 
     # every line, its # removed, is a valid entry of the same value
     free = re.sub(r"(?m)^# ([a-z_0-9]+\.[a-z_0-9.]+ = )", r"\1", text)
     (tmp_path / "free.toml").write_text(free)
-    shown = {path: item.text for path, item in given.parameters.items()}
-    assert {p: i.text for p, i in Actuator.load("free").parameters.items()} == shown
+    texts = {path: item.text for path, item in given.parameters.items()}
+    assert {p: i.text for p, i in Actuator.load("free").parameters.items()} == texts
     assert elevon_cli("new", "mine", "--from", base).code == 2
 
 

@@ -35,7 +35,7 @@ GEAR = ("simulate", "pisa-landing-gear", "--fidelity", "low")
 
 
 def test_a_gear_shows_states_by_name_and_a_timeline(elevon_cli):
-    """What a test engineer reads, recorded and printed without being asked for."""
+    """What a test engineer reads, recorded and printed without being requested."""
     out = elevon_cli(*GEAR).out
     assert "locked (7.0" in out
     assert "s after extend)" in out
@@ -131,7 +131,7 @@ BAD = {
     "rate that does not divide": ((*RUN, "--record", "output_position@300 Hz"), "nearest: 299.94"),
     "two rates": (
         (*RUN, "--record", "output_position@400 Hz", "--record", "output_position@100 Hz"),
-        "asked for twice",
+        "requested twice",
     ),
     "too much": (
         ("simulate", "torino-rotary", "--duration", "1e9", "--record", "all@every"),

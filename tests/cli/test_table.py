@@ -83,12 +83,12 @@ def test_a_value_has_the_digits_that_its_interval_supports(numbers, texts):
     assert interval_texts(*numbers) == texts
 
 
-def test_an_estimate_is_shown_in_the_unit_of_the_set():
+def test_an_estimate_is_displayed_in_the_unit_of_the_file():
     assert estimate_texts(7.7e-4, (7.6e-4, 7.8e-4), "kg m2") == ("7.70", "7.60", "7.80", "kg cm2")
     assert estimate_texts(0.03, (0.02, 0.04), "H", "mH") == ("30", "20", "40", "mH")
 
 
-def test_a_severity_is_said_in_percent_and_degrees():
+def test_a_severity_is_displayed_in_percent_and_degrees():
     assert severity_texts(0.123, (0.1, 0.15), "1") == ("12.3 %", "10.0 %", "15.0 %")
     assert severity_texts(math.radians(0.34), (math.radians(0.29), math.radians(0.41)), "rad") == (
         "0.34 deg", "0.29 deg", "0.41 deg")  # fmt: skip
@@ -97,7 +97,8 @@ def test_a_severity_is_said_in_percent_and_degrees():
 @pytest.mark.parametrize("width", [80, 100])
 @pytest.mark.parametrize("command", ["show torino-rotary", "list parameters torino-rotary"])
 def test_commands_cut_nothing_on_a_terminal(command, width):
-    """Every parameter and value of the set stands whole on a real terminal of that width."""
+    """Every parameter and value of the actuator file stands whole on a real terminal of that
+    width."""
     from elevon import Actuator
 
     text = _on_terminal(command.split(), width)

@@ -69,7 +69,7 @@ def halved(test: StandardTest) -> StandardTest:
 
 
 @pytest.mark.parametrize("name", TESTED)
-def test_some_faults_are_found_or_said_to_be_unseen(name: str) -> None:
+def test_some_faults_are_found_or_reported_as_unseen(name: str) -> None:
     """The largest severity of a few faults of the catalogue, in half of one test."""
     test = halved(standard_tests(shipped.actuator(name))[0])
     able = [fault for fault in every(None, name) if is_candidate(name, fault.key)]

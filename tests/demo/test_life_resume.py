@@ -9,10 +9,10 @@ import pytest
 from elevon import Actuator
 from elevon.cli import main
 from elevon.demo.life import run as life_run
-from elevon.demo.life.results import Said
+from elevon.demo.life.results import Statement
 from elevon.demo.life.unit import demo_mission
 from elevon.demo.results import Recovered
-from elevon.prognose import Response
+from elevon.prognose import ResponseTables
 from elevon.prognose.grid import Grid
 from elevon.prognose.life import Life
 from elevon.prognose.requirement import Requirement
@@ -26,8 +26,10 @@ def tables():
     grid = Grid(tuple(np.array([0.0, law.highest]) for law in laws))
     names = dict.fromkeys(name for law in laws for name in law.drivers)
     drivers = {name: np.full(4, 30000.0 if name == "friction_work" else 300.0) for name in names}
-    asked = (Requirement(name="backlash", measure="severity", fault=KEY, limit=0.015),)
-    return Response(laws, asked, (0.015,), ("rad",), grid, drivers, np.zeros((4, 1)), 4, "low")
+    requirements = (Requirement(name="backlash", measure="severity", fault=KEY, limit=0.015),)
+    return ResponseTables(
+        laws, requirements, (0.015,), ("rad",), grid, drivers, np.zeros((4, 1)), 4, "low"
+    )
 
 
 class Answer(SimpleNamespace):
@@ -46,7 +48,7 @@ class Answer(SimpleNamespace):
     def to_dict(self):
         cause = {"kind": "backlash", "place": "transmission", "unit": "rad", "probability": 0.9,
                  "severity": self.severity, "interval": [0.9 * self.severity, 1.1 * self.severity],
-                 "equivalents": []}  # fmt: skip
+                 "ambiguous_with": []}  # fmt: skip
         return {"status": "faulty", "faults": [cause], "best": {"faults": [KEY]}, "detectable": {}}
 
 
@@ -167,9 +169,11 @@ def test_an_edited_log_is_diagnosed_anew(story, tmp_path, monkeypatch):
 
 
 def test_what_a_diagnosis_says_comes_back_from_json():
-    said = Said.of(Answer(0.01))
-    again = Said.from_json(json.loads(json.dumps({"data": said.data, "text": said.text})))
-    assert again == said
+    statement = Statement.of(Answer(0.01))
+    again = Statement.from_json(
+        json.loads(json.dumps({"data": statement.data, "text": statement.text}))
+    )
+    assert again == statement
     assert (again.status, again.best) == ("faulty", [KEY])
 
 

@@ -89,14 +89,14 @@ def test_notebook(tmp_path, monkeypatch):
     """Every cell runs, and what it ends with can be shown as a notebook shows it."""
     monkeypatch.chdir(tmp_path)
     notebook = json.loads((EXAMPLES / "first_hour.ipynb").read_text("utf-8"))
-    names, shown = {}, []
+    names, figures = {}, []
     for cell in notebook["cells"]:
         if cell["cell_type"] == "code":
             assert not cell["outputs"], "a committed notebook has no outputs"
-            shown += _run_cell("".join(cell["source"]), names)
-    views = [item._repr_html_() for item in shown if hasattr(item, "_repr_html_")]
+            figures += _run_cell("".join(cell["source"]), names)
+    views = [item._repr_html_() for item in figures if hasattr(item, "_repr_html_")]
     assert len(views) >= 4
-    assert shown[-1] is True  # the file gives back every bit
+    assert figures[-1] is True  # the file gives back every bit
 
 
 def _run_cell(source, names):

@@ -104,7 +104,7 @@ def test_a_reversed_arm_changes_both_signs():
     one, other = (flight_load(flight(), SURFACE, arm=arm) for arm in (0.1, -0.1))
     np.testing.assert_array_equal(one.load, -other.load)
     np.testing.assert_array_equal(one.position, -other.position)
-    # The work the surface asks for does not depend on which way the ram is mounted.
+    # The work the surface needs does not depend on which way the ram is mounted.
     np.testing.assert_allclose(one.load * one.position, other.load * other.position)
 
 

@@ -108,7 +108,7 @@ def test_elastic_backlash_deflects_by_half_the_gap_plus_load_over_stiffness(sign
 
 @pytest.mark.parametrize("fidelity", ["high", "low"])
 @pytest.mark.parametrize(("name", "at"), [("torino-rotary", "2 deg"), ("nasa-ballscrew", "3 mm")])
-def test_a_run_starts_where_the_output_is_said_to_stand(name, at, fidelity):
+def test_a_run_starts_where_the_output_is_stated_to_stand(name, at, fidelity):
     """The motor stands mid-gap with it; positions further apart than the gap are refused."""
     actuator = elevon.Actuator.load(name).with_values({"backlash.model": "operator"})
     scenario = {"duration": "5 ms", "initial": {"output_position": at}}

@@ -89,7 +89,7 @@ def test_failed_switches_are_found(fault: str, action: str) -> None:
 
 
 @pytest.mark.parametrize("action", ["extend", "retract"])
-def test_a_dead_end_switch_is_told_by_the_count(action: str) -> None:
+def test_a_dead_end_switch_is_detected_by_the_count(action: str) -> None:
     """P0 or the lock's switch never comes: the nut has passed it, not for ever under current."""
     place = "proximity_100" if action == "extend" else "proximity_0"
     rec = gear((0.1, action), duration=9.0, faults=[f"proximity_off@sensor.{place}=1"],

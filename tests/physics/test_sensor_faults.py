@@ -74,7 +74,7 @@ def test_open_resolver_winding_leaves_multiples_of_half_a_turn(place: str, zero:
 
 
 @BOTH
-def test_without_excitation_the_shown_angle_stands(fidelity: str) -> None:
+def test_without_excitation_the_measured_angle_stands(fidelity: str) -> None:
     """Neither channel has a signal."""
     none = spun(fidelity, [fault("resolver_open", "sensor.resolver.excitation", 1)])
     assert np.ptp(none["resolver_position"].values) == 0.0

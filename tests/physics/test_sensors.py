@@ -43,7 +43,7 @@ def test_resolver_mismatch_is_the_angle_of_unequal_channels(lost: float) -> None
     assert np.max(np.abs(measured - true)) < math.pi / 2
 
 
-def test_resolver_offset_shifts_what_is_shown() -> None:
+def test_resolver_offset_shifts_the_measured_angle() -> None:
     """By its value, everywhere."""
     rec = swinging({"sensor.resolver.offset": 0.1}, "resolver_position,motor_position")
     measured, true = values(rec, "resolver_position", "motor_position")

@@ -30,8 +30,8 @@ def closed_loop(
     motor, rate, sum_ = output.copy(), output.copy(), output.copy()
     encoder, turned = [], []
     for t in time:
-        asked = gain * (amplitude * np.sin(2 * np.pi * FREQUENCY * t) + 0.17 - output)
-        error = asked - rate
+        torque = gain * (amplitude * np.sin(2 * np.pi * FREQUENCY * t) + 0.17 - output)
+        error = torque - rate
         push = speed * (error + sum_) - friction * np.tanh(rate / 1e-4)
         sum_ = sum_ + integral * error * STEP
         rate = rate + push * STEP
@@ -68,14 +68,14 @@ def test_exact_but_for_the_encoders_resolution(gain, integral, friction, amplitu
         np.append(backlashes, 0.0), size, gain=gain, integral=integral, friction=friction
     )
     seen = _counts(encoder)
-    held = flat_lengths(time, seen[:, -1], FREQUENCY, START).mean()
+    flat_exact = flat_lengths(time, seen[:, -1], FREQUENCY, START).mean()
     for k, backlash in enumerate(backlashes):
         found = _recover(time, encoder[:, k], encoder[:, -1], gain)
         assert abs(found.total - backlash) <= 0.005 * backlash + 1e-5
-        # A flat holds one reading that is off by half a count at most, in either run.
-        flat = flat_lengths(time, seen[:, k], FREQUENCY, START).mean()
+        # A flat holds one reading that deviates by half a count at most, in either run.
+        flat_counted = flat_lengths(time, seen[:, k], FREQUENCY, START).mean()
         counted = _recover(time, seen[:, k], seen[:, -1], gain)
-        resolution = 0.5 * COUNT * gain * (flat + held)
+        resolution = 0.5 * COUNT * gain * (flat_exact + flat_counted)
         assert abs(counted.total - backlash) <= 0.005 * backlash + 1e-5 + resolution
 
 

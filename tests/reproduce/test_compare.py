@@ -86,8 +86,8 @@ def test_every_line_of_the_catalogue_is_in_the_default_table():
     from elevon.reproduce.fault_sensitivity import ROTARY_FAULTS
 
     faults = [Fault.parse(text) for text in ROTARY_FAULTS]
-    asked = [find_record(fault.kind, fault.place, "rotary") for fault in faults]
-    assert {(record.kind, record.places) for record in asked} == {
+    records = [find_record(fault.kind, fault.place, "rotary") for fault in faults]
+    assert {(record.kind, record.places) for record in records} == {
         (record.kind, record.places) for record in catalogue("rotary")
     }
 
@@ -100,7 +100,7 @@ def test_every_shipped_actuator_says_what_it_is_compared_on():
     for name in set_names():
         actuator = elevon.Actuator.load(name)
         scenario = default_scenario(actuator)
-        assert default_start(actuator, scenario, own=True) < scenario.seconds
+        assert default_start(actuator, scenario, default=True) < scenario.seconds
         assert load_size(actuator) > 0.0
         signals = compared_signals(actuator.wiring)
         assert list(signals) == ["position", "speed", "q_current"]
@@ -111,12 +111,12 @@ def test_a_set_of_ones_own_is_compared_on_its_own_scenario():
 
     from elevon.compare import default_scenario, default_start
 
-    own = replace(elevon.Actuator.load("torino-rotary"), compare=None)
-    scenario = default_scenario(own)
+    without = replace(elevon.Actuator.load("torino-rotary"), compare=None)
+    scenario = default_scenario(without)
     assert scenario.seconds == 10.0
-    assert default_start(own, scenario, own=True) == pytest.approx(10.0 / 3.0)
-    assert default_start(own, scenario, own=False) == 10.0
-    bare = replace(own, default_scenario=None)
+    assert default_start(without, scenario, default=True) == pytest.approx(10.0 / 3.0)
+    assert default_start(without, scenario, default=False) == 10.0
+    bare = replace(without, default_scenario=None)
     assert default_scenario(bare).text == "loaded campaign, 1 N m of brake"
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from elevon.reproduce.compliance.slips import Drop, find_slips, printed_drops
+from elevon.reproduce.compliance.slips import WeightDrop, find_slips, printed_drops
 
 ENDS = (0.018432, -0.2304, -0.22118, -0.22118)
 
@@ -14,7 +14,7 @@ def _sound():
     for k in range(20):
         motor = -0.15 - 0.021 * k + 0.0013 * (k * 7 % 5)
         encoder = ENDS[k % 4]
-        drops.append(Drop(k + 1, 5.0 * (k // 4 + 1), motor, encoder, abs(encoder - motor)))
+        drops.append(WeightDrop(k + 1, 5.0 * (k // 4 + 1), motor, encoder, abs(encoder - motor)))
     return drops
 
 
@@ -51,5 +51,5 @@ def test_a_planted_slip_is_found_and_mended(row, kind, spoil):
 def test_the_printed_table_is_left_as_printed():
     drops = printed_drops()
     assert len(drops) == 40
-    assert drops[0] == Drop(1, 5.09, -0.15245, 0.18432, 0.33677)
+    assert drops[0] == WeightDrop(1, 5.09, -0.15245, 0.18432, 0.33677)
     assert drops[28].encoder_deg == 0.546464

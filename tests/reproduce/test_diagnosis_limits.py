@@ -19,9 +19,9 @@ from elevon.reproduce.diagnosis_limits.unit import draw_unit, of_the_day
 UNITS = 8
 
 
-def answer(*best, status="faulty", equivalents=()):
+def answer(*best, status="faulty", ambiguous_with=()):
     causes = tuple(
-        Cause(kind, place, "1", 0.9, value, (value - 1e-3, value + 1e-3), equivalents)
+        Cause(kind, place, "1", 0.9, value, (value - 1e-3, value + 1e-3), ambiguous_with)
         for kind, place, value in best
     )
     keys = tuple(f"{kind}@{place}" for kind, place, _ in best)
@@ -65,15 +65,15 @@ def test_an_answer_counts_only_when_it_names_all_and_nothing_else():
         Injected("short", "motor.phase_b", 0.2),
     )
     places = (("short", "motor.phase_b"), ("short", "motor.phase_c"))
-    said = answer(("short", "motor.phase_a", 0.2), equivalents=places)
+    given = answer(("short", "motor.phase_a", 0.2), ambiguous_with=places)
     row = {"test": "noload", "group": "single", "unit": 0}
-    assert judged(said, "x", **row, truth=[short]).named
-    assert not judged(said, "x", **row, truth=[backlash]).named
-    assert not judged(said, "x", **row, truth=[short, backlash]).named
-    other = answer(("short", "motor.phase_a", 0.2), equivalents=(*places, ("friction", "x")))
+    assert judged(given, "x", **row, truth=[short]).named
+    assert not judged(given, "x", **row, truth=[backlash]).named
+    assert not judged(given, "x", **row, truth=[short, backlash]).named
+    other = answer(("short", "motor.phase_a", 0.2), ambiguous_with=(*places, ("friction", "x")))
     assert not judged(other, "x", **row, truth=[short]).named
-    assert not judged(replace(said, status="healthy"), "x", **row, truth=[short]).named
-    healthy = judged(said, "x", **row, truth=[])
+    assert not judged(replace(given, status="healthy"), "x", **row, truth=[short]).named
+    healthy = judged(given, "x", **row, truth=[])
     assert healthy.alarm
     assert not healthy.named
 

@@ -10,7 +10,7 @@ from elevon.reproduce import fault_limits
 from elevon.reproduce.fault_limits import (
     FaultLimits,
     Limit,
-    Plan,
+    LimitsPlan,
     default_actuators,
     names_it,
     reproduce_fault_limits,
@@ -19,8 +19,8 @@ from elevon.reproduce.fault_limits_table import limits_table
 
 
 def limit(**given):
-    own = {"actuator": "a", "test": "t", "kind": "backlash", "place": "transmission", "unit": "m"}
-    return Limit(**{**own, "limit": 1e-3, **given})
+    entry = {"actuator": "a", "test": "t", "kind": "backlash", "place": "transmission", "unit": "m"}
+    return Limit(**{**entry, "limit": 1e-3, **given})
 
 
 def test_a_fault_counts_where_it_is_named_or_equivalent():
@@ -49,46 +49,48 @@ def test_standard_tests_are_those_that_ask_for_a_motion():
     assert ["backlash", "chirp", "loaded-1"] in names.values()
     assert all(names.values())
     assert not any(
-        "heating" in name or name.startswith("ff") for own in names.values() for name in own
+        "heating" in name or name.startswith("ff") for listed in names.values() for name in listed
     )
 
 
 def test_bad_plans_are_refused():
     with pytest.raises(InputError, match="at least one"):
-        reproduce_fault_limits(Plan(days=0))
+        reproduce_fault_limits(LimitsPlan(days=0))
     with pytest.raises(UnknownNameError):
-        reproduce_fault_limits(Plan(fidelity="middle"))
+        reproduce_fault_limits(LimitsPlan(fidelity="middle"))
 
 
 def test_what_is_finished_is_not_run_again(tmp_path, monkeypatch):
-    asked = []
+    calls = []
 
     def once(actuator, test, plan, progress):
-        asked.append(test.name)
-        if len(asked) == 2:
+        calls.append(test.name)
+        if len(calls) == 2:
             raise Interrupted("stopped")
         return [limit(actuator=actuator.name, test=test.name)], 1
 
     monkeypatch.setattr(fault_limits, "_test_limits", once)
     given = {"actuators": ["torino-rotary"], "folder": tmp_path}
     with pytest.raises(Interrupted):
-        reproduce_fault_limits(Plan(days=3), **given)
-    result = reproduce_fault_limits(Plan(days=3), **given)
-    assert asked == ["backlash", "chirp", "chirp", "loaded-1"]
+        reproduce_fault_limits(LimitsPlan(days=3), **given)
+    result = reproduce_fault_limits(LimitsPlan(days=3), **given)
+    assert calls == ["backlash", "chirp", "chirp", "loaded-1"]
     assert result.healthy == {"torino-rotary": (3, 9)}
     assert [row.test for row in result.limits] == ["backlash", "chirp", "loaded-1"]
     assert result.limits[0] == limit(actuator="torino-rotary", test="backlash")
-    reproduce_fault_limits(Plan(days=4), **given)  # other work
-    assert len(asked) == 7
+    reproduce_fault_limits(LimitsPlan(days=4), **given)  # other work
+    assert len(calls) == 7
 
 
 def test_a_stop_is_heard_between_logs(monkeypatch):
     actuator = Actuator.load("torino-rotary")
     test = standard_tests(actuator)[0]
-    monkeypatch.setattr(fault_limits, "day_logs", lambda a, t, days, *rest: [None] * len(days))
+    monkeypatch.setattr(fault_limits, "day_logs", lambda a, t, days, *options: [None] * len(days))
     monkeypatch.setattr(fault_limits, "diagnosed", lambda *given: None)
     with pytest.raises(Interrupted, match="finished tests"):
-        fault_limits._test_limits(actuator, test, Plan(days=3), lambda fraction: fraction < 0.5)
+        fault_limits._test_limits(
+            actuator, test, LimitsPlan(days=3), lambda fraction: fraction < 0.5
+        )
 
 
 def test_the_table_has_each_fault_in_each_test():

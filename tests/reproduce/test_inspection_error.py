@@ -26,9 +26,9 @@ LAW = {fault.law: fault for fault in FAULTS}
 
 
 def test_an_inspection_is_one_log_a_test_of_one_day_and_no_day_comes_twice():
-    own = visits(5, 2)
-    assert len(own) == 40
-    for visit in own:
+    of_fault = visits(5, 2)
+    assert len(of_fault) == 40
+    for visit in of_fault:
         assert [t.test for t in visit.trials] == ["noload", "chirp", "loaded"]
         assert len({t.day for t in visit.trials}) == 1
         assert len({t.seed for t in visit.trials}) == 3
@@ -37,7 +37,7 @@ def test_an_inspection_is_one_log_a_test_of_one_day_and_no_day_comes_twice():
     assert len(set(days)) == 2 * (BASELINES + 40)
     seeds = [t.seed for u in (2, 3) for v in visits(5, u) for t in v.trials]
     assert len(set(seeds)) == len(seeds)
-    severities = {v.severity for v in own if v.law == "insulation" and v.level == 0}
+    severities = {v.severity for v in of_fault if v.law == "insulation" and v.level == 0}
     assert len(severities) == 1
     assert severities.pop() == pytest.approx(0.05, rel=0.11)
 
@@ -61,8 +61,10 @@ def test_the_fit_recovers_what_the_errors_were_drawn_with():
     low, high = fitted_interval(groups[:12], seed=0)
     assert low.relative < 0.04 < high.relative
     assert low.common_relative < 0.05 < high.common_relative
-    said = np.array([0.1, 0.3, 1.0, 2.0])
-    assert stated(said, np.hypot(0.08 * said, 0.02)) == pytest.approx((0.08, 0.02), rel=1e-3)
+    estimates = np.array([0.1, 0.3, 1.0, 2.0])
+    assert stated(estimates, np.hypot(0.08 * estimates, 0.02)) == pytest.approx(
+        (0.08, 0.02), rel=1e-3
+    )
 
 
 def drawn(seed, *, worse=1.0, units=6):
@@ -73,12 +75,14 @@ def drawn(seed, *, worse=1.0, units=6):
             common = (*rng.standard_normal(2), 0.04 / np.sqrt(3.0) * rng.standard_normal())
             for level, severity in enumerate(LAW[law].levels):
                 for k in range(DAYS):
-                    said = severity + worse * (error.said(severity, common, rng) - severity)
-                    deviation = float(error.stated(np.array(said)))
+                    estimates = severity + worse * (
+                        error.estimate_of(severity, common, rng) - severity
+                    )
+                    deviation = float(error.stated(np.array(estimates)))
                     days = DAYS if law == "lubricant_loss" and k == 0 else 1
                     out.append(
                         Inspected(f"{unit}-{law}-{level}-{k}", unit, law, level, severity, days,
-                                  1.0, said, deviation, deviation, error.detectable, ())
+                                  1.0, estimates, deviation, deviation, error.detectable, ())
                     )  # fmt: skip
     return tuple(out)
 

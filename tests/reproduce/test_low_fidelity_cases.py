@@ -1,4 +1,4 @@
-"""The three cases in which the low model must hold."""
+"""The three cases in which the reduced-order model must hold."""
 
 import json
 

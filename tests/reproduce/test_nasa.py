@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import elevon
-from elevon.reproduce.nasa import Capability, Profile, profile_scenario, reproduce_baseline
+from elevon.reproduce.nasa import Capability, MotionProfile, profile_scenario, reproduce_baseline
 from elevon.reproduce.nasa.baseline import baseline_matrix
 from elevon.reproduce.nasa.features import orders
 
@@ -25,7 +25,7 @@ def statistics(
     fault: str | None = None, load: float = 4500.0, **profile: Any
 ) -> tuple[float, float]:
     """RMS current and RMS tracking error of a loaded sine after its first two seconds."""
-    data = profile_scenario(Profile("sinusoidal", 0.05, 0.06, SHORT), load)
+    data = profile_scenario(MotionProfile("sinusoidal", 0.05, 0.06, SHORT), load)
     scenario = elevon.Scenario.from_dict({**data, **({"fault": [fault]} if fault else {})})
     rec = elevon.simulate(actuator(), scenario, record=RUNS)
     late = rec["command"].time > 2.0
@@ -65,9 +65,9 @@ def test_the_matrix_decouples_amplitude_and_rate() -> None:
 def test_rows_are_what_the_command_prints(load_kind: Any) -> None:
     """A few short cases: names, units and statuses of the row."""
     cases = [
-        (Profile("sinusoidal", 0.05, 0.06, SHORT), 4500.0),
-        (Profile("rectangular", 0.05, 0.06, SHORT), 500.0),
-        (Profile("trapezoidal", 0.05, 0.20, SHORT), 500.0),
+        (MotionProfile("sinusoidal", 0.05, 0.06, SHORT), 4500.0),
+        (MotionProfile("rectangular", 0.05, 0.06, SHORT), 500.0),
+        (MotionProfile("trapezoidal", 0.05, 0.20, SHORT), 500.0),
     ]
     result = reproduce_baseline(cases=cases, load_kind=load_kind, replicates=1)
     rows = result.to_dict()["rows"]
@@ -93,13 +93,13 @@ def test_limits_follow_the_voltage_circle_and_the_current() -> None:
     assert able.acceleration(8500.0) == pytest.approx(2.6, abs=0.1)
     weak = Capability.of(actuator({"inverter.supply_voltage": 120.0}))
     assert weak.rate(8500.0)[1] == "inverter.supply_voltage"
-    reason = weak.refusal(Profile("triangular", 0.05, 0.12, 30.0), 8500.0)
+    reason = weak.refusal(MotionProfile("triangular", 0.05, 0.12, 30.0), 8500.0)
     assert reason is not None
     assert "inverter.supply_voltage" in reason
 
 
 def test_the_limit_of_the_voltage_is_where_the_motor_stops_following() -> None:
-    """Asked for 1.15 times the voltage's rate it stays near that rate; asked for 0.9 it follows."""
+    """Requested 1.15 times the voltage's rate it stays near that rate; requested 0.9 it follows."""
     weak = actuator({"inverter.supply_voltage": 120.0})
     rate = Capability.of(weak).voltage_rate(4500.0)
     reached = {}
@@ -135,7 +135,7 @@ def test_what_cannot_be_followed_is_refused_with_its_limit(
 ) -> None:
     """Value, limit and what sets it."""
     with pytest.raises(elevon.InputError) as caught:
-        Capability.of(actuator()).check(Profile(*profile, 30.0), load)
+        Capability.of(actuator()).check(MotionProfile(*profile, 30.0), load)
     for word in words:
         assert word in str(caught.value)
 
@@ -144,9 +144,9 @@ def test_wrong_profiles_are_refused() -> None:
     """Unknown name, no rate, a spring without stroke, an actuator without screw."""
     for arguments in (("sinus", 0.05, 0.06, 1.0), ("triangular", 0.05, 0.0, 1.0)):
         with pytest.raises(elevon.InputError):
-            Profile(*arguments)
+            MotionProfile(*arguments)
     with pytest.raises(elevon.InputError, match="spring"):
-        profile_scenario(Profile("rectangular", 0.0, 0.06, 1.0), 500.0, "spring")
+        profile_scenario(MotionProfile("rectangular", 0.0, 0.06, 1.0), 500.0, "spring")
     with pytest.raises(elevon.InputError, match="ballscrew"):
         Capability.of(elevon.Actuator.load("torino-rotary"))
 
@@ -156,7 +156,7 @@ def test_wrong_profiles_are_refused() -> None:
 )
 def test_profiles_are_what_they_say(name: str) -> None:
     """Start at mid-stroke (a jump jumps), reach the amplitude, keep the rate."""
-    profile = Profile(name, 0.05, 0.06, 12.0)
+    profile = MotionProfile(name, 0.05, 0.06, 12.0)
     rec = elevon.simulate(
         actuator(),
         elevon.Scenario.from_dict(profile_scenario(profile)),

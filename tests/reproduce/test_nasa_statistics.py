@@ -10,7 +10,7 @@ import pytest
 import elevon
 from elevon.errors import Interrupted, OutputExistsError
 from elevon.reproduce.nasa.design import (
-    Factor,
+    TwoLevelFactor,
     coverage,
     fit_effects,
     model_matrix,
@@ -29,7 +29,7 @@ from elevon.reproduce.nasa.population import SPREADS, draw_units
 from elevon.reproduce.nasa.separation import FAULTS, reproduce_separation
 from elevon.reproduce.nasa.store import CellStore
 
-FACTORS = (Factor("load", "low", "high"), Factor("rate", "slow", "fast"))
+FACTORS = (TwoLevelFactor("load", "low", "high"), TwoLevelFactor("rate", "slow", "fast"))
 
 
 def binomial(share: float, count: int) -> float:
@@ -46,8 +46,8 @@ def test_intervals_hold_the_true_effect_at_their_level(truth: float) -> None:
         scale.effect(rng.normal(5.0, 0.2, 40), rng.normal(5.0 + 0.2 * truth, 0.4, 12))
         for _ in range(400)
     ]
-    held = np.mean([e.low <= truth <= e.high for e in found])
-    assert abs(held - 0.9) < binomial(0.9, 400)
+    coverage = np.mean([e.low <= truth <= e.high for e in found])
+    assert abs(coverage - 0.9) < binomial(0.9, 400)
     assert np.mean([e.size for e in found]) == pytest.approx(truth, rel=0.03, abs=0.1)
 
 
@@ -55,7 +55,7 @@ def test_a_feature_that_does_not_vary_has_no_effect() -> None:
     """No scale, no number; nothing is shown."""
     effect = EffectScale(8, 4, 0.9).effect(np.ones(8), np.full(4, 2.0))
     assert np.isnan(effect.size)
-    assert not effect.shown
+    assert not effect.significant
 
 
 def test_a_winner_needs_an_interval_above_all_others() -> None:
@@ -84,7 +84,7 @@ def test_a_winner_is_one_that_another_experiment_would_name() -> None:
         assert (best.factor <= 1.0) == (winner is not None)
 
 
-def test_healthy_against_healthy_passes_the_threshold_as_rarely_as_said() -> None:
+def test_healthy_against_healthy_passes_the_threshold_as_rarely_as_stated() -> None:
     """Rayleigh amplitudes in their root's scale, groups as of the command: at most 1 % below 0.01.
 
     A fault of a deviation and a half is not missed for it.
@@ -175,7 +175,7 @@ def test_winners_agree_over_five_seeds() -> None:
 
 
 @pytest.mark.long
-def test_the_gap_is_shown_by_the_trapezoid_under_load(tmp_path: Path) -> None:
+def test_the_gap_shows_in_the_trapezoid_under_load(tmp_path: Path) -> None:
     """One fault, two profiles, one load: winner, half below whole, going on after a stop."""
 
     def stop(fraction: float) -> bool:

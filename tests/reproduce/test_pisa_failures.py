@@ -34,10 +34,10 @@ def test_a_slipping_brake_never_gives_a_false_indication() -> None:
     assert [row["phase"] for row in values["rows"]] == [phase.name for phase in PHASES]
     assert all(set(row) >= COLUMNS for row in values["rows"])
     assert all(row["safe"] for row in values["rows"])
-    rest = {row["phase"]: row for row in values["rows"]}["at rest, retracted"]
-    assert rest["indicated"] == "fault"
-    assert rest["detected_by"] == "fault: uncommanded motion"
-    assert 0.0 < rest["time_s"] < 0.3
+    at_rest = {row["phase"]: row for row in values["rows"]}["at rest, retracted"]
+    assert at_rest["indicated"] == "fault"
+    assert at_rest["detected_by"] == "fault: uncommanded motion"
+    assert 0.0 < at_rest["time_s"] < 0.3
     assert "at rest, retracted" in failures_report(result, date="2000-01-01").html()
     assert len(summary(result)[1]) == len(PHASES)
     assert matrix(result).splitlines()[2] in PAGE.read_text(encoding="utf-8")

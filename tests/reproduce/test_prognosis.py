@@ -10,12 +10,16 @@ import pytest
 from elevon import Actuator
 from elevon.cli import main
 from elevon.errors import InputError, Interrupted
-from elevon.prognose import Response
+from elevon.prognose import ResponseTables
 from elevon.prognose.grid import Grid
 from elevon.prognose.life import Life
 from elevon.prognose.metrics import Track
 from elevon.reproduce.prognosis import campaign
-from elevon.reproduce.prognosis.campaign import Plan, campaign_mission, reproduce_prognosis
+from elevon.reproduce.prognosis.campaign import (
+    InspectionPlan,
+    campaign_mission,
+    reproduce_prognosis,
+)
 from elevon.reproduce.prognosis.result import PrognosisResult, UnitResult
 from elevon.reproduce.prognosis.truth import (
     BASELINE_DAYS,
@@ -47,60 +51,70 @@ def inspected(truth, count=1000, **options):
 
 
 def test_the_next_inspection_is_due_in_a_tenth_of_what_is_surely_left():
-    plan = Plan(interval=100.0, soonest=10.0)
+    plan = InspectionPlan(interval=100.0, soonest=10.0)
     assert [plan.wait(least) for least in (1e7, 500.0, 50.0, 0.0)] == [100.0, 50.0, 10.0, 10.0]
 
 
-def test_inspections_err_as_said_and_name_what_they_do_not_see():
+def test_inspections_err_as_stated_and_name_what_they_do_not_see():
     base = Actuator.load("torino-rotary")
     usage = np.linspace(0.0, 1e5, 50)
     life = Life(usage, np.full((50, 1), 0.2), 1e5, 0)
     truth = UnitTruth(2, "insulation", life, base)
     seen = inspected(truth)
-    shown = np.array([item.seen["short@motor.phase_a"].severity for item in seen])
+    severities = np.array([item.seen["short@motor.phase_a"].severity for item in seen])
     drawn = INSPECTIONS["insulation"]
-    offset = shown.mean() - 0.2 - float(drawn.mean(np.array(0.2)))
+    offset = severities.mean() - 0.2 - float(drawn.mean(np.array(0.2)))
     assert abs(offset) < 3.0 * float(drawn.common(np.array(0.2)))
-    assert shown.std() == pytest.approx(float(drawn.own(np.array(0.2))), rel=0.1)
+    assert severities.std() == pytest.approx(float(drawn.per_visit(np.array(0.2))), rel=0.1)
     stated = [item.seen["short@motor.phase_a"].high for item in seen]
-    np.testing.assert_allclose(stated, drawn.stated(shown), rtol=1e-6)
+    np.testing.assert_allclose(stated, drawn.stated(severities), rtol=1e-6)
     assert all(item.seen["backlash@transmission"].severity is None for item in seen)
 
 
-def test_friction_is_said_against_the_healthy_days_and_not_beyond_what_diagnosis_looks_at():
+def test_friction_is_stated_against_the_healthy_days_and_not_beyond_what_diagnosis_looks_at():
     """(1 + said) scatters as (1 + severity) does; an edge leaves open what is above it."""
     drawn, rng = INSPECTIONS["lubricant_loss"], np.random.default_rng(0)
-    said = np.array([drawn.said(1.0, (0.0, 0.0, 0.03), rng) for _ in range(2000)])
-    day = np.log1p(said - float(drawn.mean(np.array(1.0)))) - np.log(2.0)
+    drawn_values = np.array([drawn.estimate_of(1.0, (0.0, 0.0, 0.03), rng) for _ in range(2000)])
+    day = np.log1p(drawn_values - float(drawn.mean(np.array(1.0)))) - np.log(2.0)
     assert day.mean() == pytest.approx(-0.03, abs=0.002)
     whole = np.hypot(drawn.of_the_day / np.sqrt(INSPECTION_DAYS), 0.5 * drawn.absolute)
     assert day.std() == pytest.approx(whole, rel=0.08)
     base, usage = Actuator.load("torino-rotary"), np.linspace(0.0, 1e4, 50)
     truth = UnitTruth(1, "lubricant_loss", Life(usage, np.full((50, 1), 2.6), 1e4, 0), base)
-    own = inspected(truth, 100)
-    seen = [item.seen["friction@transmission"] for item in own]
+    inspections = inspected(truth, 100)
+    seen = [item.seen["friction@transmission"] for item in inspections]
     assert max(item.severity for item in seen) == 2.0
     assert np.median([item.high for item in seen]) > 2.0
 
 
 def test_measured_requirements_are_the_truths_with_the_scatter_of_a_day():
     base, usage = Actuator.load("torino-rotary"), np.linspace(0.0, 1e5, 50)
-    asked = campaign_mission().requirement[:2]
+    requirements = campaign_mission().requirement[:2]
     law = campaign_mission().laws()[0]
     grid = Grid((np.array([0.0, law.highest]),))
     values = np.array([[0.02, 0.5], [0.06, 0.7]])
-    response = Response(
-        (law,), asked, (0.02, 0.88), ("rad", "A"), grid, {"hours": np.ones(2)}, values, 2, "high"
+    response = ResponseTables(
+        (law,),
+        requirements,
+        (0.02, 0.88),
+        ("rad", "A"),
+        grid,
+        {"hours": np.ones(2)},
+        values,
+        2,
+        "high",
     )
     life = Life(usage, np.full((50, 1), 0.25 * law.highest), 1e5, 0)
     truth = UnitTruth(0, "gear_wear", life, base, response)
-    seen, told = inspected(truth), inspected(truth, measured=True)
-    assert [item.seen for item in told] == [item.seen for item in seen]
+    seen, measured = inspected(truth), inspected(truth, measured=True)
+    assert [item.seen for item in measured] == [item.seen for item in seen]
     for name, value, spread in (("tracking error", 0.03, 0.002), ("current", 0.55, 0.024)):
-        shown = np.array([item.measured[name].value for item in told])
-        assert shown.mean() == pytest.approx(value, rel=3.0 * spread / np.sqrt(len(shown)))
-        assert shown.std() == pytest.approx(spread * value, rel=0.1)
-        assert told[0].measured[name].deviation == pytest.approx(spread * value)
+        severities = np.array([item.measured[name].value for item in measured])
+        assert severities.mean() == pytest.approx(
+            value, rel=3.0 * spread / np.sqrt(len(severities))
+        )
+        assert severities.std() == pytest.approx(spread * value, rel=0.1)
+        assert measured[0].measured[name].deviation == pytest.approx(spread * value)
 
 
 def test_the_calibrated_set_has_the_friction_of_the_healthy_days():
@@ -144,11 +158,11 @@ def test_too_few_histories_are_refused():
 
 def test_an_interrupted_campaign_goes_on_from_its_finished_histories(tmp_path, monkeypatch):
     """Each history is done once, and what is noted gives the same figures to the last bit."""
-    asked = []
+    calls = []
 
     def history(number, seed, _expected, *, measured):
         assert not measured
-        asked.append(number)
+        calls.append(number)
         if number == 4:
             return {"left_out": "history 4: no inspection"}
         return {"unit": unit(FAULTS[number % 3], 0.01 * number + 1e-3 * seed, number).noted()}
@@ -159,13 +173,13 @@ def test_an_interrupted_campaign_goes_on_from_its_finished_histories(tmp_path, m
     whole = reproduce_prognosis(**work)
     with pytest.raises(Interrupted):
         reproduce_prognosis(**work, folder=tmp_path, progress=lambda done: done < 0.4)
-    assert asked[6:] == [0, 1, 2]
+    assert calls[6:] == [0, 1, 2]
     again = reproduce_prognosis(**work, folder=tmp_path)
-    assert asked[9:] == [3, 4, 5]
+    assert calls[9:] == [3, 4, 5]
     assert {**again.to_dict(), "seconds": 0.0} == {**whole.to_dict(), "seconds": 0.0}
     assert again.left_out == ("history 4: no inspection",)
     assert len(reproduce_prognosis(**{**work, "histories": 3}, folder=tmp_path).units) == 3
-    assert len(asked) == 12
+    assert len(calls) == 12
 
 
 @pytest.mark.parametrize("processes", [1, 2])
@@ -179,12 +193,12 @@ def test_work_side_by_side_is_the_same_work(processes):
 
 @pytest.mark.long
 def test_the_command(tmp_path, capsys):
-    asked = ["reproduce", "prognosis", "--histories", "3", "--out", str(tmp_path), "--json"]
-    code = main(asked)
+    words = ["reproduce", "prognosis", "--histories", "3", "--out", str(tmp_path), "--json"]
+    code = main(words)
     values = json.loads(capsys.readouterr().out)
     assert code in (0, 1)  # three lives decide nothing
     assert [row["law"] for row in values["rows"]] == list(FAULTS)
     assert (tmp_path / "report.html").is_file()
-    assert main([*asked, "--force", "--processes", "1"]) == code
+    assert main([*words, "--force", "--processes", "1"]) == code
     again = json.loads(capsys.readouterr().out)
     assert {**again, "seconds": 0.0} == {**values, "seconds": 0.0}  # from the finished histories

@@ -36,9 +36,9 @@ def test_gallery():
     result = reproduce_signatures()
     assert result.to_dict()["status"] == "pass"
     for name in ACTUATORS:
-        shown = {item.kind for item in result.signatures if item.actuator == name}
+        kinds = {item.kind for item in result.signatures if item.actuator == name}
         records = catalogue(Actuator.load(name).wiring)
-        assert shown == {record.kind for record in records if "high" in record.fidelities}
+        assert kinds == {record.kind for record in records if "high" in record.fidelities}
     again = reproduce_signatures(("torino-rotary",))
     first = {i.kind: i.changes for i in result.signatures if i.actuator == "torino-rotary"}
     assert {i.kind: i.changes for i in again.signatures} == first

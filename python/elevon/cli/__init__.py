@@ -1,4 +1,4 @@
-"""Command line: a table of command modules, each loaded only when its command is asked for.
+"""Command line: a table of command modules, each loaded only when its command is requested.
 
 A command is one module with a `typer.Typer` named ``app``. To add one, add a line to
 `elevon.cli.registry.COMMANDS`.

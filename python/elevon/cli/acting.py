@@ -25,7 +25,7 @@ class Acting(Protocol):
 
 
 def check(fidelity: str | None, wirings: Sequence[str]) -> None:
-    """Raise `UnknownNameError` for a fidelity that a wiring has not; None asks for none."""
+    """Raise `UnknownNameError` for a fidelity that a wiring has not; None requests none."""
     from elevon.simulate import check_fidelity
 
     for wiring in wirings if fidelity is not None else ():
@@ -43,9 +43,9 @@ def by_drive(actuator: Actuator, record: FaultRecord) -> dict[str, Any]:
     """Drives under which a fault of an actuator acts, and where it rests with the reasons."""
     from elevon.simulate.own_faults import resting, shown_drives
 
-    rest = resting(actuator, record)
+    neutral = resting(actuator, record)
     drives = shown_drives(actuator)
-    idle = {(item.fidelity, item.drive, item.place) for item in rest}
+    idle = {(item.fidelity, item.drive, item.place) for item in neutral}
     acting = {
         fidelity: [
             drive
@@ -58,7 +58,7 @@ def by_drive(actuator: Actuator, record: FaultRecord) -> dict[str, Any]:
         "drives": {
             fidelity: [name for name in names if name] for fidelity, names in acting.items()
         },
-        "resting": [vars(item) for item in rest],
+        "resting": [vars(item) for item in neutral],
         "acts": " ".join(_words(fidelity, names) for fidelity, names in acting.items() if names),
     }
 

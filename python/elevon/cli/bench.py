@@ -87,17 +87,17 @@ def run(
     from elevon.faults import Fault
     from elevon.logs.formats.drive import DriveFormat
 
-    asked = load_procedure(procedure)
+    procedure_document = load_procedure(procedure)
     loaded = read_actuator(actuator, settings)
     ratio = loaded.parameters.value("gear.ratio") if "gear.ratio" in loaded.parameters else 1.0
     layout = DriveFormat(encoder_shaft=shaft, current_convention=current, gear_ratio=ratio)
     faults = [Fault.parse(text) for text in fault or ()]
     with (
-        interrupt.telling(lambda: _story(out, asked, force=force)),
-        progress_bar(f"bench: {asked.name}") as advance,
+        interrupt.telling(lambda: _story(out, procedure_document, force=force)),
+        progress_bar(f"bench: {procedure_document.name}") as advance,
     ):
         result = run_procedure(
-            asked,
+            procedure_document,
             loaded,
             out,
             faults=faults,

@@ -129,7 +129,7 @@ def direct_logs(
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _Options:
     """What is to be estimated, and where it goes."""
 
     free: list[str] | None
@@ -170,61 +170,63 @@ def calibrate(
     model = read_actuator(actuator, settings)
     if len(logs) == 1 and is_drop_table(logs[0]):
         return _drops(logs[0], model, out, as_json=json, force=force)
-    asked = _Asked(_paths(free), per_log or [], fidelity, transient, out, report, json, force, date)
+    options = _Options(
+        _paths(free), per_log or [], fidelity, transient, out, report, json, force, date
+    )
     way = way_by_parts(logs, model, column_map, fidelity)
     if way is not None:
-        return _by_parts(way, model, asked)
+        return _by_parts(way, model, options)
     data = direct_logs(model, logs, loadcell, command, column_map)
     if data is None:
-        return _in_closed_loop(logs, model, column_map, asked)
-    return _directly(data, model, asked)
+        return _in_closed_loop(logs, model, column_map, options)
+    return _directly(data, model, options)
 
 
-def _by_parts(way: Way, model: Actuator, asked: _Asked) -> int:
+def _by_parts(way: Way, model: Actuator, options: _Options) -> int:
     """Logs by roles: each number from its own balance."""
-    if asked.transient is not None or (asked.fidelity != "low" and not way.runs):
+    if options.transient is not None or (options.fidelity != "low" and not way.runs):
         say("--transient, and --fidelity without model runs: not used for these logs")
     return calibrate_by_parts(
-        way, model, free=asked.free, out=asked.out, report=asked.report, as_json=asked.as_json,
-        force=asked.force, date=asked.date,
+        way, model, free=options.free, out=options.out, report=options.report,
+        as_json=options.as_json, force=options.force, date=options.date,
     )  # fmt: skip
 
 
 def _in_closed_loop(
-    logs: list[Path], model: Actuator, column_map: Path | None, asked: _Asked
+    logs: list[Path], model: Actuator, column_map: Path | None, options: _Options
 ) -> int:
     """Logs with few channels."""
-    check_loop_options(asked.fidelity, asked.per_log)
+    check_loop_options(options.fidelity, options.per_log)
     return calibrate_closed_loop(
-        read_loop_logs(logs, column_map), model, asked.out, free=asked.free,
-        transient=asked.transient, report=asked.report, as_json=asked.as_json, force=asked.force,
-        date=asked.date,
+        read_loop_logs(logs, column_map), model, options.out, free=options.free,
+        transient=options.transient, report=options.report, as_json=options.as_json,
+        force=options.force, date=options.date,
     )  # fmt: skip
 
 
-def _directly(data: list[BenchLog], model: Actuator, asked: _Asked) -> int:
+def _directly(data: list[BenchLog], model: Actuator, options: _Options) -> int:
     """Logs whose signals allow direct estimates."""
     from elevon.calibrate.calibration import calibrate as run
     from elevon.calibrate.write import write_calibration
 
     with progress_bar("calibrating") as advance:
         result = run(
-            data, model, free=asked.free, per_log=asked.per_log, fidelity=asked.fidelity,
-            transient=asked.transient, progress=lambda f: advance(0.9 * f),
+            data, model, free=options.free, per_log=options.per_log, fidelity=options.fidelity,
+            transient=options.transient, progress=lambda f: advance(0.9 * f),
         )  # fmt: skip
-        before, after = _agreement(data, result, asked.transient)
+        before, after = _agreement(data, result, options.transient)
         advance(0.95)
         promise = after
-        if asked.out is not None and after is not None:
-            promise = _promise(data, model, asked.free, after)
+        if options.out is not None and after is not None:
+            promise = _promise(data, model, options.free, after)
         advance(1.0)
-    if asked.out is not None:
-        path = write_calibration(asked.out, result, validation=promise, force=asked.force)
+    if options.out is not None:
+        path = write_calibration(options.out, result, validation=promise, force=options.force)
         say(f"set: {path}")
-    if asked.report is not None:
-        page = _page(result, before, after, asked.date)
-        say(f"report: {page.save(asked.report, force=asked.force)}")
-    _print(result, before, after, asked.out, as_json=asked.as_json)
+    if options.report is not None:
+        page = _page(result, before, after, options.date)
+        say(f"report: {page.save(options.report, force=options.force)}")
+    _print(result, before, after, options.out, as_json=options.as_json)
     return 0
 
 
@@ -283,13 +285,13 @@ def _promise(
     """What the thresholds come from: logs held out, or where there is one log, that log."""
     from elevon.calibrate.promise import held_out_agreement, outliers
 
-    held = held_out_agreement(data, model, free, after)
-    if held is None:
+    agreement = held_out_agreement(data, model, free, after)
+    if agreement is None:
         say("thresholds: from the fit itself, since no log could be held out")
         return after
-    for name in outliers(held):
+    for name in outliers(agreement):
         say(f"{name}: predicted far worse than the other logs; the thresholds leave it out")
-    return held
+    return agreement
 
 
 def _page(

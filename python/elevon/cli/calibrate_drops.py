@@ -12,7 +12,7 @@ from elevon.errors import FormatError, InputError
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.calibrate.compliance import ComplianceCalibration
-    from elevon.reproduce.compliance.slips import Drop
+    from elevon.reproduce.compliance.slips import WeightDrop
 
 __all__ = ["is_drop_table", "run_drops"]
 
@@ -69,8 +69,8 @@ def run_drops(path: Path, actuator: Actuator) -> tuple[ComplianceCalibration, di
     return result, facts
 
 
-def _read(path: Path) -> list[Drop]:
-    from elevon.reproduce.compliance.slips import Drop
+def _read(path: Path) -> list[WeightDrop]:
+    from elevon.reproduce.compliance.slips import WeightDrop
 
     if path.stat().st_size > _MOST_BYTES:
         raise InputError(f"{path}: larger than {_MOST_BYTES} bytes; no table of drops")
@@ -83,5 +83,5 @@ def _read(path: Path) -> list[Drop]:
             raise FormatError(f"{path}, row {number}: {error}; four numbers expected") from error
         if not all(math.isfinite(value) for value in values):
             raise FormatError(f"{path}, row {number}: a value is not finite")
-        drops.append(Drop(number, *values))
+        drops.append(WeightDrop(number, *values))
     return drops

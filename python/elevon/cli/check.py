@@ -27,14 +27,14 @@ def check(
     ] = None,
     json: JsonOption = False,
 ) -> int:
-    """Report every finding of a parameter set or a scenario file; nothing is simulated."""
+    """Report every finding of an actuator file or a scenario file; nothing is simulated."""
     from elevon.documents import read_toml
 
     document = read_toml(file)  # a file that cannot be read is bad usage, not a finding
     # A set has groups of the same names: load.mass.
-    own = {"name", "base", "wiring"} & document.data.keys()
+    top_keys = {"name", "base", "wiring"} & document.data.keys()
     words = {"duration", "command", "load", "supply", "initial"} & document.data.keys()
-    scenario = bool(words) and not own
+    scenario = bool(words) and not top_keys
     rows = _of_scenario(file, actuator) if scenario else _of_set(file)
     failed = any(row["severity"] == "error" for row in rows)
     if json:

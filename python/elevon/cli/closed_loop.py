@@ -134,7 +134,7 @@ def _print(result: LoopCalibration, after: Validation) -> None:
 def validate_closed_loop(
     logs: Sequence[LoopLog], model: Actuator, transient: float | None
 ) -> Validation:
-    """Hold a set against logs; the set's thresholds judge."""
+    """Hold an actuator file against logs; its thresholds judge."""
     from elevon.calibrate.closed_loop.held_out import validate_loop
 
     return validate_loop(logs, model, transient)

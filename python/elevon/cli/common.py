@@ -31,7 +31,7 @@ ActuatorArgument = Annotated[
     str,
     typer.Argument(
         metavar="ACTUATOR",
-        help="Name of a set (elevon list actuators) or a file.",
+        help="Name of an actuator file (elevon list actuators) or a file.",
         autocompletion=completion.actuators,
     ),
 ]
@@ -40,7 +40,7 @@ ActuatorOption = Annotated[
     typer.Option(
         "--actuator",
         metavar="ACTUATOR",
-        help="Name of a set, or a file.",
+        help="Name of an actuator file, or a file.",
         autocompletion=completion.actuators,
     ),
 ]
@@ -200,8 +200,8 @@ def without_companions(logs: list[Path]) -> list[Path]:
     """
     from elevon.logs.importing import find_sidecars
 
-    beside = {path for log in logs for path in find_sidecars(log) if path is not None}
-    remaining = [log for log in logs if log.expanduser() not in beside]
+    sidecars = {path for log in logs for path in find_sidecars(log) if path is not None}
+    remaining = [log for log in logs if log.expanduser() not in sidecars]
     for log in logs:
         if log not in remaining:
             say(f"{log}: read with its log, not as one")

@@ -31,7 +31,8 @@ def make() -> None:
 def benchmark(
     *,
     out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Folder of the set; resumed if begun.")
+        Path,
+        typer.Option("--out", metavar="DIR", help="Folder of the data set; resumed if begun."),
     ],
     size: Annotated[str, typer.Option(help="small or full.")] = "small",
     runs: Annotated[

@@ -1,4 +1,4 @@
-"""``elevon demo``: a unit's life and its end as foreseen; or a bench with hidden values."""
+"""``elevon demo``: a unit's life and its end as predicted; or a bench with hidden values."""
 
 from __future__ import annotations
 
@@ -103,18 +103,18 @@ def _story(out: Path) -> str:
 
 
 def _row(row: dict[str, Any], result: Demo) -> tuple[str, ...]:
-    """Return a row of the table, in the unit of the set and with the digits of the interval."""
+    """Return a row of the table, in the file's unit, with the digits of the interval."""
     from elevon.number_text import estimate_texts, written_unit
     from elevon.units import to_display
 
     unit = written_unit(result.base, row["path"])
     interval = (row["low"], row["high"])
-    value, low, high, shown = estimate_texts(row["value"], interval, row["unit"], unit)
+    value, low, high, unit_text = estimate_texts(row["value"], interval, row["unit"], unit)
     before, truth = (
-        "" if row[name] is None else f"{float(to_display(row[name], shown or '1')):.5g}"
+        "" if row[name] is None else f"{float(to_display(row[name], unit_text or '1')):.5g}"
         for name in ("before", "truth")
     )
-    return row["path"], before, truth, value, f"{low} to {high}", shown
+    return row["path"], before, truth, value, f"{low} to {high}", unit_text
 
 
 def _print(result: Demo) -> None:

@@ -90,12 +90,12 @@ def diagnose(
             model, logs, baseline or [], column_map, faults=fault, false_alarm=false_alarm,
             drawn=report is not None,
         )  # fmt: skip
-        return _shown(result, method, model.name, report, traces=traces, json=json, force=force)
+        return _output(result, method, model.name, report, traces=traces, json=json, force=force)
     data = read_with(logs, loadcell, command, column_map)
     healthy = read_test_logs(without_companions(baseline or []), column_map=column_map)
     result = run(data, model, baselines=healthy, faults=fault, false_alarm=false_alarm)
     traces = traces_of(data, model, result) if report is not None else []
-    return _shown(result, method, model.name, report, traces=traces, json=json, force=force)
+    return _output(result, method, model.name, report, traces=traces, json=json, force=force)
 
 
 def read_with(
@@ -141,7 +141,7 @@ def _by_roles(
     return result, traces_by_roles(data, model, result) if drawn else []
 
 
-def _shown(
+def _output(
     result: Diagnosis,
     method: str,
     name: str,
@@ -198,7 +198,7 @@ def _print(result: Diagnosis) -> None:
             f"{c.kind}@{c.place}",
             f"{c.probability:.3f}",
             *severity_texts(c.severity, c.interval, c.unit),
-            ", ".join(f"{kind}@{place}" for kind, place in c.equivalents),
+            ", ".join(f"{kind}@{place}" for kind, place in c.ambiguous_with),
         )
         for c in result.faults
     ]

@@ -20,8 +20,10 @@ def diagnose_train(
         str, typer.Option(metavar="ACTUATOR", help="Units are drawn about it.")
     ] = "torino-rotary",
     out: Annotated[Path, typer.Option(metavar="FILE", help="Surrogate to write (.npz).")],
-    units: Annotated[int, typer.Option(min=8, help="Units on the high model.")] = 240,
-    low_units: Annotated[int, typer.Option(min=0, help="More units, on the low model.")] = 480,
+    units: Annotated[int, typer.Option(min=8, help="Units on the switching model.")] = 240,
+    low_units: Annotated[
+        int, typer.Option(min=0, help="More units, on the reduced-order model.")
+    ] = 480,
     test_units: Annotated[
         int, typer.Option(min=0, help="Units of another seed that only judge it.")
     ] = 48,
@@ -87,7 +89,7 @@ def _print(report: Any) -> None:
             f"{100.0 * s['median_error']:.1f} %",
             f"{s['covered']}/{s['runs']}",
         )
-        for name, s in report.get("asked", {}).items()
+        for name, s in report.get("single_faults", {}).items()
     ]
     if at:
         print_table(

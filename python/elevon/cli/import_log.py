@@ -191,7 +191,7 @@ def _result(imported: list[ImportedLog], targets: list[Path]) -> dict[str, Any]:
 def _show(report: ImportReport, target: Path) -> None:
     title = f"{report.source} ({report.file_format}) -> {target}"
     rows = [
-        (c["name"], c["column"], shown_unit(c["unit"]), _shown(c, "minimum"), _shown(c, "maximum"),
+        (c["name"], c["column"], shown_unit(c["unit"]), _bound(c, "minimum"), _bound(c, "maximum"),
          c["missing"])
         for c in report.channels
     ]  # fmt: skip
@@ -210,7 +210,7 @@ def _show(report: ImportReport, target: Path) -> None:
         print_table(("synchronisation", "value"), rows_)
 
 
-def _shown(channel: dict[str, Any], name: str) -> str:
+def _bound(channel: dict[str, Any], name: str) -> str:
     return _number(float(to_display(channel[name], shown_unit(channel["unit"]))))
 
 

@@ -2,7 +2,7 @@
 
 Python raises `KeyboardInterrupt` between any two instructions, also where an exception is lost: in
 a finaliser, in a weak reference's callback, in a library's start-up. So the signal is noted;
-whoever reports progress asks for it; an exception that Python reports as lost is raised again a
+whoever reports progress requests it; an exception that Python reports as lost is raised again a
 moment later. Nothing heavy is imported here: the first moments of a command count too.
 """
 

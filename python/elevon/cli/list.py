@@ -139,10 +139,10 @@ def faults(
     at each fidelity.
     """
     rows = [row for row in _faults(actuator, fidelity) if chosen(row[1], fidelity, not_modelled)]
-    shown = [{"wiring": wiring, **_fault(record), **acts} for wiring, record, acts in rows]
+    listed = [{"wiring": wiring, **_fault(record), **acts} for wiring, record, acts in rows]
     first, where = (("wiring",), "fidelities") if actuator is None else ((), "acts")
     columns = ("kind", "places", "unit", "range", where, "effect", "source", "not_modelled")
-    _print("faults", shown, json, (*first, *columns))
+    _print("faults", listed, json, (*first, *columns))
 
 
 def _faults(

@@ -113,7 +113,7 @@ def _print_alarm(alarm: Alarm) -> None:
     )
     for cause in alarm.causes:
         middle, low, high = severity_texts(cause.severity, cause.interval, cause.unit)
-        others = ", ".join(f"{kind}@{place}" for kind, place in cause.equivalents)
+        others = ", ".join(f"{kind}@{place}" for kind, place in cause.ambiguous_with)
         say(
             f"{cause.kind}@{cause.place}: {middle} ({low} to {high}), probability "
             f"{cause.probability:.2f}" + (f"; not separable from {others}" if others else "")

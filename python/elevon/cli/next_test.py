@@ -11,7 +11,7 @@ from elevon.cli.common import ActuatorOption, JsonOption, SetOption, read_actuat
 from elevon.cli.output import print_json, print_table, progress_bar, say
 
 if TYPE_CHECKING:
-    from elevon.diagnose.nexttest import Proposal
+    from elevon.diagnose.nexttest import NextTest
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -41,11 +41,11 @@ def next_test(
     _print(result)
 
 
-def _print(result: Proposal) -> None:
+def _print(result: NextTest) -> None:
     best = result.tests[0]
-    said = ", ".join(f"{name} {value}" for name, value in best.profile.parameters.items())
+    values = ", ".join(f"{name} {value}" for name, value in best.profile.parameters.items())
     say(
-        f"Run {best.profile.name} ({said}): {best.information:.2g} of the "
+        f"Run {best.profile.name} ({values}): {best.information:.2g} of the "
         f"{result.belief.entropy:.2g} bit still unknown are expected from it."
     )
     print_table(

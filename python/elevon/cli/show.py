@@ -32,7 +32,8 @@ def show(
         Path | None, typer.Option(metavar="FILE", help="Write the block diagram as SVG.")
     ] = None,
     schema: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the JSON Schema of its set files.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the JSON Schema of its actuator files."),
     ] = None,
     notes: Annotated[bool, typer.Option("--notes", help="Show the notes as well.")] = False,
     fidelity: OnlyFidelityOption = None,

@@ -70,12 +70,12 @@ def simulate(
     _check_files(out, plot, force=force)
     other = _read_other(compare, plot)
     loaded = read_actuator(actuator, settings)
-    asked = read_scenario(loaded, scenario, duration, fault)
+    wanted = read_scenario(loaded, scenario, duration, fault)
     if out is not None:
-        _check_clocks(out, Run(loaded, asked, seed), fidelity, record, force=force)
+        _check_clocks(out, Run(loaded, wanted, seed), fidelity, record, force=force)
     with progress_bar(f"simulating {loaded.name}") as advance:
         recording = run(
-            loaded, asked, fidelity=fidelity, record=record, seed=seed, progress=advance
+            loaded, wanted, fidelity=fidelity, record=record, seed=seed, progress=advance
         )
     if out is not None:
         recording.save(out, force=force)
@@ -123,7 +123,7 @@ def _check_clocks(
     from elevon.recording.formats import check_target
     from elevon.simulate.prepare import prepare
 
-    plan = prepare(run, fidelity, record, doubts=False).plan
+    plan = prepare(run, fidelity, record, notices=False).plan
     check_target(out, [clock.name for clock in plan], force=force)
 
 
@@ -185,8 +185,8 @@ def _print_result(recording: Any, wiring: str) -> None:
         elif words:
             rows.append([name, "", "", "", words.get(round(float(values[-1])), f"{values[-1]:g}")])
         else:
-            shown = to_display([values.min(), values.max(), values[-1]], unit)
-            rows.append([name, unit, *(f"{x:.6g}" for x in shown)])
+            displayed = to_display([values.min(), values.max(), values[-1]], unit)
+            rows.append([name, unit, *(f"{x:.6g}" for x in displayed)])
     print_table(("signal", "unit", "least", "greatest", "last"), rows)
 
 

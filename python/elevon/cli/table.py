@@ -107,7 +107,7 @@ def _fitted(heads: list[str], cells: list[list[str]], width: int) -> list[str]:
 
 
 def _shared(full: Sequence[int], least: Sequence[int], width: int) -> list[int]:
-    """Share the room left among the columns that want it, the narrowest first."""
+    """Share the width left among the columns that want it, the narrowest first."""
     widths, spare = list(least), width - _needed(least)
     wanting = sorted((k for k in range(len(full)) if full[k] > least[k]), key=lambda k: full[k])
     for place, k in enumerate(wanting):

@@ -49,7 +49,7 @@ def validate(
     force: ForceOption = False,
     date: DateOption = None,
 ) -> int:
-    """Compare the model with logs, signal by signal; exit 1 where a threshold of the set fails."""
+    """Compare the model with logs, signal by signal; exit 1 where a threshold fails."""
     from elevon.calibrate.replay import validate_replay
     from elevon.calibrate.report import validation_report
     from elevon.calibrate.validation import validate as run

@@ -103,7 +103,7 @@ class FinishedSteps:
             Turns the JSON form into the result; a `KeyError`, `TypeError` or `ValueError` of it
             means that it does not fit.
         """
-        log = self._own()
+        log = self._open_log()
         item = None if log is None else log.intact(name)
         if item is None or item.data.get("inputs") != inputs:
             return None
@@ -116,7 +116,7 @@ class FinishedSteps:
         self, name: str, inputs: str, result: Any, seconds: float, files: Sequence[Path]
     ) -> None:
         """Keep the JSON form of a step's result; it counts while `files` are as they are now."""
-        log = self._own()
+        log = self._open_log()
         if log is None:
             self.begin()
             log = self._log
@@ -128,7 +128,7 @@ class FinishedSteps:
         self._log = None
         self.path.unlink(missing_ok=True)
 
-    def _own(self) -> WorkLog | None:
+    def _open_log(self) -> WorkLog | None:
         """Return this work's log, None where the folder has none or that of other work."""
         log = self._log or _read(self.path)
         self._log = log if log is not None and log.key == self.key else None

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["parameters_section"]
 
-_SHOWN = {"rad": "deg", "kg m2": "kg cm2", "1": ""}
+_DISPLAYED = {"rad": "deg", "kg m2": "kg cm2", "1": ""}
 _LINEAR = 1.0  # percent up to which the axis of the errors is linear
 _SPACE, _MINUS = "\N{NO-BREAK SPACE}", "\N{MINUS SIGN}"
 
@@ -31,11 +31,13 @@ def parameters_section(report: Report, demo: Demo, rows: list[dict[str, Any]]) -
     inside = sum(row["inside"] for row in rows)
     text = (
         f"Intervals are meant to hold {100 * LEVEL:.0f} % of the truths; here {inside} of "
-        f"{len(rows)} are inside. The model behind the calibration is the low one; the logs come "
-        "from the high one, with a PWM bridge, encoder counts and noise."
+        f"{len(rows)} are inside. The model behind the fit is the reduced-order one; the logs "
+        "come from the switching one, with a PWM bridge, encoder counts and noise."
     )
     if inside < LEVEL * len(rows):
-        text += " What the low model lacks shows as a bias that the intervals do not cover."
+        text += (
+            " What the reduced-order model lacks shows as a bias that the intervals do not cover."
+        )
     section = report.section("Parameters against the hidden truth", text)
     compared = [row for row in rows if not _absolute(row)]
     section.figure(
@@ -53,7 +55,7 @@ def parameters_section(report: Report, demo: Demo, rows: list[dict[str, Any]]) -
     section.table(Table(columns, cells, caption))
     notes = _notes(demo, rows)
     if notes:
-        section.text("Estimates that no parameter set holds:")
+        section.text("Estimates that no actuator file holds:")
         section.points(notes)
     if demo.calibration.findings:
         section.text("What the calibration itself has to say:")
@@ -139,13 +141,13 @@ def _unit(demo: Demo, row: dict[str, Any]) -> str:
     """The unit the published set writes the value in, else one a person reads."""
     path, known = row["path"], demo.base.parameters
     written = known[path].unit if path in known else ""
-    return _SHOWN.get(written or row["unit"], written or row["unit"])
+    return _DISPLAYED.get(written or row["unit"], written or row["unit"])
 
 
 def _cells(row: dict[str, Any], unit: str) -> list[str]:
-    shown = unit or "1"
+    displayed = unit or "1"
     before, truth, value, low, high = (
-        math.nan if row[key] is None else to_display(row[key], shown)
+        math.nan if row[key] is None else to_display(row[key], displayed)
         for key in ("before", "truth", "value", "low", "high")
     )
     places = _places(high - low)

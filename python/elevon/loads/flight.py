@@ -185,13 +185,13 @@ def _read_lines(source: Path) -> list[tuple[int, list[str]]]:
 def _header(source: Path, cells: Sequence[str]) -> list[tuple[str, str]]:
     columns: list[tuple[str, str]] = []
     for cell in cells:
-        name, bracket, rest = cell.strip().partition("[")
-        name, unit = name.strip(), rest.strip().removesuffix("]").strip()
+        name, bracket, unit_text = cell.strip().partition("[")
+        name, unit = name.strip(), unit_text.strip().removesuffix("]").strip()
         if name not in _UNITS:
             raise unknown("column", name, _UNITS, str(source))
         if name in dict(columns):
             raise FormatError(f"{source}: column {name!r} is given twice")
-        if not bracket or not rest.strip().endswith("]"):
+        if not bracket or not unit_text.strip().endswith("]"):
             raise FormatError(
                 f"{source}: column {cell.strip()!r} has no unit; write '{name} [unit]'"
             )

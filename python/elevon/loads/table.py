@@ -103,7 +103,7 @@ def flight_load(
         An argument out of range, an altitude outside the standard atmosphere, a calibrated airspeed
         above Mach 1, a Mach number outside the coefficients' breakpoints.
     InputError
-        An offset and a measured density; a scale was asked for and the load or the position is
+        An offset and a measured density; a scale was requested and the load or the position is
         zero throughout.
 
     Notes

@@ -75,7 +75,7 @@ def _style(**more: Any) -> Iterator[None]:
 def new_figure(
     rows: int = 1, columns: int = 1, *, width: float = 8.0, height: float = 3.6, **options: Any
 ) -> Iterator[tuple[Figure, Any]]:
-    """Give a figure and its axes in the house style; draw inside the block.
+    """Give a figure and its axes in the project's style; draw inside the block.
 
     Parameters
     ----------

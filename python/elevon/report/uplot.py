@@ -147,17 +147,19 @@ def chart(
     values = {name: np.asarray(line, dtype=np.float64) for name, line in lines.items()}
     if breaks:
         instants, values = _interrupted(instants, values, breaks)
-    shown, drawn = thinned(instants, values)
-    if shown.size < instants.size:
+    selected, drawn = thinned(instants, values)
+    if selected.size < instants.size:
         note = f"{note} " if note else ""
-        note += f"{instants.size} samples drawn as the extremes of {shown.size // 2} time slices."
+        note += (
+            f"{instants.size} samples drawn as the extremes of {selected.size // 2} time slices."
+        )
     spec = {
         "x": x_label,
         "y": y_label,
         "height": int(height),
         "shaded": [list(item) for item in shaded],
         "log": bool(logarithmic),
-        "time": _base64(shown),
+        "time": _base64(selected),
         "series": [
             {
                 "name": name,
@@ -213,7 +215,7 @@ def thinned(
     values : mapping of str to ndarray, shape (n,)
         Lines.
     most : int
-        The largest number of points kept.
+        The largest number of points selected.
 
     Returns
     -------
@@ -228,9 +230,9 @@ def thinned(
     edges = np.unique(np.linspace(0, time.size, most // 2 + 1).astype(np.intp))
     starts = edges[:-1]
     middles = (starts + edges[1:]) // 2
-    shown = np.empty(2 * starts.size)
-    shown[0::2], shown[1::2] = time[starts], time[middles]
-    return shown, {name: _extremes(line, starts) for name, line in values.items()}
+    selected = np.empty(2 * starts.size)
+    selected[0::2], selected[1::2] = time[starts], time[middles]
+    return selected, {name: _extremes(line, starts) for name, line in values.items()}
 
 
 def _extremes(line: Floats, starts: npt.NDArray[np.intp]) -> Floats:

@@ -31,8 +31,8 @@ def compare_report(comparison: Comparison, actuator: str, *, date: str | None = 
     speed = f"low at {values['low_realtime_factor']:.0f} times real time"
     report.fact("Speed-up", f"{comparison.speed_up:.0f}", speed)
     _draw(report, comparison)
-    shown = [[name, value] for name, value in values.items() if isinstance(value, float)]
-    report.section("Numbers").table(Table(["Quantity", "Value"], shown))
+    numbers = [[name, value] for name, value in values.items() if isinstance(value, float)]
+    report.section("Numbers").table(Table(["Quantity", "Value"], numbers))
     report.provenance(
         provenance(
             f"elevon compare {actuator} --out DIR",
@@ -43,7 +43,7 @@ def compare_report(comparison: Comparison, actuator: str, *, date: str | None = 
     return report
 
 
-_SHOWN = {"rad": ("deg", 180.0 / np.pi), "m": ("mm", 1e3), "rad/s": ("rpm", 30.0 / np.pi)}
+_DISPLAYED = {"rad": ("deg", 180.0 / np.pi), "m": ("mm", 1e3), "rad/s": ("rpm", 30.0 / np.pi)}
 _NAMES = {"position": "Output position", "speed": "Motor speed", "q_current": "Torque current"}
 
 
@@ -51,8 +51,8 @@ def _panel(comparison: Comparison, part: str) -> tuple[str, str, float]:
     """Signal, label and scale of one panel."""
     name = comparison.signals[part]
     unit = comparison.recordings[0][name].unit
-    shown, scale = _SHOWN.get(unit, (unit, 1.0))
-    return name, f"{_NAMES[part]} [{shown}]", scale
+    text, scale = _DISPLAYED.get(unit, (unit, 1.0))
+    return name, f"{_NAMES[part]} [{text}]", scale
 
 
 def _draw(report: Report, comparison: Comparison) -> None:

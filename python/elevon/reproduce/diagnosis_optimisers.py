@@ -2,8 +2,8 @@
 
 The literature on these actuators finds severities by making the misfit of a monitoring model small
 with a genetic algorithm, differential evolution, a particle swarm or grey wolves. Here they get
-the low model, its test's command and start to the last bit, and a budget of runs; ours get the log
-as the bench writes it and one healthy log of the same test.
+the reduced-order model, its test's command and start to the last bit, and a budget of runs; ours
+get the log as the bench writes it and one healthy log of the same test.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.bymodel.replay import _RECENT
-from elevon.diagnose.optimisers import CAUSES, METHODS, Monitor, search
+from elevon.diagnose.optimisers import CAUSES, METHODS, MonitoringModel, search
 from elevon.diagnose.optimisers.cost import limits
 from elevon.report import Check, verdict
 from elevon.reproduce.side_by_side import side_by_side
@@ -54,7 +54,7 @@ _PROCEDURE = "backlash"
 
 
 @dataclass(frozen=True)
-class Outcome:
+class SearchOutcome:
     """One method on one log.
 
     Attributes
@@ -83,7 +83,7 @@ class Outcome:
         return {**vars(self), "reached": self.reached if math.isfinite(self.reached) else None}
 
     @classmethod
-    def of(cls, data: Mapping[str, Any]) -> Outcome:
+    def of(cls, data: Mapping[str, Any]) -> SearchOutcome:
         """Return what `to_dict` wrote."""
         return cls(**{**data, "reached": math.nan if data["reached"] is None else data["reached"]})
 
@@ -94,11 +94,11 @@ class OptimisersResult:
 
     Attributes
     ----------
-    outcomes : tuple of Outcome
+    outcomes : tuple of SearchOutcome
         Every log by every method.
     """
 
-    outcomes: tuple[Outcome, ...]
+    outcomes: tuple[SearchOutcome, ...]
 
     def rows(self) -> list[dict[str, Any]]:
         """Return a row for each method and fault, and one over all faults."""
@@ -176,7 +176,7 @@ def reproduce_optimisers(
     folder: Path | None = None,
     progress: Progress | None = None,
 ) -> OptimisersResult:
-    """Diagnose logs of the high model by every method.
+    """Diagnose logs of the switching model by every method.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def reproduce_optimisers(
             known[name] = [row.to_dict() for row in rows]
             if done is not None:
                 done.note(name, [], rows=known[name])
-    return OptimisersResult(tuple(Outcome.of(row) for n in names for row in known[n]))
+    return OptimisersResult(tuple(SearchOutcome.of(row) for n in names for row in known[n]))
 
 
 Job = tuple[str, "Setup", "TestLog", "TestLog"]
@@ -230,19 +230,19 @@ def _logs(unit: Actuator, cases: Sequence[str], seed: int, seeds: int) -> list[J
     from elevon.simulate import Run, simulate_batch
 
     procedure = first_trace(load_procedure(_PROCEDURE))
-    asked: list[tuple[str, Setup]] = []
+    pairs: list[tuple[str, Setup]] = []
     for k in range(seeds):
         for number, case in enumerate(("", *cases)):
             texts = [_text(key, s, k) for key, s in CASES[case].items()] if case else []
-            own = 1000 * seed + 100 * k + number
-            asked.append((case, setups(procedure, unit, faults=texts, seed=own)[0]))
+            run_seed = 1000 * seed + 100 * k + number
+            pairs.append((case, setups(procedure, unit, faults=texts, seed=run_seed)[0]))
     record = recorded(list(signal_records(unit.wiring, "high")))
-    runs = [Run(s.actuator, s.scenario, s.conditions.seed) for _, s in asked]
-    shown = simulate_batch(runs, record=record)
-    logs = [traced(s, r) for (_, s), r in zip(asked, shown, strict=True)]
+    runs = [Run(s.actuator, s.scenario, s.conditions.seed) for _, s in pairs]
+    recordings = simulate_batch(runs, record=record)
+    logs = [traced(s, r) for (_, s), r in zip(pairs, recordings, strict=True)]
     width = 1 + len(cases)
     return [
-        (case, setup, logs[n], logs[n - n % width]) for n, (case, setup) in enumerate(asked) if case
+        (case, setup, logs[n], logs[n - n % width]) for n, (case, setup) in enumerate(pairs) if case
     ]
 
 
@@ -260,7 +260,7 @@ def _one(
     *,
     budget: int,
     seed: int,
-) -> list[Outcome]:
+) -> list[SearchOutcome]:
     runs = _model_runs(unit, log)
     _ours(unit, log, base)["surrogate"]()  # what is loaded once in a process is not timed
     out = []
@@ -270,7 +270,7 @@ def _one(
         error = _error(_named(run()), case)
         seconds = clock.process_time() - begin
         count = 0 if method == "surrogate" else runs
-        out.append(Outcome(case, method, error, count, seconds, math.nan))
+        out.append(SearchOutcome(case, method, error, count, seconds, math.nan))
     goal = out[0].error
     return out + [_searched(setup, log, case, m, goal, budget=budget, seed=seed) for m in METHODS]
 
@@ -285,13 +285,17 @@ def _ours(unit: Actuator, log: TestLog, base: TestLog) -> dict[str, Callable[[],
 
 
 def _model_runs(unit: Actuator, log: TestLog) -> int:
-    """Runs of the low model that diagnosis by the model makes for one log."""
+    """Runs of the reduced-order model that diagnosis by the model makes for one log."""
     from elevon.diagnose.bymodel.candidates import chosen
     from elevon.diagnose.bymodel.log import prepared
     from elevon.diagnose.bymodel.replay import replay
 
-    shown = replay(prepared(log, unit), unit, chosen(list(CAUSES)))
-    return 1 + len(shown.draws) + sum(int((s != 0.0).sum()) for s in shown.severities.values())
+    recordings = replay(prepared(log, unit), unit, chosen(list(CAUSES)))
+    return (
+        1
+        + len(recordings.draws)
+        + sum(int((s != 0.0).sum()) for s in recordings.severities.values())
+    )
 
 
 def _named(result: Diagnosis) -> dict[str, float]:
@@ -312,9 +316,9 @@ def _error(severities: Mapping[str, float], case: str) -> float:
 
 def _searched(
     setup: Setup, log: TestLog, case: str, method: str, goal: float, *, budget: int, seed: int
-) -> Outcome:
+) -> SearchOutcome:
     begin = clock.process_time()
-    monitor = Monitor(setup, log)
+    monitor = MonitoringModel(setup, log)
     best, reached = math.inf, math.nan
 
     def costs(vectors: Floats) -> Floats:
@@ -330,4 +334,4 @@ def _searched(
     result = search(method, costs, monitor.size, budget=budget, seed=seed)
     error = _error(monitor.severities(result.vector), case)
     seconds = clock.process_time() - begin
-    return Outcome(case, method, error, monitor.evaluations, seconds, reached)
+    return SearchOutcome(case, method, error, monitor.evaluations, seconds, reached)

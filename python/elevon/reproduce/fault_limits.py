@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.recording import Recording
 
-__all__ = ["FaultLimits", "Limit", "Plan", "default_actuators", "reproduce_fault_limits"]
+__all__ = ["FaultLimits", "Limit", "LimitsPlan", "default_actuators", "reproduce_fault_limits"]
 
 FALSE_ALARM, NAMED = 0.05, 0.90
 OVER = 2.0  # times the limit: severity of the logs that check it
@@ -51,7 +51,7 @@ class Limit:
     injected : float or None
         Severity of the log that checked it, if one did.
     alarm, named : bool or None
-        Whether that log was called faulty, and the fault named or among the equivalents.
+        Whether that log was called faulty, and the fault named or ambiguous with a named one.
     """
 
     actuator: str
@@ -71,7 +71,7 @@ class Limit:
 
 
 @dataclass(frozen=True)
-class Plan:
+class LimitsPlan:
     """What is done in each test.
 
     Attributes
@@ -81,7 +81,7 @@ class Plan:
     injected : int
         Faults that are checked by a log of twice the limit, spread over the list.
     fidelity : str
-        Of the logs; the diagnosis uses the low model.
+        Of the logs; the diagnosis uses the reduced-order model.
     seed : int
         Of the days.
     """
@@ -147,7 +147,7 @@ class FaultLimits:
 
 
 def default_actuators() -> tuple[str, ...]:
-    """Return the shipped sets, one of each wiring."""
+    """Return the shipped actuator files, one of each wiring."""
     from elevon.actuator import list_actuators
 
     first: dict[str, str] = {}
@@ -157,7 +157,7 @@ def default_actuators() -> tuple[str, ...]:
 
 
 def reproduce_fault_limits(
-    plan: Plan | None = None,
+    plan: LimitsPlan | None = None,
     *,
     actuators: Sequence[str] = (),
     folder: Path | None = None,
@@ -167,7 +167,7 @@ def reproduce_fault_limits(
 
     Parameters
     ----------
-    plan : Plan, optional
+    plan : LimitsPlan, optional
         Days, faults, fidelity, seed.
     actuators : sequence of str
         Names or files of sets; default: a shipped one of each wiring.
@@ -183,7 +183,7 @@ def reproduce_fault_limits(
     Interrupted
         `progress` returned False.
     """
-    plan = plan or Plan()
+    plan = plan or LimitsPlan()
     if plan.days < 1:
         raise InputError(f"--days {plan.days}: at least one")
     if plan.fidelity not in ("high", "low"):
@@ -213,7 +213,7 @@ def _noted(data: dict[str, Any]) -> tuple[list[Limit], int]:
 
 
 def _test_limits(
-    actuator: Actuator, test: StandardTest, plan: Plan, progress: Progress | None
+    actuator: Actuator, test: StandardTest, plan: LimitsPlan, progress: Progress | None
 ) -> tuple[list[Limit], int]:
     """Limits of one test, and how many of its healthy logs were called faulty."""
     first = 1000 * plan.seed
@@ -231,9 +231,9 @@ def _test_limits(
         for k, severity in zip(tried, severities, strict=True)
     ]
     broken = _broken_logs(actuator, test, days, plan.fidelity)
-    for done, (k, severity, shown) in enumerate(zip(tried, severities, broken, strict=True)):
-        if shown is not None:
-            rows[k] = _judged(rows[k], severity, diagnosed(actuator, shown, [base]))
+    for done, (k, severity, faulty) in enumerate(zip(tried, severities, broken, strict=True)):
+        if faulty is not None:
+            rows[k] = _judged(rows[k], severity, diagnosed(actuator, faulty, [base]))
         _advance(progress, 0.6 + 0.4 * (done + 1) / len(tried))
     return rows, sum(answer.status == "faulty" for answer in answers)
 
@@ -308,6 +308,6 @@ def _judged(row: Limit, severity: float, answer: Diagnosis) -> Limit:
 
 
 def names_it(answer: Diagnosis, fault: Limit) -> bool:
-    """Whether an answer names a fault, or has it among a cause's equivalents."""
+    """Whether an answer names a fault, or has it among those a cause is ambiguous with."""
     wanted = (fault.kind, fault.place)
-    return any(wanted in {(c.kind, c.place), *c.equivalents} for c in answer.faults)
+    return any(wanted in {(c.kind, c.place), *c.ambiguous_with} for c in answer.faults)

@@ -36,13 +36,13 @@ def limits_table(result: FaultLimits, command: str) -> str:
 
 def _checked(result: FaultLimits, name: str, rows: Sequence[Limit]) -> str:
     alarms, logs = result.healthy[name]
-    said = f"{_share(alarms, logs)} healthy logs called faulty."
+    text = f"{_share(alarms, logs)} healthy logs called faulty."
     tried = [row for row in rows if row.named is not None]
     if tried:
         seen, named = sum(bool(r.alarm) for r in tried), sum(bool(r.named) for r in tried)
-        said += f" Faults of twice their limit: {_share(seen, len(tried))} called faulty, "
-        said += f"{_share(named, len(tried))} named."
-    return said + "\n"
+        text += f" Faults of twice their limit: {_share(seen, len(tried))} called faulty, "
+        text += f"{_share(named, len(tried))} named."
+    return text + "\n"
 
 
 def _share(count: int, of: int) -> str:
@@ -57,8 +57,8 @@ def _limits(rows: Sequence[Limit]) -> str:
     lines = ["| fault | " + " | ".join(tests) + " |", "|---" * (len(tests) + 1) + "|"]
     for kind, place, unit in dict.fromkeys((r.kind, r.place, r.unit) for r in seen):
         cells = [_cell(known.get((kind, place, test))) for test in tests]
-        shown = "" if unit in ("", "1") else f" [{unit}]"
-        lines.append(f"| `{kind}@{place}`{shown} | " + " | ".join(cells) + " |")
+        bracket = "" if unit in ("", "1") else f" [{unit}]"
+        lines.append(f"| `{kind}@{place}`{bracket} | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
 

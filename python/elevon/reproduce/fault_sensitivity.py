@@ -2,8 +2,8 @@
 
 A fault is looked for in a few features that a bench sees: the level and the ripple of the
 quadrature current and voltage, the ripple of the speed, the position error, the lost motion. Each
-fault is shown in the feature in which the high model's change stands highest above its floor: the
-change that the same high model shows when nothing but its step differs.
+fault is shown in the feature in which the switching model's change stands highest above its floor:
+the change that the same switching model shows when nothing but its step differs.
 """
 
 from __future__ import annotations
@@ -77,8 +77,8 @@ ROTARY_FAULTS = (
 
 What is on or off is on; mechanical wear is that of `backlash`; a contact between or from windings
 is 100 ohm, which the drive feeds beside them without tripping; a resolver's winding loses what
-`mismatch` does. A sensor fails that the loops of the shipped set do not close over, where the
-catalogue offers one: a loop around a failed sensor runs away, and nothing is left to compare.
+`mismatch` does. A sensor fails that the loops of the shipped actuator file do not close over, where
+the catalogue offers one: a loop around a failed sensor runs away, and nothing is left to compare.
 """
 
 RECORD = (
@@ -101,9 +101,9 @@ class Sensitivity:
     high, low : float
         Faulty less healthy; NaN for a model that does not have the fault.
     floor : float
-        Change of the healthy high model when only its step differs.
+        Change of the healthy switching model when only its step differs.
     reason : str
-        Why the low model cannot have the fault, from the catalogue; else empty.
+        Why the reduced-order model cannot have the fault, from the catalogue; else empty.
     """
 
     fault: str
@@ -124,12 +124,16 @@ class Sensitivity:
         if self.reason:
             return self.reason
         if abs(self.high) <= FLOORS * self.floor:
-            return "not seen by the high model in this scenario"
+            return "not seen by the switching model in this scenario"
         if self.ratio >= 0.5:
             return "seen by both"
         if abs(self.ratio) < 1e-6:
-            return "not in the low model: only the relays' ripple changes, and it has no relays"
-        return "wrong sign in the low model" if self.ratio < 0.0 else "too weak in the low model"
+            return "not in the reduced-order model: only the ripple of relays changes"
+        return (
+            "wrong sign in the reduced-order model"
+            if self.ratio < 0.0
+            else "too weak in the reduced-order model"
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return one row of the command's JSON object."""
@@ -195,7 +199,7 @@ def fault_sensitivity(
     every = [(scenario, name) for name in RATES]
     every += [(scenario.with_faults([fault]), "high") for fault in parsed]
     every += [(scenario.with_faults([fault]), "low") for fault in in_low]
-    with together((actuator, asked, fidelity) for asked, fidelity in every):
+    with together((actuator, case_scenario, fidelity) for case_scenario, fidelity in every):
         return _rows(run, other_step, parsed, in_low, spans)
 
 
@@ -316,7 +320,7 @@ def _strongest(
     floors: Mapping[str, float],
     not_modelled: str,
 ) -> Sensitivity:
-    """Choose the feature in which the high model's change stands highest above the floor."""
+    """Choose the feature in which the switching model's change stands highest above the floor."""
     changes = {name: high[1][name] - value for name, value in high[0].items()}
     smallest = {name: max(floor, 1e-3 * abs(high[0][name])) for name, floor in floors.items()}
 
@@ -326,6 +330,6 @@ def _strongest(
 
     name = max(changes, key=height)
     if low[1] is None:
-        reason = f"not in the low model: {not_modelled}"
+        reason = f"not in the reduced-order model: {not_modelled}"
         return Sensitivity(fault, name, changes[name], math.nan, floors[name], reason)
     return Sensitivity(fault, name, changes[name], low[1][name] - low[0][name], floors[name])

@@ -1,4 +1,4 @@
-"""High against low fidelity in the three cases in which the low model must hold."""
+"""High against low fidelity in the three cases in which the reduced-order model must hold."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class CaseRow:
     position_nrmse, speed_nrmse, q_current_nrmse : float
         As in `Comparison`.
     q_current_rms_a, q_current_error_a : float
-        RMS of the high model's filtered current and of the difference [A].
+        RMS of the switching model's filtered current and of the difference [A].
     floor_a : float or None
         RMS difference of two high runs that differ only in step [A]; where it is needed.
     """

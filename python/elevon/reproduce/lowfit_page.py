@@ -1,4 +1,4 @@
-"""The report of a fit of the low model."""
+"""The report of a fit of the reduced-order model."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ def lowfit_report(fit: LowFit, actuator: str, *, date: str | None = None) -> Rep
     """Return the report of a fit of an actuator named as on the command line."""
     values = fit.to_dict()
     report = Report(
-        f"Low model of {values['actuator']} fitted",
-        "The low model's own numbers, by least squares of filtered position, speed and q current "
-        f"against the high model with drive.kind = {values['drive']}.",
+        f"Reduced-order model of {values['actuator']} fitted",
+        "The reduced-order model's own numbers, by least squares of filtered position, speed and q "
+        f"current against the switching model with drive.kind = {values['drive']}.",
         date=date,
     )
     for row in values["fitted"]:

@@ -22,8 +22,8 @@ from elevon.progress import Progress, part
 from elevon.report import Check, verdict
 from elevon.reproduce.diagnosis_limits.campaign import calibrated
 from elevon.reproduce.diagnosis_limits.logs import STREAM, Trial, bench_logs
-from elevon.reproduce.diagnosis_limits.plan import FAULTS, Fault
-from elevon.reproduce.diagnosis_limits.unit import Unit, draw_unit
+from elevon.reproduce.diagnosis_limits.plan import FAULTS, CampaignFault
+from elevon.reproduce.diagnosis_limits.unit import BenchUnit, draw_unit
 
 if TYPE_CHECKING:
     from elevon.diagnose.bymodel import TestLog
@@ -82,7 +82,7 @@ class Watched:
 @dataclass(frozen=True)
 class _Planned:
     trial: Trial
-    fault: Fault | None
+    fault: CampaignFault | None
     level: float
     onset: float
 
@@ -116,18 +116,18 @@ class MonitorDelay:
         out = []
         for fault in FAULTS:
             for level in LEVELS:
-                own = [s for s in self.streams if s.kind == fault.kind and s.level == level]
-                delays = [s.delay for s in own if s.delay is not None]
+                streams = [s for s in self.streams if s.kind == fault.kind and s.level == level]
+                delays = [s.delay for s in streams if s.delay is not None]
                 out.append(
                     {
                         "fault": fault.kind,
                         "severity": level * fault.limit,
-                        "streams": len(own),
+                        "streams": len(streams),
                         "alarms": len(delays),
-                        "before_onset": sum(s.early for s in own),
+                        "before_onset": sum(s.early for s in streams),
                         "delay_median": float(np.median(delays)) if delays else None,
                         "delay_largest": max(delays) if delays else None,
-                        "named": sum(s.named for s in own),
+                        "named": sum(s.named for s in streams),
                     }
                 )
         return out
@@ -214,7 +214,7 @@ def _unit(seed: int, number: int, progress: Progress | None) -> tuple[list[Watch
     return out, monitors[0].width
 
 
-def _logs(unit: Unit, trials: list[Trial], progress: Progress | None) -> Iterator[TestLog]:
+def _logs(unit: BenchUnit, trials: list[Trial], progress: Progress | None) -> Iterator[TestLog]:
     with tempfile.TemporaryDirectory() as folder:
         yield from bench_logs(unit, trials, Path(folder), progress)
 
@@ -226,7 +226,7 @@ def _key(seed: int, number: int) -> int:
 def _plan(seed: int, number: int) -> list[_Planned]:
     """Return a unit's streams: healthy ones, and each fault at each level, either way in turn."""
     rng = np.random.default_rng([seed, 103, number])
-    wanted: list[tuple[Fault | None, float]] = [(None, 0.0)] * HEALTHY
+    wanted: list[tuple[CampaignFault | None, float]] = [(None, 0.0)] * HEALTHY
     wanted += [(fault, level) for fault in FAULTS for level in LEVELS]
     out = []
     for k, (fault, level) in enumerate(wanted):

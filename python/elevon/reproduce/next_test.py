@@ -1,8 +1,8 @@
 """Tests chosen by expected information against a fixed order, on pairs that are hard to tell.
 
 A unit has one of two conditions, equally likely; tests are run until one of them has 95 %. The
-logs are the low model's, each of another day within the stated spread: this shows what the order
-of the tests is worth, not what the model's errors cost (`diagnosis-limits` does).
+logs are the reduced-order model's, each of another day within the stated spread: this shows what
+the order of the tests is worth, not what the model's errors cost (`diagnosis-limits` does).
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ class NextTestResult:
     ----------
     episodes : tuple of Episode
         The logs of a unit are the same for all strategies: the second run of a test is one log,
-        whoever asks for it.
+        whoever asks.
     orders : ndarray, shape (units, orders)
         Tests that each unit took by each fixed order.
     """
@@ -193,9 +193,9 @@ def reproduce_next_test(
             if progress is not None and progress(done) is False:
                 raise Interrupted("interrupted between two units")
             unit = _Unit(bench, pair, [seed, list(PAIRS).index(pair), k])
-            own = unit.by_orders()
-            orders.append(own[0])
-            episodes += [unit.mean_of_orders(*own) if s == "orders" else unit.episode(s)
+            of_orders = unit.by_orders()
+            orders.append(of_orders[0])
+            episodes += [unit.mean_of_orders(*of_orders) if s == "orders" else unit.episode(s)
                          for s in STRATEGIES]  # fmt: skip
     return NextTestResult(tuple(episodes), np.array(orders))
 
@@ -233,7 +233,7 @@ class _Bench:
         from elevon.bench.rig import setups
         from elevon.bench.traces import recorded
         from elevon.diagnose.bymodel.log import prepared
-        from elevon.diagnose.bymodel.replay import logged_evidence
+        from elevon.diagnose.bymodel.replay import logged_features
         from elevon.diagnose.surrogate.population import day_of
         from elevon.diagnose.virtual import traced
         from elevon.scenario.compile import signal_records
@@ -244,16 +244,16 @@ class _Bench:
         for at, repeat in wanted:
             rng = np.random.default_rng([*seed, 2, at, repeat])
             days.append(day_of(self.actuator, rng))
-            own, procedure = int(rng.integers(2**31)), self.profiles[at].procedure
-            ready.append(setups(procedure, days[-1].actuator, faults=faults, seed=own)[0])
+            run_seed, procedure = int(rng.integers(2**31)), self.profiles[at].procedure
+            ready.append(setups(procedure, days[-1].actuator, faults=faults, seed=run_seed)[0])
         record = recorded(list(signal_records(self.actuator.wiring, "low")))
         runs = [Run(s.actuator, s.scenario, s.conditions.seed) for s in ready]
         out = []
-        shown = simulate_batch(runs, fidelity="low", record=record)
-        for (at, _), day, setup, run in zip(wanted, days, ready, shown, strict=True):
+        recordings = simulate_batch(runs, fidelity="low", record=record)
+        for (at, _), day, setup, run in zip(wanted, days, ready, recordings, strict=True):
             item = prepared(traced(setup, run, cell=day.cell), self.actuator)
             names = self.cases[at].unit.names
-            out.append(logged_evidence(item, self.actuator).only(names).values)
+            out.append(logged_features(item, self.actuator).only(names).values)
         return out
 
 
@@ -316,10 +316,10 @@ class _Unit:
         table = np.array([[self.odds(k, r) for k in range(count)] for r in range(rounds)])
         orders = _every_order(count)
         odds = np.cumsum(np.hstack([row[orders] for row in table])[:, :MOST], axis=1)
-        sure = np.abs(odds) >= _ODDS
-        last = np.where(sure.any(axis=1), sure.argmax(axis=1), MOST - 1)
+        decided = np.abs(odds) >= _ODDS
+        last = np.where(decided.any(axis=1), decided.argmax(axis=1), MOST - 1)
         at_end = odds[np.arange(len(orders)), last]
-        return last + 1.0, sure.any(axis=1), (at_end > 0.0) == bool(self._truth)
+        return last + 1.0, decided.any(axis=1), (at_end > 0.0) == bool(self._truth)
 
     def mean_of_orders(self, tests: Any, certain: Any, right: Any) -> Episode:
         """Return the mean over the fixed orders as an episode."""

@@ -46,8 +46,8 @@ def matrix(result: FailuresResult) -> str:
     lines = ["| fault | " + " | ".join(phase.name for phase in PHASES) + " |"]
     lines.append("|---" * (len(PHASES) + 1) + "|")
     for fault in faults:
-        shown = [cells[(fault, phase.name)] for phase in PHASES]
-        lines.append(f"| `{fault}` | " + " | ".join(shown) + " |")
+        cells_of_fault = [cells[(fault, phase.name)] for phase in PHASES]
+        lines.append(f"| `{fault}` | " + " | ".join(cells_of_fault) + " |")
     return "\n".join(lines) + "\n"
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.recording import Recording
 
-__all__ = ["FrictionResult", "FrictionRow", "Trace", "reproduce_friction"]
+__all__ = ["FrictionResult", "FrictionRow", "FrictionTrace", "reproduce_friction"]
 
 
 GRAVITY = 9.80665
@@ -66,7 +66,7 @@ class FrictionRow:
 
 
 @dataclass(frozen=True)
-class Trace:
+class FrictionTrace:
     """One test as the paper shows it: friction, position and speed over time."""
 
     released: bool
@@ -95,7 +95,7 @@ class FrictionResult:
     rows: list[FrictionRow]
     checks: list[Check]
     seed: int
-    traces: list[Trace]
+    traces: list[FrictionTrace]
     tables: dict[str, list[tuple[float, float]]]
     """The set's own friction: kind and direction to pairs of mm/s and N."""
 
@@ -158,13 +158,13 @@ def reproduce_friction(*, seed: int = 0, progress: Progress | None = None) -> Fr
     return FrictionResult(rows, _checks(rows), seed, traces, _tables(actuator))
 
 
-def _trace(test: _Test, log: Recording, mass: float, lead: float) -> Trace:
+def _trace(test: _Test, log: Recording, mass: float, lead: float) -> FrictionTrace:
     force, position = log["load_cell"].values, log["nut_position"].values
     over, resisting = _settled(log, lead)
     ripple = test.direction * (resisting - resisting.mean())
     order: Floats = np.arange(1, 16, dtype=np.float64) * np.float64(0.5)
     waves = np.exp(2j * math.pi * np.outer(order, over) / lead)
-    return Trace(
+    return FrictionTrace(
         test.released,
         test.direction,
         1e3 * test.speed,
@@ -273,7 +273,7 @@ def _friction_rows(
 
 
 def _table(actuator: Actuator, name: str, speed: float) -> float:
-    """Return what the set's own table says at a speed in m/s."""
+    """Return what the actuator file's own table says at a speed in m/s."""
     value = actuator.parameters.value
     knots = [value(f"friction.speed_{k}") for k in range(1, 9)]
     return float(np.interp(speed, knots, [value(f"friction.{name}_{k}") for k in range(1, 9)]))

@@ -9,7 +9,7 @@ import numpy as np
 
 from elevon.report import Report, Table
 from elevon.report.figures import COLOURS, new_figure
-from elevon.reproduce.pisa_friction import FrictionResult, FrictionRow, Trace
+from elevon.reproduce.pisa_friction import FrictionResult, FrictionRow, FrictionTrace
 from elevon.reproduce.provenance import provenance
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ def _spectra_figure(result: FrictionResult) -> Figure:
     return figure
 
 
-def _find(result: FrictionResult, released: bool, speed: float, direction: int) -> Trace:
+def _find(result: FrictionResult, released: bool, speed: float, direction: int) -> FrictionTrace:
     return next(
         trace
         for trace in result.traces
@@ -187,13 +187,11 @@ def _history(result: FrictionResult, released: bool, speed: float) -> Figure:
     with new_figure(width=8.0, height=6.2, rows=4, sharex=True) as (figure, axes):
         for (way, colour), direction in zip(_WAYS, (1, -1), strict=True):
             trace = _find(result, released, speed, direction)
-            shown = slice(10, None, max(1, trace.time.size // 1500))
-            axes[0].plot(
-                trace.time[shown], trace.friction_n[shown], color=colour, lw=0.8, label=way
-            )
-            axes[1].plot(trace.time[shown], trace.position_mm[shown], color=colour)
-            axes[2].plot(trace.time[shown], trace.ram_mm_s[shown], color=colour)
-            axes[3].plot(trace.time[shown], trace.motor_rad_s[shown], color=colour)
+            thin = slice(10, None, max(1, trace.time.size // 1500))
+            axes[0].plot(trace.time[thin], trace.friction_n[thin], color=colour, lw=0.8, label=way)
+            axes[1].plot(trace.time[thin], trace.position_mm[thin], color=colour)
+            axes[2].plot(trace.time[thin], trace.ram_mm_s[thin], color=colour)
+            axes[3].plot(trace.time[thin], trace.motor_rad_s[thin], color=colour)
         axes[0].set(ylabel="Friction [N]")
         axes[0].legend(loc="center right")
         axes[1].set(ylabel="Ram [mm]")

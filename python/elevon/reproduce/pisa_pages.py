@@ -26,11 +26,11 @@ _PALETTE = tuple(COLOURS.values())
 def functional_report(result: FunctionalResult, *, date: str | None = None) -> Report:
     """Return the report of the functional runs."""
     met = sum(row.passed is True for row in result.rows)
-    asked = sum(row.passed is not None for row in result.rows)
+    judged = sum(row.passed is not None for row in result.rows)
     report = Report(
         "Functional runs of the Pisa landing gear",
         f"Extension and retraction in six conditions, {result.fidelity} fidelity. The cycle, one "
-        f"stroke in each direction, meets its requirement in {met} of {asked} conditions; the "
+        f"stroke in each direction, meets its requirement in {met} of {judged} conditions; the "
         "limit condition has none.",
         date=date,
     )
@@ -86,13 +86,13 @@ def _stroke_figure(row: FunctionalRow) -> Figure:
             (row.retraction, "retraction", COLOURS["orange"]),
         ):
             time = run["output_position"].time - COMMANDED
-            shown = np.flatnonzero((time >= 0.0) & (time <= longest + 0.4))[::5]
-            time = time[shown]
-            axes[0].plot(time, 1e3 * run["output_position"].values[shown], color=colour, label=name)
-            axes[1].plot(time, run["motor_speed"].values[shown], color=colour)
-            axes[1].plot(time, run["speed_ref"].values[shown], ":", color=colour, lw=1.0)
-            axes[2].plot(time, run["current_mean"].values[shown], color=colour)
-            axes[3].step(time, run["state"].values[shown], color=colour, where="post")
+            thin = np.flatnonzero((time >= 0.0) & (time <= longest + 0.4))[::5]
+            time = time[thin]
+            axes[0].plot(time, 1e3 * run["output_position"].values[thin], color=colour, label=name)
+            axes[1].plot(time, run["motor_speed"].values[thin], color=colour)
+            axes[1].plot(time, run["speed_ref"].values[thin], ":", color=colour, lw=1.0)
+            axes[2].plot(time, run["current_mean"].values[thin], color=colour)
+            axes[3].step(time, run["state"].values[thin], color=colour, where="post")
         axes[0].set(ylabel="Ram [mm]")
         axes[0].legend(loc="center right")
         axes[1].set(ylabel="Motor [rad/s],\nreference dotted")

@@ -7,7 +7,7 @@ from typing import Any
 
 from elevon.report import Report, Table
 from elevon.report.figures import COLOURS, new_figure
-from elevon.reproduce.pisa_validation import SHOWN, ValidationResult
+from elevon.reproduce.pisa_validation import DISPLAYED, ValidationResult
 from elevon.reproduce.provenance import provenance
 from elevon.units import shown_unit, to_display
 
@@ -38,7 +38,7 @@ def validation_page(result: ValidationResult, *, date: str | None = None) -> Rep
     for trace in result.traces:
         section = report.section(trace.log[0].upper() + trace.log[1:])
         with new_figure(3, 1, width=8.0, height=5.4, sharex=True) as (figure, axes):
-            for axis, role in zip(axes, SHOWN, strict=True):
+            for axis, role in zip(axes, DISPLAYED, strict=True):
                 label, scale = _AXES[role]
                 axis.plot(trace.time, scale * trace.measured[role], color=COLOURS["grey"], lw=3.0)
                 axis.plot(trace.time, scale * trace.simulated[role], color=COLOURS["orange"], lw=1)

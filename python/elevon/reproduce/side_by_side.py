@@ -65,10 +65,10 @@ def _pooled(
 
     pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=_deaf)
     try:
-        asked: dict[Future[Result], str] = {pool.submit(c): name for name, c in calls.items()}
-        while asked:
-            ready = wait(asked, timeout=0.5, return_when=FIRST_COMPLETED).done
-            yield from ((asked.pop(future), future.result()) for future in ready)
+        pending: dict[Future[Result], str] = {pool.submit(c): name for name, c in calls.items()}
+        while pending:
+            ready = wait(pending, timeout=0.5, return_when=FIRST_COMPLETED).done
+            yield from ((pending.pop(future), future.result()) for future in ready)
             yield None
     finally:
         pool.shutdown(cancel_futures=True)

@@ -29,7 +29,7 @@ RATE = 2000.0
 #: Severity shown, by kind, or kind and unit: plainly visible, and short of ruin (ASSUMED: a gallery
 #: shows what to look for, not where a fault begins to be seen). Every other kind, a switch or a
 #: share of time, at its most.
-_SHOWN: Mapping[str, float] = {
+_SEVERITIES: Mapping[str, float] = {
     "adapter_gap": 0.5e-3,
     "bearing m": 2e-5,
     "bearing N m": 0.05,
@@ -108,7 +108,7 @@ class Signature:
         mean.
     time : ndarray, shape (n,)
         s.
-    shown : str
+    signal : str
         The signal whose change is the largest.
     healthy, faulty : ndarray, shape (n,)
         That signal, SI.
@@ -124,7 +124,7 @@ class Signature:
     status: str
     changes: Mapping[str, float]
     time: Floats
-    shown: str
+    signal: str
     healthy: Floats
     faulty: Floats
 
@@ -137,7 +137,7 @@ class Signature:
             "severity": self.severity,
             "unit": self.unit,
             "status": self.status,
-            "shown": self.shown,
+            "signal": self.signal,
             **{f"change_{name}": self.changes.get(name) for name in _SIGNALS},
         }
 
@@ -190,8 +190,8 @@ def reproduce_signatures(
 def _gallery(actuator: Actuator, seed: int, progress: Progress) -> list[Signature]:
     scenario = _motion(actuator)
     records = [r for r in catalogue(actuator.wiring) if "high" in r.fidelities]
-    shown = {record.kind: record for record in reversed(records)}
-    faults = [(record, record.places[0], _severity(record)) for record in shown.values()][::-1]
+    by_kind = {record.kind: record for record in reversed(records)}
+    faults = [(record, record.places[0], _severity(record)) for record in by_kind.values()][::-1]
     runs = []
     for record, place, severity in faults:
         unit = actuator.with_values(_GIVEN.get(record.kind, {}))
@@ -227,8 +227,8 @@ def _recorded(actuator: Actuator) -> list[str]:
 
 def _motion(actuator: Actuator) -> Scenario:
     """Return a motion that shows faults: a sine both ways against a load; a gear's own cycle."""
-    own = Scenario.from_dict(dict(actuator.default_scenario or {}), actuator.name)
-    if own.command.mode == "gear":
+    default_scenario = Scenario.from_dict(dict(actuator.default_scenario or {}), actuator.name)
+    if default_scenario.command.mode == "gear":
         steps = [{"time": "0.1 s", "action": "extend"}, {"time": "9 s", "action": "retract"}]
         return Scenario.from_dict({"duration": "18 s", "command": {"mode": "gear", "steps": steps}})
     linear = "m" if "screw.lead" in actuator.parameters else "deg"
@@ -245,8 +245,8 @@ def _motion(actuator: Actuator) -> Scenario:
 
 def _severity(record: FaultRecord) -> float:
     for key in (f"{record.kind} {record.unit}", record.kind):
-        if key in _SHOWN:
-            return min(_SHOWN[key], record.maximum)
+        if key in _SEVERITIES:
+            return min(_SEVERITIES[key], record.maximum)
     if not np.isfinite(record.maximum):
         raise InputError(f"{record.kind} [{record.unit}]: the gallery knows no severity to show")
     return record.maximum
@@ -266,8 +266,8 @@ def _signature(
 ) -> Signature:
     record, place, severity = fault
     changes = {name: _change(healthy[name].values, faulty[name].values) for name in healthy.names}
-    shown = max(changes, key=lambda name: changes[name])
-    count = len(faulty[shown])
+    clearest = max(changes, key=lambda name: changes[name])
+    count = len(faulty[clearest])
     return Signature(
         actuator=actuator.name,
         kind=record.kind,
@@ -278,10 +278,10 @@ def _signature(
         effect=record.effect,
         status=faulty.status,
         changes=changes,
-        time=healthy[shown].time[:count],
-        shown=shown,
-        healthy=healthy[shown].values[:count],
-        faulty=faulty[shown].values,
+        time=healthy[clearest].time[:count],
+        signal=clearest,
+        healthy=healthy[clearest].values[:count],
+        faulty=faulty[clearest].values,
     )
 
 

@@ -65,9 +65,9 @@ def _map(items: list[Signature]) -> Figure:
 def _pair(item: Signature) -> Figure:
     from elevon.recording.overview import Panel, spectra
 
-    unit = {"motor_speed": "rpm", "motor_torque": "N m"}.get(item.shown, "A")
+    unit = {"motor_speed": "rpm", "motor_torque": "N m"}.get(item.signal, "A")
     scale = float(to_display(1.0, unit)) if unit == "rpm" else 1.0
-    if item.shown.endswith("_position"):
+    if item.signal.endswith("_position"):
         linear = item.actuator != "torino-rotary"
         unit, scale = ("mm", 1e3) if linear else ("deg", float(np.rad2deg(1.0)))
     lines = {"healthy": scale * item.healthy, "faulty": scale * item.faulty}
@@ -75,12 +75,12 @@ def _pair(item: Signature) -> Figure:
     with new_figure(1, 2, height=2.3, width_ratios=[3, 2]) as (figure, axes):
         for name, values in lines.items():
             axes[0].plot(item.time[::step], values[::step], lw=1.0, label=name)
-        for panel in spectra([Panel(item.shown, unit, item.time, lines)]):
+        for panel in spectra([Panel(item.signal, unit, item.time, lines)]):
             low = panel.time < 0.45 / (item.time[1] - item.time[0])
             for name, values in panel.lines.items():
                 slices = np.unique(np.geomspace(1, low.sum() - 1, 300).astype(int))
                 axes[1].loglog(panel.time[slices], values[slices] + 1e-12, lw=0.9, label=name)
-        axes[0].set(xlabel="time [s]", ylabel=f"{item.shown} [{unit}]")
+        axes[0].set(xlabel="time [s]", ylabel=f"{item.signal} [{unit}]")
         axes[1].set(xlabel="frequency [Hz]", ylabel=f"[{unit}]")
         axes[0].legend(loc="best", fontsize=7)
     return figure

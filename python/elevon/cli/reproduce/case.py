@@ -15,7 +15,7 @@ from elevon.cli.output import Advance, print_json, print_table, progress_bar, sa
 if TYPE_CHECKING:
     from elevon.report import Report
 
-__all__ = ["Case", "Options", "Values", "add_command", "cell", "print_columns"]
+__all__ = ["Options", "PublishedCase", "Values", "add_command", "cell", "print_columns"]
 
 Options = Mapping[str, Any]
 Values = dict[str, Any]
@@ -30,7 +30,7 @@ _DATE = Annotated[str | None, typer.Option("--date", help="Date printed in the r
 
 
 @dataclass(frozen=True)
-class Case:
+class PublishedCase:
     """One published case.
 
     Attributes
@@ -76,7 +76,7 @@ class Case:
         return {**common, **self.options}
 
 
-def add_command(app: typer.Typer, case: Case) -> None:
+def add_command(app: typer.Typer, case: PublishedCase) -> None:
     """Add a case's command, its options made from its record."""
 
     def command(**options: Any) -> int:
@@ -95,7 +95,7 @@ def add_command(app: typer.Typer, case: Case) -> None:
     app.command(case.name)(command)
 
 
-def _run(case: Case, options: Options) -> int:
+def _run(case: PublishedCase, options: Options) -> int:
     """Compute, write, print; 0 when every check passed, else 1."""
     out: Path | None = options.get("out")
     if out is not None:

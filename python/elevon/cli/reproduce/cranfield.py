@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from elevon.cli.output import Advance, print_table, say
-from elevon.cli.reproduce.case import Case, Options, Values
+from elevon.cli.reproduce.case import Options, PublishedCase, Values
 
 if TYPE_CHECKING:
     from elevon.report import Report
@@ -36,10 +36,10 @@ def _page(result: Any, options: Options) -> Report:
 def _show(values: Values, result: Any) -> None:
     for line in (*values["skipped"], *(f"{name}: not possible here" for name in values["missing"])):
         say(line)
-    shown = [f for f in result.figures if f.load in {"mean", "worst"}]
+    figures = [f for f in result.figures if f.load in {"mean", "worst"}]
     rows = [
         [f.figure, f.protocol, f.load, f"{f.value:.3f}", f"{f.low:.3f} to {f.high:.3f}"]
-        for f in shown
+        for f in figures
     ]
     print_table(["figure", "protocol", "loads", "score", "95 % interval"], rows)
     rows = [
@@ -51,7 +51,7 @@ def _show(values: Values, result: Any) -> None:
 
 
 CASES = (
-    Case(
+    PublishedCase(
         "cranfield",
         "Diagnose the Cranfield linear actuator from its recordings, loads and runs held out.",
         "reading and classifying",

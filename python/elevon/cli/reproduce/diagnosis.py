@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from elevon.cli.output import Advance, print_table, say
-from elevon.cli.reproduce.case import Case, Options, Values, cell, print_columns
+from elevon.cli.reproduce.case import Options, PublishedCase, Values, cell, print_columns
 
 if TYPE_CHECKING:
     from elevon.report import Report
@@ -88,7 +88,7 @@ def _show(values: Values, _result: Any) -> None:
 
 
 CASES = (
-    Case(
+    PublishedCase(
         "diagnosis-limits",
         "Diagnose logs of benches that are unlike the model: false alarms, isolation, severity.",
         "making and diagnosing logs",
@@ -97,7 +97,7 @@ CASES = (
         _page,
         {"runs": (_RUNS, 8)},
     ),
-    Case(
+    PublishedCase(
         "monitor-delay",
         "Watch streams in which a fault begins: delay against severity, and false alarms.",
         "making and watching streams",
@@ -105,7 +105,7 @@ CASES = (
         _show_watch,
         options={"units": (_UNITS, 3)},
     ),
-    Case(
+    PublishedCase(
         "inspection-error",
         "Inspect units by three logs each: the errors of backlash, friction and short.",
         "making and diagnosing inspections",

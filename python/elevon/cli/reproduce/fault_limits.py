@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from elevon.cli.output import Advance
-from elevon.cli.reproduce.case import Case, Options, Values, print_columns
+from elevon.cli.reproduce.case import Options, PublishedCase, Values, print_columns
 
 if TYPE_CHECKING:
     from elevon.report import Report
@@ -31,9 +31,9 @@ _COLUMNS = ("actuator", "test", "kind", "place", "limit", "unit", "injected", "a
 
 
 def _work(options: Options, progress: Advance) -> Any:
-    from elevon.reproduce.fault_limits import Plan, reproduce_fault_limits
+    from elevon.reproduce.fault_limits import LimitsPlan, reproduce_fault_limits
 
-    plan = Plan(options["days"], options["injected"], options["fidelity"], options["seed"])
+    plan = LimitsPlan(options["days"], options["injected"], options["fidelity"], options["seed"])
     return reproduce_fault_limits(
         plan, actuators=options["actuator"] or (), folder=options["out"], progress=progress
     )
@@ -61,8 +61,8 @@ def _finish(result: Any, options: Options) -> None:
 def _command(options: Options) -> str:
     """What makes the same table again."""
     names = [f"--actuator {name}" for name in options["actuator"] or ()]
-    rest = f"--days {options['days']} --injected {options['injected']}"
-    words = [*names, rest, f"--fidelity {options['fidelity']} --seed {options['seed']}"]
+    options_text = f"--days {options['days']} --injected {options['injected']}"
+    words = [*names, options_text, f"--fidelity {options['fidelity']} --seed {options['seed']}"]
     return f"elevon reproduce fault-limits {' '.join(words)}"
 
 
@@ -88,7 +88,7 @@ def _show(values: Values, _result: Any) -> None:
 
 
 CASES = (
-    Case(
+    PublishedCase(
         "fault-limits",
         "Detection limit of each fault in each standard test of each actuator.",
         "running and diagnosing the standard tests",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from elevon.cli.output import Advance, print_table
-from elevon.cli.reproduce.case import Case, Options, Values, print_columns
+from elevon.cli.reproduce.case import Options, PublishedCase, Values, print_columns
 
 if TYPE_CHECKING:
     from elevon.report import Report
@@ -131,7 +131,7 @@ def _show_separation(values: Values, _result: Any) -> None:
 _FIDELITY = Annotated[str, typer.Option("--fidelity", help="Of the virtual stand: high or low.")]
 
 CASES = (
-    Case(
+    PublishedCase(
         "nasa-current",
         "Predict the motor current of 32 nominal and ten jammed runs of a mismatched stand.",
         "running and predicting 42 experiments",
@@ -140,7 +140,7 @@ CASES = (
         _current_page,
         options={"fidelity": (_FIDELITY, "high")},
     ),
-    Case(
+    PublishedCase(
         "nasa-thermal",
         "Heat the ballscrew actuator's motor for an hour, held to closed forms.",
         "simulating nine hours at low fidelity",
@@ -148,7 +148,7 @@ CASES = (
         _show_thermal,
         _page,
     ),
-    Case(
+    PublishedCase(
         "nasa-baseline",
         "Run every profile of the test stand under every load; the effects of rate, load and more.",
         "simulating the matrix",
@@ -158,7 +158,7 @@ CASES = (
         options={"load_kind": (_LOAD_KIND, "constant"), "replicates": (_REPLICATES, 4)},
         prepare=_check_load_kind,
     ),
-    Case(
+    PublishedCase(
         "nasa-separation",
         "Determine which profile shows which fault best, over a population of units.",
         "simulating faults and profiles",

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from elevon.cli.output import Advance, say
-from elevon.cli.reproduce.case import Case, Options, Values, print_columns
+from elevon.cli.reproduce.case import Options, PublishedCase, Values, print_columns
 
 __all__ = ["CASES"]
 
@@ -31,7 +31,7 @@ def _show(values: Values, _result: Any) -> None:
 
 
 CASES = (
-    Case(
+    PublishedCase(
         "next-test",
         "Choose tests by expected information on ambiguous pairs; count them and a fixed order's.",
         "testing units",

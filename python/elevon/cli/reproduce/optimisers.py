@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from elevon.cli.output import Advance
-from elevon.cli.reproduce.case import Case, Options, Values, print_columns
+from elevon.cli.reproduce.case import Options, PublishedCase, Values, print_columns
 
 __all__ = ["CASES"]
 
@@ -43,7 +43,7 @@ def _show(values: Values, _result: Any) -> None:
 
 
 CASES = (
-    Case(
+    PublishedCase(
         "diagnosis-optimisers",
         "Diagnose by genetic algorithm, differential evolution, swarm, grey wolves, and by ours.",
         "searching",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from elevon.cli.output import Advance, print_table
-from elevon.cli.reproduce.case import Case, Options, Values, print_columns
+from elevon.cli.reproduce.case import Options, PublishedCase, Values, print_columns
 
 if TYPE_CHECKING:
     from elevon.report import Report
@@ -97,7 +97,7 @@ def _show_failures(values: Values, result: Any) -> None:
 
 
 CASES = (
-    Case(
+    PublishedCase(
         "pisa-functional",
         "Extend and retract the landing gear in every condition of the thesis.",
         "simulating 12 strokes",
@@ -110,7 +110,7 @@ CASES = (
         _functional_page,
         options={"fidelity": (_FIDELITY, "high")},
     ),
-    Case(
+    PublishedCase(
         "pisa-friction",
         "Run the free-fall tests and recover weight, friction, harmonics and efficiency.",
         "simulating 32 tests and 8 strokes",
@@ -121,7 +121,7 @@ CASES = (
         ),
         _friction_page,
     ),
-    Case(
+    PublishedCase(
         "pisa-hydraulic",
         "Compare open-loop hydraulics with controlled speed over load and temperature.",
         "simulating 48 strokes",
@@ -134,7 +134,7 @@ CASES = (
         _hydraulic_page,
         seeded=False,
     ),
-    Case(
+    PublishedCase(
         "pisa-validation",
         "Predict position, speed and current of both strokes of a mismatched rig, percent errors.",
         "ten strokes on the virtual rig",
@@ -146,7 +146,7 @@ CASES = (
         _validation_page,
         options={"fidelity": (_FIDELITY, "high")},
     ),
-    Case(
+    PublishedCase(
         "pisa-failures",
         "Every fault in every phase: what the control unit indicates, what is true, is it safe.",
         "every fault in every phase",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from elevon.cli.output import Advance, print_table, say
-from elevon.cli.reproduce.case import Case, Options, Values, cell
+from elevon.cli.reproduce.case import Options, PublishedCase, Values, cell
 
 if TYPE_CHECKING:
     from elevon.report import Report
@@ -53,9 +53,9 @@ def _show(values: Values, result: Any) -> None:
 
 
 CASES = (
-    Case(
+    PublishedCase(
         "prognosis",
-        "Predict the ends of units that live on the high model with other laws than the filter's.",
+        "Predict the ends of units on the switching model, under laws unlike the filter's.",
         "run-to-failure histories",
         _work,
         _show,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from elevon.cli.output import Advance
-from elevon.cli.reproduce.case import Case, Options, Values, print_columns
+from elevon.cli.reproduce.case import Options, PublishedCase, Values, print_columns
 
 if TYPE_CHECKING:
     from elevon.report import Report
@@ -28,7 +28,7 @@ def _work(options: Options, progress: Advance) -> Any:
 
 
 def _show(values: Values, _result: Any) -> None:
-    columns = ("actuator", "kind", "place", "severity", "unit", "status", "shown")
+    columns = ("actuator", "kind", "place", "severity", "unit", "status", "signal")
     print_columns(values["rows"], columns)
 
 
@@ -39,7 +39,7 @@ def _page(result: Any, options: Options) -> Report:
 
 
 CASES = (
-    Case(
+    PublishedCase(
         "signatures",
         "Show what each fault looks like: healthy beside faulty, in time and spectrum.",
         "running every fault",

@@ -1,4 +1,4 @@
-"""The rotary actuator of the Torino bench, and the low model against the high one."""
+"""The rotary actuator of the Torino bench, and the two models compared."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from elevon.cli.output import Advance, print_table, say
-from elevon.cli.reproduce.case import Case, Options, Values
+from elevon.cli.reproduce.case import Options, PublishedCase, Values
 
 if TYPE_CHECKING:
     from elevon.report import Report
@@ -106,7 +106,7 @@ def _show_low_fidelity(values: Values, _result: Any) -> None:
 
 
 CASES = (
-    Case(
+    PublishedCase(
         "torino-backlash",
         "Simulate the no-load campaign at all fifteen measured backlashes and recover each.",
         "simulating 16 runs",
@@ -117,7 +117,7 @@ CASES = (
         prepare=_check_picture,
         finish=_save_picture,
     ),
-    Case(
+    PublishedCase(
         "torino-compliance",
         "Estimate the transmission's stiffness from the forty printed drops of a weight.",
         "forty drops",
@@ -125,9 +125,9 @@ CASES = (
         _show_compliance,
         _compliance_page,
     ),
-    Case(
+    PublishedCase(
         "low-fidelity",
-        "Compare the low model with the high one in the three cases in which it must hold.",
+        "Compare the reduced-order model with the switching one in the three cases it must pass.",
         "seven runs",
         _low_fidelity,
         _show_low_fidelity,

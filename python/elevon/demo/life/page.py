@@ -20,7 +20,7 @@ from elevon.units import to_display
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-    from elevon.demo.life.results import LifeDemo, Visit
+    from elevon.demo.life.results import InspectionVisit, LifeDemo
 
 __all__ = ["lead", "life_report", "moving_picture"]
 
@@ -37,7 +37,7 @@ def lead(demo: LifeDemo) -> str:
     )
 
 
-def _late_visit(demo: LifeDemo) -> Visit:
+def _late_visit(demo: LifeDemo) -> InspectionVisit:
     return min(demo.visits, key=lambda v: abs(v.usage - 0.7 * demo.life.end))
 
 
@@ -50,7 +50,7 @@ def life_report(demo: LifeDemo) -> Report:
     report = Report("How long will it last?", lead(demo))
     report.open_with(
         cone_figure(demo),
-        "The end of life as foreseen at each inspection, and the true one. No inspection knew it: "
+        "The end of life as predicted at each inspection, and the true one. No inspection knew it: "
         "each saw one log of the bench, a model calibrated on the new unit, and the mission.",
     )
     passed = [check.passed for check in demo.checks]
@@ -163,15 +163,15 @@ def _prediction(report: Report, demo: LifeDemo) -> None:
     ]
     columns = ("flights", "remain", "90 %", "truth", "survives 500 more", "fails first")
     section.table(Table(columns, rows))
-    held = []
+    lines = []
     for item in demo.visits[-1].prognosis.reserve:
         unit = severity_unit(item["unit"])
         now, end = to_display(item["value"], unit), to_display(item["threshold"], unit)
-        held.append((item["name"], f"{now:.3g} {unit}", f"{end:.3g} {unit}"))
+        lines.append((item["name"], f"{now:.3g} {unit}", f"{end:.3g} {unit}"))
     section.table(
         Table(
             ("requirement", "at the last inspection", "life ends at"),
-            held,
+            lines,
             "By the calibrated model, at the severities diagnosed.",
         )
     )

@@ -16,13 +16,13 @@ from elevon.report.checks import Check, verdict
 
 if TYPE_CHECKING:
     from elevon.diagnose.bymodel import Diagnosis
-    from elevon.prognose import Inspection, Prognosis, Response
+    from elevon.prognose import Inspection, Prognosis, ResponseTables
 
-__all__ = ["LifeDemo", "Said", "Visit", "life_from_json", "life_to_json"]
+__all__ = ["InspectionVisit", "LifeDemo", "Statement", "life_from_json", "life_to_json"]
 
 
 @dataclass(frozen=True)
-class Said:
+class Statement:
     """What a diagnosis says, as it is kept.
 
     Attributes
@@ -37,14 +37,14 @@ class Said:
     text: str
 
     @classmethod
-    def of(cls, answer: Diagnosis) -> Said:
+    def of(cls, answer: Diagnosis) -> Statement:
         """Take it from the whole answer."""
         from elevon.diagnose.bymodel.words import sentence
 
         return cls(answer.to_dict(), sentence(answer))
 
     @classmethod
-    def from_json(cls, data: Any) -> Said:
+    def from_json(cls, data: Any) -> Statement:
         """Return it again."""
         return cls(dict(data["data"]), str(data["text"]))
 
@@ -60,7 +60,7 @@ class Said:
 
 
 @dataclass(frozen=True)
-class Visit:
+class InspectionVisit:
     """One inspection.
 
     Attributes
@@ -69,7 +69,7 @@ class Visit:
         Flights.
     log : Path
         What the bench wrote.
-    diagnosis : Said
+    diagnosis : Statement
         Of it.
     inspection : Inspection
         As the filter takes it.
@@ -79,7 +79,7 @@ class Visit:
 
     usage: float
     log: Path
-    diagnosis: Said
+    diagnosis: Statement
     inspection: Inspection
     prognosis: Prognosis
 
@@ -94,17 +94,17 @@ class LifeDemo(Story):
         The true course.
     calibration : Recovered
         The healthy unit as its logs show it.
-    response : Response
+    response : ResponseTables
         The calibrated unit's tables.
-    visits : list of Visit
+    visits : list of InspectionVisit
         In the order of flights.
     """
 
     life: Life = field(init=False)
     calibration: Recovered = field(init=False)
-    response: Response = field(init=False)
+    response: ResponseTables = field(init=False)
     healthy: list[Path] = field(default_factory=list)
-    visits: list[Visit] = field(default_factory=list)
+    visits: list[InspectionVisit] = field(default_factory=list)
 
     @property
     def track(self) -> Track:
@@ -128,7 +128,7 @@ class LifeDemo(Story):
     def checks(self) -> list[Check]:
         """What must hold of any one life; how well it was predicted is shown, and judged by many.
 
-        `elevon reproduce prognosis` asks for accuracy and coverage, of sixty lives.
+        `elevon reproduce prognosis` requests accuracy and coverage, of sixty lives.
         """
         track = self.track
         named = np.mean([v.diagnosis.status == "faulty" for v in self.visits[1:]])

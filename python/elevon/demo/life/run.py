@@ -1,4 +1,4 @@
-"""The demonstration's steps: a life, its inspections, and the end as it was foreseen."""
+"""The demonstration's steps: a life, its inspections, and the end as it was predicted."""
 
 from __future__ import annotations
 
@@ -11,7 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elevon.demo.finished import FinishedSteps, inputs_of, work_key
-from elevon.demo.life.results import LifeDemo, Said, Visit, life_from_json, life_to_json
+from elevon.demo.life.results import (
+    InspectionVisit,
+    LifeDemo,
+    Statement,
+    life_from_json,
+    life_to_json,
+)
 from elevon.demo.life.unit import (
     INSPECTED,
     demo_mission,
@@ -223,17 +229,17 @@ def _visit(demo: LifeDemo, baselines: list[TestLog], flt: Any, usage: float, num
         lambda: _log(demo, f"flight-{usage:05.0f}", usage, number),
     )
     actuator = demo.calibration.actuator
-    said = demo.resumed(
+    statement = demo.resumed(
         "diagnosis of each log",
         Work(
             f"inspection-{number}",
-            lambda: Said.of(diagnose(read_test_logs([log]), actuator, baselines=baselines)),
+            lambda: Statement.of(diagnose(read_test_logs([log]), actuator, baselines=baselines)),
             asdict,
-            Said.from_json,
+            Statement.from_json,
             inputs_of([log, *demo.healthy], actuator.hash),
         ),
     )
-    seen = inspection(said.data, demo.response.laws, usage=usage, name=log.parent.name)
+    seen = inspection(statement.data, demo.response.laws, usage=usage, name=log.parent.name)
 
     def look() -> Prognosis:
         flt.update(seen)
@@ -241,13 +247,13 @@ def _visit(demo: LifeDemo, baselines: list[TestLog], flt: Any, usage: float, num
         return prognosis(flt, demo_mission(), [*past, seen], seed=demo.seed, serial=_UNIT)
 
     result = demo.timed("prediction at each inspection", look)
-    demo.visits.append(Visit(usage, log, said, seen, result))
+    demo.visits.append(InspectionVisit(usage, log, statement, seen, result))
     stamp = demo.folder / "history" / f"flight-{usage:05.0f}.json"
-    write_stamp(stamp, said.data, usage=usage, unit="flights", serial=_UNIT, force=True)
+    write_stamp(stamp, statement.data, usage=usage, unit="flights", serial=_UNIT, force=True)
 
 
 def _finish(demo: LifeDemo, *, force: bool) -> None:
-    """Write what a user goes on with, the truth, and the page; `_claim` has asked for leave."""
+    """Write what a user goes on with, the truth, and the page; `_claim` has checked first."""
     from elevon.demo.life.figures import cone_figure
     from elevon.demo.life.page import life_report, moving_picture
     from elevon.files import write_text

@@ -68,7 +68,7 @@ def of_day(unit: Actuator, rng: np.random.Generator) -> Actuator:
 
 
 def live(unit: Actuator, seed: int, progress: Progress | None = None) -> Life:
-    """Let the unit fly until it fails, on tables corrected by the high-fidelity model.
+    """Let the unit fly until it fails, on tables corrected by the switching model.
 
     Its laws feed back on themselves and scatter more than those of the prediction.
     """

@@ -66,7 +66,7 @@ def backlash_from_encoder(
     frequency : float
         Frequency of the commanded sine [Hz].
     loop_gain : float
-        Speed of the output side that the position loop asks for a unit of error [1/s]: the
+        Speed of the output side that the position loop commands a unit of error [1/s]: the
         position gain over the gear ratio.
     start : float
         Samples before this time are left out [s].

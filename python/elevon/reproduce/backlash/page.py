@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["backlash_report", "summary_figure"]
 
-SHOWN = (1, 7, 14)
+DISPLAYED = (1, 7, 14)
 """Rows whose traces the paper shows."""
 
 
@@ -179,7 +179,7 @@ def _errors(result: BacklashResult) -> Figure:
 
 def _trace_figure(result: BacklashResult) -> Figure:
     with new_figure(2, 3, width=9.0, height=5.6) as (figure, axes):
-        for column, number in enumerate(SHOWN):
+        for column, number in enumerate(DISPLAYED):
             whole, top = axes[:, column]
             period = 1.0 / FREQUENCY
             _draw_trace(whole, result, number, (START, START + period))
@@ -196,12 +196,12 @@ def _trace_figure(result: BacklashResult) -> Figure:
 def _draw_trace(axis: Any, result: BacklashResult, number: int, span: tuple[float, float]) -> None:
     recording = result.recordings[number - 1]
     encoder = recording["encoder_position"]
-    shown = (encoder.time >= span[0]) & (encoder.time < span[1])
+    window = (encoder.time >= span[0]) & (encoder.time < span[1])
     lines = [
         ("command", recording["command"].values, "grey", 1.0),
         ("motor / ratio", recording["motor_position"].values / result.gear_ratio, "blue", 1.2),
         ("encoder", encoder.values, "orange", 1.6),
     ]
     for label, values, colour, width in lines:
-        degrees = np.degrees(values[shown])
-        axis.plot(encoder.time[shown], degrees, color=COLOURS[colour], lw=width, label=label)
+        degrees = np.degrees(values[window])
+        axis.plot(encoder.time[window], degrees, color=COLOURS[colour], lw=width, label=label)

@@ -19,9 +19,9 @@ from elevon.reproduce.compliance.fit import (
     load_on_loss,
     loss_on_load,
 )
-from elevon.reproduce.compliance.slips import Drop, Slip, find_slips, printed_drops
+from elevon.reproduce.compliance.slips import Slip, WeightDrop, find_slips, printed_drops
 
-__all__ = ["ComplianceResult", "Variant", "reproduce_compliance"]
+__all__ = ["AngleColumns", "ComplianceResult", "reproduce_compliance"]
 
 GUIDE_RADIUS_M = 0.08
 """Radius of the winding guide (160 mm across), thesis Table 5.1 set-up."""
@@ -35,7 +35,7 @@ SLIPS_BY_HAND = frozenset({1, 3, 10, 14, 28, 29})
 
 
 @dataclass(frozen=True, slots=True)
-class Variant:
+class AngleColumns:
     """Both regressions over one reading of the table [N/deg]."""
 
     name: str
@@ -50,10 +50,10 @@ class Variant:
 class ComplianceResult:
     """Everything `elevon reproduce torino-compliance` reports; stiffnesses in N/deg."""
 
-    printed: list[Drop]
-    repaired: list[Drop]
+    printed: list[WeightDrop]
+    repaired: list[WeightDrop]
     slips: list[Slip]
-    variants: list[Variant]
+    variants: list[AngleColumns]
     robust_printed: ComplianceFit
     robust: ComplianceFit
     interval: tuple[float, float]
@@ -138,11 +138,11 @@ def reproduce_compliance(*, seed: int = 0, resamples: int = 2000) -> ComplianceR
 
 
 def _variants(
-    printed: Sequence[Drop], repaired: Sequence[Drop], slips: Sequence[Slip]
-) -> list[Variant]:
+    printed: Sequence[WeightDrop], repaired: Sequence[WeightDrop], slips: Sequence[Slip]
+) -> list[AngleColumns]:
     load, loss = _columns(printed)
     fixed = _columns(repaired)[1]
-    own = np.array([abs(drop.encoder_deg - drop.motor_deg) for drop in printed])
+    differences = np.array([abs(drop.encoder_deg - drop.motor_deg) for drop in printed])
     signed = np.array([drop.encoder_deg - drop.motor_deg for drop in printed])
     worst = int(np.argmax(loss))
     keep = np.arange(len(load)) != worst
@@ -150,7 +150,7 @@ def _variants(
     sound = np.array([drop.row not in wrong for drop in printed])
     return [
         _variant("as printed", load, loss),
-        _variant("each loss from its own printed positions", load, own),
+        _variant("each loss from its own printed positions", load, differences),
         _variant(f"as printed, without row {worst + 1} ({loss[worst]:.2f} deg)",
                  load[keep], loss[keep]),
         _variant("encoder minus motor, swapped columns left swapped", load, signed),
@@ -159,12 +159,12 @@ def _variants(
     ]  # fmt: skip
 
 
-def _variant(name: str, load: Array, loss: Array) -> Variant:
+def _variant(name: str, load: Array, loss: Array) -> AngleColumns:
     from scipy.stats import theilslopes
 
     slope = float(theilslopes(loss, load)[0])
     r2 = float(np.corrcoef(load, loss)[0, 1] ** 2)
-    return Variant(
+    return AngleColumns(
         name, len(load), load_on_loss(load, loss), loss_on_load(load, loss), 1.0 / slope, r2
     )
 
@@ -182,8 +182,8 @@ def _curvature(load: Array, loss: Array, group: np.ndarray[Any, Any]) -> float:
     return float(f_distribution.sf((squares[0] - squares[1]) / (squares[1] / freedom), 1, freedom))
 
 
-def _checks(variants: Sequence[Variant], slips: Sequence[Slip]) -> list[Check]:
-    printed, own, repaired = variants[0], variants[1], variants[-1]
+def _checks(variants: Sequence[AngleColumns], slips: Sequence[Slip]) -> list[Check]:
+    printed, single, repaired = variants[0], variants[1], variants[-1]
     rows_called_wrong = {slip.row for slip in slips if slip.kind != "swapped"}
     return [
         Check("load on loss, printed rows, from 68.16", abs(printed.load_on_loss - 68.16),
@@ -191,7 +191,7 @@ def _checks(variants: Sequence[Variant], slips: Sequence[Slip]) -> list[Check]:
         Check("loss on load, printed rows, from 114.6", abs(printed.loss_on_load - 114.6),
               0.05, "N/deg"),
         Check("published 68.23 from losses of the rows' own positions",
-              abs(own.load_on_loss - PUBLISHED_N_PER_DEG), 0.005, "N/deg"),
+              abs(single.load_on_loss - PUBLISHED_N_PER_DEG), 0.005, "N/deg"),
         Check("load on loss, repaired, from 85.7", abs(repaired.load_on_loss - 85.7), 0.05,
               "N/deg"),
         Check("loss on load, repaired, from 113.4", abs(repaired.loss_on_load - 113.4), 0.05,
@@ -204,14 +204,14 @@ def _checks(variants: Sequence[Variant], slips: Sequence[Slip]) -> list[Check]:
     ]  # fmt: skip
 
 
-def _columns(drops: Sequence[Drop]) -> tuple[Array, Array]:
+def _columns(drops: Sequence[WeightDrop]) -> tuple[Array, Array]:
     return (
         np.array([drop.load_n for drop in drops]),
         np.array([drop.loss_deg for drop in drops]),
     )
 
 
-def _variant_dict(variant: Variant) -> dict[str, Any]:
+def _variant_dict(variant: AngleColumns) -> dict[str, Any]:
     return {
         "name": variant.name,
         "rows": variant.rows,
@@ -222,7 +222,7 @@ def _variant_dict(variant: Variant) -> dict[str, Any]:
     }
 
 
-def _row(printed: Drop, repaired: Drop) -> dict[str, Any]:
+def _row(printed: WeightDrop, repaired: WeightDrop) -> dict[str, Any]:
     return {
         "row": printed.row,
         "load_n": printed.load_n,

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from elevon.data import read_table
 
-__all__ = ["Drop", "Slip", "find_slips", "printed_drops"]
+__all__ = ["Slip", "WeightDrop", "find_slips", "printed_drops"]
 
 _ROUNDING = 2e-5
 """Half a unit of the last printed digit of two positions and a loss, together [deg]."""
@@ -22,7 +22,7 @@ _NEAR = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
-class Drop:
+class WeightDrop:
     """One weight let down once.
 
     Attributes
@@ -68,24 +68,26 @@ class Slip:
     reason: str
 
 
-def printed_drops() -> list[Drop]:
+def printed_drops() -> list[WeightDrop]:
     """Return the forty rows as printed."""
     table = read_table("torino_compliance")
     names = ("load_n", "motor_deg", "encoder_deg", "loss_deg")
-    return [Drop(k, *(float(line[name]) for name in names)) for k, line in enumerate(table, 1)]
+    return [
+        WeightDrop(k, *(float(line[name]) for name in names)) for k, line in enumerate(table, 1)
+    ]
 
 
-def find_slips(drops: Sequence[Drop]) -> tuple[list[Drop], list[Slip]]:
+def find_slips(drops: Sequence[WeightDrop]) -> tuple[list[WeightDrop], list[Slip]]:
     """Find what is wrong in each row, and what the row should have read.
 
     Parameters
     ----------
-    drops : sequence of Drop
+    drops : sequence of WeightDrop
         Rows in printed order.
 
     Returns
     -------
-    repaired : list of Drop
+    repaired : list of WeightDrop
         Rows in the same order; a row without a slip is the row given.
     slips : list of Slip
         Every slip with its evidence, in the order of the rows.
@@ -101,7 +103,7 @@ def find_slips(drops: Sequence[Drop]) -> tuple[list[Drop], list[Slip]]:
     return repaired, slips
 
 
-def _encoder_ends(drops: Sequence[Drop]) -> list[float]:
+def _encoder_ends(drops: Sequence[WeightDrop]) -> list[float]:
     """Positions at which at least three rows ended: only the encoder repeats itself."""
     readings = [value for drop in drops for value in (drop.motor_deg, drop.encoder_deg)]
     counts = Counter(round(value, 5) for value in readings)
@@ -112,15 +114,17 @@ def _is_end(value: float, ends: Sequence[float]) -> bool:
     return any(abs(value - end) < _NEAR for end in ends)
 
 
-def _swapped(drop: Drop, ends: Sequence[float]) -> bool:
+def _swapped(drop: WeightDrop, ends: Sequence[float]) -> bool:
     return _is_end(drop.motor_deg, ends) and not _is_end(drop.encoder_deg, ends)
 
 
-def _motor(drop: Drop, ends: Sequence[float]) -> float:
+def _motor(drop: WeightDrop, ends: Sequence[float]) -> float:
     return drop.encoder_deg if _swapped(drop, ends) else drop.motor_deg
 
 
-def _positions(drop: Drop, ends: Sequence[float], downwards: bool) -> tuple[Drop, list[Slip]]:
+def _positions(
+    drop: WeightDrop, ends: Sequence[float], downwards: bool
+) -> tuple[WeightDrop, list[Slip]]:
     """Mend the two positions of a row."""
     fixed, slips = drop, []
     if _swapped(drop, ends):
@@ -138,15 +142,15 @@ def _positions(drop: Drop, ends: Sequence[float], downwards: bool) -> tuple[Drop
 
 
 def _loss(
-    printed: Drop, fixed: Drop, moved: bool, drops: Sequence[Drop]
-) -> tuple[Drop, list[Slip]]:
+    printed: WeightDrop, fixed: WeightDrop, moved: bool, drops: Sequence[WeightDrop]
+) -> tuple[WeightDrop, list[Slip]]:
     """Hold the printed loss against the positions, as printed and as mended."""
-    own = abs(printed.encoder_deg - printed.motor_deg)
+    difference = abs(printed.encoder_deg - printed.motor_deg)
     slips = []
-    if abs(own - printed.loss_deg) > _ROUNDING:
+    if abs(difference - printed.loss_deg) > _ROUNDING:
         twins = [d.row for d in drops if d.loss_deg == printed.loss_deg and d.row != printed.row]
         copy = f"; {printed.loss_deg:g} is the loss of row {twins[0]}" if twins else ""
-        reason = f"printed loss {printed.loss_deg:g}, its positions give {own:.5f}{copy}"
+        reason = f"printed loss {printed.loss_deg:g}, its positions give {difference:.5f}{copy}"
         slips.append(Slip(printed.row, "loss", reason))
     distance = abs(fixed.encoder_deg - fixed.motor_deg)
     if slips or (moved and abs(distance - printed.loss_deg) > _ROUNDING):

@@ -107,9 +107,9 @@ def _session_p(
             return None
         squares.append(np.var(means, axis=0, ddof=1))
     at = int(np.flatnonzero(baseline.loads == data.load[index])[0])
-    own = baseline.spread**2 * (1.0 + 1.0 / baseline.counts[at])
+    variance = baseline.spread**2 * (1.0 + 1.0 / baseline.counts[at])
     # Twice: the baseline is one session, the tested recording another.
-    width = np.sqrt(own + 2.0 * np.mean(squares, axis=0))
+    width = np.sqrt(variance + 2.0 * np.mean(squares, axis=0))
     largest = float(np.abs((x[index] - baseline.means[at]) / width).max())
     single = min(2.0 * float(stdtr(len(names) - 1, -largest)), 1.0 - 1e-15)
     return float(-np.expm1(len(DETECTION) * np.log1p(-single)))

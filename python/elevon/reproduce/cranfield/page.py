@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["cranfield_report"]
 
-_SHOWN = (f"three classes: {STRICT}", f"four families: {GROUPED}", f"four families: {STRICT}",
+_PROTOCOLS = (f"three classes: {STRICT}", f"four families: {GROUPED}", f"four families: {STRICT}",
           f"thirteen classes: {GROUPED}", f"thirteen classes: {STRICT}")  # fmt: skip
 
 
@@ -84,7 +84,7 @@ def _figures(report: Report, result: CranfieldResult) -> None:
 
 def _confusions(report: Report, result: CranfieldResult) -> None:
     section = report.section("Who is taken for whom")
-    for name in _SHOWN:
+    for name in _PROTOCOLS:
         if name in result.confusions:
             classes, counts = result.confusions[name]
             section.figure(_matrix(classes, counts), f"{name}; a row is what it was.")

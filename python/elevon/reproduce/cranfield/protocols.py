@@ -21,20 +21,20 @@ Mask = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """What a classifier said of recordings that it was not trained on.
+    """What a classifier named of recordings that it was not trained on.
 
     Attributes
     ----------
-    truth, said : array of str
+    truth, named : array of str
         Condition of each, as it was and as the most probable one.
     probability : array
-        That the classifier gave to what it said.
+        That the classifier gave to what it named.
     load : array
         Load of each [kgf].
     """
 
     truth: npt.NDArray[np.str_]
-    said: npt.NDArray[np.str_]
+    named: npt.NDArray[np.str_]
     probability: Floats
     load: Floats
 
@@ -43,7 +43,7 @@ class Answers:
         """Put the answers of several splits together."""
         return cls(
             np.concatenate([part.truth for part in parts]),
-            np.concatenate([part.said for part in parts]),
+            np.concatenate([part.named for part in parts]),
             np.concatenate([part.probability for part in parts]),
             np.concatenate([part.load for part in parts]),
         )

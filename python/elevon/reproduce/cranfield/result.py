@@ -243,10 +243,10 @@ class _Scorer:
         """Add a row for each load, their mean and the worst; return mean and worst."""
         if answers is None:
             return None, None
-        truth, said = answers.truth, answers.said
+        truth, named = answers.truth, answers.named
         if families:
-            truth, said = _families(truth), _families(said)
-        codes = np.unique(np.concatenate([truth, said]), return_inverse=True)[1]
+            truth, named = _families(truth), _families(named)
+        codes = np.unique(np.concatenate([truth, named]), return_inverse=True)[1]
         right, answer = codes[: len(truth)], codes[len(truth) :]
         loads = np.unique(answers.load)
         strata = np.unique(
@@ -273,20 +273,20 @@ class _Scorer:
         mean, worst = float(values.mean()), float(values[lowest])
         self._row(Figure(name, protocol, "mean", mean, *over[0], total))
         self._row(Figure(name, protocol, "worst", worst, *over[1], total))
-        self._keep(f"{name}: {protocol}", truth, said, None if families else answers.probability)
+        self._keep(f"{name}: {protocol}", truth, named, None if families else answers.probability)
         return mean, worst
 
     def _row(self, figure: Figure) -> None:
         self.result.figures.append(figure)
 
     def _keep(
-        self, key: str, truth: Words, said: Words, probability: npt.NDArray[np.float64] | None
+        self, key: str, truth: Words, named: Words, probability: npt.NDArray[np.float64] | None
     ) -> None:
         order = (*CONDITIONS, *FAMILIES)
-        classes = sorted(set(truth.tolist()) | set(said.tolist()), key=order.index)
-        self.result.confusions[key] = (classes, confusion(truth, said, classes))
+        classes = sorted(set(truth.tolist()) | set(named.tolist()), key=order.index)
+        self.result.confusions[key] = (classes, confusion(truth, named, classes))
         if probability is not None:
-            self.result.reliability[key] = (float(probability.mean()), accuracy(truth, said))
+            self.result.reliability[key] = (float(probability.mean()), accuracy(truth, named))
 
 
 def _quantiles(values: npt.NDArray[np.float64]) -> tuple[float, float]:

@@ -15,7 +15,7 @@ from elevon.progress import Progress, part
 from elevon.reproduce.diagnosis_limits.judge import Injected, Row, judged
 from elevon.reproduce.diagnosis_limits.logs import TESTS, Trial, bench_logs
 from elevon.reproduce.diagnosis_limits.plan import Planned, planned, trials_of
-from elevon.reproduce.diagnosis_limits.unit import BASE, Unit, draw_unit
+from elevon.reproduce.diagnosis_limits.unit import BASE, BenchUnit, draw_unit
 from elevon.worklog import WorkLog, locked
 
 if TYPE_CHECKING:
@@ -115,7 +115,9 @@ def _unit_rows(
     return [rows[p.trial.name] for p in wanted]
 
 
-def calibrated(unit: Unit, seed: int, progress: Progress | None) -> tuple[Actuator, list[TestLog]]:
+def calibrated(
+    unit: BenchUnit, seed: int, progress: Progress | None
+) -> tuple[Actuator, list[TestLog]]:
     """One healthy log a test, each of a day of its own: calibration, then baselines."""
     key = (seed * 1000 + unit.number) * 1000
     trials = [trials_of(test, key + k, f"base-{test}") for k, test in enumerate(TESTS)]
@@ -123,7 +125,7 @@ def calibrated(unit: Unit, seed: int, progress: Progress | None) -> tuple[Actuat
 
 
 def calibrated_on(
-    unit: Unit, trials: Sequence[Trial], first: int, progress: Progress | None
+    unit: BenchUnit, trials: Sequence[Trial], first: int, progress: Progress | None
 ) -> tuple[Actuator, list[TestLog]]:
     """Calibrate on the first of some healthy trials; all of them are baselines."""
     from elevon.actuator import Actuator
@@ -139,7 +141,7 @@ def calibrated_on(
 
 
 def _block_rows(
-    unit: Unit,
+    unit: BenchUnit,
     block: Sequence[Planned],
     actuator: Actuator,
     baselines: Sequence[TestLog],
@@ -173,6 +175,6 @@ def _read(data: dict[str, Any]) -> Row:
         name, severity = text.split("=")
         kind, place = name.split("@")
         truth.append(Injected(kind, place, float(severity)))
-    row["said"] = tuple(row["said"])
+    row["causes"] = tuple(row["causes"])
     row["severities"] = tuple(None if s is None else tuple(s) for s in row["severities"])
     return Row(truth=tuple(truth), **row)

@@ -36,7 +36,7 @@ class Injected:
 
 @dataclass(frozen=True)
 class Row:
-    """One log: what was true, what was said.
+    """One log: what was true, what was reported.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Row:
         Called faulty.
     named : bool
         The most probable set is the injected one, and nothing of another kind explains it.
-    said : tuple of str
+    causes : tuple of str
         That set.
     severities : tuple of (float, float, float) or None
         Median and 90 % interval for each injected fault, None where it is not listed.
@@ -65,7 +65,7 @@ class Row:
     truth: tuple[Injected, ...]
     alarm: bool
     named: bool
-    said: tuple[str, ...]
+    causes: tuple[str, ...]
     severities: tuple[tuple[float, float, float] | None, ...]
     p_fault: float
     chance: float
@@ -81,7 +81,7 @@ class Row:
             "faults": [item.text for item in self.truth],
             "alarm": self.alarm,
             "named": self.named,
-            "said": list(self.said),
+            "causes": list(self.causes),
             "severities": [None if s is None else list(s) for s in self.severities],
             "p_fault": self.p_fault,
             "chance": self.chance,
@@ -95,7 +95,7 @@ def judged(
     """Hold an answer against the truth."""
     causes = [_cause(result, item) for item in truth]
     right = {f"{c.kind}@{c.place}" for c in causes if c is not None}
-    sole = all(c is not None and all(k == c.kind for k, _ in c.equivalents) for c in causes)
+    sole = all(c is not None and all(k == c.kind for k, _ in c.ambiguous_with) for c in causes)
     named = result.status == "faulty" and set(result.best) == right and len(right) == len(truth)
     return Row(
         name,
@@ -116,7 +116,7 @@ def judged(
 def _cause(result: Diagnosis, item: Injected) -> Cause | None:
     """Return the cause of the answer that names the injected fault, or a place like it."""
     for cause in result.faults:
-        places = {cause.place} | {p for kind, p in cause.equivalents if kind == item.kind}
+        places = {cause.place} | {p for kind, p in cause.ambiguous_with if kind == item.kind}
         if cause.kind == item.kind and item.place in places:
             return cause
     return None

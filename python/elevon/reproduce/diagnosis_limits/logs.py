@@ -1,4 +1,4 @@
-"""Logs of the bench: many at once in lanes, written by the bench, read as a user reads them."""
+"""Logs of the bench: many at once in batches, written by the bench, read as a user reads them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from elevon.reproduce.diagnosis_limits.unit import Unit, of_the_day
+from elevon.reproduce.diagnosis_limits.unit import BenchUnit, of_the_day
 
 if TYPE_CHECKING:
     from elevon.bench.procedure import Procedure
@@ -69,7 +69,7 @@ class Trial:
 
 
 def bench_logs(
-    unit: Unit, trials: Sequence[Trial], folder: Path, progress: Progress | None = None
+    unit: BenchUnit, trials: Sequence[Trial], folder: Path, progress: Progress | None = None
 ) -> list[TestLog]:
     """Run trials in one batch and return the logs as they are read from their files."""
     from elevon.bench.run import stand_setups

@@ -61,10 +61,10 @@ def _curve(result: DiagnosisLimits) -> Figure:
     with new_figure(len(FAULTS), height=1.7 * len(FAULTS), squeeze=False) as (figure, axes):
         for axis, fault in zip(axes[:, 0], FAULTS, strict=True):
             for test in TESTS:
-                own = [r for r in table if r["fault"] == fault.kind and r["test"] == test]
-                x = np.array([r["severity"] for r in own]) / fault.at(test)
-                share = np.array([r["share"] for r in own])
-                ends = np.array([r["interval"] for r in own]).reshape(-1, 2)
+                rows = [r for r in table if r["fault"] == fault.kind and r["test"] == test]
+                x = np.array([r["severity"] for r in rows]) / fault.at(test)
+                share = np.array([r["share"] for r in rows])
+                ends = np.array([r["interval"] for r in rows]).reshape(-1, 2)
                 bars = np.maximum([share - ends[:, 0], ends[:, 1] - share], 0.0)
                 colour = COLOURS[_COLOURS[test]]
                 axis.errorbar(x, share, bars, fmt="o-", color=colour, label=test, capsize=2)

@@ -10,7 +10,7 @@ from itertools import combinations
 from elevon.reproduce.diagnosis_limits.judge import Injected
 from elevon.reproduce.diagnosis_limits.logs import TESTS, Trial
 
-__all__ = ["FAULTS", "Fault", "Planned", "planned", "trials_of"]
+__all__ = ["FAULTS", "CampaignFault", "Planned", "planned", "trials_of"]
 
 HEALTHY = 9  # logs of each test and unit
 ABOVE = (1.0, 2.0)  # times the limit: where faults must be isolated
@@ -18,7 +18,7 @@ BELOW = (0.25, 0.5)  # for the detection curve
 
 
 @dataclass(frozen=True)
-class Fault:
+class CampaignFault:
     """A fault of the campaign.
 
     Attributes
@@ -48,14 +48,14 @@ class Fault:
 
 
 _PHASES = tuple(f"motor.phase_{p}" for p in "abc")
-FAULTS: tuple[Fault, ...] = (
-    Fault(
+FAULTS: tuple[CampaignFault, ...] = (
+    CampaignFault(
         "backlash", ("transmission",), math.radians(0.13), math.radians(0.13), math.radians(0.26)
     ),
-    Fault("friction", ("transmission",), 0.25, 0.25, 1.0),
-    Fault("short", _PHASES, 0.20, 0.10, 0.40),
-    Fault("eccentricity_static", ("motor",), 0.10, 0.05, 0.20),
-    Fault("gain_drift", ("control.position",), 0.02, 0.02, 0.04, both=True),
+    CampaignFault("friction", ("transmission",), 0.25, 0.25, 1.0),
+    CampaignFault("short", _PHASES, 0.20, 0.10, 0.40),
+    CampaignFault("eccentricity_static", ("motor",), 0.10, 0.05, 0.20),
+    CampaignFault("gain_drift", ("control.position",), 0.02, 0.02, 0.04, both=True),
 )
 
 
@@ -115,6 +115,6 @@ def _wanted(unit: int) -> Iterator[tuple[str, str, tuple[Injected, ...]]]:
         yield "pair", test, (_one(a, test, 1.0, unit), _one(b, test, 1.0, unit))
 
 
-def _one(fault: Fault, test: str, times: float, turn: int) -> Injected:
+def _one(fault: CampaignFault, test: str, times: float, turn: int) -> Injected:
     place = fault.places[turn % len(fault.places)]
     return Injected(fault.kind, place, times * fault.at(test))

@@ -15,7 +15,7 @@ from elevon.report import Check, verdict
 from elevon.reproduce.diagnosis_limits.campaign import Campaign, run_campaign
 from elevon.reproduce.diagnosis_limits.judge import Row
 from elevon.reproduce.diagnosis_limits.logs import TESTS
-from elevon.reproduce.diagnosis_limits.plan import FAULTS, Fault
+from elevon.reproduce.diagnosis_limits.plan import FAULTS, CampaignFault
 
 __all__ = ["DiagnosisLimits", "reproduce_diagnosis_limits"]
 
@@ -45,8 +45,10 @@ class DiagnosisLimits:
                      share_interval(alarms, len(healthy))[0], FALSE_ALARM)]  # fmt: skip
         single = self._rows("single")
         for fault in FAULTS:
-            own = [row for row in single if row.truth[0].kind == fault.kind]
-            out.append(_share_check(f"{fault.kind} isolated at or above its limit", own, ISOLATED))
+            of_kind = [row for row in single if row.truth[0].kind == fault.kind]
+            out.append(
+                _share_check(f"{fault.kind} isolated at or above its limit", of_kind, ISOLATED)
+            )
         out.append(_share_check("pairs named together", self._rows("pair"), TOGETHER))
         for fault in FAULTS:
             out.append(_error_check(fault, single))
@@ -66,14 +68,14 @@ class DiagnosisLimits:
         out = [_row("healthy", t, "-", None, [r for r in healthy if r.test == t]) for t in TESTS]
         for fault in FAULTS:
             for test in TESTS:
-                own = [
+                of_kind = [
                     row
                     for row in self._rows("single", "below")
                     if row.test == test and row.truth[0].kind == fault.kind
                 ]
-                levels = sorted({abs(row.truth[0].severity) for row in own})
+                levels = sorted({abs(row.truth[0].severity) for row in of_kind})
                 for level in levels:
-                    at = [row for row in own if abs(row.truth[0].severity) == level]
+                    at = [row for row in of_kind if abs(row.truth[0].severity) == level]
                     out.append(_row(at[0].group, test, fault.kind, level, at))
         for test in TESTS:
             pairs = [row for row in self._rows("pair") if row.test == test]
@@ -114,7 +116,7 @@ def _share_check(name: str, rows: Sequence[Row], limit: float) -> Check:
     return Check(name, share, limit, at_least=True)
 
 
-def _error_check(fault: Fault, rows: Iterable[Row]) -> Check:
+def _error_check(fault: CampaignFault, rows: Iterable[Row]) -> Check:
     """Median of the severity's error over what is allowed for it."""
     ratios = [
         abs(row.severities[0][0] - row.truth[0].severity)
@@ -129,11 +131,11 @@ def _error_check(fault: Fault, rows: Iterable[Row]) -> Check:
 def _covered(rows: Iterable[Row], kind: str | None = None) -> list[bool]:
     """Whether each interval of a named fault holds the true severity."""
     return [
-        said[1] <= item.severity <= said[2]
+        severity[1] <= item.severity <= severity[2]
         for row in rows
         if row.named
-        for item, said in zip(row.truth, row.severities, strict=True)
-        if said is not None and kind in (None, item.kind)
+        for item, severity in zip(row.truth, row.severities, strict=True)
+        if severity is not None and kind in (None, item.kind)
     ]
 
 
@@ -144,11 +146,11 @@ def _row(
     count: Callable[[str], int] = lambda name: sum(getattr(row, name) for row in rows)  # noqa: E731
     hits = count("alarm" if group == "healthy" else "named")
     errors = [
-        abs(said[0] - item.severity)
+        abs(severity[0] - item.severity)
         for row in rows
         if row.named
-        for item, said in zip(row.truth, row.severities, strict=True)
-        if said is not None
+        for item, severity in zip(row.truth, row.severities, strict=True)
+        if severity is not None
     ]
     return {
         "group": group,

@@ -1,7 +1,7 @@
 """Units of the virtual bench that are unlike the model: what they are, and how they vary.
 
-Every number of this file is ASSUMED: it states how far the bench may stand off the set that
-diagnosis starts from, and how far one unit changes from day to day. Diagnosis never reads it.
+Every number of this file is ASSUMED: it states how far the bench may deviate from the actuator file
+that diagnosis starts from, and how far one unit changes from day to day. Diagnosis never reads it.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ import numpy as np
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["BASE", "DAILY", "Unit", "draw_unit", "of_the_day"]
+__all__ = ["BASE", "DAILY", "BenchUnit", "draw_unit", "of_the_day"]
 
 BASE = "torino-rotary"
 
 #: Built alike in all units, unlike the set: elastic backlash between two masses, a carrier PWM with
 #: real switches, a sampled controller on encoder counts with a filtered derivative, imperfect
-#: current sensors. The step is the set's, 1 us: edges of the PWM fall on whole steps, and at 5 us
-#: that shifts the mean voltage by up to a third of what depends on the speed.
+#: current sensors. The step is the actuator file's, 1 us: edges of the PWM fall on whole steps, and
+#: at 5 us that shifts the mean voltage by up to a third of what depends on the speed.
 _BUILT: dict[str, float | str] = {
     "drive.kind": "pwm",
     "backlash.model": "elastic",
@@ -35,7 +35,7 @@ _BUILT: dict[str, float | str] = {
     "sensor.current.bits": 12.0,
     "sensor.current.full_scale": 40.0,
 }
-#: Path to the deviation between units: share of the set's value.
+#: Path to the deviation between units: share of the actuator file's value.
 _BETWEEN = {
     "motor.inertia": 0.10,
     "motor.winding_resistance": 0.04,
@@ -66,7 +66,7 @@ _WINDING = 12.0  # K, deviation of the winding's temperature from day to day
 
 
 @dataclass(frozen=True)
-class Unit:
+class BenchUnit:
     """A healthy unit of the bench.
 
     Attributes
@@ -81,7 +81,7 @@ class Unit:
     actuator: Actuator
 
 
-def draw_unit(seed: int, number: int) -> Unit:
+def draw_unit(seed: int, number: int) -> BenchUnit:
     """Draw a unit; odd ones have bristle friction (LuGre), even ones a Stribeck curve."""
     from elevon.actuator import Actuator
 
@@ -99,7 +99,7 @@ def draw_unit(seed: int, number: int) -> Unit:
     for phase in "abc":
         values[f"sensor.current.gain_{phase}"] = _factor(rng, 0.003)
         values[f"sensor.current.offset_{phase}"] = 0.01 * float(rng.standard_normal())
-    return Unit(number, base.with_values(values, source="drawn for the bench"))
+    return BenchUnit(number, base.with_values(values, source="drawn for the bench"))
 
 
 def _friction(rng: np.random.Generator, number: int) -> dict[str, float | str]:
@@ -114,7 +114,7 @@ def _friction(rng: np.random.Generator, number: int) -> dict[str, float | str]:
     }
 
 
-def of_the_day(unit: Unit, seed: int) -> Actuator:
+def of_the_day(unit: BenchUnit, seed: int) -> Actuator:
     """Return the unit as it is on one day: temperatures, friction, supply, current sensors."""
     rng = np.random.default_rng([seed, 102])
     value = unit.actuator.parameters.value

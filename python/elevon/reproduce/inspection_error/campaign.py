@@ -19,15 +19,15 @@ from elevon.prognose.observation import inspection
 from elevon.progress import Progress, part
 from elevon.reproduce.diagnosis_limits.campaign import calibrated_on
 from elevon.reproduce.diagnosis_limits.logs import TESTS, Trial, bench_logs
-from elevon.reproduce.diagnosis_limits.unit import Unit, draw_unit, of_the_day
-from elevon.reproduce.inspection_error.plan import FAULTS, Visit, healthy_trials, visits
+from elevon.reproduce.diagnosis_limits.unit import BenchUnit, draw_unit, of_the_day
+from elevon.reproduce.inspection_error.plan import FAULTS, DayVisit, healthy_trials, visits
 from elevon.worklog import WorkLog, finished
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.diagnose.bymodel import TestLog
 
-    _Bench = tuple[Unit, Actuator, list[TestLog], int]  # unit, calibrated set, baselines, seed
+    _Bench = tuple[BenchUnit, Actuator, list[TestLog], int]  # unit, calibrated set, baselines, seed
 
 __all__ = ["OF_THE_DAY", "Inspected", "friction_of", "inspect_units"]
 
@@ -48,7 +48,7 @@ class Inspected:
     law : str
         Whose fault it had.
     level : int
-        As in `Visit`.
+        As in `DayVisit`.
     severity : float
         True.
     days : int
@@ -56,7 +56,7 @@ class Inspected:
     day : float
         Dry friction of its days over that of the baselines' days, on the bench. Friction alone is
         said against it; 1 for other faults.
-    said : float or None
+    estimate : float or None
         Median severity; None where the fault was not seen.
     low, high : float
         Deviations stated below and above it.
@@ -73,7 +73,7 @@ class Inspected:
     severity: float
     days: int
     day: float
-    said: float | None
+    estimate: float | None
     low: float
     high: float
     detectable: float
@@ -82,9 +82,9 @@ class Inspected:
     @property
     def error(self) -> float:
         """Of the severity said, less what the days' own friction makes of it; NaN: not seen."""
-        if self.said is None:
+        if self.estimate is None:
             return float("nan")
-        return (1.0 + self.said) / self.day - 1.0 - self.severity
+        return (1.0 + self.estimate) / self.day - 1.0 - self.severity
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
@@ -158,22 +158,24 @@ def _unit(
             raise Interrupted("inspection-error was stopped")
 
 
-def _severity(number: int, group: Sequence[Visit], bench: _Bench) -> list[Inspected]:
+def _severity(number: int, group: Sequence[DayVisit], bench: _Bench) -> list[Inspected]:
     """Inspect one severity, a day at a time; friction also by one log of each of three days."""
     with tempfile.TemporaryDirectory() as folder:
         trials = [trial for visit in group for trial in visit.trials]
         logs = bench_logs(bench[0], trials, Path(folder))
     width = len(TESTS)
     days = [logs[k : k + width] for k in range(0, len(logs), width)]
-    rows = [_inspected(number, [v], bench, own) for v, own in zip(group, days, strict=True)]
+    rows = [
+        _inspected(number, [v], bench, day_logs) for v, day_logs in zip(group, days, strict=True)
+    ]
     if group[0].law == OF_THE_DAY and len(days) == width:
-        spread = [own[k] for k, own in enumerate(days)]
+        spread = [day_logs[k] for k, day_logs in enumerate(days)]
         rows.append(_inspected(number, group, bench, spread))
     return rows
 
 
 def _inspected(
-    number: int, group: Sequence[Visit], bench: _Bench, logs: Sequence[TestLog]
+    number: int, group: Sequence[DayVisit], bench: _Bench, logs: Sequence[TestLog]
 ) -> Inspected:
     """Diagnose logs of one severity together; they are of the days of a group of visits."""
     from elevon.diagnose.bymodel import diagnose
@@ -183,7 +185,7 @@ def _inspected(
     answer = diagnose(logs, bench[1], baselines=bench[2]).to_dict()
     seen = inspection(answer, laws, usage=0.0).seen
     key = LAWS[visit.law].key
-    said = seen[key]
+    estimate = seen[key]
     others = tuple(k for k, s in seen.items() if k != key and s.severity is not None)
     days = [trial for v in group for trial in v.trials]
     return Inspected(
@@ -191,12 +193,12 @@ def _inspected(
         visit.severity, len(group),
         friction_of(bench[0], days) / friction_of(bench[0], healthy_trials(bench[3], number))
         if visit.law == OF_THE_DAY else 1.0,
-        said.severity, said.low, said.high,
+        estimate.severity, estimate.low, estimate.high,
         float(answer["detectable"].get(key, float("nan"))), others,
     )  # fmt: skip
 
 
-def friction_of(unit: Unit, trials: Sequence[Trial]) -> float:
+def friction_of(unit: BenchUnit, trials: Sequence[Trial]) -> float:
     """Return the dry friction of a unit, a mean over the days of trials [N m]."""
     days = [of_the_day(unit, t.seed if t.day is None else t.day).parameters for t in trials]
     return sum(day.value("friction.dynamic") for day in days) / len(days)

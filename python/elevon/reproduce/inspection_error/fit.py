@@ -44,7 +44,7 @@ class Scatter:
     common_relative: float
     common_absolute: float
 
-    def own(self, severity: Floats) -> Floats:
+    def per_visit(self, severity: Floats) -> Floats:
         """Return the deviation from one inspection to the next."""
         return np.hypot(self.relative * severity, self.absolute)
 
@@ -96,15 +96,13 @@ def _surprise(values: Floats, groups: Sequence[Group]) -> Floats:
     s = np.concatenate([severity for severity, _ in groups])
     r = np.concatenate([error for _, error in groups])
     first = np.cumsum([0, *[len(error) for _, error in groups[:-1]]])
-    own = (relative * s) ** 2 + absolute**2
-    parts = np.array(
-        [np.log(own), r * r / own, 1.0 / own, s / own, s * s / own, r / own, s * r / own]
-    )
-    log_own, square, aa, ar, rr, ba, br = np.add.reduceat(parts, first, axis=1)
+    v = (relative * s) ** 2 + absolute**2
+    parts = np.array([np.log(v), r * r / v, 1.0 / v, s / v, s * s / v, r / v, s * r / v])
+    log_variance, square, aa, ar, rr, ba, br = np.add.reduceat(parts, first, axis=1)
     aa, rr, ar, ba, br = 1.0 + c_a**2 * aa, 1.0 + c_r**2 * rr, c_a * c_r * ar, c_a * ba, c_r * br
     det = aa * rr - ar**2
     square = square - (rr * ba**2 - 2.0 * ar * ba * br + aa * br**2) / det
-    return np.asarray(0.5 * (log_own + np.log(det) + square))
+    return np.asarray(0.5 * (log_variance + np.log(det) + square))
 
 
 def fitted_interval(groups: Sequence[Group], seed: int) -> tuple[Scatter, Scatter]:
@@ -116,8 +114,8 @@ def fitted_interval(groups: Sequence[Group], seed: int) -> tuple[Scatter, Scatte
     return Scatter(*map(float, low)), Scatter(*map(float, high))
 
 
-def stated(said: Floats, deviation: Floats) -> tuple[float, float]:
-    """Return share and absolute part of the deviations stated, hypot(share said, absolute).
+def stated(estimates: Floats, deviation: Floats) -> tuple[float, float]:
+    """Return share and absolute part of the deviations stated, hypot(share estimated, absolute).
 
     Least squares of their logarithms.
     """
@@ -125,9 +123,9 @@ def stated(said: Floats, deviation: Floats) -> tuple[float, float]:
 
     def misfit(x: Floats) -> float:
         share, absolute = np.exp(x)
-        return float(np.sum(np.log(np.hypot(share * said, absolute) / deviation) ** 2))
+        return float(np.sum(np.log(np.hypot(share * estimates, absolute) / deviation) ** 2))
 
-    start = np.log([float(np.median(deviation / said)), float(deviation.min())])
+    start = np.log([float(np.median(deviation / estimates)), float(deviation.min())])
     best = minimize(misfit, start, method="Nelder-Mead")
     share, absolute = np.exp(best.x)
     return float(share), float(absolute)

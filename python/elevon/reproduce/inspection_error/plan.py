@@ -9,7 +9,7 @@ import numpy as np
 
 from elevon.reproduce.diagnosis_limits.logs import TESTS, Trial
 
-__all__ = ["BASELINES", "DAYS", "FAULTS", "Growing", "Visit", "healthy_trials", "visits"]
+__all__ = ["BASELINES", "DAYS", "FAULTS", "DayVisit", "Growing", "healthy_trials", "visits"]
 
 BASELINES = 3  # healthy days, each with one log of every test
 DAYS = 3  # on which a severity is inspected
@@ -47,7 +47,7 @@ FAULTS: tuple[Growing, ...] = (
 
 
 @dataclass(frozen=True)
-class Visit:
+class DayVisit:
     """One log of every test of a unit, all of one day.
 
     Attributes
@@ -80,17 +80,17 @@ def healthy_trials(seed: int, unit: int, days: int = BASELINES) -> list[Trial]:
     return [trial for day in range(days) for trial in _of_a_day(f"base-{day}", (), key + 10 * day)]
 
 
-def visits(seed: int, unit: int) -> list[Visit]:
+def visits(seed: int, unit: int) -> list[DayVisit]:
     """Return a unit's inspections; each day has a seed of its own."""
     rng = np.random.default_rng([seed, 104, unit])
     out = []
     for number, (fault, level, severity, days) in enumerate(_wanted()):
-        own = severity * float(np.exp(_JITTER * rng.uniform(-1.0, 1.0)))
+        jittered = severity * float(np.exp(_JITTER * rng.uniform(-1.0, 1.0)))
         for day in range(days):
             name = f"u{unit}-{number:02d}-{fault.law}-{day}"
             key = _key(seed, unit) + 1000 + 100 * number + 10 * day
-            trials = _of_a_day(name, (f"{fault.key}={own!r}",), key)
-            out.append(Visit(name, fault.law, level, own, day, trials))
+            trials = _of_a_day(name, (f"{fault.key}={jittered!r}",), key)
+            out.append(DayVisit(name, fault.law, level, jittered, day, trials))
     return out
 
 

@@ -37,23 +37,23 @@ class InspectionErrors:
     def of(self, fault: Growing, days: int = 1) -> list[Inspected]:
         """Return a fault's inspections within the range, by logs of so many days."""
         levels = range(len(fault.levels))
-        own = [row for row in self.inspections if row.law == fault.law and row.days == days]
-        return [row for row in own if row.level in levels]
+        subset = [row for row in self.inspections if row.law == fault.law and row.days == days]
+        return [row for row in subset if row.level in levels]
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the table: one row a fault, and one more for friction, by logs of three days."""
-        asked = [(fault, days) for fault in FAULTS for days in (1, DAYS)]
-        rows = [(fault, self.of(fault, days)) for fault, days in asked]
-        return [_row(fault, own, self.seed) for fault, own in rows if own]
+        cells = [(fault, days) for fault in FAULTS for days in (1, DAYS)]
+        rows = [(fault, self.of(fault, days)) for fault, days in cells]
+        return [_row(fault, subset, self.seed) for fault, subset in rows if subset]
 
     def detection(self) -> list[dict[str, Any]]:
         """Return how many inspections saw each severity."""
         out = []
         for fault in FAULTS:
-            own = [r for r in self.inspections if r.law == fault.law and r.days == 1]
-            for level in sorted({row.level for row in own}):
-                at = [row for row in own if row.level == level]
-                seen = sum(row.said is not None for row in at)
+            subset = [r for r in self.inspections if r.law == fault.law and r.days == 1]
+            for level in sorted({row.level for row in subset}):
+                at = [row for row in subset if row.level == level]
+                seen = sum(row.estimate is not None for row in at)
                 out.append(
                     {
                         "fault": fault.key,
@@ -72,17 +72,17 @@ class InspectionErrors:
         """Whether the histories' inspections err as much as those that were measured."""
         out = []
         for fault in FAULTS:
-            own, drawn = self.of(fault), INSPECTIONS[fault.law]
+            subset, drawn = self.of(fault), INSPECTIONS[fault.law]
             if fault.law == OF_THE_DAY:
-                own = self.of(fault, DAYS)
-            seen = [row for row in own if row.said is not None]
+                subset = self.of(fault, DAYS)
+            seen = [row for row in subset if row.estimate is not None]
             out += [
                 Check(f"{fault.key}: error over what the histories draw (RMS, lower end)",
                       _over_drawn(seen, drawn, self.seed), 1.0),
                 Check(f"{fault.key}: deviation stated over what the histories state",
                       _over_stated(seen, drawn), _STATED),
                 Check(f"{fault.key}: share seen from the histories' least severity on",
-                      _seen_from(own, drawn.seen), _SEEN, at_least=True),
+                      _seen_from(subset, drawn.seen), _SEEN, at_least=True),
             ]  # fmt: skip
         return out
 
@@ -111,9 +111,11 @@ def _offsets(rows: Sequence[Inspected]) -> dict[int, tuple[float, float]]:
     """Return the mean severity and error of what was seen of each level."""
     out = {}
     for level in sorted({row.level for row in rows}):
-        own = [(r.severity, r.error) for r in rows if r.level == level and r.said is not None]
-        if own:
-            severity, error = np.mean(own, axis=0)
+        subset = [
+            (r.severity, r.error) for r in rows if r.level == level and r.estimate is not None
+        ]
+        if subset:
+            severity, error = np.mean(subset, axis=0)
             out[level] = (float(severity), float(error))
     return out
 
@@ -122,13 +124,13 @@ def _groups(rows: Sequence[Inspected]) -> list[Group]:
     """Return true severities and errors of what was seen, less the levels' means, by unit."""
     means, out = _offsets(rows), []
     for unit in sorted({row.unit for row in rows}):
-        own = [
+        subset = [
             (r.severity, r.error - r.severity / means[r.level][0] * means[r.level][1])
             for r in rows
-            if r.unit == unit and r.said is not None
+            if r.unit == unit and r.estimate is not None
         ]
-        if own:
-            out.append((np.array([s for s, _ in own]), np.array([e for _, e in own])))
+        if subset:
+            out.append((np.array([s for s, _ in subset]), np.array([e for _, e in subset])))
     return out
 
 
@@ -136,8 +138,8 @@ def _row(fault: Growing, rows: Sequence[Inspected], seed: int) -> dict[str, Any]
     groups = _groups(rows)
     scatter = fitted(groups)
     low, high = fitted_interval(groups, seed)
-    seen = [row for row in rows if row.said is not None]
-    share, absolute = stated(_said(seen), _deviation(seen))
+    seen = [row for row in rows if row.estimate is not None]
+    share, absolute = stated(_estimates(seen), _deviation(seen))
     inside = [_inside(row) for row in seen]
     return {
         "fault": fault.key,
@@ -158,14 +160,16 @@ def _row(fault: Growing, rows: Sequence[Inspected], seed: int) -> dict[str, Any]
         "stated_absolute": absolute,
         "stated_over_scatter": _stated_over(seen, scatter),
         "of_the_day": float(np.std(np.log([row.day for row in rows]))),
-        "error_rms": float(np.sqrt(np.mean((_said(seen) - _true(seen)) ** 2 / _true(seen) ** 2))),
+        "error_rms": float(
+            np.sqrt(np.mean((_estimates(seen) - _true(seen)) ** 2 / _true(seen) ** 2))
+        ),
         "coverage": float(np.mean(inside)),
         "detectable": float(np.median([row.detectable for row in rows])),
     }
 
 
-def _said(rows: Sequence[Inspected]) -> Floats:
-    return np.array([row.said for row in rows], dtype=np.float64)
+def _estimates(rows: Sequence[Inspected]) -> Floats:
+    return np.array([row.estimate for row in rows], dtype=np.float64)
 
 
 def _true(rows: Sequence[Inspected]) -> Floats:
@@ -178,20 +182,20 @@ def _deviation(rows: Sequence[Inspected]) -> Floats:
 
 def _inside(row: Inspected) -> bool:
     """Whether the 90 % interval holds the true severity."""
-    assert row.said is not None
-    return row.said - SIGMAS * row.low <= row.severity <= row.said + SIGMAS * row.high
+    assert row.estimate is not None
+    return row.estimate - SIGMAS * row.low <= row.severity <= row.estimate + SIGMAS * row.high
 
 
 def _stated_over(rows: Sequence[Inspected], scatter: Scatter) -> float:
     """Return the deviations stated over those from one inspection to the next: a median."""
     true = _true(rows)
     day = float(np.std(np.log([row.day for row in rows])))
-    own = np.hypot(scatter.own(true), day * (1.0 + true))
-    return float(np.median(_deviation(rows) / own))
+    subset = np.hypot(scatter.per_visit(true), day * (1.0 + true))
+    return float(np.median(_deviation(rows) / subset))
 
 
 def _error_median(rows: Sequence[Inspected]) -> float | None:
-    errors = [abs(row.said - row.severity) for row in rows if row.said is not None]
+    errors = [abs(row.estimate - row.severity) for row in rows if row.estimate is not None]
     return float(np.median(errors)) if errors else None
 
 
@@ -199,10 +203,10 @@ def _over_drawn(rows: Sequence[Inspected], drawn: InspectionError, seed: int) ->
     """Return the lower end of 95 % of the errors' RMS over the deviation that is drawn."""
     by_unit = []
     for unit in sorted({row.unit for row in rows}):
-        own = [row for row in rows if row.unit == unit]
-        s = _true(own)
-        whole = np.sqrt(drawn.own(s) ** 2 + drawn.common(s) ** 2)
-        by_unit.append(float(np.mean(((_said(own) - s - drawn.mean(s)) / whole) ** 2)))
+        subset = [row for row in rows if row.unit == unit]
+        s = _true(subset)
+        whole = np.sqrt(drawn.per_visit(s) ** 2 + drawn.common(s) ** 2)
+        by_unit.append(float(np.mean(((_estimates(subset) - s - drawn.mean(s)) / whole) ** 2)))
     rng = np.random.default_rng([seed, 106])
     draws = rng.choice(by_unit, size=(2000, len(by_unit))).mean(axis=1)
     return float(np.sqrt(np.quantile(draws, 0.025)))
@@ -210,10 +214,10 @@ def _over_drawn(rows: Sequence[Inspected], drawn: InspectionError, seed: int) ->
 
 def _over_stated(rows: Sequence[Inspected], drawn: InspectionError) -> float:
     """Return the median ratio of the deviations stated, the larger over the smaller."""
-    ratio = float(np.median(_deviation(rows) / drawn.stated(_said(rows))))
+    ratio = float(np.median(_deviation(rows) / drawn.stated(_estimates(rows))))
     return max(ratio, 1.0 / ratio)
 
 
 def _seen_from(rows: Sequence[Inspected], least: float) -> float:
-    own = [row for row in rows if row.severity >= least]
-    return float(np.mean([row.said is not None for row in own])) if own else float("nan")
+    subset = [row for row in rows if row.severity >= least]
+    return float(np.mean([row.estimate is not None for row in subset])) if subset else float("nan")

@@ -3,7 +3,7 @@
 from elevon.reproduce.nasa.baseline import reproduce_baseline
 from elevon.reproduce.nasa.baseline_rows import BaselineResult
 from elevon.reproduce.nasa.capability import Capability
-from elevon.reproduce.nasa.profiles import PROFILES, Profile, profile_scenario
+from elevon.reproduce.nasa.profiles import PROFILES, MotionProfile, profile_scenario
 from elevon.reproduce.nasa.separation import reproduce_separation
 from elevon.reproduce.nasa.separation_rows import SeparationResult
 from elevon.reproduce.nasa.thermal import ThermalResult, reproduce_thermal
@@ -12,7 +12,7 @@ __all__ = [
     "PROFILES",
     "BaselineResult",
     "Capability",
-    "Profile",
+    "MotionProfile",
     "SeparationResult",
     "ThermalResult",
     "profile_scenario",

@@ -23,8 +23,8 @@ from elevon.reproduce.nasa.baseline_rows import MEASURES, BaselineResult, Baseli
 from elevon.reproduce.nasa.capability import Capability
 from elevon.reproduce.nasa.corners import corner_rows
 from elevon.reproduce.nasa.design import (
-    Factor,
     FactorEffect,
+    TwoLevelFactor,
     coverage,
     fit_effects,
     model_matrix,
@@ -32,7 +32,7 @@ from elevon.reproduce.nasa.design import (
 )
 from elevon.reproduce.nasa.histories import time_histories
 from elevon.reproduce.nasa.population import draw_units
-from elevon.reproduce.nasa.profiles import PROFILES, LoadKind, Profile, profile_scenario
+from elevon.reproduce.nasa.profiles import PROFILES, LoadKind, MotionProfile, profile_scenario
 from elevon.reproduce.nasa.store import CellStore, work_key
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 __all__ = ["baseline_matrix", "reproduce_baseline"]
 
 Array = npt.NDArray[np.float64]
-Case = tuple[Profile, float]
+Case = tuple[MotionProfile, float]
 
 ACTUATOR = "nasa-ballscrew"
 LOADS = (0.0, -500.0, -4500.0, -8500.0, 500.0, 4500.0, 8500.0)
@@ -63,11 +63,11 @@ RECORD = "command,output_position,current_a,current_b,current_c,winding_temperat
 SOLVER = {"solver.step": 5e-6}
 BATCH = 16
 FACTORS = (
-    Factor("profile", "sinusoidal", "triangular"),
-    Factor("amplitude", "50 mm", "100 mm"),
-    Factor("rate", "6 cm/s", "12 cm/s"),
-    Factor("load", "500 N", "8500 N"),
-    Factor("direction", "tensile", "compressive"),
+    TwoLevelFactor("profile", "sinusoidal", "triangular"),
+    TwoLevelFactor("amplitude", "50 mm", "100 mm"),
+    TwoLevelFactor("rate", "6 cm/s", "12 cm/s"),
+    TwoLevelFactor("load", "500 N", "8500 N"),
+    TwoLevelFactor("direction", "tensile", "compressive"),
 )
 RESPONSES = ("rms_current_a", "peak_current_a", "tracking_rms_mm", "winding_rise_k")
 
@@ -81,7 +81,7 @@ def baseline_matrix() -> list[Case]:
         if name == "rectangular":
             motions.insert(0, (0.0, RATES[0]))
         for amplitude, rate in motions:
-            cells += [(Profile(name, amplitude, rate, duration), load) for load in LOADS]
+            cells += [(MotionProfile(name, amplitude, rate, duration), load) for load in LOADS]
     return cells
 
 
@@ -103,7 +103,7 @@ def reproduce_baseline(
         Of the wiring ``ballscrew``; by default the stand's.
     load_kind : str
         How the load acts: ``constant``, ``step`` or ``spring``.
-    cases : sequence of (Profile, float), optional
+    cases : sequence of (MotionProfile, float), optional
         Profiles and loads [N] instead of the whole matrix, which alone has effects and histories.
     replicates : int
         Blocks, each with a reassembly of its own; at least 1.
@@ -222,7 +222,7 @@ def _measure(
     store: CellStore,
     progress: Progress | None,
 ) -> dict[tuple[int, int], tuple[float, ...]]:
-    """Return `MEASURES` of every run; runs that share lanes go together."""
+    """Return `MEASURES` of every run; runs that share a batch go together."""
     from elevon.simulate import simulate_batch
 
     alike: dict[tuple[bool, float], list[tuple[int, int]]] = {}
@@ -277,7 +277,7 @@ def _measures(recording: Recording, period: float) -> list[float]:
 
 
 def _row(
-    profile: Profile,
+    profile: MotionProfile,
     load: float,
     reason: str | None,
     runs: Sequence[tuple[float, ...]],

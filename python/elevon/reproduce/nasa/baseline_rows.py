@@ -9,8 +9,8 @@ import numpy as np
 
 from elevon.report.checks import Check, verdict
 from elevon.reproduce.nasa.design import FactorEffect
-from elevon.reproduce.nasa.histories import History
-from elevon.reproduce.nasa.profiles import LoadKind, Profile
+from elevon.reproduce.nasa.histories import HistoryFigure
+from elevon.reproduce.nasa.profiles import LoadKind, MotionProfile
 
 __all__ = ["MEASURES", "BaselineResult", "BaselineRow"]
 
@@ -31,16 +31,16 @@ class BaselineRow:
 
     Attributes
     ----------
-    profile, load : Profile and float
+    profile, load : MotionProfile and float
         N, positive compressive.
     status, reason : str
-        ``ok``, ``limited`` (asks for more than there is, and runs), ``refused``, or how a run
+        ``ok``, ``limited`` (requests more than there is, and runs), ``refused``, or how a run
         ended; and why.
     runs : tuple of tuple of float
         `MEASURES` of each replicate.
     """
 
-    profile: Profile
+    profile: MotionProfile
     load: float
     status: str
     reason: str = ""
@@ -93,7 +93,7 @@ class BaselineResult:
         Of each response, the effects of the factors and of their pairs.
     sheet : list of dict
         The runs in the order in which they were done: block, order, air temperature, cell.
-    histories : list of History
+    histories : list of HistoryFigure
         Figures 5, 6 and 7 of the paper.
     corners : list of dict
         Sharp against rounded corners.
@@ -106,7 +106,7 @@ class BaselineResult:
     replicates: int
     effects: dict[str, list[FactorEffect]] = field(default_factory=dict)
     sheet: list[dict[str, Any]] = field(default_factory=list)
-    histories: list[History] = field(default_factory=list)
+    histories: list[HistoryFigure] = field(default_factory=list)
     corners: list[dict[str, Any]] = field(default_factory=list)
     meta: dict[str, Any] = field(default_factory=dict)
 

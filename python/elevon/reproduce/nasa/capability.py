@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from elevon.actuator import Actuator
 from elevon.errors import InputError, RangeError
 from elevon.parameters.relations import torque_constant
-from elevon.reproduce.nasa.profiles import Profile
+from elevon.reproduce.nasa.profiles import MotionProfile
 
 __all__ = ["Capability"]
 
@@ -122,9 +122,9 @@ class Capability:
         # (k^2 + p^2 L^2 i^2) w^2 + 2 R i k w + R^2 i^2 = V^2
         square = self.emf**2 + (self.reactance * current) ** 2
         half = self.resistance * current * self.emf
-        rest = (self.resistance * current) ** 2 - self.voltage**2
-        root = half * half - square * rest
-        speed = (math.sqrt(root) - half) / square if rest < 0.0 else 0.0
+        constant = (self.resistance * current) ** 2 - self.voltage**2
+        root = half * half - square * constant
+        speed = (math.sqrt(root) - half) / square if constant < 0.0 else 0.0
         return self.travel_per_radian * speed
 
     def rate(self, load: float) -> tuple[float, str]:
@@ -140,7 +140,7 @@ class Capability:
         spare = torque_constant(self.emf) * (self.current_limit - self.current(load, rate))
         return self.travel_per_radian * spare / self.inertia
 
-    def refusal(self, profile: Profile, load: float, opposing: float = 0.0) -> str | None:
+    def refusal(self, profile: MotionProfile, load: float, opposing: float = 0.0) -> str | None:
         """Return why a profile cannot be run, or None; jumps and sweeps only need the stroke."""
         force = abs(load) + opposing
         lower, upper = self.stops
@@ -171,14 +171,14 @@ class Capability:
             )
         return None
 
-    def check(self, profile: Profile, load: float, opposing: float = 0.0) -> None:
+    def check(self, profile: MotionProfile, load: float, opposing: float = 0.0) -> None:
         """Raise `RangeError` for a profile that cannot be run."""
         reason = self.refusal(profile, load, opposing)
         if reason is not None:
             raise RangeError(f"profile {profile.name}: {reason}")
 
-    def limited(self, profile: Profile, load: float, opposing: float = 0.0) -> bool:
-        """Tell whether a jump or a sweep asks for more than the actuator can give."""
+    def limited(self, profile: MotionProfile, load: float, opposing: float = 0.0) -> bool:
+        """Tell whether a jump or a sweep requests more than the actuator can give."""
         force = abs(load) + opposing
         too_fast = profile.peak_rate > self.rate(force)[0]
         return too_fast or profile.peak_acceleration > self.acceleration(force)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elevon.errors import SimulationError
-from elevon.reproduce.nasa.profiles import Profile, profile_scenario
+from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -38,7 +38,7 @@ def corner_rows(actuator: Actuator, progress: Progress | None = None) -> list[di
         Run(
             actuator,
             Scenario.from_dict(
-                profile_scenario(Profile(shape, 0.05, 0.06, DURATION, acceleration), load)
+                profile_scenario(MotionProfile(shape, 0.05, 0.06, DURATION, acceleration), load)
             ),
             label=f"{shape}, {load:g} N",
         )

@@ -187,7 +187,7 @@ def _unit(model: Actuator, seed: int, assembly: int) -> Actuator:
     )
     values["motor.emf_constant"] = 0.97 * value("motor.emf_constant")
     values["screw.efficiency"] = value("screw.efficiency") - 0.01
-    return model.with_values(values, source="assembly on the virtual stand", asked=False)
+    return model.with_values(values, source="assembly on the virtual stand", request=False)
 
 
 def _log(
@@ -240,8 +240,8 @@ def _predicted(
     if state == "jam":
         scenario = scenario.with_faults([JAM])
     run = simulate(model, scenario, fidelity="low", record="current_q_meas@every")
-    shown = run["current_q_meas"]
-    predicted = np.interp(time, shown.time, shown.values)
+    simulated = run["current_q_meas"]
+    predicted = np.interp(time, simulated.time, simulated.values)
     measured = np.asarray(log.role("torque_current").values, dtype=np.float64)
     used = time >= SETTLED
     rms = float(np.sqrt(np.mean((predicted - measured)[used] ** 2)))

@@ -3,8 +3,8 @@
 The paper fits its network to one hour on the sub-scale DEMA stand: it measures surface, nut and
 air, averages over 1 s, and reports an error of the surface of 0.84 K at most and 0.42 K rms; it
 prints neither the temperatures nor the parameters. So what can be checked is the procedure: a bench
-with hidden values about those of the set ``nasa-dema`` is measured in the same way, and the fit has
-to recover them.
+with hidden values about those of the actuator file ``nasa-dema`` is measured in the same way, and
+the fit has to recover them.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy.typing as npt
 from elevon.errors import SimulationError
 from elevon.progress import part
 from elevon.report.checks import Check
-from elevon.reproduce.nasa.profiles import Profile, profile_scenario
+from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -42,7 +42,7 @@ FITTED = (
     "screw.nut_to_air",
 )
 SPREAD = 0.2
-"""Hidden values differ from the set's by a factor of this deviation (logarithm)."""
+"""Hidden values differ from the actuator file's by a factor of this deviation (logarithm)."""
 NOISE = 0.15
 """Of a thermocouple averaged over 1 s [K] (ASSUMED)."""
 LOADS = (1000.0, 3000.0, 0.0, 4000.0)
@@ -117,9 +117,9 @@ def fit_dema(seed: int = 0, progress: Progress | None = None) -> DemaFit:
         shifted = [logarithms, *(logarithms + STEP * row for row in np.eye(len(FITTED)))]
         runs = _hours(nominal, shifted, span)
         slopes = np.array([(run[:2] - runs[0][:2]).ravel() / STEP for run in runs[1:]]).T
-        rest = (measured - runs[0][:2]).ravel()
-        logarithms = logarithms + np.linalg.lstsq(slopes, rest, rcond=None)[0]
-    variance = float(rest @ rest) / (rest.size - len(FITTED))
+        residual = (measured - runs[0][:2]).ravel()
+        logarithms = logarithms + np.linalg.lstsq(slopes, residual, rcond=None)[0]
+    variance = float(residual @ residual) / (residual.size - len(FITTED))
     deviation = np.sqrt(np.diag(variance * np.linalg.inv(slopes.T @ slopes)))
     rows = [
         FitRow(path, *(float(np.exp(x)) for x in (h, f, f - 1.96 * d, f + 1.96 * d)))
@@ -135,7 +135,7 @@ def _hours(nominal: Actuator, values: Sequence[Array], progress: Progress | None
     from elevon.scenario import Scenario
     from elevon.simulate import Run, simulate_batch
 
-    data = profile_scenario(Profile("sinusoidal", 0.05, 0.06, HOUR))
+    data = profile_scenario(MotionProfile("sinusoidal", 0.05, 0.06, HOUR))
     steps = [
         {"kind": "step", "final": after - before, "time": (i + 1) * HOUR / len(LOADS)}
         for i, (before, after) in enumerate(pairwise(LOADS))

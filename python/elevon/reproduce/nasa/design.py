@@ -14,7 +14,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Factor", "FactorEffect", "coverage", "fit_effects", "model_matrix", "shuffled_blocks"]
+__all__ = [
+    "FactorEffect",
+    "TwoLevelFactor",
+    "coverage",
+    "fit_effects",
+    "model_matrix",
+    "shuffled_blocks",
+]
 
 Array = npt.NDArray[np.float64]
 
@@ -22,7 +29,7 @@ LEVEL = 0.95
 
 
 @dataclass(frozen=True, slots=True)
-class Factor:
+class TwoLevelFactor:
     """A factor and its two levels, as shown."""
 
     name: str
@@ -56,18 +63,20 @@ def shuffled_blocks(runs: int, blocks: int, seed: int) -> npt.NDArray[np.int64]:
     return np.array([np.random.default_rng([seed, b]).permutation(runs) for b in range(blocks)])
 
 
-def terms(factors: Sequence[Factor]) -> list[tuple[int, ...]]:
+def terms(factors: Sequence[TwoLevelFactor]) -> list[tuple[int, ...]]:
     """Return the factors' indices of every term: one, then two at a time."""
     places = range(len(factors))
     return [*((i,) for i in places), *combinations(places, 2)]
 
 
-def model_matrix(factors: Sequence[Factor], levels: Array, block: npt.NDArray[np.int64]) -> Array:
+def model_matrix(
+    factors: Sequence[TwoLevelFactor], levels: Array, block: npt.NDArray[np.int64]
+) -> Array:
     """Return the columns of the model: blocks, then the terms.
 
     Parameters
     ----------
-    factors : sequence of Factor
+    factors : sequence of TwoLevelFactor
         In the order of the levels.
     levels : ndarray, shape (runs, factors)
         -1 or +1.
@@ -80,7 +89,7 @@ def model_matrix(factors: Sequence[Factor], levels: Array, block: npt.NDArray[np
 
 
 def fit_effects(
-    factors: Sequence[Factor], levels: Array, block: npt.NDArray[np.int64], response: Array
+    factors: Sequence[TwoLevelFactor], levels: Array, block: npt.NDArray[np.int64], response: Array
 ) -> list[FactorEffect]:
     """Return the effect of every term with its interval.
 
@@ -120,7 +129,7 @@ def _holm(p: Array) -> Array:
 
 
 def coverage(
-    factors: Sequence[Factor],
+    factors: Sequence[TwoLevelFactor],
     levels: Array,
     block: npt.NDArray[np.int64],
     truth: Mapping[str, Any],
@@ -149,13 +158,13 @@ def coverage(
     matrix = model_matrix(factors, levels, block)
     effects = np.asarray(truth["effects"], dtype=float)
     first = matrix.shape[1] - effects.size
-    held, errors = [], []
+    within, errors = [], []
     for _ in range(campaigns):
         offsets = truth["block"] * rng.standard_normal(first)
         scatter = truth["scatter"] * rng.standard_normal(block.size)
         response = matrix @ np.concatenate([offsets, 0.5 * effects]) + scatter
         fitted = fit_effects(factors, levels, block, response)
-        held.append([f.low <= e <= f.high for f, e in zip(fitted, effects, strict=True)])
+        within.append([f.low <= e <= f.high for f, e in zip(fitted, effects, strict=True)])
         errors.append([f.effect - e for f, e in zip(fitted, effects, strict=True)])
     error = np.array(errors)
-    return float(np.mean(held)), float(np.abs(error.mean(axis=0) / error.std(axis=0)).max())
+    return float(np.mean(within)), float(np.abs(error.mean(axis=0) / error.std(axis=0)).max())

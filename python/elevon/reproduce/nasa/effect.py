@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["POWER", "Comparison", "Effect", "EffectScale", "compare_profiles", "null_p"]
+__all__ = ["POWER", "Effect", "EffectScale", "GroupComparison", "compare_profiles", "null_p"]
 
 Array = npt.NDArray[np.float64]
 
@@ -41,7 +41,7 @@ class Effect:
         return (0.0 if self.low <= 0.0 <= self.high else ends[0]), ends[1]
 
     @property
-    def shown(self) -> bool:
+    def significant(self) -> bool:
         """Whether the interval leaves out zero."""
         return self.low > 0.0 or self.high < 0.0
 
@@ -80,11 +80,13 @@ class EffectScale:
         healthy, faulty : ndarray
             One value a unit, of the sizes given to the scale.
         """
-        deviation, own = float(np.std(healthy, ddof=1)), float(np.std(faulty, ddof=1))
+        deviation, faulty_deviation = float(np.std(healthy, ddof=1)), float(np.std(faulty, ddof=1))
         moved = float(np.mean(faulty) - np.mean(healthy))
         if deviation == 0.0:
             return Effect(float("nan"), float("nan"), float("nan"))
-        change = (moved - max(own, deviation) * self._faulty) / (deviation * self._deviation)
+        change = (moved - max(faulty_deviation, deviation) * self._faulty) / (
+            deviation * self._deviation
+        )
         ends = 0.5 * (1.0 - self._level), 0.5 * (1.0 + self._level)
         low, high = np.quantile(change - self._healthy, ends)
         return Effect(self._correction * moved / deviation, float(low), float(high))
@@ -100,15 +102,15 @@ def null_p(healthy: Array, faulty: Array) -> Array:
 
     large, small = len(healthy), len(faulty)
     variance = np.var(healthy, axis=0, ddof=1)
-    own = np.maximum(np.var(faulty, axis=0, ddof=1), variance) / small
+    ratio = np.maximum(np.var(faulty, axis=0, ddof=1), variance) / small
     other = variance / large
-    freedom = (own + other) ** 2 / (own**2 / (small - 1) + other**2 / (large - 1))
+    freedom = (ratio + other) ** 2 / (ratio**2 / (small - 1) + other**2 / (large - 1))
     moved = np.abs(np.mean(healthy, axis=0) - np.mean(faulty, axis=0))
-    return np.asarray(2.0 * t.sf(moved / np.sqrt(own + other), freedom))
+    return np.asarray(2.0 * t.sf(moved / np.sqrt(ratio + other), freedom))
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class GroupComparison:
     """Which of several effects is the largest, if the intervals tell.
 
     Attributes
@@ -129,20 +131,20 @@ class Comparison:
     factor: float
 
 
-def compare_profiles(effects: Sequence[Effect], level: float) -> Comparison:
+def compare_profiles(effects: Sequence[Effect], level: float) -> GroupComparison:
     """Compare effects by their distance from zero; `level` is that of their intervals."""
     from scipy.stats import norm
 
     order = sorted(range(len(effects)), key=lambda i: -abs(effects[i].size))
-    best, rest = effects[order[0]], [effects[i] for i in order[1:]]
+    best, others = effects[order[0]], [effects[i] for i in order[1:]]
     # The most dangerous rival is the one whose interval reaches highest.
-    rival = max(rest, key=lambda effect: effect.bounds[1])
+    rival = max(others, key=lambda effect: effect.bounds[1])
     gap = abs(best.size) - abs(rival.size)
     halves = abs(best.size) - best.bounds[0], rival.bounds[1] - abs(rival.size)
     z = float(norm.ppf(0.5 + 0.5 * level))
     spread = math.hypot(halves[0] / z, halves[1] / z)
     power = float(norm.cdf((gap - sum(halves)) / spread))
-    named = best.shown and best.bounds[0] > rival.bounds[1] and power >= POWER
+    named = best.significant and best.bounds[0] > rival.bounds[1] and power >= POWER
     apart = sum(halves) + float(norm.ppf(POWER)) * spread
     factor = (apart / gap) ** 2 if gap > 0.0 else math.inf
-    return Comparison(order[0] if named else None, power, factor)
+    return GroupComparison(order[0] if named else None, power, factor)

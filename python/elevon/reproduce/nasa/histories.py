@@ -12,14 +12,14 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import SimulationError
-from elevon.reproduce.nasa.profiles import Profile, profile_scenario
+from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
 from elevon.units import to_si
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.progress import Progress
 
-__all__ = ["History", "time_histories"]
+__all__ = ["HistoryFigure", "time_histories"]
 
 Array = npt.NDArray[np.float64]
 
@@ -30,7 +30,7 @@ POUND_FORCE = float(to_si(1.0, "lbf"))
 
 
 @dataclass(frozen=True, slots=True)
-class History:
+class HistoryFigure:
     """One figure: time [s] and its curves by signal, SI.
 
     Attributes
@@ -48,13 +48,13 @@ class History:
 
 
 def _conditions() -> list[tuple[int, str, dict[str, Any]]]:
-    sine = Profile("sinusoidal", 0.05, 0.06, 40.0)
+    sine = MotionProfile("sinusoidal", 0.05, 0.06, 40.0)
     stepped = profile_scenario(sine)
     step = {"kind": "step", "initial": 500.0, "final": 4500.0, "time": 20.0}
     stepped["load"] = {"output": {"terms": [step]}}
-    short = Profile("sinusoidal", 0.05, 0.06, 20.0)
+    short = MotionProfile("sinusoidal", 0.05, 0.06, 20.0)
     opposed = profile_scenario(short, opposing=900.0 * POUND_FORCE)
-    triangle = Profile("triangular", 0.05, 0.06, 20.0)
+    triangle = MotionProfile("triangular", 0.05, 0.06, 20.0)
     sprung = profile_scenario(triangle, 1725.0 * POUND_FORCE, "spring")
     return [
         (5, "sine, load stepping from 500 to 4500 N at 20 s", stepped),
@@ -63,7 +63,7 @@ def _conditions() -> list[tuple[int, str, dict[str, Any]]]:
     ]
 
 
-def time_histories(actuator: Actuator, progress: Progress | None = None) -> list[History]:
+def time_histories(actuator: Actuator, progress: Progress | None = None) -> list[HistoryFigure]:
     """Return the three figures, simulated at high fidelity.
 
     Raises
@@ -84,7 +84,7 @@ def time_histories(actuator: Actuator, progress: Progress | None = None) -> list
         if recording.status != "ok":
             raise SimulationError(f"{recording.meta['label']}: {recording.meta['message']}")
     return [
-        History(number, title, recording["command"].time,
+        HistoryFigure(number, title, recording["command"].time,
                 {name: recording[name].values for name in recording.names})
         for (number, title, _), recording in zip(wanted, recordings, strict=True)
     ]  # fmt: skip

@@ -11,12 +11,12 @@ import numpy.typing as npt
 
 from elevon.report.checks import Check
 from elevon.reproduce.nasa.features import FEATURES, PEAK
-from elevon.reproduce.nasa.profiles import Profile, profile_scenario
+from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["GAP", "Impact", "Trace", "gap_impacts", "gap_traces", "impact_checks"]
+__all__ = ["GAP", "Impact", "ImpactTrace", "gap_impacts", "gap_traces", "impact_checks"]
 
 Array = npt.NDArray[np.float64]
 Cells = Mapping[tuple[str, float], Mapping[str, Array]]
@@ -50,7 +50,7 @@ class Impact:
 
 
 @dataclass(frozen=True, slots=True)
-class Trace:
+class ImpactTrace:
     """Load-cell force of the nominal actuator about a reversal."""
 
     profile: str
@@ -96,7 +96,7 @@ def impact_checks(cells: Cells) -> list[Check]:
     return checks
 
 
-def gap_traces(actuator: Actuator) -> list[Trace]:
+def gap_traces(actuator: Actuator) -> list[ImpactTrace]:
     """Return the load cell's force about the second reversal, with and without the gap."""
     from elevon.scenario import Scenario
     from elevon.simulate import Run, simulate_batch
@@ -109,7 +109,7 @@ def gap_traces(actuator: Actuator) -> list[Trace]:
     ]
     runs = []
     for shape, load, gap in cases:
-        profile = Profile(shape, 0.05, 0.06, 4.0)
+        profile = MotionProfile(shape, 0.05, 0.06, 4.0)
         scenario = Scenario.from_dict(profile_scenario(profile, opposing=load))
         runs.append(Run(actuator, scenario.with_faults([GAP_FAULT]) if gap else scenario))
     recordings = simulate_batch(runs, fidelity="high", record="joint_force,command@4 kHz")
@@ -118,7 +118,7 @@ def gap_traces(actuator: Actuator) -> list[Trace]:
         time, command = recording["command"].time, recording["command"].values
         # The motion downwards begins where the command leaves its first peak.
         leaves = time[np.flatnonzero(command >= command.max() - 1e-9)[-1]]
-        shown = (time >= leaves - 0.05) & (time <= leaves + 0.15)
-        force = recording["joint_force"].values[shown]
-        traces.append(Trace(shape, load, gap, time[shown] - leaves, force))
+        window = (time >= leaves - 0.05) & (time <= leaves + 0.15)
+        force = recording["joint_force"].values[window]
+        traces.append(ImpactTrace(shape, load, gap, time[window] - leaves, force))
     return traces

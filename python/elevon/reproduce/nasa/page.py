@@ -23,7 +23,7 @@ Result = BaselineResult | SeparationResult | ThermalResult
 
 
 def nasa_report(result: Result, *, date: str | None = None) -> Report:
-    """Return the report of a result of this room."""
+    """Return the report of a result of this package."""
     if isinstance(result, ThermalResult):
         report, command = _thermal(result, date), "nasa-thermal"
     elif isinstance(result, BaselineResult):
@@ -77,8 +77,8 @@ def _fit_figure(fit: DemaFit) -> Figure:
         minutes = fit.time / 60.0
         for row, (name, colour) in enumerate((("surface", "blue"), ("nut", "green"))):
             axes.plot(minutes, fit.measured[row] - 273.15, ".", ms=1, color=COLOURS["grey"])
-            shown = fit.fitted[row] - 273.15
-            axes.plot(minutes, shown, color=COLOURS[colour], label=f"{name}, fitted")
+            fitted = fit.fitted[row] - 273.15
+            axes.plot(minutes, fitted, color=COLOURS[colour], label=f"{name}, fitted")
         label = "winding, not measured"
         axes.plot(minutes, fit.fitted[2] - 273.15, color=COLOURS["orange"], label=label, lw=0.8)
         axes.set(xlabel="Time [min]", ylabel="Temperature [degC]")

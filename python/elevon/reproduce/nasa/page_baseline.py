@@ -10,7 +10,7 @@ from elevon.report import Report, Table
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.nasa.baseline import DRIFT
 from elevon.reproduce.nasa.baseline_rows import MEASURES, BaselineResult
-from elevon.reproduce.nasa.histories import History
+from elevon.reproduce.nasa.histories import HistoryFigure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -109,7 +109,7 @@ def _current_figure(result: BaselineResult) -> Figure:
     return figure
 
 
-def _history_figure(history: History) -> Figure:
+def _history_figure(history: HistoryFigure) -> Figure:
     curve = history.curves
     with new_figure(2, 2, width=8.0, height=4.4, sharex=True) as (figure, grid):
         position, load, current, warm = grid.flat
@@ -138,16 +138,16 @@ def _legend_above(axes: Axes) -> None:
 
 
 def _rows_table(result: BaselineResult) -> Table:
-    shown = ("rms_current_a", "peak_current_a", "tracking_rms_mm", "winding_rise_k")
+    measures = ("rms_current_a", "peak_current_a", "tracking_rms_mm", "winding_rise_k")
     columns = ["Profile", "Amplitude [mm]", "Rate [mm/s]", "Load [N]", "Direction",
-               *(f"{MEASURES[name][0]} [{MEASURES[name][1]}]" for name in shown),
+               *(f"{MEASURES[name][0]} [{MEASURES[name][1]}]" for name in measures),
                "Scatter of the RMS [A]", "Status"]  # fmt: skip
     rows = [
         [d["profile"], d["amplitude_mm"], d["rate_mm_s"], d["load_n"], d["direction"],
-         *(d[name] for name in shown), d["rms_current_scatter_a"], d["status"]]
+         *(d[name] for name in measures), d["rms_current_scatter_a"], d["status"]]
         for d in (row.to_dict() for row in result.rows)
     ]  # fmt: skip
-    numbers = [f".{MEASURES[name][2]}f" for name in shown]
+    numbers = [f".{MEASURES[name][2]}f" for name in measures]
     return Table(
         columns, rows, "Means over the replicates and the scatter between reassemblies.",
         formats=("", ".0f", ".0f", ".0f", "", *numbers, ".4f", ""),

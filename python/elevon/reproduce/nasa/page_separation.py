@@ -76,7 +76,7 @@ def _winners_table(result: SeparationResult) -> Table:
     for (fault, load), group in _groups(result).items():
         largest = max(group, key=lambda row: abs(row.effect.size))
         winner = next((row.profile for row in group if row.winner), None)
-        if winner is None and not any(row.effect.shown for row in group):
+        if winner is None and not any(row.effect.significant for row in group):
             verdict = "not shown by any"
         else:
             verdict = winner or "none named"
@@ -209,7 +209,7 @@ def _population(report: Report) -> None:
     report.section(
         "Healthy population",
         "Nothing of it is printed: every spread is ASSUMED. Deviations are in SI units or shares "
-        "of the set's value; all groups, healthy and faulty, are drawn from it.",
+        "of the actuator file's value; all groups, healthy and faulty, are drawn from it.",
     ).table(Table(["Property", "Deviation", "Why this much"], rows))
 
 

@@ -16,13 +16,13 @@ import numpy as np
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["NOISE", "SPREADS", "Spread", "draw_units", "spread_rows"]
+__all__ = ["NOISE", "SPREADS", "UnitSpread", "draw_units", "spread_rows"]
 
 Kind = Literal["factor", "added", "vector", "range"]
 
 
 @dataclass(frozen=True, slots=True)
-class Spread:
+class UnitSpread:
     """How one property differs between healthy units.
 
     Attributes
@@ -32,8 +32,9 @@ class Spread:
     paths : tuple of str
         Parameters that share the draw.
     kind : str
-        ``factor``: 1 + size n on the set's values; ``added``: size n; ``vector``: the length
-        of two of them at a right angle; ``range``: even between `size` and `upper`. n is normal.
+        ``factor``: 1 + size n on the actuator file's values; ``added``: size n; ``vector``: the
+        length of two of them at a right angle; ``range``: even between `size` and `upper`. n is
+        normal.
     size : float
         Deviation (of a range its lower end), in the parameter's SI unit or as a share.
     reason : str
@@ -65,35 +66,36 @@ GREASE_PER_KELVIN = 0.03
 """Share of the grease's viscosity lost per kelvin (ASSUMED: common greases halve in some 23 K)."""
 
 SPREADS = (
-    Spread("dry friction", ("friction.static", "friction.dynamic"), "factor", 0.10,
-           "seals and bearings seat anew with each reassembly"),
-    Spread("preload", ("screw.preload",), "factor", 0.10,
-           "makers hold the torque of a preload to 10 to 30 %"),
-    Spread(FRICTION_COEFFICIENT, (), "factor", 0.05, "grease, finish and run-in of the raceways"),
-    Spread("friction of the load side", ("load.friction",), "factor", 0.10, "guides and seals"),
-    Spread("backlash of the fixture", ("backlash.total",), "factor", 0.20, "pins are fitted anew"),
-    Spread("EMF constant", ("motor.emf_constant",), "factor", 0.01, "magnets of another article"),
-    Spread("gain of each current sensor",
-           ("sensor.current.gain_a",), "added", 0.005, "adjusted to 0.5 %"),
-    Spread("gain of each current sensor", ("sensor.current.gain_b",), "added", 0.005, ""),
-    Spread("gain of each current sensor", ("sensor.current.gain_c",), "added", 0.005, ""),
-    Spread("offset of each current sensor",
-           ("sensor.current.offset_a",), "added", 0.01, "0.05 % of a 20 A sensor"),
-    Spread("offset of each current sensor", ("sensor.current.offset_b",), "added", 0.01, ""),
-    Spread("offset of each current sensor", ("sensor.current.offset_c",), "added", 0.01, ""),
-    Spread("mismatch of the resolver's channels",
-           ("sensor.resolver.mismatch",), "range", 0.0, "up to 1 mrad, 3.4 arcmin", 0.002),
-    Spread("runout of the rotor", ("motor.eccentricity_dynamic",), "vector", 0.01,
-           "1 % of the gap: 5 um of 0.5 mm"),
-    Spread("bore out of centre", ("motor.eccentricity_static",), "vector", 0.02,
-           "fits of the end shields"),
-    Spread("cogging", ("motor.cogging_torque",), "vector", 0.05,
-           "N m; some 0.4 % of the rated torque, 24 cycles a turn"),
-    Spread("place of the cogging", ("motor.cogging_phase",), "range", 0.0,
-           "the resolver is adjusted anew", 0.2618),
-    Spread("unbalance left", ("motor.unbalance_inertia",), "vector", 1e-5,
-           "0.1 kg cm2, a seventieth of the seeded one"),
-    Spread(AIR, ("thermal.ambient",), "range", 288.15, "15 to 30 degC in a laboratory", 303.15),
+    UnitSpread("dry friction", ("friction.static", "friction.dynamic"), "factor", 0.10,
+               "seals and bearings seat anew with each reassembly"),
+    UnitSpread("preload", ("screw.preload",), "factor", 0.10,
+               "makers hold the torque of a preload to 10 to 30 %"),
+    UnitSpread(FRICTION_COEFFICIENT, (), "factor", 0.05, "grease, finish, run-in of the raceways"),
+    UnitSpread("friction of the load side", ("load.friction",), "factor", 0.10, "guides and seals"),
+    UnitSpread("backlash of the fixture",
+               ("backlash.total",), "factor", 0.20, "pins are fitted anew"),
+    UnitSpread("EMF constant", ("motor.emf_constant",), "factor", 0.01, "magnets of another lot"),
+    UnitSpread("gain of each current sensor",
+               ("sensor.current.gain_a",), "added", 0.005, "adjusted to 0.5 %"),
+    UnitSpread("gain of each current sensor", ("sensor.current.gain_b",), "added", 0.005, ""),
+    UnitSpread("gain of each current sensor", ("sensor.current.gain_c",), "added", 0.005, ""),
+    UnitSpread("offset of each current sensor",
+               ("sensor.current.offset_a",), "added", 0.01, "0.05 % of a 20 A sensor"),
+    UnitSpread("offset of each current sensor", ("sensor.current.offset_b",), "added", 0.01, ""),
+    UnitSpread("offset of each current sensor", ("sensor.current.offset_c",), "added", 0.01, ""),
+    UnitSpread("mismatch of the resolver's channels",
+               ("sensor.resolver.mismatch",), "range", 0.0, "up to 1 mrad, 3.4 arcmin", 0.002),
+    UnitSpread("runout of the rotor", ("motor.eccentricity_dynamic",), "vector", 0.01,
+               "1 % of the gap: 5 um of 0.5 mm"),
+    UnitSpread("bore out of centre", ("motor.eccentricity_static",), "vector", 0.02,
+               "fits of the end shields"),
+    UnitSpread("cogging", ("motor.cogging_torque",), "vector", 0.05,
+               "N m; some 0.4 % of the rated torque, 24 cycles a turn"),
+    UnitSpread("place of the cogging", ("motor.cogging_phase",), "range", 0.0,
+               "the resolver is adjusted anew", 0.2618),
+    UnitSpread("unbalance left", ("motor.unbalance_inertia",), "vector", 1e-5,
+               "0.1 kg cm2, a seventieth of the seeded one"),
+    UnitSpread(AIR, ("thermal.ambient",), "range", 288.15, "15 to 30 degC in a laboratory", 303.15),
 )  # fmt: skip
 """What differs between healthy units, all ASSUMED."""
 
@@ -152,7 +154,7 @@ def _values(actuator: Actuator, rng: np.random.Generator) -> dict[str, float]:
 
 
 def _efficiencies(actuator: Actuator, factor: float) -> dict[str, float]:
-    """Both efficiencies of a screw whose friction coefficient is `factor` times the set's."""
+    """Both efficiencies of a screw whose friction coefficient is so many times the file's."""
     value = actuator.parameters.value
     slope = 2.0 * value("screw.lead") / value("screw.pitch_diameter")
     eta, aiding = value("screw.efficiency"), value("screw.efficiency_aiding")
@@ -166,15 +168,15 @@ def _efficiencies(actuator: Actuator, factor: float) -> dict[str, float]:
 
 def spread_rows() -> list[dict[str, Any]]:
     """Return the spreads as rows of a report: property, deviation and reason."""
-    shown: dict[str, dict[str, Any]] = {}
+    rows: dict[str, dict[str, Any]] = {}
     for spread in SPREADS:
         if spread.kind == "range":
             size = f"{spread.size:g} to {spread.upper:g}"
         else:
             size = f"{100 * spread.size:g} %" if spread.kind == "factor" else f"{spread.size:g}"
         row = {"property": spread.name, "deviation": size, "reason": spread.reason}
-        shown.setdefault(spread.name, row)
+        rows.setdefault(spread.name, row)
     noise = [
         dict(zip(("property", "deviation", "reason"), row, strict=True)) for row in _NOISE_ROWS
     ]
-    return [*shown.values(), *noise]
+    return [*rows.values(), *noise]

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from elevon.errors import InputError, unknown
 
-__all__ = ["LOAD_KINDS", "PROFILES", "LoadKind", "Profile", "profile_scenario"]
+__all__ = ["LOAD_KINDS", "PROFILES", "LoadKind", "MotionProfile", "profile_scenario"]
 
 LoadKind = Literal["constant", "step", "spring"]
 LOAD_KINDS: tuple[LoadKind, ...] = ("constant", "step", "spring")
@@ -28,7 +28,7 @@ sweep may ask for more than it can give, a ramp may not."""
 
 
 @dataclass(frozen=True, slots=True)
-class Profile:
+class MotionProfile:
     """One motion about mid-stroke.
 
     Attributes
@@ -126,13 +126,13 @@ class Profile:
 
 
 def profile_scenario(
-    profile: Profile, load: float = 0.0, kind: LoadKind = "constant", opposing: float = 0.0
+    profile: MotionProfile, load: float = 0.0, kind: LoadKind = "constant", opposing: float = 0.0
 ) -> dict[str, Any]:
     """Return the scenario of a profile under a load.
 
     Parameters
     ----------
-    profile : Profile
+    profile : MotionProfile
         The motion.
     load : float
         N, positive compressive (opposes extension), negative tensile.

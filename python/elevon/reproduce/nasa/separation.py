@@ -20,11 +20,17 @@ import numpy.typing as npt
 from elevon.progress import part
 from elevon.report.checks import Check
 from elevon.reproduce.nasa.corners import ACCELERATION
-from elevon.reproduce.nasa.effect import Comparison, Effect, EffectScale, compare_profiles, null_p
+from elevon.reproduce.nasa.effect import (
+    Effect,
+    EffectScale,
+    GroupComparison,
+    compare_profiles,
+    null_p,
+)
 from elevon.reproduce.nasa.features import FEATURES, PEAK, RECORD, RMS, UNITS, compared, features
 from elevon.reproduce.nasa.impact import GAP, gap_impacts, gap_traces, impact_checks
 from elevon.reproduce.nasa.population import draw_units
-from elevon.reproduce.nasa.profiles import Profile, profile_scenario
+from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
 from elevon.reproduce.nasa.separation_rows import Seeded, SeparationResult, SeparationRow
 from elevon.reproduce.nasa.store import CellStore, work_key
 
@@ -139,9 +145,9 @@ def reproduce_separation(
                             traces, meta)  # fmt: skip
 
 
-def _profile(shape: str) -> Profile:
+def _profile(shape: str) -> MotionProfile:
     name, rounded, _ = shape.partition(ROUNDED)
-    return Profile(name, 0.05, 0.06, DURATION, ACCELERATION if rounded else 0.0)
+    return MotionProfile(name, 0.05, 0.06, DURATION, ACCELERATION if rounded else 0.0)
 
 
 def _provenance(actuator: Actuator) -> dict[str, Any]:
@@ -254,8 +260,8 @@ def _effect(scale: EffectScale, cell: Mapping[str, Array], name: str, column: in
     return scale.effect(compared(cell["healthy"])[:, column], compared(cell[name])[:, column])
 
 
-def _draws(best: Comparison, effects: Sequence[Effect], drawn: int) -> int | None:
-    if best.winner is not None or not any(effect.shown for effect in effects):
+def _draws(best: GroupComparison, effects: Sequence[Effect], drawn: int) -> int | None:
+    if best.winner is not None or not any(effect.significant for effect in effects):
         return None
     needed = best.factor * drawn
     return math.ceil(needed) if needed < 1e9 else None
@@ -283,7 +289,7 @@ def _null(
 def _checks(rows: Sequence[SeparationRow], rate: float, tables: float) -> list[Check]:
     # One-sided 95 % of the sampling error of a share of one twentieth over the splits.
     limit = FAMILY + 1.645 * math.sqrt(FAMILY * (1.0 - FAMILY) / SPLITS)
-    halved = [row for row in rows if row.half is not None and row.effect.shown]
+    halved = [row for row in rows if row.half is not None and row.effect.significant]
     wrong = sum(abs(row.half.size) >= abs(row.effect.size) for row in halved if row.half)
     return [
         Check("healthy against healthy: comparisons above the threshold", rate, limit, "1"),

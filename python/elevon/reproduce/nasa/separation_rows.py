@@ -7,7 +7,7 @@ from typing import Any
 
 from elevon.report.checks import Check, verdict
 from elevon.reproduce.nasa.effect import Effect
-from elevon.reproduce.nasa.impact import Impact, Trace
+from elevon.reproduce.nasa.impact import Impact, ImpactTrace
 
 __all__ = ["Seeded", "SeparationResult", "SeparationRow"]
 
@@ -101,7 +101,7 @@ class SeparationResult:
         Healthy units, and units of each fault.
     level : float
         Of every interval, so that all of them hold together with 95 %.
-    traces : list of Trace
+    traces : list of ImpactTrace
         Load-cell force of the nominal actuator about a reversal, with and without the gap.
     """
 
@@ -114,7 +114,7 @@ class SeparationResult:
     healthy: int
     reassemblies: int
     level: float
-    traces: list[Trace] = field(default_factory=list)
+    traces: list[ImpactTrace] = field(default_factory=list)
     meta: dict[str, Any] = field(default_factory=dict)
 
     def winners(self) -> dict[tuple[str, float], str | None]:

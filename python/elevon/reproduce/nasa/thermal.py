@@ -13,7 +13,7 @@ from elevon.parameters.relations import copper_loss
 from elevon.progress import part
 from elevon.report.checks import Check, verdict
 from elevon.reproduce.nasa.dema import DemaFit, fit_dema
-from elevon.reproduce.nasa.profiles import Profile, profile_scenario
+from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -29,7 +29,7 @@ HOUR = 3600.0
 STEP_TIME = 1800.0
 LOADS = (4500.0, 8500.0)
 """N before and after the step."""
-PROFILE = Profile("sinusoidal", 0.05, 0.06, HOUR)
+PROFILE = MotionProfile("sinusoidal", 0.05, 0.06, HOUR)
 STEADY = 6.0 * HOUR
 """Eleven of the slow time constants."""
 CURRENT = 7.0
@@ -215,7 +215,7 @@ def _hour(actuator: Actuator, seed: int, progress: Progress | None) -> Recording
     return _simulate(actuator, data, "10 Hz", seed, progress)
 
 
-def _held(
+def _at_torque(
     actuator: Actuator, duration: float, seed: int, progress: Progress | None
 ) -> tuple[Recording, float]:
     """Hold a constant current on a locked shaft; return the run and the sum of the squares."""
@@ -228,7 +228,7 @@ def _held(
 
 def _steady_check(actuator: Actuator, seed: int, progress: Progress | None) -> Check:
     locked = actuator.with_values(LOCKED)
-    recording, square = _held(locked, STEADY, seed, progress)
+    recording, square = _at_torque(locked, STEADY, seed, progress)
     winding, surface = steady_state(locked, square)
     errors = (
         abs(recording["winding_temperature"].values[-1] - winding),
@@ -241,7 +241,7 @@ def _closed_form_check(
     actuator: Actuator, model: str, seed: int, progress: Progress | None
 ) -> Check:
     bare = actuator.with_values(LOCKED | {"thermal.model": model, "thermal.emissivity": 0.0})
-    recording, square = _held(bare, HOUR, seed, progress)
+    recording, square = _at_torque(bare, HOUR, seed, progress)
     winding = recording["winding_temperature"]
     error = np.max(np.abs(winding.values - closed_form(bare, square, winding.time)))
     return Check(f"one hour without radiation less the closed form, {model}", float(error),

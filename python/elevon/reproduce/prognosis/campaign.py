@@ -1,4 +1,4 @@
-"""Sixty lives on the high-fidelity model, each predicted from its inspections."""
+"""Sixty lives on the switching model, each predicted from its inspections."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from elevon.prognose import (
     Mission,
     ParticleFilter,
     Process,
-    Response,
+    ResponseTables,
     UnscentedFilter,
     respond,
 )
@@ -28,7 +28,7 @@ from elevon.prognose.future import MODEL_ERROR, look_ahead
 from elevon.prognose.metrics import Track
 from elevon.prognose.particle import resampled
 from elevon.prognose.predict import LEVEL
-from elevon.prognose.process import Population
+from elevon.prognose.process import UnitPopulation
 from elevon.progress import Progress
 from elevon.reproduce.prognosis.result import SHARES, PrognosisResult, UnitResult
 from elevon.reproduce.prognosis.truth import (
@@ -118,7 +118,7 @@ def _history(
     base, mission = Actuator.load(_BASE), campaign_mission()
     law = FAULTS[number % len(FAULTS)]
     truth = true_unit(base, mission, law, number, seed)
-    unit = predicted(truth, mission, Plan.of(expected[law]), seed, measured=measured)
+    unit = predicted(truth, mission, InspectionPlan.of(expected[law]), seed, measured=measured)
     if unit is None:
         return {"left_out": f"history {number}: no inspection before half of its life"}
     return {"unit": unit.noted()}
@@ -128,10 +128,10 @@ def _expected() -> dict[str, float]:
     """Return the median life that the model expects of a unit in which one law acts alone."""
     base, mission, out = Actuator.load(_BASE), campaign_mission(), {}
     for law in mission.laws():
-        asked = tuple(
+        requirements = tuple(
             item for item in mission.requirement if item.fault is None or item.fault == law.key
         )
-        alone = mission.model_copy(update={"requirement": asked})
+        alone = mission.model_copy(update={"requirement": requirements})
         process = Process(respond(base, alone, laws=[replace(law, dormant=0.0)]))
         rng = np.random.default_rng(0)
         future = look_ahead(process, process.start(500, rng), mission.usage, rng)
@@ -140,7 +140,7 @@ def _expected() -> dict[str, float]:
 
 
 @dataclass(frozen=True)
-class Plan:
+class InspectionPlan:
     """When units are inspected: at even intervals, sooner where the end may be near.
 
     Attributes
@@ -155,7 +155,7 @@ class Plan:
     soonest: float
 
     @classmethod
-    def of(cls, expected: float) -> Plan:
+    def of(cls, expected: float) -> InspectionPlan:
         """Return the campaign's, for a life that is expected."""
         return cls(_INTERVAL * expected, _SOONEST * expected)
 
@@ -165,7 +165,7 @@ class Plan:
 
 
 def predicted(
-    truth: UnitTruth, mission: Mission, plan: Plan, seed: int, *, measured: bool = False
+    truth: UnitTruth, mission: Mission, plan: InspectionPlan, seed: int, *, measured: bool = False
 ) -> UnitResult | None:
     """Predict a unit's end at each inspection, on tables of its own calibrated model.
 
@@ -190,15 +190,15 @@ def predicted(
 def _first(truth: UnitTruth, mission: Mission) -> int:
     """Index among all requirements of the one that failed."""
     key = next(law.key for law in mission.laws() if law.name == truth.law)
-    asked = [k for k, r in enumerate(mission.requirement) if r.fault is None or r.fault == key]
-    return asked[truth.life.first]
+    indices = [k for k, r in enumerate(mission.requirement) if r.fault is None or r.fault == key]
+    return indices[truth.life.first]
 
 
 def tracked(
-    response: Response,
+    response: ResponseTables,
     mission: Mission,
     inspector: Inspector,
-    plan: Plan,
+    plan: InspectionPlan,
     seed: int,
 ) -> tuple[list[Inspection], Track, float]:
     """Inspect a unit until its end and predict it each time.
@@ -231,7 +231,7 @@ def tracked(
 
 
 def _remaining(
-    process: Process, units: Population, mission: Mission, rng: np.random.Generator
+    process: Process, units: UnitPopulation, mission: Mission, rng: np.random.Generator
 ) -> list[float]:
     """Return low, median, high of the remaining life, as `elevon predict` draws it."""
     future = look_ahead(process, units, mission.usage, rng, model_error=MODEL_ERROR, course=False)
@@ -244,16 +244,16 @@ def _track(seen: Sequence[Inspection], rows: Sequence[Sequence[float]], end: flo
 
 
 def _by_sigma_points(
-    response: Response, mission: Mission, seen: Sequence[Inspection], end: float, seed: int
+    response: ResponseTables, mission: Mission, seen: Sequence[Inspection], end: float, seed: int
 ) -> Track:
     """Return the unscented filter's predictions, at the last inspection before each of `SHARES`."""
     flt = UnscentedFilter(Process(response))
     usage = np.array([item.usage for item in seen])
-    asked = set(np.searchsorted(usage, np.array(SHARES) * end, side="right") - 1)
+    visits = set(np.searchsorted(usage, np.array(SHARES) * end, side="right") - 1)
     rows, at = [], []
     for k, item in enumerate(seen):
         flt.update(item)
-        if k in asked:
+        if k in visits:
             rng = np.random.default_rng([22, seed])
             rows.append(_remaining(flt.process, flt.sampled(_SAMPLES, rng), mission, rng))
             at.append(item)
@@ -269,7 +269,11 @@ def _quantiles(remaining: Floats) -> list[float]:
 
 
 def _unaided(
-    response: Response, mission: Mission, seen: Sequence[Inspection], truth: UnitTruth, seed: int
+    response: ResponseTables,
+    mission: Mission,
+    seen: Sequence[Inspection],
+    truth: UnitTruth,
+    seed: int,
 ) -> Track:
     """Return what the laws alone say: the same life for every unit, less what was used.
 

@@ -14,7 +14,7 @@ def prognosis_report(result: PrognosisResult, *, seed: int, date: str | None = N
     """Return the report."""
     report = Report(
         "Run-to-failure histories, predicted",
-        f"{len(result.units)} units live on the high-fidelity model with growth laws other than "
+        f"{len(result.units)} units live on the switching model with growth laws other than "
         f"the filter's; over 50 to 90 % of life the median prediction is right to "
         f"{100 * (1 - result.accuracy()):.0f} % of what truly remained.",
         date=date,

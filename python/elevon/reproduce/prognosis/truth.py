@@ -21,7 +21,7 @@ from elevon.reproduce.diagnosis_limits.unit import DAILY
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.prognose.mission import Mission
-    from elevon.prognose.response import Response
+    from elevon.prognose.response import ResponseTables
 
 __all__ = [
     "FAULTS",
@@ -91,7 +91,7 @@ class InspectionError:
         at, error = zip((0.0, 0.0), *self.offset, strict=True)
         return np.asarray(np.interp(severity, at, error))
 
-    def own(self, severity: Floats) -> Floats:
+    def per_visit(self, severity: Floats) -> Floats:
         """Return the deviation from one inspection to the next, its days' own included."""
         day = self.of_the_day / np.sqrt(INSPECTION_DAYS) * (1.0 + severity)
         return np.asarray(np.sqrt((self.relative * severity) ** 2 + self.absolute**2 + day**2))
@@ -102,7 +102,7 @@ class InspectionError:
         part = self.common_relative * severity
         return np.asarray(np.sqrt(part**2 + self.common_absolute**2 + day**2))
 
-    def said(
+    def estimate_of(
         self, severity: float, common: tuple[float, float, float], rng: np.random.Generator
     ) -> float:
         """Draw what an inspection says of a severity.
@@ -115,18 +115,18 @@ class InspectionError:
         if self.of_the_day > 0.0:
             day -= common[2]
         share = self.common_relative * common[1]
-        own = float(np.hypot(self.relative * severity, self.absolute)) * normal[1]
-        error = float(self.mean(np.array(severity))) + self.common_absolute * common[0] + own
+        scatter = float(np.hypot(self.relative * severity, self.absolute)) * normal[1]
+        error = float(self.mean(np.array(severity))) + self.common_absolute * common[0] + scatter
         return float((1.0 + severity) * np.exp(day) - 1.0 + share * severity + error)
 
-    def stated(self, said: Floats) -> Floats:
+    def stated(self, severity: Floats) -> Floats:
         """Return the deviation stated."""
-        return np.hypot(self.stated_relative * said, self.stated_absolute)
+        return np.hypot(self.stated_relative * severity, self.stated_absolute)
 
 
 #: An inspection is one log in each of the three standard tests, each of a day of its own, diagnosed
-#: together by a low model that the bench is unlike, against healthy logs of three days. Measured by
-#: `elevon reproduce inspection-error --seed 31` on six units; rounded up.
+#: together by a reduced-order model that the bench is unlike, against healthy logs of three days.
+#: Measured by `elevon reproduce inspection-error --seed 31` on six units; rounded up.
 INSPECTIONS: Mapping[str, InspectionError] = {
     "gear_wear": InspectionError(
         of_the_day=0.0,
@@ -181,7 +181,7 @@ class UnitTruth:
         Severity of that law's fault.
     calibrated : Actuator
         The healthy unit as its calibration says.
-    response : Response, optional
+    response : ResponseTables, optional
         What its fault does to the requirements.
     """
 
@@ -189,11 +189,11 @@ class UnitTruth:
     law: str
     life: Life
     calibrated: Actuator
-    response: Response | None = None
+    response: ResponseTables | None = None
 
 
 def true_unit(base: Actuator, mission: Mission, law: str, number: int, seed: int) -> UnitTruth:
-    """Let one unit live on the high-fidelity model until it fails.
+    """Let one unit live on the switching model until it fails.
 
     The truth's tables come from thirteen runs at high fidelity along its own fault; its parameters,
     its growth factor, its law's form and its scatter differ from what the filter believes.
@@ -210,7 +210,7 @@ def true_unit(base: Actuator, mission: Mission, law: str, number: int, seed: int
     believed = {item.name: item for item in mission.laws()}[law]
     true = other_law(believed, rng)
     key = {"severity"}
-    asked = mission.model_copy(
+    reduced = mission.model_copy(
         update={
             "requirement": tuple(
                 item
@@ -220,7 +220,9 @@ def true_unit(base: Actuator, mission: Mission, law: str, number: int, seed: int
         }
     )
     acting = [replace(true, dormant=0.0)]
-    response = respond(base.with_values(unit, source="truth"), asked, laws=acting, fidelity="high")
+    response = respond(
+        base.with_values(unit, source="truth"), reduced, laws=acting, fidelity="high"
+    )
     process = Process(response, drift=0.0)
     start = process.start(10, rng).picked(np.array([0]))
     factor = _FACTOR[0] + _FACTOR[1] * rng.standard_normal((1, 1))
@@ -293,10 +295,13 @@ class Inspector:
 
     def at(self, usage: float) -> Inspection:
         """Return what an inspection at a use says."""
-        own = float(self.truth.life.at(usage)[0])
+        severity = float(self.truth.life.at(usage)[0])
         seen = {
             law.key: _seen(
-                law, own if law.name == self.truth.law else 0.0, self._common[law.name], self.rng
+                law,
+                severity if law.name == self.truth.law else 0.0,
+                self._common[law.name],
+                self.rng,
             )
             for law in self._laws
         }
@@ -309,11 +314,11 @@ class Inspector:
         response = self.truth.response
         values = response.measured(np.atleast_1d(self.truth.life.at(usage))[None, :])[:, 0]
         measured = {}
-        for asked, value in zip(response.requirements, values, strict=True):
-            day = VALUES.get(asked.measure, 0.0) * float(value)
+        for requirement, value in zip(response.requirements, values, strict=True):
+            day = VALUES.get(requirement.measure, 0.0) * float(value)
             if day > 0.0:
                 drawn = float(value + day * self._of_values.standard_normal())
-                measured[asked.name] = Measured(drawn, day)
+                measured[requirement.name] = Measured(drawn, day)
         return measured
 
 
@@ -322,13 +327,13 @@ def _seen(
 ) -> Seen:
     """Return what a diagnosis says, read as `elevon predict` reads it, its edges included."""
     drawn = INSPECTIONS[law.name]
-    shown = drawn.said(severity, common, rng)
+    estimate = drawn.estimate_of(severity, common, rng)
     data: dict[str, Any] = {"faults": [], "detectable": {law.key: drawn.detectable}}
-    if shown >= drawn.seen:
+    if estimate >= drawn.seen:
         edge = max(c.high for c in CANDIDATES if c.kind == law.kind)
-        said = min(shown, edge)
-        half = SIGMAS * float(drawn.stated(np.array(shown)))
-        cause = {"kind": law.kind, "place": law.place, "probability": 1.0, "severity": said,
-                 "interval": [max(said - half, 0.0), min(said + half, edge)]}  # fmt: skip
+        value = min(estimate, edge)
+        half = SIGMAS * float(drawn.stated(np.array(estimate)))
+        cause = {"kind": law.kind, "place": law.place, "probability": 1.0, "severity": value,
+                 "interval": [max(value - half, 0.0), min(value + half, edge)]}  # fmt: skip
         data["faults"].append(cause)
     return inspection(data, [law], usage=0.0).seen[law.key]
