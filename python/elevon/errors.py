@@ -8,6 +8,8 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import ClassVar
 
+from elevon.retired import remark, successors
+
 __all__ = [
     "ArgumentTypeError",
     "BusyError",
@@ -24,6 +26,7 @@ __all__ = [
     "OutputError",
     "OutputExistsError",
     "RangeError",
+    "RetiredNamesWarning",
     "SimulationError",
     "UncheckedWarning",
     "UnitError",
@@ -165,6 +168,10 @@ class UncheckedWarning(ElevonWarning):
     """A file carries no checksum: whether it is as it was written cannot be checked."""
 
 
+class RetiredNamesWarning(ElevonWarning):
+    """A file was written with names that were replaced: it is read with the present ones."""
+
+
 class FindingWarning(ElevonWarning):
     """The core questions these values together, but runs them."""
 
@@ -185,16 +192,19 @@ def nearest(name: str, candidates: Iterable[str], count: int = 3) -> list[str]:
     -------
     list of str
         Best first. Case and the choice of `-`, `_`, `.` or space do not count as differences; a
-        name of which the given one is a whole part (`inertia` of `motor.inertia`) is near.
+        name of which the given one is a whole part (`inertia` of `motor.inertia`) is near. What
+        replaced a retired name comes first.
     """
     names = list(dict.fromkeys(candidates))
+    first = successors(name, names)
     wanted = _plain(name)
     plain: dict[str, list[str]] = {}
     for candidate in names:
         plain.setdefault(_plain(candidate), []).append(candidate)
     keys = get_close_matches(wanted, plain, n=count, cutoff=0.6)
     keys += [key for key in plain if len(wanted) > 2 and wanted in key.split() and key not in keys]
-    return [original for key in keys for original in plain[key]][:count]
+    like = [original for key in keys for original in plain[key]]
+    return list(dict.fromkeys([*first, *like]))[:count]
 
 
 def did_you_mean(name: str, candidates: Iterable[str]) -> str:
@@ -237,7 +247,9 @@ def unknown(
     """
     names = list(candidates)
     start = f"{place}: " if place else ""
-    message = f"{start}unknown {what} {name!r}{did_you_mean(name, names)}"
+    about = remark(what, name)
+    more = f"; {about}" if about else did_you_mean(name, names)
+    message = f"{start}unknown {what} {name!r}{more}"
     return UnknownNameError(message, name, nearest(name, names))
 
 

@@ -148,7 +148,7 @@ def _with_header(path, header):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda h: h.update(schema=1), "layout has version 1, this Elevon reads version 2"),
+        (lambda h: h.update(schema=1), "layout has version 1, this Elevon reads version 2 and 3"),
         (lambda h: h.pop("clocks"), "damaged"),
         (lambda h: h.update(clocks=[]), "describes 0 clocks"),
         (lambda h: h["clocks"][0].update(samples=4), "holds 5 of 4"),

@@ -9,6 +9,7 @@ from functools import lru_cache
 from typing import Any
 
 from elevon.errors import RangeError, UnknownNameError, nearest, unknown
+from elevon.retired import remark, successors
 from elevon.units import format_quantity, parse_quantity
 
 __all__ = ["FaultRecord", "catalogue", "find_record"]
@@ -117,7 +118,7 @@ def find_record(kind: str, place: str, wiring: str, where: str = "") -> FaultRec
     known = catalogue(wiring)
     matches = [record for record in known if record.kind == kind]
     if not matches:
-        raise _unknown_kind(kind, known, where)
+        raise _unknown_kind(kind, place, known, where)
     for record in matches:
         if place in record.places:
             return record
@@ -134,13 +135,17 @@ _STUCK = ("not", "high", "low", "on", "off")
 """Words by which the catalogue says that something is stuck."""
 
 
-def _unknown_kind(kind: str, known: tuple[FaultRecord, ...], where: str) -> UnknownNameError:
+def _unknown_kind(
+    kind: str, place: str, known: tuple[FaultRecord, ...], where: str
+) -> UnknownNameError:
     """Build the error for a kind that does not exist.
 
-    Like names first, then those that share a word with it: `brake_stuck` is near every fault of
+    What replaced a retired name comes first, kinds that act at the place before others. Then like
+    names, then those that share a word with it: `brake_stuck` is near every fault of
     the brake, those that mean stuck first.
     """
     kinds = list(dict.fromkeys(record.kind for record in known))
+    here = {record.kind for record in known if place in record.places}
     words = {word for word in kind.lower().replace("-", "_").split("_") if len(word) > 2}
     if "stuck" in words:
         words.update(_STUCK)
@@ -151,8 +156,9 @@ def _unknown_kind(kind: str, known: tuple[FaultRecord, ...], where: str) -> Unkn
     things = words.difference(_STUCK)
     related = [name for name in kinds if things & set(name.split("_"))]
     related.sort(key=shared, reverse=True)
-    near = list(dict.fromkeys([*nearest(kind, kinds), *related]))[:4]
-    if not near:
+    old = sorted(successors(kind, kinds), key=lambda name: name not in here)
+    near = list(dict.fromkeys([*old, *nearest(kind, kinds), *related]))[:4]
+    if remark("fault", kind) or not near:
         return unknown("fault", kind, kinds, where or None)
     start = f"{where}: " if where else ""
     listed = " or ".join(repr(name) for name in near)

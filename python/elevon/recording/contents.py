@@ -12,20 +12,24 @@ import numpy.typing as npt
 from elevon.errors import DamageError, FormatError, InputError
 from elevon.recording.channel import Channel
 from elevon.recording.clock import Clock
-from elevon.recording.header import Header
+from elevon.recording.header import SCHEMA, Header
 
 __all__ = ["Contents", "check_size", "header_bytes", "rebuild"]
 
 
 @dataclass(frozen=True)
 class Contents:
-    """Everything of which a recording is made; see `Recording`."""
+    """Everything of which a recording is made; see `Recording`.
+
+    `old` lists the channels whose names in the file were replaced since.
+    """
 
     channels: list[Channel]
     clocks: list[Clock]
     meta: dict[str, Any] = field(default_factory=dict)
     labels: Any = None
     final: dict[str, float] = field(default_factory=dict)
+    old: list[str] = field(default_factory=list)
 
 
 def check_size(place: str, needed: int, max_bytes: int) -> None:
@@ -63,6 +67,8 @@ def rebuild(
     FormatError
         A column is missing, of another length, or breaks a rule of `Clock` or `Channel`.
     """
+    from elevon.recording.old import with_present_names
+
     clocks: list[Clock] = []
     channels: list[Channel] = []
     try:
@@ -88,7 +94,8 @@ def rebuild(
         ]
         if header.digest(by_clock) != header.sha256:
             raise DamageError(f"{place}: damaged: not as it was written (SHA-256)")
-        return Contents(channels, clocks, header.meta, header.labels, header.final)
+        whole = Contents(channels, clocks, header.meta, header.labels, header.final)
+        return whole if header.schema == SCHEMA else with_present_names(whole)
     except FormatError:
         raise
     except (InputError, TypeError, ValueError) as error:

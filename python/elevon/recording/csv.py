@@ -177,6 +177,7 @@ def load(path: Path, max_bytes: int) -> Contents:
         first,
         channels=[channel for contents, _ in read for channel in contents.channels],
         clocks=[clock for contents, _ in read for clock in contents.clocks],
+        old=sorted({name for contents, _ in read for name in contents.old}),
     )
 
 

@@ -22,8 +22,10 @@ if TYPE_CHECKING:
 
 __all__ = ["SCHEMA", "ClockHeader", "Header", "plain"]
 
-SCHEMA = 2
+SCHEMA = 3
 """Version of the files' layout, apart from the version of the package."""
+_READ = (2, SCHEMA)
+"""What is read: version 2 has names that were replaced since."""
 
 _LONGEST = 64 * 2**20
 _DEEPEST = 50
@@ -49,6 +51,7 @@ class Header:
     labels: Any = None
     final: dict[str, float] = field(default_factory=dict)
     sha256: str = ""
+    schema: int = SCHEMA
 
     @classmethod
     def of(cls, recording: "Recording") -> "Header":
@@ -87,7 +90,7 @@ class Header:
     def to_json(self) -> str:
         """Return the text written into files (ASCII)."""
         document = {
-            "schema": SCHEMA,
+            "schema": self.schema,
             "clocks": [
                 {
                     "name": clock.name,
@@ -121,14 +124,15 @@ class Header:
             raise FormatError(f"{place}: its description is longer than {_LONGEST} bytes")
         try:
             document = _decoded(json.loads(text))
-            if document["schema"] != SCHEMA:
+            if document["schema"] not in _READ:
                 raise FormatError(
                     f"{place}: its layout has version {document['schema']!r}, "
-                    f"this Elevon reads version {SCHEMA}"
+                    f"this Elevon reads version {' and '.join(str(number) for number in _READ)}"
                 )
             clocks = [_clock(entry) for entry in document["clocks"]]
             meta, final = dict(document["meta"]), dict(document["final"])
-            return cls(clocks, meta, document["labels"], final, str(document["sha256"]))
+            mark, schema = str(document["sha256"]), int(document["schema"])
+            return cls(clocks, meta, document["labels"], final, mark, schema)
         except FormatError:
             raise
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:

@@ -423,9 +423,12 @@ class Recording:
             No such file, or an ending that is not a format.
         """
         from elevon.recording.formats import load
+        from elevon.recording.old import warn_of_old_names
 
-        loaded = load(path, max_bytes=max_bytes)
+        loaded = dict(vars(load(path, max_bytes=max_bytes)))
+        if old := loaded.pop("old"):
+            warn_of_old_names(path, old, 2)
         try:
-            return cls(**vars(loaded))
+            return cls(**loaded)
         except InputError as error:
             raise FormatError(f"{path}: {error}") from error
