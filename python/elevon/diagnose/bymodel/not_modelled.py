@@ -1,4 +1,4 @@
-"""Faults of the rotary catalogue that are not weighed, and what becomes of a log that has one."""
+"""Faults of the rotary catalogue that are no candidates, and what becomes of a log that has one."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ _CURRENTS = tuple(f"sensor.current_{p}" for p in "abc")
 _SWITCHES = tuple(f"inverter.{p}_{side}" for p in "abc" for side in ("high", "low"))
 
 _LOOP = (
-    "the low model has no loop of its own for it: its current brakes like viscous friction and "
-    "unbalances the phases, so it is named lubrication@transmission with short@motor.phase_a (or "
-    "gain@sensor.current_a), or not explained"
+    "the reduced-order model has no loop of its own for it: its current brakes like viscous "
+    "friction and unbalances the phases, so it is named lubrication@transmission with "
+    "short@motor.phase_a (or gain@sensor.current_a), or not explained"
 )
 _OPEN = (
     "with it the unit hardly moves, and such a log is refused; where it still moves, what the "
-    "motor does is not in the low model: not explained, or a short@motor.phase_a is named"
+    "motor does is not in the reduced-order model: not explained, or a short@motor.phase_a is named"
 )
 _DRY = "on the whole it adds dry friction and is named friction@transmission"
 _ANGLE = (
     "it shifts or distorts the angle that the drive commutates by: less torque for the current "
-    "(named demagnetisation@motor where it is much), else nothing that these tests show"
+    "(named demagnetisation@motor where it is much), else nothing visible in these tests"
 )
 _COUNTS = (
-    "counts that are lost in one place shift the position in steps, which no number of the "
-    "evidence follows: refused as another gear ratio where many are lost, else not seen"
+    "counts that are lost in one place shift the position in steps, which no feature "
+    "follows: refused as another gear ratio where many are lost, else not seen"
 )
 _GONE = "without that signal there is no motion, or none both ways: such a log is refused"
 
-#: Kind and places to the reason; what it may be named is said in it by ``KIND@PLACE``.
-_DECLINED: tuple[tuple[str, tuple[str, ...], str], ...] = (
+#: Kind and places to the reason; what it may be named stands in it as ``KIND@PLACE``.
+_NOT_MODELLED: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("open_phase", _PHASES, _OPEN),
     ("open_switch", _SWITCHES, _OPEN),
     ("shorted_switch", _SWITCHES, "the drive trips, and a log without motion is refused"),
@@ -39,10 +39,10 @@ _DECLINED: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("phase_short", tuple(f"motor.phases_{p}" for p in ("ab", "bc", "ca")), _LOOP),
     ("ground_short", _PHASES, _LOOP),
     ("offset", _CURRENTS, "it moves the current once a turn of the electrical angle, by as much "
-     "in any motion, which the low model has not: not explained where it is much"),
-    ("stuck", _CURRENTS, "the low model has no single sensor: not explained, or named "
+     "in any motion, which the reduced-order model has not: not explained where it is much"),
+    ("stuck", _CURRENTS, "the reduced-order model has no single sensor: not explained, or named "
      "gain@sensor.current_a"),
-    ("dead", _CURRENTS, "a gain of nothing: beyond what is weighed of gain@sensor.current_a, which "
+    ("dead", _CURRENTS, "a gain of nothing: beyond the range tried of gain@sensor.current_a, which "
      "is named, or not explained"),
     ("bearing", ("bearing.cage",), f"{_DRY}; how that changes once a turn of the cage is not "
      "looked for"),
@@ -50,8 +50,8 @@ _DECLINED: tuple[tuple[str, tuple[str, ...], str], ...] = (
      "for"),
     ("jam", ("transmission",), f"{_DRY}, or not explained where it is more than a motor still "
      "moves with"),
-    ("chipped_tooth", ("gear",), "a step once a turn of a wheel, which no number of the evidence "
-     "follows: not seen, or named tooth_wear@gear or backlash@transmission"),
+    ("chipped_tooth", ("gear",), "a step once a turn of a wheel, which no feature follows: "
+     "not seen, or named tooth_wear@gear or backlash@transmission"),
     ("offset", ("sensor.encoder",), "no test looks at absolute positions"),
     ("offset", ("sensor.resolver",), _ANGLE),
     ("mismatch", ("sensor.resolver",), _ANGLE),
@@ -60,7 +60,7 @@ _DECLINED: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("resolver_open", ("sensor.resolver.sine", "sensor.resolver.cosine",
                       "sensor.resolver.excitation"), _GONE),
     ("dropout", ("sensor.resolver",), "the motor's position and speed disagree: reading the log "
-     "refuses it, or no number of the evidence follows"),
+     "refuses it, or no feature follows"),
     ("stuck", ("sensor.resolver", "sensor.encoder"), _GONE),
     ("dead", ("sensor.encoder",), _GONE),
     ("missing_counts", ("sensor.encoder",), _COUNTS),
@@ -69,9 +69,9 @@ _DECLINED: tuple[tuple[str, tuple[str, ...], str], ...] = (
 
 
 def not_modelled() -> tuple[dict[str, str], ...]:
-    """Return kind, place and reason of each fault that is not weighed."""
+    """Return kind, place and reason of each fault that is no candidate."""
     return tuple(
         {"kind": kind, "place": place, "reason": reason}
-        for kind, places, reason in _DECLINED
+        for kind, places, reason in _NOT_MODELLED
         for place in places
     )
