@@ -84,24 +84,26 @@ def test_a_fault_is_isolated_with_its_severity(unit, logs, name, key, severity):
     assert against[""].left > 3.0
     assert against["friction@transmission"].probability < 0.01
     if name == "short":
-        assert set(cause.equivalents) == {("short", "motor.phase_b"), ("short", "motor.phase_c")}
+        assert set(cause.ambiguous_with) == {("short", "motor.phase_b"), ("short", "motor.phase_c")}
 
 
 def test_without_the_voltage_a_short_and_a_current_sensor_are_one_cause(unit):
-    """Both scale one phase's share of the torque; only the EMF tells them apart."""
+    """Both scale one phase's share of the torque; only the EMF separates them."""
     pwm = unit.with_values({"drive.kind": "pwm"})
     made = bench_logs(pwm, [(1, []), (2, ["short@motor.phase_b=0.2"])])
     base, log = (replace(item, voltage=None) for item in made)
     result = diagnose([log], pwm, baselines=[base])
     assert result.status == "faulty"
     cause = result.faults[0]
-    kinds = {cause.kind, *(kind for kind, _ in cause.equivalents)}
+    kinds = {cause.kind, *(kind for kind, _ in cause.ambiguous_with)}
     assert {"short", "gain"} <= kinds
-    assert {p for k, p in cause.equivalents if k == "gain"} >= {f"sensor.current_{p}" for p in "bc"}
-    told = {(item["kind"], item["place"]): item["reason"] for item in result.unobservable}
-    assert "3 deviations" in told["sag", "supply"]
-    assert "short" in told["open_phase", "motor.phase_a"]
-    assert ("bearing", "bearing.cage") in told
+    assert {p for k, p in cause.ambiguous_with if k == "gain"} >= {
+        f"sensor.current_{p}" for p in "bc"
+    }
+    reasons = {(item["kind"], item["place"]): item["reason"] for item in result.unobservable}
+    assert "3 deviations" in reasons["sag", "supply"]
+    assert "short" in reasons["open_phase", "motor.phase_a"]
+    assert ("bearing", "bearing.cage") in reasons
 
 
 def test_what_a_fault_leaves_alone_or_to_chance_is_no_evidence_of_it(unit, logs):
@@ -112,36 +114,36 @@ def test_what_a_fault_leaves_alone_or_to_chance_is_no_evidence_of_it(unit, logs)
     names = np.array(model.healthy.names)
     moved = model.shift(turning.key, np.array([0.3]))[0]
     assert set(names[moved != 0.0]) == {"current_sideband", "voltage_sideband"}
-    assert model.doubt(turning.key, 0.3)[names == "inertia_current"] > 0.0
-    assert not model.doubt(turning.key, 0.3)[moved != 0.0].any()
-    still = model.shift(sensor.key, np.array([0.2]))[0]
-    assert not still[np.isin(names, sensor.still)].any()
-    assert still[names == "current_order_2"] > 0.0
-    assert not model.doubt(sensor.key, 0.2).any()
+    assert model.uncertainty(turning.key, 0.3)[names == "inertia_current"] > 0.0
+    assert not model.uncertainty(turning.key, 0.3)[moved != 0.0].any()
+    moved_by_gain = model.shift(sensor.key, np.array([0.2]))[0]
+    assert not moved_by_gain[np.isin(names, sensor.fixed_features)].any()
+    assert moved_by_gain[names == "current_order_2"] > 0.0
+    assert not model.uncertainty(sensor.key, 0.2).any()
 
 
 @pytest.mark.parametrize("baselines", [(), ("base",)])
 def test_an_answer_does_not_depend_on_what_was_asked_before(unit, logs, baselines):
-    def said(name):
+    def chance_of(name):
         whole = answer(unit, logs[name], *(logs[b] for b in baselines), faults=FEW).to_dict()
         return {k: v for k, v in whole.items() if k != "seconds"}
 
     _RECENT.clear()
-    alone = said("backlash")
+    alone = chance_of("backlash")
     _RECENT.clear()
-    other = said("healthy")
-    assert said("backlash") == alone != other
+    other = chance_of("healthy")
+    assert chance_of("backlash") == alone != other
 
 
 def test_the_runs_of_a_baseline_stand_about_the_logs_own_healthy_run(unit, logs):
     item, base = (prepared(*read_test_logs([logs[n]]), unit) for n in ("healthy", "base"))
     few = chosen(FEW)
-    lent, own, theirs = (
+    lent, direct, theirs = (
         replay(item, unit, few, [base]),
         replay(item, unit, few),
         replay(base, unit, few),
     )
-    np.testing.assert_array_equal(lent.healthy.values, own.healthy.values)
+    np.testing.assert_array_equal(lent.healthy.values, direct.healthy.values)
     np.testing.assert_array_equal(lent.shifts[FEW[0]], theirs.shifts[FEW[0]])
     np.testing.assert_allclose(
         lent.draws - lent.healthy.values, theirs.draws - theirs.healthy.values, rtol=0.0, atol=1e-12
@@ -230,9 +232,9 @@ def test_logs_that_cannot_be_diagnosed(unit, logs, tmp_path):
         first = rows[1]
         return [rows[0], *([row[0], *first[1:3], "0", "0", *first[5:]] for row in rows[1:])]
 
-    still = _edited(logs["healthy"], tmp_path / "b" / NAME, at_rest)
+    moved_by_gain = _edited(logs["healthy"], tmp_path / "b" / NAME, at_rest)
     with pytest.raises(InputError, match="nothing moves"):
-        answer(unit, still)
+        answer(unit, moved_by_gain)
     gaps = _edited(
         logs["healthy"], tmp_path / "c" / NAME,
         lambda rows: [*rows[:900], *([r[0], *["NaN"] * (len(r) - 1)] for r in rows[900:])],
@@ -243,7 +245,7 @@ def test_logs_that_cannot_be_diagnosed(unit, logs, tmp_path):
         answer(Actuator.load("nasa-ballscrew"), logs["healthy"])
     with pytest.raises(UnknownNameError):
         answer(unit, logs["healthy"], faults=["backlash@moon"])
-    with pytest.raises(InputError, match="not weighed by the model: with it"):
+    with pytest.raises(InputError, match="not modelled: with it"):
         answer(unit, logs["healthy"], faults=["open_phase@motor.phase_a"])
 
 
@@ -280,7 +282,7 @@ def test_the_threshold_keeps_its_rate():
 
 
 def test_severities_cover_what_was_drawn():
-    """With a linear shift and Gaussian evidence the intervals hold 90 % of the true severities."""
+    """With a linear shift and Gaussian features the intervals hold 90 % of the true severities."""
     item = CANDIDATES[1]
     slope = np.array([8.0, 3.0, 0.0])
     rng = np.random.default_rng(8)
@@ -288,8 +290,8 @@ def test_severities_cover_what_was_drawn():
     for _ in range(count):
         true = 0.5 + rng.random()
         error = item.error * true * slope * rng.standard_normal()
-        rest = true * slope + error + rng.standard_normal(3)
-        result = posterior(rest, np.eye(3), 1e4, [item], lambda _key, s: s[:, None] * slope)
+        residual = true * slope + error + rng.standard_normal(3)
+        result = posterior(residual, np.eye(3), 1e4, [item], lambda _key, s: s[:, None] * slope)
         low, high = quantiles(*marginals(result, item.key), (0.05, 0.95))
         inside += low < true < high
     assert inside / count == pytest.approx(0.9, abs=4 * np.sqrt(0.09 / count))
@@ -312,7 +314,7 @@ def test_severities_cover_what_was_drawn():
     ],
 )
 def test_on_the_high_model_with_another_drive(unit, tmp_path, fault, best):
-    """Logs of the high model with a PWM drive, diagnosed by the low one."""
+    """Logs of the switching model with a PWM drive, diagnosed by the low one."""
     pwm = {"fidelity": "high", "settings": ["drive.kind=pwm"]}
     base = bench(tmp_path / "base", 50, **pwm)
     path = bench(tmp_path / "log", 51, *([fault] if fault else []), **pwm)

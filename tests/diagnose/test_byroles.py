@@ -6,11 +6,11 @@ import pytest
 from elevon import Actuator, Recording, Scenario, simulate
 from elevon.cli import main
 from elevon.diagnose.byroles import diagnose_by_roles
-from elevon.diagnose.byroles.asked import same_test
 from elevon.diagnose.byroles.candidates import candidates_of, not_modelled_of
 from elevon.diagnose.byroles.load import load_alike, read_load
 from elevon.diagnose.byroles.log import _onset, role_log
 from elevon.diagnose.byroles.numbers import numbers_of
+from elevon.diagnose.byroles.role_test import same_test
 from elevon.diagnose.byroles.runs import spread_of
 from elevon.diagnose.byroles.spread import drawn, factors_of
 from elevon.diagnose.standard import Day, day_logs, diagnosed, standard_tests
@@ -62,13 +62,13 @@ def test_two_faults_of_a_screw_are_named_together(screw):
     base = [("base", log(screw, day=1))]
     backlash = {"kind": "backlash", "place": "transmission", "severity": "0.4 mm"}
     gain = {"kind": "gain_drift", "place": "control.position", "severity": -0.5}
-    said = diagnose_by_roles(
+    answer = diagnose_by_roles(
         [("w", log(screw, backlash, gain, day=3))], screw, baselines=base, faults=few
     )
-    assert set(said.best) == {"backlash@transmission", "gain_drift@control.position"}
-    low, high = next(c.interval for c in said.faults if c.kind == "backlash")
+    assert set(answer.best) == {"backlash@transmission", "gain_drift@control.position"}
+    low, high = next(c.interval for c in answer.faults if c.kind == "backlash")
     assert low < 4e-4 < high
-    assert all(c.probability > 0.9 for c in said.faults)
+    assert all(c.probability > 0.9 for c in answer.faults)
 
 
 PAIRS = [
@@ -95,11 +95,11 @@ def test_pairs_of_faults_are_named_with_the_whole_catalogue(name, title, pairs):
     days = [Day((), 71), *(Day(pair, 72 + k) for k, pair in enumerate(pairs))]
     base, *logs = day_logs(actuator, test, days)
     for pair, item in zip(pairs, logs, strict=True):
-        said = diagnosed(actuator, item, [base])
-        names = [{(c.kind, c.place), *c.equivalents} for c in said.faults]
+        answer = diagnosed(actuator, item, [base])
+        names = [{(c.kind, c.place), *c.ambiguous_with} for c in answer.faults]
         for text in pair:
             wanted = tuple(text.split("=")[0].split("@"))
-            assert any(wanted in own for own in names), (pair, said.best)
+            assert any(wanted in causes for causes in names), (pair, answer.best)
 
 
 def test_a_gear_is_diagnosed_whenever_its_action_came(gear):
@@ -116,8 +116,8 @@ def test_a_gear_is_diagnosed_whenever_its_action_came(gear):
     blind = {(item["kind"], item["place"]): item["reason"] for item in late.unobservable}
     assert "moves nothing" in blind["release_cable_failed", "release"]
     dead = {"kind": "proximity_off", "place": "sensor.proximity_25", "severity": 1}
-    said = diagnose_by_roles([("f", log(gear, dead, day=3))], gear, baselines=base, faults=few)
-    assert (said.status, said.best) == ("faulty", ("proximity_off@sensor.proximity_25",))
+    answer = diagnose_by_roles([("f", log(gear, dead, day=3))], gear, baselines=base, faults=few)
+    assert (answer.status, answer.best) == ("faulty", ("proximity_off@sensor.proximity_25",))
 
 
 def test_a_baseline_that_is_itself_faulty_is_left_out(screw):
@@ -158,17 +158,17 @@ def test_a_load_is_read_over_the_stroke_and_its_noise_is_none(gear):
     position = 0.264 * time / time[-1]
     knots = np.array([-2000.0, -1900, -1700, -1600, -1500, -1400, -1300, -1100, -800])
     load = np.interp(position, np.linspace(0.0, 0.264, 9), knots) + rng.normal(0.0, 5.0, len(time))
-    rest, over = read_load(gear, time, {"load": load, "output_position": position})
+    residual, over = read_load(gear, time, {"load": load, "output_position": position})
     assert over is not None
     np.testing.assert_allclose(over.forces, knots, atol=3.0)
-    assert np.abs(rest[1]).max() < 20.0
+    assert np.abs(residual[1]).max() < 20.0
     settings = over.settings(gear)
-    own = gear.parameters.value("load.force_3") * gear.parameters.value("load.factor")
-    assert settings["load.force_3"] == pytest.approx(own - over.forces[3])
+    causes = gear.parameters.value("load.force_3") * gear.parameters.value("load.factor")
+    assert settings["load.force_3"] == pytest.approx(causes - over.forces[3])
     half = {"load": load[:2000], "output_position": position[:2000]}  # a gear that stops midway
-    assert load_alike((rest, over), read_load(gear, time[:2000], half), time[::20])
+    assert load_alike((residual, over), read_load(gear, time[:2000], half), time[::20])
     heavy = {"load": 1.3 * load, "output_position": position}
-    assert not load_alike((rest, over), read_load(gear, time, heavy), time[::20])
+    assert not load_alike((residual, over), read_load(gear, time, heavy), time[::20])
     noise = rng.normal(0.0, 5.0, len(time))
     assert read_load(gear, time, {"load": noise, "output_position": position}) == (None, None)
 
@@ -178,7 +178,7 @@ def test_numbers_of_a_closed_form():
     time = np.arange(0.0, 10.0, 0.01)
     speed = 20.0 * np.sin(2.0 * time)
     current = 3.0 * np.sign(speed) + 0.05 * np.gradient(speed, time)
-    shown = {
+    channels = {
         "torque_voltage": 0.9 * current + 1.1 * speed,
         "torque_current": current,
         "motor_speed": speed,
@@ -188,7 +188,7 @@ def test_numbers_of_a_closed_form():
     }
     units = {"torque_voltage": "V", "torque_current": "A", "motor_speed": "rad/s", "state": "1"}
     units |= {"speed_ref": "rad/s", "output_position": "m", "command": "m"}
-    values = numbers_of(shown, np.zeros(len(time)), time, units, 4.0).values
+    values = numbers_of(channels, np.zeros(len(time)), time, units, 4.0).values
     assert values["torque_voltage: by speed"] == pytest.approx(1.1)
     assert values["torque_voltage: by current"] == pytest.approx(0.9)
     assert values["torque_current: by dry"] == pytest.approx(3.0, rel=1e-3)
@@ -217,9 +217,9 @@ def test_what_cannot_be_diagnosed_is_refused(screw):
         diagnose_by_roles([("x", good)], screw, faults=["backlash@moon"])
     with pytest.raises(InputError, match="at least one"):
         diagnose_by_roles([], screw)
-    still = Scenario.from_dict({"duration": 2, "command": {"mode": "position"}})
-    with pytest.raises(InputError, match="nothing is asked"):
-        role_log(simulate(screw, still, fidelity="low", record="command,encoder_position@200 Hz"),
+    idle = Scenario.from_dict({"duration": 2, "command": {"mode": "position"}})
+    with pytest.raises(InputError, match="nothing is commanded"):
+        role_log(simulate(screw, idle, fidelity="low", record="command,encoder_position@200 Hz"),
                  "x", screw)  # fmt: skip
 
 
@@ -228,9 +228,9 @@ def test_every_fault_is_a_candidate_or_not_modelled_with_a_reason(name):
     from elevon.faults import catalogue
 
     actuator = Actuator.load(name)
-    said = {(c.kind, p) for c in candidates_of(actuator) for p in (c.place, *c.same)}
-    said |= {(item["kind"], item["place"]) for item in not_modelled_of(actuator)}
-    assert said == {(r.kind, p) for r in catalogue(actuator.wiring) for p in r.places}
+    answer = {(c.kind, p) for c in candidates_of(actuator) for p in (c.place, *c.same)}
+    answer |= {(item["kind"], item["place"]) for item in not_modelled_of(actuator)}
+    assert answer == {(r.kind, p) for r in catalogue(actuator.wiring) for p in r.places}
     assert all(item["reason"] for item in not_modelled_of(actuator))
     assert len(factors_of(actuator)) >= 4
 
@@ -246,12 +246,12 @@ def test_the_command_line(screw, tmp_path, capsys):
     assert "Signals against the healthy model" in page
     assert "backlash@transmission" in page.partition("What these logs can tell")[2]
     assert '"status": "healthy"' in capsys.readouterr().out
-    asked = ["--actuator", "nasa-ballscrew", "--method", "surrogate"]
-    assert main(["diagnose", str(path), *asked]) == 2
+    options = ["--actuator", "nasa-ballscrew", "--method", "surrogate"]
+    assert main(["diagnose", str(path), *options]) == 2
 
 
-def loaded_log(actuator, gives, *faults, seconds=3.0, day=1, force=1500.0):
-    """A sine against 1500 N; the output gives way by `gives` times load over stiffness."""
+def loaded_log(actuator, compliance, *faults, seconds=3.0, day=1, force=1500.0):
+    """A sine against 1500 N; the output deflects by `compliance` times load over stiffness."""
     unit = drawn(actuator, np.random.default_rng(day))
     grid = np.arange(0.0, 4.0, 0.01)
     force = force * np.clip(5.0 * np.cos(2.0 * np.pi * 0.7 * grid), -1.0, 1.0)
@@ -270,7 +270,7 @@ def loaded_log(actuator, gives, *faults, seconds=3.0, day=1, force=1500.0):
     columns, units, roles = {}, {}, {}
     for role in made.roles:
         channel = made.role(role)
-        back = gives * load / actuator.parameters.value("backlash.stiffness")
+        back = compliance * load / actuator.parameters.value("backlash.stiffness")
         columns[role] = channel.values - (back if role == "output_position" else 0.0)
         units[role], roles[role] = channel.unit, role
     columns["load"], units["load"], roles["load"] = load, "N", "load"
@@ -294,8 +294,8 @@ def test_a_screw_that_gives_under_its_load_is_healthy_and_its_backlash_is_seen(s
     assert diagnose_by_roles(stiff, screw, baselines=stiff, faults=few).findings == ()
     soft = [("s", loaded_log(screw, 8.0))]
     driven = [("d", loaded_log(screw, -1.0, force=-1500.0))]
-    said = diagnose_by_roles(driven, screw, baselines=driven, faults=few)
-    assert any("drives the output" in finding for finding in said.findings)
+    answer = diagnose_by_roles(driven, screw, baselines=driven, faults=few)
+    assert any("drives the output" in finding for finding in answer.findings)
     assert "looks faulty" in diagnose_by_roles(soft, screw, baselines=soft, faults=few).findings[-1]
 
 

@@ -1,14 +1,14 @@
-"""What is not weighed: it is told from what is, and each fault of the catalogue has its place."""
+"""What is no candidate is distinguished from what is; each fault of the catalogue has a place."""
 
 import numpy as np
 import pytest
 
 from elevon.diagnose.bymodel import diagnose
 from elevon.diagnose.bymodel.candidates import CANDIDATES
-from elevon.diagnose.bymodel.case import Case
+from elevon.diagnose.bymodel.case import LogCase
 from elevon.diagnose.bymodel.detection import Detector
 from elevon.diagnose.bymodel.diagnosis import answer_of
-from elevon.diagnose.bymodel.evidence import Evidence
+from elevon.diagnose.bymodel.features import FeatureVector
 from elevon.diagnose.bymodel.healthy import healthy
 from elevon.diagnose.bymodel.not_modelled import not_modelled
 from elevon.diagnose.bymodel.replay import Replay
@@ -23,8 +23,8 @@ NAMES = ("lost_motion", "dry_current", "viscous_current", "voltage_order_1", "sp
 BACKLASH = next(c for c in CANDIDATES if c.kind == "backlash")
 
 
-def _case(shown, baselines=(), *, held=False):
-    """A unit whose evidence is 1 with a deviation of 2 %; backlash moves the lost motion only."""
+def _case(values, baselines=(), *, brake_unknown=False):
+    """A unit whose features are 1 with a deviation of 2 %; backlash moves the lost motion only."""
     rng = np.random.default_rng(0)
     draws = 1.0 + 0.02 * rng.standard_normal((40, len(NAMES)))
     grid = np.linspace(0.0, BACKLASH.high, 6)
@@ -32,29 +32,29 @@ def _case(shown, baselines=(), *, held=False):
     moved[:, 0] = grid / 0.01
     std = np.full(len(NAMES), 1e-3)
     model = Replay(
-        Evidence(NAMES, np.ones(5), std), {BACKLASH.key: grid}, {BACKLASH.key: moved}, draws
+        FeatureVector(NAMES, np.ones(5), std), {BACKLASH.key: grid}, {BACKLASH.key: moved}, draws
     )
-    logs = [Evidence(NAMES, np.array(values), std) for values in baselines]
-    unit = healthy(model, NAMES, logs, held=held)
-    return Case("log", Evidence(NAMES, np.array(shown), std), unit, model)
+    logs = [FeatureVector(NAMES, np.array(values), std) for values in baselines]
+    unit = healthy(model, NAMES, logs, brake_unknown=brake_unknown)
+    return LogCase("log", FeatureVector(NAMES, np.array(values), std), unit, model)
 
 
-def test_the_catalogue_is_weighed_akin_or_not_modelled_each_fault_once():
-    weighed = [(c.kind, p) for c in CANDIDATES for p in (c.place, *c.same)]
-    weighed += [name for c in CANDIDATES for name in c.akin]
-    weighed += [(item["kind"], item["place"]) for item in not_modelled()]
+def test_each_fault_of_the_catalogue_is_candidate_ambiguous_or_not_modelled_once():
+    placed = [(c.kind, p) for c in CANDIDATES for p in (c.place, *c.same)]
+    placed += [name for c in CANDIDATES for name in c.ambiguous]
+    placed += [(item["kind"], item["place"]) for item in not_modelled()]
     known = [(r.kind, place) for r in catalogue("rotary") for place in r.places]
-    assert sorted(weighed) == sorted(known)
+    assert sorted(placed) == sorted(known)
 
 
-def test_something_else_is_told_from_what_is_weighed():
+def test_something_else_is_distinguished_from_the_candidates():
     base = [[1.0] * 5]
     other = answer_of([_case([1, 2, 0, 1.3, 2], base)], [BACKLASH], 0.05, [], other=True)
     assert (other.status, other.best) == ("faulty", ())
     assert other.p_other > 0.9
     assert other.p_fault > 0.9
-    assert "none of the weighed faults" in sentence(other)
-    assert any("no fault that is weighed" in text for text in other.findings)
+    assert "none of the candidates" in sentence(other)
+    assert any("no candidate explains" in text for text in other.findings)
     backlash = answer_of([_case([1.5, 1, 1, 1, 1], base)], [BACKLASH], 0.05, [], other=True)
     assert backlash.best == (BACKLASH.key,)
     assert backlash.p_other < 0.01
@@ -85,14 +85,14 @@ def test_the_assumed_distance_from_the_model_yields_to_a_baseline():
 
 
 def test_of_a_brake_of_unknown_torque_a_baseline_says_all_of_friction():
-    shown = [1.0, 1.15, 1, 1, 1]
-    known, held = (_case(shown, [shown], held=h).unit for h in (False, True))
-    assert held.mean[1] == pytest.approx(1.15, abs=2e-3)
+    values = [1.0, 1.15, 1, 1, 1]
+    known, brake_unknown = (_case(values, [values], brake_unknown=h).unit for h in (False, True))
+    assert brake_unknown.mean[1] == pytest.approx(1.15, abs=2e-3)
     assert known.mean[1] < 1.147
-    assert _case(shown, held=True).unit.covariance[1, 1] > 50.0
+    assert _case(values, brake_unknown=True).unit.covariance[1, 1] > 50.0
 
 
-#: A clear severity of each fault that the high model has, by its kind and place.
+#: A clear severity of each fault that the switching model has, by its kind and place.
 CLEAR = {
     "short@motor.phase_a": 0.3, "eccentricity_static@motor": 0.2, "eccentricity_dynamic@motor": 0.2,
     "resistor_short@motor.phase_a": 0.2, "phase_short@motor.phases_ab": 0.01,
@@ -125,7 +125,7 @@ def bench():
 @pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
 @pytest.mark.parametrize("test", ["noload", "loaded"])
 def test_no_fault_of_the_catalogue_is_called_another(bench, test, tmp_path):
-    """Each is named, equivalent, or not_modelled with a reason that says what it may be named."""
+    """Each is named, ambiguous, or not_modelled with a reason that says what it may be named."""
     unit, actuator, baselines = bench
     reasons = {f"{i['kind']}@{i['place']}": i["reason"] for i in not_modelled()}
     wrong = []
@@ -145,7 +145,7 @@ def test_no_fault_of_the_catalogue_is_called_another(bench, test, tmp_path):
 
 
 def _made(unit, trials, folder):
-    """Logs, eight in lanes; None for one that cannot even be read."""
+    """Logs, eight in a batch; None for one that cannot even be read."""
     out = []
     for k in range(0, len(trials), 8):
         block = trials[k : k + 8]
@@ -166,19 +166,24 @@ def _wrong(answer, key, severity, reasons):
     below = severity < answer.detectable.get(key, 0.0)
     named = set()
     for cause in answer.faults:
-        own = {f"{cause.kind}@{cause.place}", *(f"{k}@{p}" for k, p in cause.equivalents)}
-        named |= own
-        said = any(name in reasons.get(key, "") for name in own)
-        if cause.probability > 0.9 and key not in own and not said and not _beside(answer, key):
+        names = {f"{cause.kind}@{cause.place}", *(f"{k}@{p}" for k, p in cause.ambiguous_with)}
+        named |= names
+        stated = any(name in reasons.get(key, "") for name in names)
+        if (
+            cause.probability > 0.9
+            and key not in names
+            and not stated
+            and not _named_too(answer, key)
+        ):
             yield f"called {cause.kind}@{cause.place} with {cause.probability:.2f}"
     if key not in named | blind | set(reasons) and not below:
         yield f"nowhere: {answer.status}, {answer.best}"
 
 
-def _beside(answer, key):
+def _named_too(answer, key):
     """Whether the fault is named, too: a second one beside it is another question."""
     return any(
-        key in {f"{c.kind}@{c.place}", *(f"{k}@{p}" for k, p in c.equivalents)}
+        key in {f"{c.kind}@{c.place}", *(f"{k}@{p}" for k, p in c.ambiguous_with)}
         for c in answer.faults
         if c.probability > 0.5
     )

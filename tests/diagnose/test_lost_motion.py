@@ -1,23 +1,23 @@
-"""Lost motion of an output that is dragged through its backlash, and of one that flies in it."""
+"""Lost motion of an output that friction carries through its backlash, and of one that is free."""
 
 import numpy as np
 import pytest
 
 from elevon.calibrate.backlash import through_backlash
-from elevon.diagnose.bymodel.evidence import Signals, evidence
+from elevon.diagnose.bymodel.features import DriveSignals, features_of
 
 RATIO, BACKLASH = 124.0, 0.009
 TIME = np.arange(0.0, 20.0, 0.0025)
 
 
-def shown(output):
-    """Evidence of a sine of 7 deg whose output stands where it is told."""
+def features_with(output):
+    """Features of a sine of 7 deg whose output stands where it is put."""
     motor = RATIO * (0.17 + 0.12 * np.sin(2.0 * np.pi * 0.2 * TIME))
     speed = np.gradient(motor, TIME)
     count = 2.0 * np.pi / 80_000
     position = np.floor(output(motor / RATIO) / count) * count
     flat, good = np.zeros_like(TIME), np.ones(len(TIME), dtype=bool)
-    signals = Signals(
+    signals = DriveSignals(
         TIME,
         position,
         motor,
@@ -31,7 +31,7 @@ def shown(output):
         None,
         good,
     )
-    return evidence(signals, ratio=RATIO, pole_pairs=4.0, emf=1.0)
+    return features_of(signals, ratio=RATIO, pole_pairs=4.0, emf=1.0)
 
 
 def lost(evident):
@@ -39,8 +39,8 @@ def lost(evident):
     return evident.values[at], evident.std[at]
 
 
-def test_a_dragged_output_shows_its_backlash_between_the_directions():
-    result = shown(lambda driver: through_backlash(driver, BACKLASH))
+def test_a_carried_output_shows_its_backlash_between_the_directions():
+    result = features_with(lambda driver: through_backlash(driver, BACKLASH))
     assert not result.floats
     assert lost(result)[0] == pytest.approx(BACKLASH, rel=0.01)
 
@@ -48,7 +48,7 @@ def test_a_dragged_output_shows_its_backlash_between_the_directions():
 def test_a_output_that_flies_from_end_to_end_shows_its_backlash_by_the_width():
     """The directions alone would say that there is hardly any backlash."""
     bounce = 0.5 * BACKLASH * np.sign(np.sin(2.0 * np.pi * 7.3 * TIME))
-    result = shown(lambda driver: driver + bounce)
+    result = features_with(lambda driver: driver + bounce)
     assert result.floats
     value, std = lost(result)
     assert value == pytest.approx(BACKLASH, rel=0.01)
@@ -56,6 +56,6 @@ def test_a_output_that_flies_from_end_to_end_shows_its_backlash_by_the_width():
 
 
 def test_without_backlash_rounding_does_not_float():
-    result = shown(lambda driver: driver)
+    result = features_with(lambda driver: driver)
     assert not result.floats
     assert abs(lost(result)[0]) < 2e-5

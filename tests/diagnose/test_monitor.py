@@ -11,7 +11,7 @@ from elevon.bench.procedure import Procedure
 from elevon.bench.rig import setups
 from elevon.bench.traces import recorded
 from elevon.diagnose.monitor import Monitor
-from elevon.diagnose.monitor.filter import ChangeFilter, Spread
+from elevon.diagnose.monitor.filter import ChangeFilter, WindowSpread
 from elevon.diagnose.monitor.threshold import simulated
 from elevon.diagnose.monitor.windows import CHANNELS
 from elevon.diagnose.virtual import traced
@@ -29,7 +29,7 @@ ONSET = 13.0  # s
 def spread(size=3, memory=0.8):
     rng = np.random.default_rng(5)
     root = rng.standard_normal((size, size))
-    return Spread(0.3 * np.eye(size), root @ root.T, 0.5 * np.eye(size), memory)
+    return WindowSpread(0.3 * np.eye(size), root @ root.T, 0.5 * np.eye(size), memory)
 
 
 def test_the_filter_is_the_likelihood_ratio_of_all_windows():
@@ -43,18 +43,18 @@ def test_the_filter_is_the_likelihood_ratio_of_all_windows():
         + np.kron(between, s.day)
         + np.kron(np.eye(count), s.noise)
     )
-    shown, fault = rng.standard_normal((count, 3)), np.array([0.4, -1.0, 2.0])
-    shown[5, 1] = np.nan
+    deviations, fault = rng.standard_normal((count, 3)), np.array([0.4, -1.0, 2.0])
+    deviations[5, 1] = np.nan
     watch = ChangeFilter(s, np.eye(3), streams=1, last=10)
-    for day, values in zip(days, shown, strict=True):
+    for day, values in zip(days, deviations, strict=True):
         if day == 1 and watch.windows == 4:
             watch.new_day()
         watch.step(values[None, :])
-    known = np.isfinite(shown.ravel())
+    known = np.isfinite(deviations.ravel())
     inverse = np.linalg.inv(covariance[np.ix_(known, known)])
     for change in watch.changes:
         effect = np.kron(at >= change.window, fault)[known]
-        expected = effect @ inverse @ shown.ravel()[known] - 0.5 * effect @ inverse @ effect
+        expected = effect @ inverse @ deviations.ravel()[known] - 0.5 * effect @ inverse @ effect
         got = change.linear[0] @ fault - 0.5 * fault @ change.information @ fault
         assert got == pytest.approx(expected, rel=1e-9)
     assert [c.window for c in watch.changes if c.opening] == [0, 4]
@@ -71,12 +71,12 @@ def test_healthy_streams_alarm_as_often_as_set():
     fast = np.sqrt(20.0 / rng.chisquare(20.0, (streams, 1)))
     day = np.linalg.cholesky(s.day)
     unit = slow * np.sqrt(0.3) * rng.standard_normal((streams, 3))
-    own = slow * (rng.standard_normal((streams, 3)) @ day.T)
+    drift = slow * (rng.standard_normal((streams, 3)) @ day.T)
     alarms = np.zeros((2, streams), dtype=bool)
     for _ in range(10):
-        watch.step(unit + own + fast * np.sqrt(0.5) * rng.standard_normal((streams, 3)))
+        watch.step(unit + drift + fast * np.sqrt(0.5) * rng.standard_normal((streams, 3)))
         fresh = slow * (rng.standard_normal((streams, 3)) @ day.T)
-        own = s.memory * own + np.sqrt(1.0 - s.memory**2) * fresh
+        drift = s.memory * drift + np.sqrt(1.0 - s.memory**2) * fresh
         pairs = zip(watch.ratios(), (levels.opening, levels.within), strict=True)
         alarms |= np.array([ratio > level for ratio, level in pairs])
     chance = 1.0 - np.exp(-0.5 * 10 * 5.0 / 500.0)
@@ -101,15 +101,15 @@ def streams(unit):
         "friction": [f"friction@transmission=0.5:step(time={ONSET} s)"],
     }
     noise = {"motor_speed": 0.05, "current_q_meas": 0.02, "voltage_q_ref": 0.5}
-    asked = [
+    ready = [
         setups(procedure, unit, faults=given, seed=seed)[0]
         for seed, given in enumerate(faults.values())
     ]
     record = recorded(list(signal_records("rotary", "low")))
-    shown = simulate_batch(
-        [Run(s.actuator, s.scenario) for s in asked], fidelity="low", record=record
+    deviations = simulate_batch(
+        [Run(s.actuator, s.scenario) for s in ready], fidelity="low", record=record
     )
-    logs = [traced(s, r, noise=noise) for s, r in zip(asked, shown, strict=True)]
+    logs = [traced(s, r, noise=noise) for s, r in zip(ready, deviations, strict=True)]
     return dict(zip(faults, logs, strict=True))
 
 
@@ -174,8 +174,8 @@ def test_windows_begin_a_second_after_the_motion_has(streams):
     top = top_speed(item)
     rests = replace(item, log=replace(item.log, speed=np.where(item.log.time < 2.0, 0.0, top)))
     assert run_in(rests, top) == pytest.approx(3.0, abs=item.log.period)
-    still = replace(item, log=replace(item.log, speed=0.0 * item.log.speed))
-    assert run_in(still, top) is None
+    standing = replace(item, log=replace(item.log, speed=0.0 * item.log.speed))
+    assert run_in(standing, top) is None
 
 
 def test_another_motion_is_left_out(monitor, streams):
@@ -205,8 +205,8 @@ def test_the_command(elevon_cli, tmp_path):  # noqa: F811
     assert document["alarm"]["causes"][0]["kind"] == "backlash"
     assert len(document["steps"]) == 3  # the first second of motion is none
     assert document["steps"][0]["start"] >= 1.0
-    said = elevon_cli("monitor", logs[0], *options)
-    assert "No alarm in" in said.err + said.out
+    answer = elevon_cli("monitor", logs[0], *options)
+    assert "No alarm in" in answer.err + answer.out
     refused = elevon_cli("monitor", logs[1], *options, "--false-alarm-time", "0 s", "--json")
     assert refused.code == 2
     assert refused.out == ""

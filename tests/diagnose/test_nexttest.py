@@ -85,7 +85,7 @@ def test_two_results_agree_more_than_one():
 
 
 def test_a_log_says_of_what_it_cannot_show_that_nothing_is_there():
-    """A fault that was not weighed looks like none; beside another one, like that one alone."""
+    """A fault that was no candidate looks like none; beside another one, like that one alone."""
     detectable = {key: 0.1 for key in RESULT["detectable"] if key != BACKLASH}
     belief, prior = (
         _weights(Belief.after([{**RESULT, "detectable": detectable}])),
@@ -101,8 +101,8 @@ def test_a_surrogates_result_stands_against_what_it_was_trained_on():
     """It says one half of a fault that half of the runs do not have: twenty times as likely."""
     detectable = dict.fromkeys(FAULTS, 0.1)
     shares = {0: 0.37, 1: 0.7 * 0.65 / 9, 2: 0.7 * 0.25 / 36}
-    said = {**RESULT, "detectable": detectable, "method": "surrogate"}
-    belief, prior = _weights(Belief.after([said])), _weights(Belief.prior())
+    answer = {**RESULT, "detectable": detectable, "method": "surrogate"}
+    belief, prior = _weights(Belief.after([answer])), _weights(Belief.prior())
     moved = [belief[keys] / prior[keys] for keys in ((SHORT,), ())]
     assert moved[0] / moved[1] == pytest.approx((0.5 / shares[1]) / (0.0998 / shares[0]), rel=1e-9)
 
@@ -120,8 +120,8 @@ def test_information_lies_between_nothing_and_all(cases):
 def test_a_tests_outcome_moves_the_belief(cases):
     case = cases["loaded"]
     before = Belief.of([Possible((), 1.0), Possible((SHORT,), 1.0, (0.1,), (0.02,))])
-    shown = case.unit.mean + case.shift(SHORT, np.array([0.1]))[0]
-    assert _weights(updated(case, before, shown))[SHORT,] > 0.99
+    values = case.unit.mean + case.shift(SHORT, np.array([0.1]))[0]
+    assert _weights(updated(case, before, values))[SHORT,] > 0.99
     assert _weights(updated(case, before, case.unit.mean))[()] > 0.9
 
 
@@ -157,10 +157,10 @@ def test_the_command_line(elevon_cli, monkeypatch, tmp_path):  # noqa: F811
     result = elevon_cli("next-test", "--actuator", "torino-rotary", "--so-far", path, "--json")
     assert result.code == 0
     document = json.loads(result.out)
-    told = [t["expected_information_bit"] for t in document["tests"]]
-    assert told == sorted(told, reverse=True)
+    bits = [t["expected_information_bit"] for t in document["tests"]]
+    assert bits == sorted(bits, reverse=True)
     assert document["next"] == document["tests"][0]
-    assert 0.0 < told[0] < document["unknown_bit"] + 0.1
+    assert 0.0 < bits[0] < document["unknown_bit"] + 0.1
     assert elevon_cli("next-test", "--actuator", "torino-rotary", "--so-far", tmp_path).code == 2
 
 

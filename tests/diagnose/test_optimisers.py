@@ -9,11 +9,11 @@ from elevon import Actuator
 from elevon.bench.procedure import load_procedure
 from elevon.bench.rig import setups
 from elevon.bench.traces import recorded
-from elevon.diagnose.optimisers import CAUSES, METHODS, Monitor, search
+from elevon.diagnose.optimisers import CAUSES, METHODS, MonitoringModel, search
 from elevon.diagnose.optimisers.cost import limits
 from elevon.diagnose.virtual import first_trace, traced
 from elevon.errors import UnknownNameError
-from elevon.reproduce.diagnosis_optimisers import Outcome
+from elevon.reproduce.diagnosis_optimisers import SearchOutcome
 from elevon.scenario.compile import signal_records
 from elevon.simulate import Run, simulate_batch
 from elevon.worklog import finished
@@ -52,8 +52,8 @@ def monitor():
     setup = setups(first_trace(load_procedure("backlash")), unit, faults=faults, seed=4)[0]
     record = recorded(list(signal_records(unit.wiring, "low")))
     run = Run(setup.actuator, setup.scenario, setup.conditions.seed)
-    shown = simulate_batch([run], fidelity="low", record=record)[0]
-    return Monitor(setup, traced(setup, shown))
+    recording = simulate_batch([run], fidelity="low", record=record)[0]
+    return MonitoringModel(setup, traced(setup, recording))
 
 
 def _vector(**values):
@@ -78,8 +78,8 @@ def test_the_misfit_is_least_at_the_truth(monitor):
 
 def test_an_outcome_survives_its_file():
     for reached in (1.5, float("nan")):
-        one = Outcome("backlash", "genetic", 0.1, 2000, 1.4, reached)
-        again = Outcome.of(json.loads(json.dumps(one.to_dict(), allow_nan=False)))
+        one = SearchOutcome("backlash", "genetic", 0.1, 2000, 1.4, reached)
+        again = SearchOutcome.of(json.loads(json.dumps(one.to_dict(), allow_nan=False)))
         assert again.to_dict() == one.to_dict()
 
 
@@ -94,10 +94,10 @@ def test_finished_work_is_known_again_by_its_name(tmp_path):
 
 @pytest.mark.long
 def test_the_table(elevon_cli, tmp_path):  # noqa: F811
-    asked = ("reproduce", "diagnosis-optimisers", "--seeds", "2", "--budget", "400",
+    arguments = ("reproduce", "diagnosis-optimisers", "--seeds", "2", "--budget", "400",
              "--runs", tmp_path, "--json")  # fmt: skip
-    result = elevon_cli(*asked)
+    result = elevon_cli(*arguments)
     document = json.loads(result.out)
     assert {row["method"] for row in document["rows"]} >= set(METHODS)
     assert all({"name", "value", "limit", "unit", "passed"} <= set(c) for c in document["checks"])
-    assert elevon_cli(*asked).out == result.out  # seconds and all: from the finished logs
+    assert elevon_cli(*arguments).out == result.out  # seconds and all: from the finished logs

@@ -6,9 +6,9 @@ import pytest
 from elevon import Actuator
 from elevon.diagnose.bymodel.candidates import CANDIDATES
 from elevon.diagnose.bymodel.case import case_of
+from elevon.diagnose.bymodel.likelihood import Frame, one_fault, prior_density, two_faults
 from elevon.diagnose.bymodel.log import prepared
 from elevon.diagnose.bymodel.posterior import quantiles
-from elevon.diagnose.bymodel.weigh import Frame, one_fault, prior_density, two_faults
 from tests.diagnose.virtual import bench_logs
 
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
@@ -33,8 +33,10 @@ def frames():
     for (name, texts), item in zip(FAULTS.items(), made[1:], strict=True):
         few = [KNOWN[text.partition("=")[0]] for text in texts]
         case = case_of(prepared(item, unit), unit, CANDIDATES, [base], [])
-        rest = case.shown.values - case.unit.mean
-        frame = Frame(rest, case.covariance, case.unit.degrees, case.shift, case.errors, case.doubt)
+        residual = case.features.values - case.unit.mean
+        frame = Frame(
+            residual, case.covariance, case.unit.degrees, case.shift, case.errors, case.uncertainty
+        )
         out[name] = (frame, few)
     return out
 
@@ -44,11 +46,11 @@ def density(frame, few, severities, *, fixed):
     low, high = (np.array([getattr(c, end) for c in few]) for end in ("low", "high"))
     if not ((severities >= low) & (severities <= high)).all():
         return -np.inf
-    own = frame if fixed else frame.loosened(list(zip(few, severities, strict=True)))
-    moved = [own.shift(c.key, np.array([s])) for c, s in zip(few, severities, strict=True)]
+    frame_at = frame if fixed else frame.loosened(list(zip(few, severities, strict=True)))
+    moved = [frame_at.shift(c.key, np.array([s])) for c, s in zip(few, severities, strict=True)]
     errors = [c.error * m for c, m in zip(few, moved, strict=True)]
     before = [prior_density(c, np.array([s]))[0] for c, s in zip(few, severities, strict=True)]
-    return float(own.log(own.y - sum(moved), *errors)[0] + np.log(before).sum())
+    return float(frame_at.log(frame_at.y - sum(moved), *errors)[0] + np.log(before).sum())
 
 
 def sampled(frame, few, start, widths, *, steps, fixed):
@@ -59,8 +61,8 @@ def sampled(frame, few, start, widths, *, steps, fixed):
     walkers = 8 * len(few)
     first = start + widths * rng.standard_normal((walkers, len(few)))
     first = np.clip(first, [c.low for c in few], [c.high for c in few])
-    own = frame.loosened(list(zip(few, start, strict=True))) if fixed else frame
-    run = emcee.EnsembleSampler(walkers, len(few), lambda s: density(own, few, s, fixed=fixed))
+    frame_at = frame.loosened(list(zip(few, start, strict=True))) if fixed else frame
+    run = emcee.EnsembleSampler(walkers, len(few), lambda s: density(frame_at, few, s, fixed=fixed))
     run.random_state = np.random.RandomState(4).get_state()
     run.run_mcmc(first, steps)
     burn = steps // 5
@@ -73,18 +75,20 @@ def sampled(frame, few, start, widths, *, steps, fixed):
 
 
 def by_grids(frame, few):
-    said = one_fault(frame, few[0], 0.5) if len(few) == 1 else two_faults(frame, tuple(few), 0.5)
-    ends = [quantiles(g, w, AT) for g, w in zip(said.grids, said.weights, strict=True)]
-    return said, np.array(ends).T
+    hypothesis = (
+        one_fault(frame, few[0], 0.5) if len(few) == 1 else two_faults(frame, tuple(few), 0.5)
+    )
+    ends = [quantiles(g, w, AT) for g, w in zip(hypothesis.grids, hypothesis.weights, strict=True)]
+    return hypothesis, np.array(ends).T
 
 
 @pytest.mark.parametrize("name", ["friction", "backlash and friction"])
 def test_grids_say_what_sampling_says(frames, name):
     frame, few = frames[name]
-    said, ends = by_grids(frame, few)
+    hypothesis, ends = by_grids(frame, few)
     widths = (ends[2] - ends[0]) / 3.3
-    chain, error, _ = sampled(frame, few, np.array(said.best), widths, steps=300, fixed=True)
-    step = np.array([np.diff(grid).mean() for grid in said.grids])
+    chain, error, _ = sampled(frame, few, np.array(hypothesis.best), widths, steps=300, fixed=True)
+    step = np.array([np.diff(grid).mean() for grid in hypothesis.grids])
     assert (np.abs(chain - ends) < 4.0 * error + 0.5 * step).all()
 
 
@@ -93,8 +97,10 @@ def test_grids_say_what_sampling_says(frames, name):
 def test_the_models_own_error_may_be_fixed_at_the_best_severities(frames, name):
     """Sampling lets it grow with each severity; ends move by a fraction of the interval."""
     frame, few = frames[name]
-    said, ends = by_grids(frame, few)
+    hypothesis, ends = by_grids(frame, few)
     widths = (ends[2] - ends[0]) / 3.3
-    chain, error, spread = sampled(frame, few, np.array(said.best), widths, steps=1500, fixed=False)
+    chain, error, spread = sampled(
+        frame, few, np.array(hypothesis.best), widths, steps=1500, fixed=False
+    )
     off = np.abs(chain - ends)
     assert (off < 4.0 * error + 0.25 * spread).all()

@@ -13,11 +13,11 @@ from elevon.diagnose.modelfree.scores import (
 
 
 def test_macro_f1_by_hand():
-    truth, said = list("aaabbc"), list("aabbbb")
+    truth, predicted = list("aaabbc"), list("aabbbb")
     # a: 2 2/(3+2) = 0.8, b: 2 2/(2+4) = 2/3, c: 0.
-    assert macro_f1(truth, said) == pytest.approx((0.8 + 2.0 / 3.0) / 3.0)
-    assert accuracy(truth, said) == pytest.approx(4.0 / 6.0)
-    assert confusion(truth, said, ["a", "b", "c"]) == [[2, 1, 0], [0, 2, 0], [0, 1, 0]]
+    assert macro_f1(truth, predicted) == pytest.approx((0.8 + 2.0 / 3.0) / 3.0)
+    assert accuracy(truth, predicted) == pytest.approx(4.0 / 6.0)
+    assert confusion(truth, predicted, ["a", "b", "c"]) == [[2, 1, 0], [0, 2, 0], [0, 1, 0]]
 
 
 def test_share_interval_is_that_of_the_tables():

@@ -8,8 +8,8 @@ import pytest
 
 from elevon import Actuator
 from elevon.diagnose.bymodel.candidates import CANDIDATES
-from elevon.diagnose.bymodel.evidence import UNITS, Signals, evidence, median
-from elevon.diagnose.bymodel.lost_motion import dragged
+from elevon.diagnose.bymodel.features import UNITS, DriveSignals, features_of, median
+from elevon.diagnose.bymodel.lost_motion import carried
 from elevon.diagnose.nexttest.belief import Answered
 from elevon.diagnose.surrogate import (
     Surrogate,
@@ -17,7 +17,7 @@ from elevon.diagnose.surrogate import (
     diagnose_by_surrogate,
     shipped,
 )
-from elevon.diagnose.surrogate.campaign import ASKED, _Plan, _unit_runs
+from elevon.diagnose.surrogate.campaign import SINGLE_FAULTS, _Plan, _unit_runs
 from elevon.diagnose.surrogate.features import NAMES, changes, log_features
 from elevon.diagnose.surrogate.population import (
     FAULTS,
@@ -62,9 +62,9 @@ def test_sizes_and_severities_are_inverse():
 
 
 def test_features_are_the_evidence_and_the_position_gain(unit, logs):
-    shown = log_features(logs["healthy"], unit)
+    features = log_features(logs["healthy"], unit)
     assert set(NAMES) <= set(UNITS)
-    values = dict(zip(NAMES, shown.values, strict=True))
+    values = dict(zip(NAMES, features.values, strict=True))
     assert values["lost_motion"] == pytest.approx(unit.parameters.value("backlash.total"), rel=0.01)
     gain = unit.parameters.value("control.position_gain")
     assert values["following_gain"] == pytest.approx(1.0 / gain, rel=0.005)
@@ -74,14 +74,14 @@ def test_features_are_the_evidence_and_the_position_gain(unit, logs):
 def test_evidence_without_deviations_is_the_same(unit, logs):
     """The surrogate and the model's runs need the numbers alone; they must be the same ones."""
     log = logs["short"].log
-    signals = Signals(
+    signals = DriveSignals(
         log.time, log.output, log.motor, log.speed_ref, log.speed, log.current_target, log.current,
         logs["short"].voltage, None, None, (150.0, 1.0), log.good,
     )  # fmt: skip
     value = unit.parameters.value
     about = {"ratio": value("gear.ratio"), "pole_pairs": value("motor.pole_pairs"), "emf": 1.0}
-    whole = evidence(signals, **about)
-    quick = evidence(signals, **about, deviations=False, shaft=False)
+    whole = features_of(signals, **about)
+    quick = features_of(signals, **about, deviations=False, shaft=False)
     turning = {"current_shaft", "current_sideband", "voltage_sideband"}
     assert set(whole.names) - set(quick.names) == turning
     np.testing.assert_allclose(quick.values, whole.only(quick.names).values, rtol=1e-9)
@@ -92,7 +92,7 @@ def test_evidence_without_deviations_is_the_same(unit, logs):
 def test_a_gap_is_passed_once_the_driver_has_gone_its_width():
     driver = np.concatenate((np.arange(0.0, 10.0), np.arange(10.0, -5.0, -1.0)))
     expected = np.concatenate((np.arange(0.0, 10.0), [10.0], np.arange(1.0, 15.0))) > 4.5
-    out = dragged(driver, 3.0)
+    out = carried(driver, 3.0)
     np.testing.assert_array_equal(out[:10], expected[:10])
     assert not out[11:15].any()
     assert out[16:].all()
@@ -124,37 +124,37 @@ def test_the_surrogate_names_the_fault(unit, logs, name, best):
         true = np.radians(0.3) if name == "backlash" else 0.25
         assert cause.interval[0] < true < cause.interval[1]
     if name == "short":
-        assert set(cause.equivalents) == {("short", "motor.phase_b"), ("short", "motor.phase_c")}
+        assert set(cause.ambiguous_with) == {("short", "motor.phase_b"), ("short", "motor.phase_c")}
 
 
 def test_both_is_the_model_on_what_was_proposed(unit, logs):
     result = diagnose_by_both([logs["short"]], unit, baselines=[logs["base"]])
     assert result.best == (FAULTS[3],)
     assert any("surrogate: proposed" in text for text in result.findings)
-    weighed = {f"{i['kind']}@{i['place']}" for i in result.unobservable} | set(result.detectable)
+    listed = {f"{i['kind']}@{i['place']}" for i in result.unobservable} | set(result.detectable)
     # What it was not trained on it cannot rule out.
-    assert {c.key for c in CANDIDATES} - set(FAULTS) <= weighed < {c.key for c in CANDIDATES}
+    assert {c.key for c in CANDIDATES} - set(FAULTS) <= listed < {c.key for c in CANDIDATES}
 
 
 def test_sets_of_faults_share_the_probability(unit, logs):
     """What next-test reads: each set with its own probability, the likeliest first."""
-    asked = ([logs["short"]], unit)
+    words = ([logs["short"]], unit)
     for way in (diagnose_by_surrogate, diagnose_by_both):
-        result = way(*asked, baselines=[logs["base"]])
+        result = way(*words, baselines=[logs["base"]])
         shares = [item.probability for item in result.hypotheses]
         assert shares == sorted(shares, reverse=True)
         assert sum(shares) == pytest.approx(1.0, abs=0.05)
         first = result.hypotheses[0]
         assert [f"{kind}@{place}" for kind, place, _ in first.faults] == list(result.best)
         assert first.interval[0][0] < first.severity[0] < first.interval[0][1]
-        told = Answered.of(json.loads(json.dumps(result.to_dict())))
-        assert told.possible[result.best].weight == shares[0]
+        answered = Answered.of(json.loads(json.dumps(result.to_dict())))
+        assert answered.possible[result.best].weight == shares[0]
 
 
 def test_a_history_takes_what_a_diagnosis_says(unit, logs):
     """`elevon predict` refuses keys that it does not know; a diagnosis must have none."""
-    said = diagnose_by_surrogate([logs["short"]], unit, baselines=[logs["base"]]).to_dict()
-    assert set(said) <= _KEYS | _OF_DIAGNOSIS
+    findings = diagnose_by_surrogate([logs["short"]], unit, baselines=[logs["base"]]).to_dict()
+    assert set(findings) <= _KEYS | _OF_DIAGNOSIS
 
 
 def test_two_logs_of_a_unit_are_surer_than_one(unit, logs):
@@ -175,10 +175,10 @@ def test_a_faulty_baseline_is_named(unit, logs):
     log = bench_logs(unit, [(9, [])])
     result = diagnose_by_surrogate(log, unit, baselines=[*healthy, faulty])
     assert result.status == "healthy"
-    said = [text for text in result.findings if "looks faulty itself" in text]
-    assert len(said) == 1
-    assert "third" in said[0]
-    assert "left out" in said[0]
+    findings = [text for text in result.findings if "looks faulty itself" in text]
+    assert len(findings) == 1
+    assert "third" in findings[0]
+    assert "left out" in findings[0]
     sound = diagnose_by_surrogate(log, unit, baselines=healthy)
     assert not any("looks faulty" in text for text in sound.findings)
 
@@ -201,8 +201,8 @@ def test_a_unit_unlike_the_trained_ones_is_said():
         {"friction.dynamic": 1.2, "friction.static": 1.6}
     )
     log, base = bench_logs(rough, [(1, []), (2, [])])
-    said = diagnose_by_surrogate([log], rough, baselines=[base]).findings
-    assert any("unit whose healthy dry_current" in text for text in said)
+    findings = diagnose_by_surrogate([log], rough, baselines=[base]).findings
+    assert any("unit whose healthy dry_current" in text for text in findings)
     plain = Actuator.load("torino-rotary")
     cases = bench_logs(plain, [(1, []), (2, [])], procedure="loaded")
     bare = [
@@ -239,12 +239,12 @@ def test_the_file_that_ships(tmp_path):
 
 def test_days_asked_are_days_of_the_same_units(unit):
     drawn = next(_unit_runs(_Plan(unit, "loaded", 0, "low", False), 3))
-    asked = list(_unit_runs(_Plan(unit, "loaded", 0, "low", True), 3))
-    assert [p.faults for p in asked] == [{k: v} for k, v in ASKED["loaded"].items()]
+    words = list(_unit_runs(_Plan(unit, "loaded", 0, "low", True), 3))
+    assert [p.faults for p in words] == [{k: v} for k, v in SINGLE_FAULTS["loaded"].items()]
     path = "gear.inertia"  # of the unit, the same on every day
-    inertia = {p.setup.actuator.parameters.value(path) for p in (drawn, *asked)}
+    inertia = {p.setup.actuator.parameters.value(path) for p in (drawn, *words)}
     assert len(inertia) == 1
-    assert not any(p.baseline for p in asked)
+    assert not any(p.baseline for p in words)
 
 
 def test_units_and_days_differ(unit):
@@ -276,26 +276,26 @@ def test_the_command_line(elevon_cli, tmp_path):  # noqa: F811
         elevon_cli("bench", "run", "backlash", "--actuator", "torino-rotary", "--fidelity", "low",
                    "--out", tmp_path / name, "--seed", seed, *faults)  # fmt: skip
     log, base = (tmp_path / n / "backlash.csv" for n in ("log", "base"))
-    asked = ("diagnose", log, "--actuator", "torino-rotary", "--baseline", base, "--json")
-    result = elevon_cli(*asked, "--method", "surrogate")
+    words = ("diagnose", log, "--actuator", "torino-rotary", "--baseline", base, "--json")
+    result = elevon_cli(*words, "--method", "surrogate")
     assert result.code == 0
     document = json.loads(result.out)
     assert document["method"] == "surrogate"
     assert document["best"]["faults"] == [FAULTS[0]]
-    assert elevon_cli(*asked, "--method", "magic").code == 2
-    assert elevon_cli(*asked, "--surrogate", tmp_path / "none.npz").code == 2
-    assert elevon_cli(*asked, "--method", "both", "--surrogate", tmp_path / "none.npz").code == 2
+    assert elevon_cli(*words, "--method", "magic").code == 2
+    assert elevon_cli(*words, "--surrogate", tmp_path / "none.npz").code == 2
+    assert elevon_cli(*words, "--method", "both", "--surrogate", tmp_path / "none.npz").code == 2
 
 
 @pytest.mark.long
 def test_training_by_one_command(elevon_cli, tmp_path):  # noqa: F811
     out = tmp_path / "own.npz"
-    asked = ("diagnose-train", "--out", out, "--units", "8", "--low-units", "16", "--rounds", "200",
+    words = ("diagnose-train", "--out", out, "--units", "8", "--low-units", "16", "--rounds", "200",
              "--test-units", "2", "--runs", tmp_path / "runs", "--json")  # fmt: skip
-    first = elevon_cli(*asked)
+    first = elevon_cli(*words)
     assert first.code == 0
     whole = out.read_bytes()
-    again = elevon_cli(*asked, "--force")
+    again = elevon_cli(*words, "--force")
     assert json.loads(again.out) == json.loads(first.out)
     assert out.read_bytes() == whole
     assert set(Surrogate.load(out).tests) == {"backlash", "loaded"}

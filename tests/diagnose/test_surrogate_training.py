@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from elevon.diagnose.surrogate import shipped
-from elevon.diagnose.surrogate.campaign import ASKED, Table
+from elevon.diagnose.surrogate.campaign import SINGLE_FAULTS, TrainingTable
 from elevon.diagnose.surrogate.features import NAMES
-from elevon.diagnose.surrogate.fit import Plan, fitted
+from elevon.diagnose.surrogate.fit import TrainingPlan, fitted
 from elevon.diagnose.surrogate.judge import judged, judged_at
 from elevon.diagnose.surrogate.network import (
     Batch,
@@ -53,14 +53,14 @@ def test_training_learns_a_linear_law_and_its_noise():
 
     ensemble = train(draw, 4, members=1, rounds=1500, seed=0)
     fresh = draw(np.random.default_rng(9), 4000)
-    said = ensemble.says(fresh.inputs)
+    opinion = ensemble.says(fresh.inputs)
     there = fresh.size[:, 0] != 0.0
-    score = ((fresh.size - said.size) / said.deviation)[there, 0]
+    score = ((fresh.size - opinion.size) / opinion.deviation)[there, 0]
     assert np.std(score) == pytest.approx(1.0, abs=0.1)
-    assert np.median(said.deviation[there]) == pytest.approx(0.2 / np.sqrt(1.04), rel=0.15)
+    assert np.median(opinion.deviation[there]) == pytest.approx(0.2 / np.sqrt(1.04), rel=0.15)
     large = np.abs(fresh.inputs[:, 0]) > 1.0
-    assert (said.faulty[large] > 2.0).all()
-    assert said.faulty[np.abs(fresh.inputs[:, 0]) < 0.1].max() < 0.0
+    assert (opinion.faulty[large] > 2.0).all()
+    assert opinion.faulty[np.abs(fresh.inputs[:, 0]) < 0.1].max() < 0.0
 
 
 def test_calibrated_logits():
@@ -89,13 +89,13 @@ def _table(units, rng, unlike=0.1):
             unit.append(u)
             baseline.append(k < 3)
     about = np.ones((len(unit), 2))
-    return Table(*map(np.array, (unit, baseline, severity, values)), about)
+    return TrainingTable(*map(np.array, (unit, baseline, severity, values)), about)
 
 
 def test_calibration_holds_on_units_never_seen():
     rng = np.random.default_rng(3)
     tables = {"backlash": _table(40, rng)}
-    plan = Plan(folds=2, members=1, rounds=150)
+    plan = TrainingPlan(folds=2, members=1, rounds=150)
     result = fitted(tables, {}, plan, {})
     scores = judged(result, {"backlash": _table(40, rng)})["backlash.relative"]
     assert scores["covered"] / scores["severities"] > 0.82
@@ -105,20 +105,20 @@ def test_calibration_holds_on_units_never_seen():
 
 def test_units_are_judged_at_the_severities_asked():
     rng = np.random.default_rng(5)
-    tables, plan = {"loaded": _table(40, rng, 0.0)}, Plan(folds=2, members=1, rounds=400)
+    tables, plan = {"loaded": _table(40, rng, 0.0)}, TrainingPlan(folds=2, members=1, rounds=400)
     drawn = _table(20, rng, 0.0)
     surrogate = fitted(tables, {}, plan, {})
     severity = np.zeros((100, len(FAULTS)))
-    for row, (key, size) in enumerate(list(ASKED["loaded"].items()) * 20):
+    for row, (key, size) in enumerate(list(SINGLE_FAULTS["loaded"].items()) * 20):
         severity[row, FAULTS.index(key)] = size
     unit = np.arange(100) // 5
     values = 1.0 + 0.02 * rng.standard_normal((100, len(NAMES)))
     values[:, : len(FAULTS)] += sizes(severity)
-    asked = Table(unit, np.zeros(100, dtype=bool), severity, values, np.ones((100, 2)))
-    said = judged_at(surrogate, {"loaded": drawn}, {"loaded": asked})
-    assert list(said) == [f"loaded.{key}" for key in ASKED["loaded"]]
-    *large, small = said.values()  # the gain's size is 0.18, the others' 0.28 and more
-    for fault in said.values():
+    singles = TrainingTable(unit, np.zeros(100, dtype=bool), severity, values, np.ones((100, 2)))
+    opinion = judged_at(surrogate, {"loaded": drawn}, {"loaded": singles})
+    assert list(opinion) == [f"loaded.{key}" for key in SINGLE_FAULTS["loaded"]]
+    *large, small = opinion.values()  # the gain's size is 0.18, the others' 0.28 and more
+    for fault in opinion.values():
         assert fault["runs"] == 20
         assert fault["isolated"] <= min(fault["alarms"], fault["first"])
         assert fault["covered"] >= 15

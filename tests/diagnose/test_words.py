@@ -26,8 +26,8 @@ def named(kind, place, unit="1", severity=0.2):
 
 
 def test_a_fault_without_words_of_its_own_is_said_by_kind_and_place():
-    said = sentence(named("resolver_short", "sensor.resolver.sine"))
-    assert said.startswith(
+    text = sentence(named("resolver_short", "sensor.resolver.sine"))
+    assert text.startswith(
         "There is resolver short at the sensor resolver sine: 20 % (10 to 30 %);"
     )
     assert sentence(named("brake_dragging", "brake", "N m")).startswith(

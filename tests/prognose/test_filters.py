@@ -113,14 +113,14 @@ def test_how_widely_diagnoses_scatter_is_learned_from_them():
 
 def test_what_all_diagnoses_err_by_alike_is_learned_from_where_growth_began():
     """A new unit has no fault: what its diagnoses show beyond the growth is their common error."""
-    rate, off, own = 1e-3, 0.06, 0.002
+    rate, off, scatter = 1e-3, 0.06, 0.002
     rng = np.random.default_rng(5)
     flt = ParticleFilter(process(law(rate)), count=4000, seed=1)
     deaf = ParticleFilter(process(law(rate)), count=4000, seed=1)
     for usage in np.linspace(50.0, 400.0, 15):
-        value = rate * usage + off + own * rng.standard_normal()
-        flt.update(Inspection(usage, {KEY: Seen(value, own, own, 0.05)}))
-        deaf.update(seen(usage, value, own))
+        value = rate * usage + off + scatter * rng.standard_normal()
+        flt.update(Inspection(usage, {KEY: Seen(value, scatter, scatter, 0.05)}))
+        deaf.update(seen(usage, value, scatter))
     assert 0.05 * flt.units.common[:, 0].mean() == pytest.approx(off, abs=0.006)
     assert flt.units.damage.mean() == pytest.approx(0.4, abs=0.008)
     assert deaf.units.damage.mean() > 0.43
@@ -134,10 +134,10 @@ def test_a_coefficient_that_differs_from_unit_to_unit_is_learned():
     flt = ParticleFilter(process(law(rate, spread=0.0, rate_spread=0.4)), count=4000, seed=1)
     for usage, value in observed:
         flt.update(seen(usage, value, 0.02))
-    own = flt.units.own[:, 0, 0]
-    assert own.mean() == pytest.approx(mean, abs=0.3 * spread)
-    assert own.std() == pytest.approx(spread, rel=0.35)
-    renewed = flt.update(Inspection(1000.0, {}, reset=(KEY,))).own[:, 0, 0]
+    scatter = flt.units.coefficients[:, 0, 0]
+    assert scatter.mean() == pytest.approx(mean, abs=0.3 * spread)
+    assert scatter.std() == pytest.approx(spread, rel=0.35)
+    renewed = flt.update(Inspection(1000.0, {}, reset=(KEY,))).coefficients[:, 0, 0]
     assert renewed.std() == pytest.approx(0.4, rel=0.1)
 
 
@@ -203,7 +203,7 @@ def test_a_diagnosis_becomes_an_inspection():
     item = law()
     cause = {"kind": "backlash", "place": "gear", "probability": 0.9, "severity": 0.015,
              "interval": [0.01, 0.0175],
-             "equivalents": [{"kind": "backlash", "place": "transmission"}]}  # fmt: skip
+             "ambiguous_with": [{"kind": "backlash", "place": "transmission"}]}  # fmt: skip
     data = {"faults": [cause], "detectable": {KEY: 0.003}}
     got = inspection(data, [item], usage=5.0).seen[KEY]
     assert (got.severity, got.low, got.high) == pytest.approx((0.015, 0.00304, 0.00152), rel=1e-3)

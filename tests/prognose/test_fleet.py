@@ -54,9 +54,9 @@ def test_a_unit_that_ends_soon_beside_one_that_lasts_is_done_when_it_would_be_al
     ends = np.linspace(1000.0, 2000.0, 101)
     costs = Costs(early=1.0, late=1e6, visit=0.0)
     alone = plan_fleet({"a": unit(*ends)}, costs)
-    beside = plan_fleet({"a": unit(*ends), "b": unit(1e7)}, costs)
-    assert beside.alone["a"] == pytest.approx(alone.alone["a"])
-    assert beside.visit_of("b") == pytest.approx(1e7, rel=0.01)
+    together = plan_fleet({"a": unit(*ends), "b": unit(1e7)}, costs)
+    assert together.alone["a"] == pytest.approx(alone.alone["a"])
+    assert together.visit_of("b") == pytest.approx(1e7, rel=0.01)
 
 
 def test_what_a_prediction_must_be_read_with_is_said_of_the_fleet():

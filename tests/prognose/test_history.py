@@ -65,10 +65,10 @@ def test_all_logs_of_an_inspection_are_one_diagnosis_against_all_healthy_ones(
     import elevon.diagnose.byroles as byroles
     import elevon.prognose.history as room
 
-    asked = []
+    calls = []
 
     def answered(logs, actuator, baselines):
-        asked.append((actuator.name, logs, baselines))
+        calls.append((actuator.name, logs, baselines))
         return Answer()
 
     monkeypatch.setattr({"bymodel": bymodel, "byroles": byroles}[module], function, answered)
@@ -86,7 +86,7 @@ def test_all_logs_of_an_inspection_are_one_diagnosis_against_all_healthy_ones(
     done = diagnosed(read, Actuator.load(name))
     healthy = ["a0", "b0", "a1", "b1"]
     logs = [["a0", "b0"], ["a1", "b1"], ["a2", "b2", "c2"]]
-    assert asked == [(name, own, healthy) for own in logs]
+    assert calls == [(name, group, healthy) for group in logs]
     seen = done.inspections([LAWS["gear_wear"]])
     assert [item.seen[KEY].severity for item in seen] == [2e-3] * 4
     with pytest.raises(Interrupted):

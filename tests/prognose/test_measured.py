@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from elevon.errors import FormatError, InputError
-from elevon.prognose import LAWS, Inspection, ParticleFilter, Process, Response, Seen
+from elevon.prognose import LAWS, Inspection, ParticleFilter, Process, ResponseTables, Seen
 from elevon.prognose.future import LASTING, MODEL_ERROR, look_ahead
 from elevon.prognose.grid import Grid
 from elevon.prognose.history import read_history
@@ -26,20 +26,22 @@ def process(*laws):
     points = np.array(list(grid.points()))
     current = 1.0 + points @ np.array([1.0, 0.1][: len(laws)])
     bare = Requirement(name="bare", measure="severity", fault=laws[0].key, limit=3.5)
-    asked = (Requirement(name="current", measure="current", limit=2.0), bare)
+    requirements = (Requirement(name="current", measure="current", limit=2.0), bare)
     values = np.column_stack((current, np.zeros(len(points))))
     hours = {"hours": np.ones(len(points))}
-    return Process(Response(laws, asked, (2.0, 3.5), ("A", "1"), grid, hours, values, 1, "low"))
+    return Process(
+        ResponseTables(laws, requirements, (2.0, 3.5), ("A", "1"), grid, hours, values, 1, "low")
+    )
 
 
 def flown(unit, off, *, measured, count=20, seed=0):
     """Inspect a unit whose current is less than the model's by the share `off`."""
     rng, flt = np.random.default_rng(7), ParticleFilter(unit, count=2000, seed=seed)
-    for model, shown in flown_values(off, count):
+    for model, value in flown_values(off, count):
         severity = model - 1.0 + 0.005 * rng.standard_normal()
-        own = {"current": Measured(shown, 0.01)} if measured else {}
+        measured_now = {"current": Measured(value, 0.01)} if measured else {}
         seen = {KEY: Seen(severity, 0.005, 0.005)}
-        flt.update(Inspection((model - 1.0) / RATE, seen, measured=own))
+        flt.update(Inspection((model - 1.0) / RATE, seen, measured=measured_now))
     return flt
 
 
@@ -56,11 +58,13 @@ def test_what_the_model_is_off_by_is_learned_and_moves_the_end():
     flt = flown(unit, off, measured=True)
     lasting = MODEL_ERROR * np.sqrt(LASTING)
     learned = lasting * flt.units.off[:, 0, 0]
-    model, shown = np.array(flown_values(off)).T
-    variance = 0.01**2 + (1.0 - LASTING) * (MODEL_ERROR * shown) ** 2
-    told = 0.6 / variance  # Student's likelihood of two degrees tells three fifths of a normal one
-    precision = np.sum(model**2 * told) + 1.0 / lasting**2
-    expected = np.sum(model * (model - shown) * told) / precision
+    model, value = np.array(flown_values(off)).T
+    variance = 0.01**2 + (1.0 - LASTING) * (MODEL_ERROR * value) ** 2
+    precision_each = (
+        0.6 / variance
+    )  # Student's likelihood of two degrees tells three fifths of a normal one
+    precision = np.sum(model**2 * precision_each) + 1.0 / lasting**2
+    expected = np.sum(model * (model - value) * precision_each) / precision
     assert expected > 3.0 / np.sqrt(precision)
     assert learned.mean() == pytest.approx(expected, abs=1.0 / np.sqrt(precision))
     assert learned.std() < 0.6 * lasting
@@ -80,12 +84,14 @@ def test_without_a_measured_value_nothing_is_drawn_anew():
     unit = process(law(1e-3))
     flt = flown(unit, 0.0, measured=False)
     assert flt.units.off.shape == (2000, 1, 0)
-    told = flown(unit, 0.0, measured=True, count=1)
-    assert told.units.off.shape == (2000, 1, 2)
-    assert told.units.off[:, 0, 1].std() == pytest.approx(1.0, rel=0.1)  # not measured: as drawn
+    precision_each = flown(unit, 0.0, measured=True, count=1)
+    assert precision_each.units.off.shape == (2000, 1, 2)
+    assert precision_each.units.off[:, 0, 1].std() == pytest.approx(
+        1.0, rel=0.1
+    )  # not measured: as drawn
 
 
-def test_the_law_that_moves_a_requirement_most_is_weighed_and_the_other_left_alone():
+def test_the_law_that_moves_a_requirement_most_is_reweighted_and_the_other_left_alone():
     unit = process(law(1e-3), law(1e-3, "friction"))
     assert governing(unit.response, "current") == (0, 0)
     flt = ParticleFilter(unit, seed=1)

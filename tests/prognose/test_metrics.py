@@ -84,6 +84,6 @@ def test_the_picture_shows_each_metric_at_its_value():
     assert [line.get_ydata()[0] for line in wedge.lines[1:]] == pytest.approx([1.0, 1.05, 1.3])
     dots = [line for line in band.lines if line.get_marker() == "o"]
     assert [dot.get_xdata()[0] for dot in dots] == pytest.approx([0.0, 0.0])  # the third has none
-    middle, held = rates.lines
+    middle, covered = rates.lines
     np.testing.assert_allclose(middle.get_ydata(), [0.9, 0.5])
-    np.testing.assert_allclose(held.get_ydata(), [2 / 3, 2 / 3])
+    np.testing.assert_allclose(covered.get_ydata(), [2 / 3, 2 / 3])

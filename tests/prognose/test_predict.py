@@ -97,10 +97,10 @@ def test_a_last_diagnosis_beyond_the_requirement_is_said_even_where_it_is_taken_
 ):
     last = Inspection(2100.0, {KEY: Seen(0.028, 3e-4, 3e-4)}, name="last.json")
     result = predict([*inspections(), last], unit, mission(), response=tables)
-    (said,) = [text for text in result.findings if "last.json" in text]
-    assert "if what it says of backlash@transmission is true, the unit has failed" in said
-    assert "requirement error: 1" in said
-    assert "deg, limit 1 deg" in said
+    (finding,) = [text for text in result.findings if "last.json" in text]
+    assert "if what it says of backlash@transmission is true, the unit has failed" in finding
+    assert "requirement error: 1" in finding
+    assert "deg, limit 1 deg" in finding
     near = Inspection(2100.0, {KEY: Seen(4e-6 * 2100.0, 3e-4, 3e-4)}, name="last.json")
     assert predict([*inspections(), near], unit, mission(), response=tables).findings == ()
 
@@ -109,13 +109,13 @@ def test_margin_and_severity_limits_and_a_least_value(unit):
     stall = {"name": "stall", "measure": "stall_load", "limit": "1200 N m", "slope": "10 deg/s",
              "load_slope": "150 N m/s", "margin": 0.1}  # fmt: skip
     bare = {"name": "backlash", "measure": "severity", "fault": KEY, "limit": "0.5 deg"}
-    asked = mission(requirement=[stall, bare, *FLIGHT["requirement"]])
-    tables = respond(unit, asked)
+    flight = mission(requirement=[stall, bare, *FLIGHT["requirement"]])
+    tables = respond(unit, flight)
     assert tables.thresholds[0] == pytest.approx(1320.0)
     reserve = tables.reserve(np.array([[0.0], [np.radians(0.5)], [np.radians(0.6)]]))
     assert reserve[1] == pytest.approx([1.0, 0.0, -0.2])
     assert reserve[0, 0] == pytest.approx(tables.values[0, 0] / 1320.0 - 1.0)
-    assert predict(inspections(), unit, asked, response=tables).first["backlash"] == 1.0
+    assert predict(inspections(), unit, flight, response=tables).first["backlash"] == 1.0
 
 
 def test_a_law_of_ones_own(unit):
@@ -123,14 +123,14 @@ def test_a_law_of_ones_own(unit):
         return c["pace"] * drivers["shaft_travel"] * (1.0 + damage / 0.01)
 
     base = LAWS["gear_wear"]
-    own = Law(
+    creep = Law(
         name="creep", text="", source="a user's", kind="backlash", place="transmission", unit="rad",
         rate=creep, drivers=("shaft_travel",), highest=base.highest,
         coefficients={"pace": base.coefficients["wear"]},
     )  # fmt: skip
-    asked = mission(growth=[{"law": "creep"}])
-    laws = asked.laws({"creep": own})
-    result = predict(inspections(), unit, asked, response=respond(unit, asked, laws=laws))
+    flight = mission(growth=[{"law": "creep"}])
+    laws = flight.laws({"creep": creep})
+    result = predict(inspections(), unit, flight, response=respond(unit, flight, laws=laws))
     assert result.known[0].law == "creep"
     assert np.isfinite(result.median)
 
@@ -288,7 +288,7 @@ def test_a_part_made_new_is_known_since_then(unit, tables):
 
 def test_a_ball_screw_and_its_stall_load():
     actuator = Actuator.load("nasa-ballscrew")
-    asked = Mission.from_dict({
+    flight = Mission.from_dict({
         "unit": "cycles", "hours": 0.01,
         "scenario": {
             "duration": "4 s",
@@ -303,10 +303,10 @@ def test_a_ball_screw_and_its_stall_load():
         ],
         "growth": [{"law": "screw_wear", "dormant": 0}],
     })  # fmt: skip
-    tables = respond(actuator, asked)
+    tables = respond(actuator, flight)
     assert tables.units == ("m", "N")
     assert tables.values[0, 1] > 3000.0
-    result = predict([], actuator, asked, response=tables)
+    result = predict([], actuator, flight, response=tables)
     mean = 0.5e-3 / (2e-11 * tables.drivers["friction_work"][0])
     assert result.median == pytest.approx(mean, rel=0.2)
 
@@ -318,12 +318,12 @@ def test_a_landing_gear_locks_in_time_until_its_bearings_are_worn():
     bare = {"name": "rotor", "measure": "severity", "fault": "eccentricity_static@motor",
             "limit": 0.3}  # fmt: skip
     growth = [{"law": "bearing_wear", "dormant": 0, "coefficients": {"wear": 1e-8}}]
-    asked = Mission.from_dict({"unit": "landings", "hours": 0.02, "scenario": scenario,
+    flight = Mission.from_dict({"unit": "landings", "hours": 0.02, "scenario": scenario,
                                "requirement": [lock, bare], "growth": growth})  # fmt: skip
-    tables = respond(actuator, asked)
+    tables = respond(actuator, flight)
     assert 2.0 < tables.values[0, 0] < 9.0
-    result = predict([], actuator, asked, response=tables)
+    result = predict([], actuator, flight, response=tables)
     assert result.first["rotor"] == 1.0
     tracking = {"name": "error", "measure": "tracking_error", "limit": "1 mm"}
     with pytest.raises(InputError, match="is no position"):
-        respond(actuator, asked.model_copy(update={"requirement": (Requirement(**tracking),)}))
+        respond(actuator, flight.model_copy(update={"requirement": (Requirement(**tracking),)}))

@@ -32,9 +32,9 @@ class TestWithProgpy:
         assert result.times[-1] == pytest.approx(end(1e-3, 2.0, 1.0), abs=6.0)
         state = result.event_states[-1]
         assert state["backlash limit"] == pytest.approx(0.0, abs=0.01)
-        shown = np.array([z["backlash@transmission"] for z in result.outputs])
+        severities = np.array([z["backlash@transmission"] for z in result.outputs])
         expected = np.expm1(1e-3 * np.array(result.times))
-        np.testing.assert_allclose(shown, expected, rtol=1e-4, atol=1e-6)
+        np.testing.assert_allclose(severities, expected, rtol=1e-4, atol=1e-6)
 
     def test_samples_go_there_and_back(self):
         unit = process(
@@ -44,7 +44,7 @@ class TestWithProgpy:
         back = from_samples(to_samples(units, unit), unit, usage=units.usage)
         np.testing.assert_array_equal(back.damage, units.damage)
         np.testing.assert_array_equal(back.active, units.active)
-        np.testing.assert_array_equal(back.own[:, 1], units.own[:, 1])
+        np.testing.assert_array_equal(back.coefficients[:, 1], units.coefficients[:, 1])
         np.testing.assert_allclose(back.growth[back.active], units.growth[units.active])
         with pytest.raises(InputError, match="damage friction"):
             from_samples([{"damage backlash@transmission": 0.0, "growth backlash@transmission": 0.0,

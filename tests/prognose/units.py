@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from elevon.prognose import Coefficient, Law, Process, Response
+from elevon.prognose import Coefficient, Law, Process, ResponseTables
 from elevon.prognose.grid import Grid
 from elevon.prognose.requirement import Requirement
 
@@ -30,7 +30,7 @@ def response(*laws, limits):
     )
     grid = Grid(tuple(np.array([0.0, item.highest]) for item in laws))
     count = 2 ** len(laws)
-    return Response(
+    return ResponseTables(
         laws, requirements, tuple(float(v) for v in limits), ("1",) * len(laws), grid,
         {"hours": np.ones(count)}, np.zeros((count, len(laws))), count, "low",
     )  # fmt: skip

@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
     from elevon.diagnose.bymodel.answer import Diagnosis, Moved
 
-__all__ = ["Panel", "Traces", "evidence_figure", "named_faults", "traces_figure"]
+__all__ = ["SignalPanel", "Traces", "features_figure", "named_faults", "traces_figure"]
 
 _POINTS = 800  # means drawn of a signal
-_MOST = 12  # numbers drawn of the evidence, those off the most
+_MOST = 12  # features drawn, those that deviate most
 
 
 @dataclass(frozen=True)
-class Panel:
+class SignalPanel:
     """One signal of a log beside the model's.
 
     Attributes
@@ -48,7 +48,7 @@ class Traces:
 
     name: str
     time: Floats
-    panels: Sequence[Panel]
+    panels: Sequence[SignalPanel]
 
 
 def named_faults(result: Diagnosis) -> Mapping[str, float]:
@@ -91,7 +91,7 @@ def _means(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     return time[starts] + 0.5 * (width - 1) * (time[1] - time[0]), sums / width
 
 
-def evidence_figure(moved: Sequence[Moved]) -> Figure:
+def features_figure(moved: Sequence[Moved]) -> Figure:
     """Draw how far each number is off a healthy unit, and what the named faults account for."""
     from elevon.report.figures import COLOURS, new_figure
 

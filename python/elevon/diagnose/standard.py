@@ -67,7 +67,7 @@ class Day:
 def standard_tests(actuator: Actuator) -> tuple[StandardTest, ...]:
     """Return the tests, in the order of the bench's list.
 
-    What asks for nothing, or is there for temperatures or vibration (a rate of its own), is none.
+    What commands nothing, or is there for temperatures or vibration (a rate of its own), is none.
     """
     stand = stand_of(actuator.wiring)
     out = []
@@ -110,14 +110,16 @@ def day_logs(
     fidelity: str = "low",
     progress: Progress | None = None,
 ) -> list[TestLog | Recording]:
-    """Run a test on several days, in lanes; return the logs as diagnosis reads them."""
+    """Run a test on several days, in a batch; return the logs as diagnosis reads them."""
     out: list[TestLog | Recording] = []
     for first in range(0, len(days), _BLOCK):
         block = days[first : first + _BLOCK]
         share = part(progress, first / len(days), (first + len(block)) / len(days))
         rotary = stand_of(actuator.wiring).equipment == _POSITION
         made = _rotary if rotary else _loaded
-        with warnings.catch_warnings():  # a day may set what a set's own model of heat replaces
+        with (
+            warnings.catch_warnings()
+        ):  # a day may set what an actuator's own model of heat replaces
             warnings.simplefilter("ignore", ElevonWarning)
             out += made(actuator, test, block, fidelity, share)
     return out
@@ -149,7 +151,7 @@ def _rotary(
     record = recorded(list(signal_records(actuator.wiring, fidelity)))
     runs = [Run(s.actuator, s.scenario, s.conditions.seed) for s in ready]
     recordings = simulate_batch(runs, fidelity=fidelity, record=record, progress=progress)
-    return [traced(s, shown) for s, shown in zip(ready, recordings, strict=True)]
+    return [traced(s, recording) for s, recording in zip(ready, recordings, strict=True)]
 
 
 def _loaded(

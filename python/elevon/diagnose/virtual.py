@@ -46,36 +46,36 @@ def traced(
     recording : Recording
         Its run, with what `elevon.bench.traces.recorded` says.
     cell : float
-        Brake torque shown over the true one.
+        Brake torque measured over the true one.
     noise : mapping of str to float, optional
         Deviation of white noise on channels of the log, SI.
     """
     from elevon.calibrate.brake_level import brake_of
     from elevon.calibrate.log import BenchLog
 
-    shown = drive_signals(setup, recording)
+    signals = drive_signals(setup, recording)
     rng = np.random.default_rng([setup.conditions.seed, 7])
     for name, deviation in (noise or {}).items():
-        shown[name] = shown[name] + deviation * rng.standard_normal(len(shown[name]))
-    time, note = shown["time"], _noted(setup)
-    brake = brake_of(_cell(setup, recording, cell), note, time, 0.0, shown["motor_speed"])
+        signals[name] = signals[name] + deviation * rng.standard_normal(len(signals[name]))
+    time, note = signals["time"], _noted(setup)
+    brake = brake_of(_cell(setup, recording, cell), note, time, 0.0, signals["motor_speed"])
     log = BenchLog(
         name=setup.trace.name,
         start=0.0,
         time=time,
-        speed_ref=shown["speed_ref"],
-        speed=shown["motor_speed"],
-        current=shown["current_q_meas"],
+        speed_ref=signals["speed_ref"],
+        speed=signals["motor_speed"],
+        current=signals["current_q_meas"],
         current_signal="current_q_meas",
-        current_target=shown["current_ref"],
-        motor=shown["resolver_position"],
-        output=shown["encoder_position"],
+        current_target=signals["current_ref"],
+        motor=signals["resolver_position"],
+        output=signals["encoder_position"],
         brake=brake,
         note=note,
         good=np.ones(len(time), dtype=np.bool_),
         warnings=(),
     )
-    return TestLog(log, shown["voltage_q_ref"])
+    return TestLog(log, signals["voltage_q_ref"])
 
 
 def _noted(setup: Setup) -> CommandNote:
@@ -97,10 +97,10 @@ def _cell(setup: Setup, recording: Recording, factor: float) -> Recording:
     """Return a recording of the brake's torque by the load cell, on the drive's clock."""
     from elevon.recording import Recording as Built
 
-    shown = cell_signals(setup, recording)
-    if shown is None:
+    signals = cell_signals(setup, recording)
+    if signals is None:
         return recording
-    time, force = shown
+    time, force = signals
     equipment = setup.rig.equipment
     torque = factor * force * equipment.arm / equipment.chain_ratio
     clock = setup.conditions.trigger + time * (1.0 + setup.conditions.cell.clock_drift)

@@ -15,7 +15,7 @@ from elevon.prognose.particle import ParticleFilter
 from elevon.prognose.predict import predict
 from elevon.prognose.process import Process
 from elevon.prognose.respond import respond
-from elevon.prognose.response import Response
+from elevon.prognose.response import ResponseTables
 from elevon.prognose.unscented import UnscentedFilter
 
 __all__ = [
@@ -27,7 +27,7 @@ __all__ = [
     "ParticleFilter",
     "Process",
     "Prognosis",
-    "Response",
+    "ResponseTables",
     "Seen",
     "UnscentedFilter",
     "inspection",

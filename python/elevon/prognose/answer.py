@@ -11,11 +11,11 @@ import numpy as np
 
 from elevon.prognose.future import Future
 
-__all__ = ["Known", "Prognosis", "survival"]
+__all__ = ["KnownFault", "Prognosis", "survival"]
 
 
 @dataclass(frozen=True)
-class Known:
+class KnownFault:
     """What is known of one fault at the last inspection.
 
     Attributes
@@ -75,7 +75,7 @@ class Prognosis:
         The samples.
     requirements : tuple of str
         Names, in the order of `Future.first`.
-    known : tuple of Known
+    known : tuple of KnownFault
         Severities and growth at the last inspection.
     reserve : tuple of dict
         Each requirement's ``name``, ``value``, ``threshold``, ``unit`` at the median severities.
@@ -92,7 +92,7 @@ class Prognosis:
     level: float
     future: Future
     requirements: tuple[str, ...]
-    known: tuple[Known, ...]
+    known: tuple[KnownFault, ...]
     reserve: tuple[dict[str, Any], ...]
     findings: tuple[str, ...]
     serial: str = ""

@@ -9,13 +9,13 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.prognose.laws import LAWS
-from elevon.prognose.requirement import Shown
+from elevon.prognose.requirement import RunSignals
 
 if TYPE_CHECKING:
     from elevon.prognose.mission import Mission
     from elevon.recording import Recording
 
-__all__ = ["exposure", "recorded_signals", "shown"]
+__all__ = ["exposure", "recorded_signals", "run_signals"]
 
 _RATE = 400.0  # Hz
 _ROLES = (
@@ -50,18 +50,18 @@ def recorded_signals(wiring: str, fidelity: str) -> str:
     return ",".join(dict.fromkeys(_signals(wiring, fidelity).values())) + f"@{_RATE:g} Hz"
 
 
-def shown(recording: Recording, wiring: str, fidelity: str) -> Shown:
+def run_signals(recording: Recording, wiring: str, fidelity: str) -> RunSignals:
     """Return the signals of a run by role."""
     names = _signals(wiring, fidelity)
     first = recording[next(iter(names.values()))]
-    return Shown(
+    return RunSignals(
         np.asarray(first.time, dtype=np.float64),
         {role: np.asarray(recording[name].values) for role, name in names.items()},
         recording.status == "ok",
     )
 
 
-def exposure(run: Shown, mission: Mission) -> dict[str, float]:
+def exposure(run: RunSignals, mission: Mission) -> dict[str, float]:
     """Return the drivers of a mission, keys of `DRIVERS`, for one of its units of use."""
     step = np.diff(run.time, append=run.time[-1])
     speed = run["motor_speed"]
@@ -81,7 +81,7 @@ def exposure(run: Shown, mission: Mission) -> dict[str, float]:
     return {**out, "surface_temperature": float(surface.mean())}
 
 
-def _friction_work(run: Shown, step: Floats) -> float:
+def _friction_work(run: RunSignals, step: Floats) -> float:
     if "friction_torque" in run.signals:
         return float(np.abs(run["friction_torque"] * run["motor_speed"]) @ step)
     parts = [run[name] for name in ("energy_friction", "energy_efficiency") if name in run.signals]

@@ -21,7 +21,7 @@ __all__ = ["course_figure", "severity_unit", "survival_figure"]
 
 
 def severity_unit(unit: str) -> str:
-    """Return the unit severities are shown in: shares in percent, lengths in millimetres."""
+    """Return the unit severities are displayed in: shares in percent, lengths in millimetres."""
     return {"1": "%", "m": "mm"}.get(unit, shown_unit(unit))
 
 

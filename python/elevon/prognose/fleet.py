@@ -23,7 +23,7 @@ _INSTANTS = 400  # at which a visit may be, of each unit's remaining life
 
 @dataclass(frozen=True)
 class Costs:
-    """What is weighed, in one currency.
+    """What the plan balances, in one currency.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ def plan_fleet(units: Mapping[str, Prognosis], costs: Costs) -> FleetPlan:
     units : mapping of str to Prognosis
         Serial number to prediction, one unit of use for all.
     costs : Costs
-        What is weighed.
+        What is balanced.
 
     Raises
     ------
@@ -154,17 +154,17 @@ def _instants(units: Iterable[Prognosis]) -> Floats:
 
 def _finite(item: Prognosis) -> Floats:
     """Remaining lives; those without end in sight count as the longest seen, or as none."""
-    rest = item.future.remaining
-    known = rest[np.isfinite(rest)]
-    return np.where(np.isfinite(rest), rest, known.max(initial=1.0))
+    lives = item.future.remaining
+    known = lives[np.isfinite(lives)]
+    return np.where(np.isfinite(lives), lives, known.max(initial=1.0))
 
 
 def _expected(item: Prognosis, instants: Floats, costs: Costs) -> Floats:
     """Expected cost of doing a unit at each instant, shape (t,)."""
-    rest = np.sort(_finite(item))
-    failed = np.searchsorted(rest, instants, side="left") / len(rest)
-    left = np.append(np.cumsum(rest[::-1])[::-1], 0.0)[np.searchsorted(rest, instants)]
-    lost = left / len(rest) - (1.0 - failed) * instants
+    lives = np.sort(_finite(item))
+    failed = np.searchsorted(lives, instants, side="left") / len(lives)
+    left = np.append(np.cumsum(lives[::-1])[::-1], 0.0)[np.searchsorted(lives, instants)]
+    lost = left / len(lives) - (1.0 - failed) * instants
     return np.asarray(costs.early * lost + costs.late * failed)
 
 

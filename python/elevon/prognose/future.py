@@ -10,14 +10,14 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 from elevon.prognose.measured import governing
 from elevon.prognose.mission import Usage
-from elevon.prognose.process import Population, Process
+from elevon.prognose.process import Process, UnitPopulation
 from elevon.prognose.requirement import SEVERITY
 
 __all__ = ["LASTING", "MODEL_ERROR", "Future", "crossing", "look_ahead"]
 
 MODEL_ERROR = 0.008
 """Deviation of what the calibrated model says of a requirement, over its threshold. Measured on
-units of other values, calibrated to about 1 %, against the high-fidelity model at the true end of
+units of other values, calibrated to about 1 %, against the switching model at the true end of
 life: 0.8 % (23 histories). A limit on a severity itself has none."""
 LASTING = 0.5
 """Share of the square of `MODEL_ERROR` that a unit keeps as its faults grow, so that what is
@@ -62,7 +62,7 @@ class Future:
 
 def look_ahead(
     process: Process,
-    units: Population,
+    units: UnitPopulation,
     usage: Usage,
     rng: np.random.Generator,
     *,
@@ -75,7 +75,7 @@ def look_ahead(
     ----------
     process : Process
         How they grow.
-    units : Population
+    units : UnitPopulation
         Now; weights are not used.
     usage : Usage
         Of the future: the factor on the loads is drawn once a unit.
@@ -120,7 +120,7 @@ def look_ahead(
 
 
 def _model_errors(
-    process: Process, units: Population, deviation: float, rng: np.random.Generator
+    process: Process, units: UnitPopulation, deviation: float, rng: np.random.Generator
 ) -> Floats:
     """Return what each unit's requirements are off by, shape (m, n), in thresholds.
 

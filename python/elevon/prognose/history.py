@@ -29,19 +29,19 @@ if TYPE_CHECKING:
     from elevon.prognose.law import Law
     from elevon.recording import Recording
 
-__all__ = ["Entry", "History", "diagnosed", "read_history", "write_stamp"]
+__all__ = ["History", "HistoryEntry", "diagnosed", "read_history", "write_stamp"]
 
 _KEYS = frozenset({"usage", "unit", "date", "serial", "reset", "logs", "healthy", "measured"})
 _OF_DIAGNOSIS = frozenset(
     {
         "status", "p_fault", "p_other", "false_alarm", "chance", "faults", "best", "unobservable",
-        "detectable", "evidence", "findings", "hypotheses", "alternatives", "seconds", "method",
+        "detectable", "features", "findings", "hypotheses", "alternatives", "seconds", "method",
     }
 )  # fmt: skip
 
 
 @dataclass(frozen=True)
-class Entry:
+class HistoryEntry:
     """One file of a history.
 
     Attributes
@@ -51,7 +51,7 @@ class Entry:
     usage : float
         Use at it.
     date, serial : str
-        Empty where not said.
+        Empty where not given.
     reset : tuple of str
         Parts made new after it.
     diagnosis : mapping or None
@@ -79,7 +79,7 @@ class Entry:
 class History:
     """Inspections of one unit in the order of use; ``unit`` is that of use."""
 
-    entries: tuple[Entry, ...]
+    entries: tuple[HistoryEntry, ...]
     unit: str
     serial: str
 
@@ -122,7 +122,7 @@ class History:
         return out
 
 
-def _check_reset(entry: Entry, laws: Sequence[Law]) -> None:
+def _check_reset(entry: HistoryEntry, laws: Sequence[Law]) -> None:
     """Refuse a part made new that neither the laws nor diagnosis know: it is a slip of the pen."""
     from elevon.diagnose.bymodel.candidates import CANDIDATES
 
@@ -184,7 +184,7 @@ def _one(place: Path, what: str, names: Mapping[str, str], why: str) -> None:
         )
 
 
-def _entry(path: Path) -> tuple[Entry, str] | None:
+def _entry(path: Path) -> tuple[HistoryEntry, str] | None:
     try:
         data = json.loads(path.read_text("utf-8"))
     except OSError as error:
@@ -207,7 +207,7 @@ def _entry(path: Path) -> tuple[Entry, str] | None:
     missing = next((log for log in logs if not log.is_file()), None)
     if missing is not None:
         raise InputError(f"{path}: the log {missing.name} is not there")
-    entry = Entry(
+    entry = HistoryEntry(
         path,
         float(usage),
         _date(path, data.get("date", "")),

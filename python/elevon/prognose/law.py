@@ -19,8 +19,11 @@ Rate = Callable[[Floats, Mapping[str, Floats], Mapping[str, Any]], Floats]
 DRIVERS: dict[str, tuple[str, str]] = {
     "hours": ("h", "time in use"),
     "friction_work": ("J", "work that friction turned into heat"),
-    "shaft_travel": ("rad", "travel of the motor's shaft"),
-    "torque_cubic_mean": ("N m", "cubic mean of the motor torque over the shaft's travel"),
+    "shaft_travel": ("rad", "sliding distance of the motor shaft"),
+    "torque_cubic_mean": (
+        "N m",
+        "cubic mean of the motor torque over the shaft's sliding distance",
+    ),
     "winding_temperature": ("K", "winding temperature that ages as the whole mission does"),
     "surface_temperature": ("K", "mean temperature of the motor's surface"),
 }
@@ -145,7 +148,10 @@ class Law:
         return tuple(name for name, item in self.coefficients.items() if item.spread > 0.0)
 
     def growth(
-        self, damage: Floats, drivers: Mapping[str, Floats], own: Mapping[str, Floats] | None = None
+        self,
+        damage: Floats,
+        drivers: Mapping[str, Floats],
+        factors: Mapping[str, Floats] | None = None,
     ) -> Floats:
         """Return the mean growth of the damage in one repetition, shape (n,).
 
@@ -153,11 +159,11 @@ class Law:
         ----------
         damage, drivers
             As `rate` takes them.
-        own : mapping of str to ndarray, shape (n,), optional
+        factors : mapping of str to ndarray, shape (n,), optional
             Factors of units on coefficients.
         """
         values: dict[str, Any] = {name: item.value for name, item in self.coefficients.items()}
-        for name, factor in (own or {}).items():
+        for name, factor in (factors or {}).items():
             values[name] = values[name] * factor
         return np.maximum(self.rate(damage, drivers, values), 0.0)
 

@@ -79,7 +79,7 @@ def _spall(damage: Floats, drivers: Drivers, c: Values) -> Floats:
 _WEAR = Law(
     name="gear_wear",
     text="backlash of the gear from the friction work done in it",
-    source="Archard 1953: worn volume is proportional to load times sliding way, hence to "
+    source="Archard 1953: worn volume is proportional to load times sliding distance, hence to "
            "friction work",
     kind="backlash", place="transmission", unit="rad",
     rate=_archard, drivers=("friction_work",), highest=0.03,
@@ -169,7 +169,7 @@ LAWS: dict[str, Law] = {
     "bearing_wear": Law(
         name="bearing_wear",
         text="clearance of the bearings, and the rotor out of centre in it",
-        source="Archard 1953, with the way of the shaft at constant load; the magnets' pull adds "
+        source="Archard 1953, with the sliding distance at constant load; the magnets' pull adds "
                "to the load in proportion to the eccentricity",
         kind="eccentricity_static", place="motor", unit="1",
         rate=_bearing, drivers=("shaft_travel",), highest=0.6,

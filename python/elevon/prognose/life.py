@@ -9,7 +9,7 @@ import numpy as np
 from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.prognose.future import crossing
-from elevon.prognose.process import Population, Process
+from elevon.prognose.process import Process, UnitPopulation
 
 __all__ = ["Life", "run_to_failure"]
 
@@ -43,14 +43,14 @@ class Life:
         return np.array([np.interp(usage, self.usage, column) for column in self.severity.T])
 
 
-def run_to_failure(process: Process, unit: Population, rng: np.random.Generator) -> Life:
+def run_to_failure(process: Process, unit: UnitPopulation, rng: np.random.Generator) -> Life:
     """Use one unit until it fails.
 
     Parameters
     ----------
     process : Process
         How it grows, and what it must hold.
-    unit : Population
+    unit : UnitPopulation
         One unit.
     rng : Generator
         Of chance.
@@ -72,10 +72,10 @@ def run_to_failure(process: Process, unit: Population, rng: np.random.Generator)
         if not np.isfinite(step):
             break
         unit = process.advance(unit, step, rng)
-        shown = process.severity(unit.damage)
-        after = process.response.reserve(shown)
+        severities = process.severity(unit.damage)
+        after = process.response.reserve(severities)
         usage.append(unit.usage)
-        severity.append(shown[0])
+        severity.append(severities[0])
         if after.min() < 0.0:
             return _ended(usage, severity, before, after)
         before = after

@@ -13,7 +13,7 @@ from elevon.prognose.requirement import SEVERITY
 from elevon.units import parse_quantity
 
 if TYPE_CHECKING:
-    from elevon.prognose.response import Response
+    from elevon.prognose.response import ResponseTables
 
 __all__ = ["Measured", "governing", "read_measured"]
 
@@ -70,7 +70,7 @@ def read_measured(data: Any, units: Mapping[str, str], place: str) -> dict[str, 
     return out
 
 
-def governing(response: Response, name: str) -> tuple[int, int]:
+def governing(response: ResponseTables, name: str) -> tuple[int, int]:
     """Return which requirement has a name, and which law moves its reserve most over its range.
 
     Raises

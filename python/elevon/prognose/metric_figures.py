@@ -81,8 +81,8 @@ def _draw_rates(axis: Any, tracks: Sequence[Track], shares: Sequence[float]) -> 
     low, middle, high = np.quantile(accuracy, [0.1, 0.5, 0.9], axis=0)
     axis.fill_between(shares, low, high, color=COLOURS["blue"], alpha=0.2, lw=0)
     axis.plot(shares, middle, "o-", ms=4, color=COLOURS["blue"], label="relative accuracy")
-    held = [coverage(tracks, share) for share in shares]
-    axis.plot(shares, held, "s--", ms=4, color=COLOURS["orange"], label="coverage of intervals")
+    rates = [coverage(tracks, share) for share in shares]
+    axis.plot(shares, rates, "s--", ms=4, color=COLOURS["orange"], label="coverage of intervals")
     mean = np.mean([cumulative_relative_accuracy(t, shares) for t in tracks])
     centre = np.nanmedian([convergence(t) for t in tracks]) if len(tracks[0].usage) > 1 else np.nan
     axis.set(ylim=(0.0, 1.05), xlabel="share of life")

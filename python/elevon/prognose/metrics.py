@@ -1,7 +1,7 @@
 """Metrics of a series of predictions against the end that came.
 
 Definitions: Saxena, Celaya, Saha, Saha, Goebel, "Metrics for offline evaluation of prognostic
-performance", IJPHM 1 (2010). Where that paper leaves a choice, the strict one is made and said.
+performance", IJPHM 1 (2010). Where that paper leaves a choice, the strict one is made and stated.
 """
 
 from __future__ import annotations

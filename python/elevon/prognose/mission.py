@@ -26,7 +26,7 @@ from elevon.prognose.requirement import Requirement
 from elevon.scenario import Scenario
 from elevon.units import parse_quantity
 
-__all__ = ["UNITS_OF_USE", "Growth", "Mission", "Usage"]
+__all__ = ["UNITS_OF_USE", "FaultGrowth", "Mission", "Usage"]
 
 Quantity = StrictInt | StrictFloat | StrictStr
 _NUMBERS = ("spread", "form_spread", "grain", "start", "start_spread", "dormant")
@@ -37,7 +37,7 @@ class _Frozen(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class Growth(_Frozen):
+class FaultGrowth(_Frozen):
     """A law that acts on the unit, and what of it differs from the package's.
 
     Attributes
@@ -121,7 +121,7 @@ class Mission(_Frozen):
         Command, loads, parameters, duration: the grammar of scenario files.
     requirement : tuple of Requirement
         What must hold; the first that does not ends the life.
-    growth : tuple of Growth
+    growth : tuple of FaultGrowth
         Laws that act.
     usage : Usage
         Of the future.
@@ -135,7 +135,7 @@ class Mission(_Frozen):
     temperature: Quantity | None = None
     scenario: dict[str, Any]
     requirement: tuple[Requirement, ...]
-    growth: tuple[Growth, ...]
+    growth: tuple[FaultGrowth, ...]
     usage: Usage = Usage()
 
     @field_validator("hours", "repeats")

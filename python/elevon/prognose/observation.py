@@ -1,4 +1,4 @@
-"""What an inspection says of the severities, as the filters take it."""
+"""What an inspection reports of the severities, as the filters take it."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _COMMON = (0.01, 0.0)  # of other faults; ASSUMED
 
 @dataclass(frozen=True)
 class Seen:
-    """What is said of one fault.
+    """What is reported of one fault.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ class Inspection:
     usage : float
         Use up to it, in the mission's unit.
     seen : mapping of str to Seen
-        ``KIND@PLACE`` to what is said; a fault that is not in it was not looked for.
+        ``KIND@PLACE`` to what is reported; a fault that is not in it was not looked for.
     reset : tuple of str
         Faults whose part was made new after the inspection.
     name : str
@@ -176,7 +176,7 @@ def _common(kind: str, severity: float) -> float:
 
 
 def _cause(data: Mapping[str, Any], law: Law, place: str) -> Mapping[str, Any] | None:
-    """Return the cause that is the law's fault, also by a place not to be told from it.
+    """Return the cause that is the law's fault, also by a place it is ambiguous with.
 
     A cause that is less likely than not is none: its severity is that of a guess.
     """
@@ -193,7 +193,9 @@ def _cause(data: Mapping[str, Any], law: Law, place: str) -> Mapping[str, Any] |
 def _named(cause: Any, place: str) -> tuple[list[tuple[str, str]], float]:
     """Return kind and place of a cause and of those like it, and its probability."""
     try:
-        names = [(str(n["kind"]), str(n["place"])) for n in (cause, *cause.get("equivalents", []))]
+        names = [
+            (str(n["kind"]), str(n["place"])) for n in (cause, *cause.get("ambiguous_with", []))
+        ]
         probability = float(cause["probability"])
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise InputError(

@@ -13,7 +13,7 @@ from elevon.arrays import Floats
 from elevon.prognose.future import LASTING, MODEL_ERROR
 from elevon.prognose.measured import Measured, governing
 from elevon.prognose.observation import Inspection, Seen
-from elevon.prognose.process import Population, Process
+from elevon.prognose.process import Process, UnitPopulation
 
 __all__ = ["COUNT", "ParticleFilter", "resampled"]
 
@@ -21,16 +21,16 @@ COUNT = 2000
 SURPRISE = 4.0
 _KERNEL = 0.08  # variance of what is drawn that is drawn anew, a lost share of the particles
 _FEWEST = 0.5  # effective particles, of all, that one share of a likelihood leaves
-_HALVINGS = 8  # so that a likelihood is weighed in 256 shares at most
+_HALVINGS = 8  # so that a likelihood is applied in 256 shares at most
 
 
 class ParticleFilter:
     """Sequential importance resampling with the process as proposal (Gordon 1993).
 
     Law by law: faults are diagnosed one by one and hardly drive each other's growth, so that each
-    law's numbers are weighed and drawn by its own diagnoses alone (factored particles: Ng, Peshkin
-    and Pfeffer 2002), and no particle is lost in one fault for what another shows. Numbers that do
-    not change are moved by the kernel of Liu and West (2001).
+    law's numbers are reweighted and drawn by its own diagnoses alone (factored particles: Ng,
+    Peshkin and Pfeffer 2002), and no particle is lost in one fault for what another shows. Numbers
+    that do not change are moved by the kernel of Liu and West (2001).
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class ParticleFilter:
 
     Attributes
     ----------
-    units : Population
+    units : UnitPopulation
         The posterior of the moment, of equal weights.
     surprises : list of (float, str, float)
         Use, fault and deviations off of diagnoses that stood more than `SURPRISE` of them from
@@ -57,7 +57,7 @@ class ParticleFilter:
         self.surprises: list[tuple[float, str, float]] = []
         self._counts = [0] * len(process.laws)
 
-    def update(self, item: Inspection) -> Population:
+    def update(self, item: Inspection) -> UnitPopulation:
         """Grow to an inspection, weigh by what it saw, make new what was replaced after it."""
         units = self.process.to(self.units, item.usage, self.rng)
         for k, law in enumerate(self.process.laws):
@@ -65,9 +65,9 @@ class ParticleFilter:
             if seen is None:
                 continue
             self._compare(units, k, seen)
-            units = self._weighed(units, k, partial(self._likelihood, k, seen))
+            units = self._reweighted(units, k, partial(self._likelihood, k, seen))
             if seen.severity is not None:
-                units = _with_misfit(units, k, seen.scatter(self._shown(units, k, seen)))
+                units = _with_misfit(units, k, seen.scatter(self._expected(units, k, seen)))
                 self._counts[k] += 1
         for name, value in item.measured.items():
             units = self._measured(units, name, value)
@@ -76,23 +76,23 @@ class ParticleFilter:
         self.units = units
         return units
 
-    def _shown(self, units: Population, k: int, seen: Seen) -> Floats:
+    def _expected(self, units: UnitPopulation, k: int, seen: Seen) -> Floats:
         """Return what diagnoses without scatter would say of units, shape (n,)."""
         severity = self.process.laws[k].severity(units.damage[:, k])
         return severity + seen.common * units.common[:, k]
 
-    def _likelihood(self, k: int, seen: Seen, units: Population) -> Floats:
+    def _likelihood(self, k: int, seen: Seen, units: UnitPopulation) -> Floats:
         """Return the logarithm of a diagnosis' likelihood, shape (n,)."""
-        shown = self._shown(units, k, seen)
-        return seen.log_likelihood(shown, units.misfit[:, k], self._counts[k])
+        expected = self._expected(units, k, seen)
+        return seen.log_likelihood(expected, units.misfit[:, k], self._counts[k])
 
-    def _measured(self, units: Population, name: str, value: Measured) -> Population:
+    def _measured(self, units: UnitPopulation, name: str, value: Measured) -> UnitPopulation:
         """Weigh by a requirement's own value: the model's at the units' severities, and off it.
 
         What the model is off by is a share of its value; `LASTING` of its square stays as faults
         grow, the rest is the value's own scatter.
-        The numbers of the law that moves it most are weighed, and what the model is off by stands
-        beside them; of the other laws' faults their units' spread is in the value.
+        The numbers of the law that moves it most are reweighted, and what the model is off by
+        stands beside them; of the other laws' faults their units' spread is in the value.
         """
         response = self.process.response
         r, k = governing(response, name)
@@ -104,18 +104,18 @@ class ParticleFilter:
         deviation = float(np.hypot(value.deviation / limit, np.sqrt(1.0 - LASTING) * size))
         seen = Seen(reserve, deviation, deviation)
 
-        def likelihood(units: Population) -> Floats:
+        def likelihood(units: UnitPopulation) -> Floats:
             left = response.reserve(self.process.severity(units.damage))[r]
             return seen.log_likelihood(left + np.sqrt(LASTING) * size * units.off[:, k, r])
 
-        return self._weighed(units, k, likelihood)
+        return self._reweighted(units, k, likelihood)
 
-    def _weighed(
-        self, units: Population, k: int, likelihood: Callable[[Population], Floats]
-    ) -> Population:
+    def _reweighted(
+        self, units: UnitPopulation, k: int, likelihood: Callable[[UnitPopulation], Floats]
+    ) -> UnitPopulation:
         """Weigh and draw one law's numbers, in shares of the likelihood that leave enough of them.
 
-        A diagnosis that few particles foresaw so narrows the cloud in steps, rather than to those
+        A diagnosis that few particles predicted so narrows the cloud in steps, rather than to those
         few (tempering: Neal 2001).
         """
         left = 1.0
@@ -126,11 +126,11 @@ class ParticleFilter:
             units = _drawn(units, k, _weights(share * score), self.rng)
         return units
 
-    def _compare(self, units: Population, k: int, seen: Seen) -> None:
+    def _compare(self, units: UnitPopulation, k: int, seen: Seen) -> None:
         """Note a diagnosis that the units expected before it hardly allow."""
         if seen.severity is None:
             return
-        severity = self._shown(units, k, seen)
+        severity = self._expected(units, k, seen)
         mean = float(severity.mean())
         deviation = seen.low if mean < seen.severity else seen.high
         score = (seen.severity - mean) / np.sqrt(float(severity.var()) + deviation**2)
@@ -138,7 +138,7 @@ class ParticleFilter:
             self.surprises.append((units.usage, self.process.laws[k].key, float(score)))
 
 
-def resampled(units: Population, count: int, rng: np.random.Generator) -> Population:
+def resampled(units: UnitPopulation, count: int, rng: np.random.Generator) -> UnitPopulation:
     """Draw units by their weights (systematic)."""
     return units.picked(_systematic(units.weight, count, rng))
 
@@ -173,13 +173,15 @@ def _share(score: Floats, left: float) -> float:
     return high
 
 
-def _with_misfit(units: Population, k: int, added: Floats) -> Population:
+def _with_misfit(units: UnitPopulation, k: int, added: Floats) -> UnitPopulation:
     misfit = units.misfit.copy()
     misfit[:, k] += added
     return replace(units, misfit=misfit)
 
 
-def _drawn(units: Population, k: int, weight: Floats, rng: np.random.Generator) -> Population:
+def _drawn(
+    units: UnitPopulation, k: int, weight: Floats, rng: np.random.Generator
+) -> UnitPopulation:
     """Draw one law's numbers by weights, and move them by a kernel that keeps mean and covariance.
 
     Damage moves along with growth and form: with little scatter of the growth all particles would
@@ -194,22 +196,34 @@ def _drawn(units: Population, k: int, weight: Floats, rng: np.random.Generator) 
     wide = _KERNEL * max(1.0 - _effective(weight), 0.0)  # equal weights round to just below zero
     new = _kernel(_rows(units, updated, k), part, _rows(out, moved, k), wide, rng)
     damage, growth, form = out.damage.copy(), out.growth.copy(), out.form.copy()
-    common, own, off = out.common.copy(), out.own.copy(), out.off.copy()
+    common, coefficients, off = out.common.copy(), out.coefficients.copy(), out.off.copy()
     damage[moved, k], growth[moved, k] = np.exp(new[:, 0]), new[:, 1]
     form[moved, k] = np.abs(new[:, 2])  # one-sided as its prior
-    last = 4 + own.shape[2]
-    common[moved, k], own[moved, k], off[moved, k] = new[:, 3], new[:, 4:last], new[:, last:]
-    return replace(out, damage=damage, growth=growth, form=form, common=common, own=own, off=off)
+    last = 4 + coefficients.shape[2]
+    common[moved, k], coefficients[moved, k], off[moved, k] = (
+        new[:, 3],
+        new[:, 4:last],
+        new[:, last:],
+    )
+    return replace(
+        out,
+        damage=damage,
+        growth=growth,
+        form=form,
+        common=common,
+        coefficients=coefficients,
+        off=off,
+    )
 
 
-def _rows(units: Population, keep: npt.NDArray[np.bool_], k: int) -> Floats:
+def _rows(units: UnitPopulation, keep: npt.NDArray[np.bool_], k: int) -> Floats:
     """Logarithm of the damage and all fixed numbers of one law, shape (n, 4 + c + m)."""
     fixed = (units.growth, units.form, units.common)
     return np.column_stack(
         (
             np.log(units.damage[keep, k]),
             *(v[keep, k] for v in fixed),
-            units.own[keep, k],
+            units.coefficients[keep, k],
             units.off[keep, k],
         )
     )
@@ -223,8 +237,8 @@ def _kernel(
     `wide` is the share of the variance that is drawn anew.
     """
     mean = weight @ before
-    rest = before - mean
-    values, vectors = np.linalg.eigh((rest.T * weight) @ rest)
+    residual = before - mean
+    values, vectors = np.linalg.eigh((residual.T * weight) @ residual)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     jitter = np.sqrt(wide) * rng.standard_normal(after.shape) @ root.T
     return np.asarray(mean + np.sqrt(1.0 - wide) * (after - mean) + jitter)

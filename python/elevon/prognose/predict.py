@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elevon.errors import InputError
-from elevon.prognose.answer import Known, Prognosis
+from elevon.prognose.answer import KnownFault, Prognosis
 from elevon.prognose.future import MODEL_ERROR, look_ahead
 from elevon.prognose.observation import Inspection
 from elevon.prognose.particle import COUNT, ParticleFilter, resampled
 from elevon.prognose.process import Process
 from elevon.prognose.respond import respond
-from elevon.prognose.response import Response, check_start
+from elevon.prognose.response import ResponseTables, check_start
 from elevon.units import to_display
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.prognose.mission import Mission
-    from elevon.prognose.process import Population
+    from elevon.prognose.process import UnitPopulation
 
 __all__ = ["LEVEL", "predict", "prognosis"]
 
@@ -36,7 +36,7 @@ def predict(
     actuator: Actuator,
     mission: Mission,
     *,
-    response: Response | None = None,
+    response: ResponseTables | None = None,
     snapshots: bool = False,
     particles: int = COUNT,
     level: float = LEVEL,
@@ -53,10 +53,10 @@ def predict(
         The healthy unit, calibrated.
     mission : Mission
         What it does, must do, and what grows.
-    response : Response, optional
+    response : ResponseTables, optional
         Tables made before, for a series of predictions.
     snapshots : bool
-        Correct the tables by runs at high fidelity.
+        Correct the tables by runs of the switching model.
     particles : int
         Of the filter.
     level : float
@@ -146,7 +146,7 @@ def check_order(inspections: Sequence[Inspection]) -> None:
             )
 
 
-def _check_new(response: Response) -> None:
+def _check_new(response: ResponseTables) -> None:
     new = np.array([law.severity(np.array([law.start]))[0] for law in response.laws])
     broken = check_start(response, new)
     if broken:
@@ -156,15 +156,15 @@ def _check_new(response: Response) -> None:
         )
 
 
-def _measured(item: Any, value: float, known: Sequence[Known]) -> float:
+def _measured(item: Any, value: float, known: Sequence[KnownFault]) -> float:
     if item.fault is None:
         return value
     return next(k.severity for k in known if f"{k.kind}@{k.place}" == item.fault)
 
 
 def _known(
-    process: Process, units: Population, inspections: Sequence[Inspection], level: float
-) -> tuple[Known, ...]:
+    process: Process, units: UnitPopulation, inspections: Sequence[Inspection], level: float
+) -> tuple[KnownFault, ...]:
     tail = 0.5 * (1.0 - level)
     severity = process.severity(units.damage)
     out = []
@@ -172,20 +172,20 @@ def _known(
         low, middle, high = np.quantile(severity[:, k], [tail, 0.5, 1.0 - tail])
         grows = units.active[:, k]
         factors = np.exp(units.growth[grows, k]) if grows.any() else np.zeros(1)
-        slow, own, fast = np.quantile(factors, [tail, 0.5, 1.0 - tail])
+        slow, median, fast = np.quantile(factors, [tail, 0.5, 1.0 - tail])
         since = _since_reset(inspections, law.key)
         count = sum(
             1 for i in since if (s := i.seen.get(law.key)) is not None and s.severity is not None
         )
         out.append(
-            Known(
+            KnownFault(
                 law.kind,
                 law.place,
                 law.unit,
                 law.name,
                 float(middle),
                 (float(low), float(high)),
-                float(own),
+                float(median),
                 (float(slow), float(fast)),
                 count,
                 float(grows.mean()),
@@ -238,9 +238,9 @@ def _stray(flt: ParticleFilter, inspections: Sequence[Inspection]) -> list[str]:
     stray = [key for usage, key, score in flt.surprises if usage == last.usage and score > 0.0]
     severity = np.zeros(len(response.laws))
     for k, law in enumerate(response.laws):
-        said = last.seen.get(law.key)
-        if law.key in stray and said is not None and said.severity is not None:
-            severity[k] = said.severity
+        seen = last.seen.get(law.key)
+        if law.key in stray and seen is not None and seen.severity is not None:
+            severity[k] = seen.severity
     broken = check_start(response, severity) if severity.any() else []
     if not broken:
         return []
@@ -273,9 +273,9 @@ def _beyond(result: Prognosis, process: Process) -> list[str]:
     out = []
     for k, law in enumerate(process.laws):
         if result.future.course[-1, k, 2] > 1.05 * law.highest:
-            shown = to_display(law.highest, law.unit)
+            display = to_display(law.highest, law.unit)
             out.append(
-                f"{law.key} grows beyond {shown:.3g} {law.unit}, the last of the tables; what "
+                f"{law.key} grows beyond {display:.3g} {law.unit}, the last of the tables; what "
                 "happens beyond is taken as there"
             )
     return out

@@ -11,9 +11,9 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.prognose.law import Law
-from elevon.prognose.response import Response
+from elevon.prognose.response import ResponseTables
 
-__all__ = ["DRIFT", "Population", "Process"]
+__all__ = ["DRIFT", "Process", "UnitPopulation"]
 
 
 DRIFT = 0.05
@@ -26,11 +26,20 @@ ONSET = 0.05
 """Rate at which a dormant fault begins to grow, for each e-fold of use. ASSUMED."""
 
 
-_OF_LAWS = ("damage", "growth", "form", "active", "misfit", "common", "own", "off")  # unit, law
+_OF_LAWS = (
+    "damage",
+    "growth",
+    "form",
+    "active",
+    "misfit",
+    "common",
+    "coefficients",
+    "off",
+)  # unit, law
 
 
 @dataclass(frozen=True)
-class Population:
+class UnitPopulation:
     """Units that may be the true one, n of them, with k laws.
 
     Attributes
@@ -49,7 +58,7 @@ class Population:
         Sum of the squared distances, in stated deviations, from the diagnoses that saw the fault.
     common : ndarray, shape (n, k)
         What all diagnoses of the fault err by alike, in deviations of it (`Seen.common`).
-    own : ndarray, shape (n, k, c)
+    coefficients : ndarray, shape (n, k, c)
         Logarithms of the unit's factors on the coefficients that differ from unit to unit, in the
         order of `Law.spreading`; the rest of c is unused.
     off : ndarray, shape (n, k, m)
@@ -66,14 +75,14 @@ class Population:
     active: npt.NDArray[np.bool_]
     misfit: Floats
     common: Floats
-    own: Floats
+    coefficients: Floats
     off: Floats
     usage: float = 0.0
 
     @classmethod
     def of(
         cls, damage: Floats, growth: Floats, *, form: Floats | None = None, usage: float = 0.0
-    ) -> Population:
+    ) -> UnitPopulation:
         """Return growing units of equal weight, shape (n, k), with the laws' coefficients."""
         zeros = np.zeros_like(growth)
         return cls(
@@ -84,27 +93,27 @@ class Population:
             active=np.ones(growth.shape, dtype=np.bool_),
             misfit=zeros,
             common=zeros,
-            own=np.zeros((*growth.shape, 0)),
+            coefficients=np.zeros((*growth.shape, 0)),
             off=np.zeros((*growth.shape, 0)),
             usage=usage,
         )
 
-    def without_dormant(self) -> Population:
+    def without_dormant(self) -> UnitPopulation:
         """Return the units without the faults that do not grow in them: those are not there."""
         return replace(self, damage=np.where(self.active, self.damage, 0.0))
 
-    def picked(self, index: npt.NDArray[np.intp]) -> Population:
+    def picked(self, index: npt.NDArray[np.intp]) -> UnitPopulation:
         """Return those of an index, all with the same weight."""
         even = np.full(len(index), 1.0 / max(len(index), 1))
         return replace(self, weight=even, **{name: getattr(self, name)[index] for name in _OF_LAWS})
 
-    def with_law(self, k: int, index: npt.NDArray[np.intp]) -> Population:
+    def with_law(self, k: int, index: npt.NDArray[np.intp]) -> UnitPopulation:
         """Return the units with the numbers of one law from those of an index, shape (n,)."""
         columns = np.arange(self.damage.shape[1])
         rows = np.where(columns == k, index[:, None], np.arange(len(index))[:, None])
         return replace(self, **{name: getattr(self, name)[rows, columns] for name in _OF_LAWS})
 
-    def with_off(self, requirements: int, rng: np.random.Generator) -> Population:
+    def with_off(self, requirements: int, rng: np.random.Generator) -> UnitPopulation:
         """Return the units with what the model is off by, drawn where they carry none yet."""
         if self.off.shape[2]:
             return self
@@ -116,13 +125,13 @@ class Process:
 
     Parameters
     ----------
-    response : Response
+    response : ResponseTables
         What severities do.
     drift : float
         See `DRIFT`.
     """
 
-    def __init__(self, response: Response, *, drift: float = DRIFT) -> None:
+    def __init__(self, response: ResponseTables, *, drift: float = DRIFT) -> None:
         self.response = response
         self.laws: tuple[Law, ...] = response.laws
         self.drift = drift
@@ -133,7 +142,7 @@ class Process:
         self._most = np.array([2.0 * law.highest_damage for law in self.laws])
         self._spreads = _spreads(self.laws)
 
-    def start(self, count: int, rng: np.random.Generator) -> Population:
+    def start(self, count: int, rng: np.random.Generator) -> UnitPopulation:
         """Draw new units."""
         if count < 10:
             raise InputError(f"{count} particles: at least 10 are needed")
@@ -142,7 +151,7 @@ class Process:
         spread = np.array([law.start_spread for law in self.laws])
         growth = np.array([law.spread for law in self.laws])
         form = np.array([law.form_spread for law in self.laws])
-        return Population(
+        return UnitPopulation(
             damage=np.maximum(start + spread * rng.standard_normal((count, size)), 0.0),
             growth=growth * rng.standard_normal((count, size)),
             form=np.abs(form * rng.standard_normal((count, size))),
@@ -150,7 +159,7 @@ class Process:
             active=rng.random((count, size)) >= np.array([law.dormant for law in self.laws]),
             misfit=np.zeros((count, size)),
             common=rng.standard_normal((count, size)),
-            own=self._spreads * rng.standard_normal((count, *self._spreads.shape)),
+            coefficients=self._spreads * rng.standard_normal((count, *self._spreads.shape)),
             off=np.zeros((count, size, 0)),
         ).without_dormant()
 
@@ -159,15 +168,15 @@ class Process:
         columns = [law.severity(damage[:, k]) for k, law in enumerate(self.laws)]
         return np.column_stack(columns)
 
-    def rate(self, units: Population, damage: Floats, load: Floats) -> Floats:
+    def rate(self, units: UnitPopulation, damage: Floats, load: Floats) -> Floats:
         """Return the mean growth of each damage in one repetition, shape (n, k).
 
         Parameters
         ----------
-        units : Population
+        units : UnitPopulation
             Whose growth it is.
         damage : ndarray, shape (n, k)
-            Where it is asked: not always the units' own.
+            Where it is evaluated: not always the units' own.
         load : ndarray, shape (n,)
             Factor on the mission's loads.
         """
@@ -175,25 +184,25 @@ class Process:
         severity = self.severity(damage)
         drivers = self.response.exposed(severity, load)
         columns = [
-            law.growth(damage[:, k], drivers, self._own(units, k))
+            law.growth(damage[:, k], drivers, self._factors(units, k))
             for k, law in enumerate(self.laws)
         ]
         factor = np.exp(units.growth + units.form * np.log1p(severity / self._quarter))
         return np.asarray(np.column_stack(columns) * factor * units.active)
 
-    def _own(self, units: Population, k: int) -> dict[str, Floats]:
+    def _factors(self, units: UnitPopulation, k: int) -> dict[str, Floats]:
         """Return units' factors on one law's coefficients; none where they carry none."""
-        names = self.laws[k].spreading[: units.own.shape[2]]
-        return {name: np.exp(units.own[:, k, c]) for c, name in enumerate(names)}
+        names = self.laws[k].spreading[: units.coefficients.shape[2]]
+        return {name: np.exp(units.coefficients[:, k, c]) for c, name in enumerate(names)}
 
     def advance(
         self,
-        units: Population,
+        units: UnitPopulation,
         steps: float,
         rng: np.random.Generator | None,
         load: Floats | None = None,
         rate: Floats | None = None,
-    ) -> Population:
+    ) -> UnitPopulation:
         """Let all units be used `steps` repetitions more, in one step of the midpoint rule.
 
         Without a random generator growth is the mean one; `rate` is that of the units as they
@@ -223,12 +232,12 @@ class Process:
 
     def to(
         self,
-        units: Population,
+        units: UnitPopulation,
         usage: float,
         rng: np.random.Generator | None,
         *,
         steps: int = 12,
-    ) -> Population:
+    ) -> UnitPopulation:
         """Use all units up to `usage`, in `steps` steps."""
         if usage < units.usage:
             raise InputError(f"use goes back from {units.usage:g} to {usage:g}")
@@ -238,7 +247,9 @@ class Process:
             units = self.advance(units, float(stop) - units.usage, rng)
         return replace(units, usage=usage)
 
-    def reset(self, units: Population, keys: Sequence[str], rng: np.random.Generator) -> Population:
+    def reset(
+        self, units: UnitPopulation, keys: Sequence[str], rng: np.random.Generator
+    ) -> UnitPopulation:
         """Return the units with parts made new; what replaces them has a growth of its own."""
         new = self.start(len(units.weight), rng)
         made = np.array([law.key in keys for law in self.laws])
@@ -246,8 +257,8 @@ class Process:
             name: np.where(made, getattr(new, name), getattr(units, name))
             for name in ("damage", "growth", "form", "active")
         }
-        own = np.where(made[:, None], new.own, units.own)
-        return replace(units, own=own, **renewed)
+        coefficients = np.where(made[:, None], new.coefficients, units.coefficients)
+        return replace(units, coefficients=coefficients, **renewed)
 
 
 def _spreads(laws: Sequence[Law]) -> Floats:

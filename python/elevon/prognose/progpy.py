@@ -15,7 +15,7 @@ import numpy as np
 
 from elevon.errors import InputError
 from elevon.prognose.law import Law
-from elevon.prognose.process import Population, Process
+from elevon.prognose.process import Process, UnitPopulation
 
 __all__ = ["from_samples", "progpy_model", "to_samples"]
 
@@ -88,7 +88,7 @@ def progpy_model(process: Process, *, load: float = 1.0, step: float = 1.0) -> A
     return Actuator(process_noise=0.0, measurement_noise=0.0)
 
 
-def to_samples(units: Population, process: Process) -> Any:
+def to_samples(units: UnitPopulation, process: Process) -> Any:
     """Return units of equal weight as ``progpy.uncertain_data.UnweightedSamples`` of states.
 
     A fault that does not grow gets a growth of -700: the exponential of it is nothing.
@@ -98,7 +98,7 @@ def to_samples(units: Population, process: Process) -> Any:
     return UnweightedSamples([_states(units, n, process.laws) for n in range(len(units.weight))])
 
 
-def from_samples(samples: Any, process: Process, *, usage: float = 0.0) -> Population:
+def from_samples(samples: Any, process: Process, *, usage: float = 0.0) -> UnitPopulation:
     """Return ProgPy's samples of states as units; the inverse of `to_samples`.
 
     Raises
@@ -124,7 +124,7 @@ def _names(law: Law) -> tuple[str, ...]:
     return tuple(f"{part} {law.key}" for part in ("damage", "growth", "form", *law.spreading))
 
 
-def _units(x: Mapping[str, Any], laws: Sequence[Law]) -> Population:
+def _units(x: Mapping[str, Any], laws: Sequence[Law]) -> UnitPopulation:
     """Return one unit of a state."""
     units = _population([x], laws)
     return replace(units, damage=np.maximum(units.damage, 0.0))
@@ -132,7 +132,7 @@ def _units(x: Mapping[str, Any], laws: Sequence[Law]) -> Population:
 
 def _population(
     rows: Sequence[Mapping[str, Any]], laws: Sequence[Law], usage: float = 0.0
-) -> Population:
+) -> UnitPopulation:
     """Return units of states; a growth of -700 as it is."""
     most = max(len(_names(law)) for law in laws)
     table = np.zeros((len(rows), len(laws), most))
@@ -141,15 +141,15 @@ def _population(
             values = [float(np.asarray(row[name]).item()) for name in _names(law)]
             table[n, k, : len(values)] = values
     damage, growth, form = np.moveaxis(table[:, :, :3], 2, 0)
-    units = Population.of(damage, growth, form=form, usage=usage)
-    return replace(units, own=table[:, :, 3:])
+    units = UnitPopulation.of(damage, growth, form=form, usage=usage)
+    return replace(units, coefficients=table[:, :, 3:])
 
 
-def _states(units: Population, n: int, laws: Sequence[Law]) -> dict[str, float]:
+def _states(units: UnitPopulation, n: int, laws: Sequence[Law]) -> dict[str, float]:
     out: dict[str, float] = {}
     for k, law in enumerate(laws):
         growth = units.growth[n, k] if units.active[n, k] else -700.0
-        own = units.own[n, k, : len(law.spreading)]
-        values = (units.damage[n, k], growth, units.form[n, k], *own)
+        coefficients = units.coefficients[n, k, : len(law.spreading)]
+        values = (units.damage[n, k], growth, units.form[n, k], *coefficients)
         out.update(zip(_names(law), map(float, values), strict=True))
     return out

@@ -16,17 +16,17 @@ from elevon.errors import InputError, UnitError, did_you_mean
 from elevon.scenario import Scenario
 from elevon.units import parse_quantity
 
-__all__ = ["MEASURES", "SEVERITY", "Measure", "Requirement", "Shown"]
+__all__ = ["MEASURES", "SEVERITY", "Measure", "Requirement", "RunSignals"]
 
 Quantity = StrictInt | StrictFloat | StrictStr
 SEVERITY = "severity"
 FAR = 2.0
-"""Largest distance from a limit that is told apart, in limits."""
+"""Largest distance from a limit that is distinguished, in limits."""
 
 
 @dataclass(frozen=True)
-class Shown:
-    """What a run showed: `time` and roles, shape (n,) each; ``complete`` unless it tripped."""
+class RunSignals:
+    """What a run recorded: `time` and roles, shape (n,) each; ``complete`` unless it tripped."""
 
     time: Floats
     signals: Mapping[str, Floats]
@@ -61,7 +61,7 @@ class Measure:
     text: str
     unit: str
     roles: tuple[str, ...]
-    value: Callable[[Sequence[Shown], Requirement], float]
+    value: Callable[[Sequence[RunSignals], Requirement], float]
     scenarios: Callable[[Requirement, Scenario], list[Scenario]] | None = None
     at_least: bool = False
     needs: tuple[str, ...] = ()
@@ -153,53 +153,53 @@ class Requirement(BaseModel):
         reserve = ratio - 1.0 if self.at_least else 1.0 - ratio
         return np.clip(np.nan_to_num(reserve, nan=-FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
 
-    def value(self, runs: Sequence[Shown]) -> float:
+    def value(self, runs: Sequence[RunSignals]) -> float:
         """Return the number; infinitely bad where a run did not end well."""
         if not all(run.complete for run in runs):
             return -math.inf if self.at_least else math.inf
         return MEASURES[self.measure].value(runs, self)
 
 
-def _counted(run: Shown, requirement: Requirement) -> npt.NDArray[np.bool_]:
+def _counted(run: RunSignals, requirement: Requirement) -> npt.NDArray[np.bool_]:
     return run.time >= requirement.after
 
 
-def _tracking(runs: Sequence[Shown], requirement: Requirement) -> float:
+def _tracking(runs: Sequence[RunSignals], requirement: Requirement) -> float:
     run = runs[0]
     error = np.abs(run["command"] - run["output_position"])
     return float(error[_counted(run, requirement)].max())
 
 
-def _tracking_rms(runs: Sequence[Shown], requirement: Requirement) -> float:
+def _tracking_rms(runs: Sequence[RunSignals], requirement: Requirement) -> float:
     run = runs[0]
     error = (run["command"] - run["output_position"])[_counted(run, requirement)]
     return float(np.sqrt(np.mean(error**2)))
 
 
-def _current(runs: Sequence[Shown], requirement: Requirement) -> float:
+def _current(runs: Sequence[RunSignals], requirement: Requirement) -> float:
     current = runs[0]["torque_current"][_counted(runs[0], requirement)]
     return float(np.sqrt(np.mean(current**2)))
 
 
-def _current_peak(runs: Sequence[Shown], requirement: Requirement) -> float:
+def _current_peak(runs: Sequence[RunSignals], requirement: Requirement) -> float:
     return float(np.abs(runs[0]["torque_current"][_counted(runs[0], requirement)]).max())
 
 
-def _temperature(runs: Sequence[Shown], requirement: Requirement) -> float:
+def _temperature(runs: Sequence[RunSignals], requirement: Requirement) -> float:
     return float(runs[0]["temperature"][_counted(runs[0], requirement)].max())
 
 
 def _step_runs(requirement: Requirement, mission: Scenario) -> list[Scenario]:
     terms = [{"kind": "constant", "value": requirement.step}]
-    return [_still(mission, 2.0, terms)]
+    return [_bare_run(mission, 2.0, terms)]
 
 
-def _overshoot(runs: Sequence[Shown], _requirement: Requirement) -> float:
-    asked = float(runs[0]["command"][-1])
-    return float(np.max(runs[0]["output_position"] / asked) - 1.0)
+def _overshoot(runs: Sequence[RunSignals], _requirement: Requirement) -> float:
+    commanded = float(runs[0]["command"][-1])
+    return float(np.max(runs[0]["output_position"] / commanded) - 1.0)
 
 
-def _rise_time(runs: Sequence[Shown], _requirement: Requirement) -> float:
+def _rise_time(runs: Sequence[RunSignals], _requirement: Requirement) -> float:
     done = runs[0]["output_position"] / float(runs[0]["command"][-1]) >= 0.9
     return float(runs[0].time[np.argmax(done)]) if done.any() else math.inf
 
@@ -209,7 +209,7 @@ _CYCLES = 6.0
 
 def _sine_runs(requirement: Requirement, mission: Scenario) -> list[Scenario]:
     return [
-        _still(
+        _bare_run(
             mission,
             max(_CYCLES / f, 1.0),
             [{"kind": "sine", "amplitude": requirement.amplitude, "frequency": f"{f!r} Hz"}],
@@ -218,8 +218,8 @@ def _sine_runs(requirement: Requirement, mission: Scenario) -> list[Scenario]:
     ]
 
 
-def _bandwidth(runs: Sequence[Shown], requirement: Requirement) -> float:
-    """Frequency at which the travel falls to -3 dB, on logarithmic scales between the runs."""
+def _bandwidth(runs: Sequence[RunSignals], requirement: Requirement) -> float:
+    """Frequency at which the amplitude falls to -3 dB, on logarithmic scales between the runs."""
     gains = []
     for run in runs:
         late = run.time >= 0.5 * run.time[-1]
@@ -242,15 +242,15 @@ _STALL_TIME = 12.0
 def _stall_runs(requirement: Requirement, mission: Scenario) -> list[Scenario]:
     terms = [{"kind": "ramp", "slope": requirement.slope}]
     load = {"output": {"terms": [{"kind": "ramp", "slope": requirement.load_slope}]}}
-    return [_still(mission, _STALL_TIME, terms).replaced(load=load)]
+    return [_bare_run(mission, _STALL_TIME, terms).replaced(load=load)]
 
 
-def _stall_load(runs: Sequence[Shown], requirement: Requirement) -> float:
-    """Load at which the output last moved at a quarter of the speed asked for."""
+def _stall_load(runs: Sequence[RunSignals], requirement: Requirement) -> float:
+    """Load at which the output last moved at a quarter of the commanded speed."""
     run = runs[0]
     speed = np.gradient(run["output_position"], run.time)
-    asked = float(run["command"][-1] / run.time[-1])
-    moving = np.flatnonzero(speed > 0.25 * asked)
+    commanded = float(run["command"][-1] / run.time[-1])
+    moving = np.flatnonzero(speed > 0.25 * commanded)
     seconds = float(run.time[moving[-1]]) if len(moving) else 0.0
     assert requirement.load_slope is not None
     text = requirement.load_slope
@@ -266,12 +266,12 @@ def _slope(text: str, name: str) -> float:
         return parse_quantity(text, "N/s", place)
 
 
-def _lock_time(runs: Sequence[Shown], requirement: Requirement) -> float:
+def _lock_time(runs: Sequence[RunSignals], requirement: Requirement) -> float:
     locked = (runs[0]["locked"] > 0.5) & _counted(runs[0], requirement)
     return float(runs[0].time[np.argmax(locked)]) if locked.any() else math.inf
 
 
-def _still(mission: Scenario, seconds: float, terms: list[dict[str, Any]]) -> Scenario:
+def _bare_run(mission: Scenario, seconds: float, terms: list[dict[str, Any]]) -> Scenario:
     """Return a run of its own with the mission's parameters and supply, without its loads."""
     of_mission = mission.to_dict()
     data: dict[str, Any] = {
@@ -296,7 +296,7 @@ MEASURES: dict[str, Measure] = {
         "time to nine tenths of a step", "s", _BOTH, _rise_time, _step_runs, needs=("step",)
     ),
     "bandwidth": Measure(
-        "frequency at which a sine's travel falls to -3 dB", "Hz", _BOTH, _bandwidth, _sine_runs,
+        "frequency at which a sine's amplitude falls to -3 dB", "Hz", _BOTH, _bandwidth, _sine_runs,
         at_least=True, needs=("amplitude",),
     ),
     "stall_load": Measure(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from elevon.prognose.grid import axis_points
 from elevon.prognose.law import Law
-from elevon.prognose.response import Response
+from elevon.prognose.response import ResponseTables
 from elevon.prognose.snapshots import correction
 from elevon.prognose.tabulate import severity_grid, tabulate
 from elevon.progress import Progress
@@ -29,7 +29,7 @@ def respond(
     fidelity: str = "low",
     snapshots: bool = False,
     progress: Progress | None = None,
-) -> Response:
+) -> ResponseTables:
     """Run the mission and the requirements over a grid of severities.
 
     Parameters
@@ -43,12 +43,12 @@ def respond(
     fidelity : str
         Of the runs.
     snapshots : bool
-        Correct the low fidelity's tables by runs at high fidelity, see `correction`.
+        Correct the low fidelity's tables by runs of the switching model, see `correction`.
 
     Raises
     ------
     InputError
-        A fault the actuator has not, a requirement it cannot be asked, a mission it cannot do.
+        A fault the actuator has not, a requirement it cannot be judged by, a mission it cannot do.
     """
     begin = clock.perf_counter()
     acting = tuple(mission.laws() if laws is None else laws)

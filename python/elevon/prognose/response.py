@@ -13,11 +13,11 @@ from elevon.prognose.law import Law
 from elevon.prognose.requirement import SEVERITY, Requirement
 from elevon.units import shown_unit, to_display
 
-__all__ = ["Response", "check_start"]
+__all__ = ["ResponseTables", "check_start"]
 
 
 @dataclass(frozen=True)
-class Response:
+class ResponseTables:
     """Tables over severities.
 
     Attributes
@@ -101,7 +101,7 @@ class Response:
         return [*columns, load] if self.loaded else columns
 
 
-def check_start(response: Response, severity: Floats) -> list[str]:
+def check_start(response: ResponseTables, severity: Floats) -> list[str]:
     """Return what is violated by a unit of these severities, shape (k,), in words."""
     reserve = response.reserve(severity[None, :])[:, 0]
     values = response.measured(severity[None, :])[:, 0]

@@ -1,4 +1,4 @@
-"""Runs at high fidelity at a few severities, and what they correct."""
+"""Runs of the switching model at a few severities, and what they correct."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.prognose.response import Response
+from elevon.prognose.response import ResponseTables
 from elevon.prognose.tabulate import severity_grid, tabulate
 from elevon.progress import Progress
 
@@ -24,7 +24,7 @@ _POINTS = 5  # severities of each axis
 
 @dataclass(frozen=True)
 class Correction:
-    """What high fidelity says over what low fidelity says, along each axis from the origin.
+    """What the switching model gives over the reduced-order one, along each axis from the origin.
 
     Between axes the ratios multiply: they are near one, so that what two faults do to a ratio
     together is small of second order.
@@ -38,7 +38,7 @@ class Correction:
     values : tuple of ndarray, shape (points, m)
         Ratios of what requirements measure, along each axis.
     runs : int
-        Runs at high fidelity behind it.
+        Runs of the switching model behind it.
     """
 
     axes: tuple[Floats, ...]
@@ -46,7 +46,7 @@ class Correction:
     values: tuple[Floats, ...]
     runs: int
 
-    def of(self, low: Response) -> Response:
+    def of(self, low: ResponseTables) -> ResponseTables:
         """Return low-fidelity tables of the same axes, corrected."""
         points = np.array(list(low.grid.points()))
         drivers = {
@@ -74,10 +74,10 @@ class Correction:
 def correction(
     actuator: Actuator,
     mission: Mission,
-    low: Response,
+    low: ResponseTables,
     progress: Progress | None = None,
 ) -> Correction:
-    """Run a few points of each axis at high fidelity and compare; `low` are the unit's low tables.
+    """Run a few points of each axis of the switching model; compare with the `low` tables.
 
     Points: nothing, and four of each axis up to its greatest severity.
     """

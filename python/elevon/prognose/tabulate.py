@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.errors import InputError, Interrupted, NotActingWarning
-from elevon.prognose.exposure import exposure, recorded_signals, shown
+from elevon.prognose.exposure import exposure, recorded_signals, run_signals
 from elevon.prognose.grid import Grid
 from elevon.prognose.law import Law
-from elevon.prognose.requirement import MEASURES, SEVERITY, Requirement, Shown
-from elevon.prognose.response import Response
+from elevon.prognose.requirement import MEASURES, SEVERITY, Requirement, RunSignals
+from elevon.prognose.response import ResponseTables
 from elevon.progress import Progress
 from elevon.units import shown_unit, to_display
 
@@ -47,7 +47,7 @@ def tabulate(
     fidelity: str,
     progress: Progress | None,
     points: Sequence[tuple[float, ...]] | None = None,
-) -> Response:
+) -> ResponseTables:
     """Run every point of the grid, or those given."""
     base = mission.scenarios(known=actuator.parameters)
     requirements = mission.requirement
@@ -57,21 +57,21 @@ def tabulate(
     _check_measures(actuator, requirements)
     units = tuple(item.unit(output, load, faults) for item in requirements)
     points = list(grid.points()) if points is None else points
-    own = [scenario for plan in plans for scenario in plan]
+    extra = [scenario for plan in plans for scenario in plan]
     # Requirements are judged at the loads as stated: elsewhere only the mission is run.
-    jobs = [[base, *own] if _as_stated(laws, point) else [base] for point in points]
+    jobs = [[base, *extra] if _as_stated(laws, point) else [base] for point in points]
     work = [[_scenario(s, laws, p) for s in job] for job, p in zip(jobs, points, strict=True)]
     drivers: dict[str, list[float]] = {}
     values = []
     batches = _runs(actuator, work, fidelity, progress)
-    for k, (flown, *rest) in enumerate(batches):
+    for k, (flown, *others) in enumerate(batches):
         if k == 0:
             _check_capability(actuator, flown)
         for name, value in exposure(flown, mission).items():
             drivers.setdefault(name, []).append(value)
         stated = _as_stated(laws, points[k])
-        values.append(_values(requirements, plans, flown, rest) if stated else [])
-    return Response(
+        values.append(_values(requirements, plans, flown, others) if stated else [])
+    return ResponseTables(
         laws,
         requirements,
         tuple(item.threshold(unit) for item, unit in zip(requirements, units, strict=True)),
@@ -104,10 +104,10 @@ def _check_measures(actuator: Actuator, requirements: Sequence[Requirement]) -> 
             )
 
 
-_FOLLOWED = 0.9  # share of the command's travel that a healthy unit must reach
+_FOLLOWED = 0.9  # share of the command's range that a healthy unit must reach
 
 
-def _check_capability(actuator: Actuator, flown: Shown) -> None:
+def _check_capability(actuator: Actuator, flown: RunSignals) -> None:
     """Refuse a mission that the healthy unit trips on or does not follow."""
     if not flown.complete:
         raise InputError(
@@ -119,13 +119,13 @@ def _check_capability(actuator: Actuator, flown: Shown) -> None:
     units = {s["role"]: s["unit"] for s in reversed(_core.signals(actuator.wiring, "low"))}
     if units["command"] != units["output_position"]:
         return
-    asked, done = (float(np.ptp(flown[role])) for role in ("command", "output_position"))
-    if done < _FOLLOWED * asked:
+    commanded, done = (float(np.ptp(flown[role])) for role in ("command", "output_position"))
+    if done < _FOLLOWED * commanded:
         unit = shown_unit(units["output_position"])
         raise InputError(
             f"the mission is outside the capability of {actuator.name}: the healthy unit travels "
-            f"{to_display(done, unit):.4g} {unit} of the {to_display(asked, unit):.4g} {unit} "
-            f"asked for; at least {_FOLLOWED:.0%} are needed"
+            f"{to_display(done, unit):.4g} {unit} of the {to_display(commanded, unit):.4g} {unit} "
+            f"commanded; at least {_FOLLOWED:.0%} are needed"
         )
 
 
@@ -163,17 +163,17 @@ def _own_runs(requirement: Requirement, mission: Scenario) -> list[Scenario]:
 def _values(
     requirements: Sequence[Requirement],
     plans: Sequence[Sequence[Scenario]],
-    flown: Shown,
-    rest: Sequence[Shown],
+    flown: RunSignals,
+    others: Sequence[RunSignals],
 ) -> list[float]:
     out, at = [], 0
     for requirement, plan in zip(requirements, plans, strict=True):
-        own = rest[at : at + len(plan)]
+        runs = others[at : at + len(plan)]
         at += len(plan)
         if requirement.measure == SEVERITY:
             out.append(0.0)
         else:
-            out.append(requirement.value(own or [flown]))
+            out.append(requirement.value(runs or [flown]))
     return out
 
 
@@ -229,7 +229,7 @@ def _runs(
     work: Sequence[Sequence[Scenario]],
     fidelity: str,
     progress: Progress | None,
-) -> Iterator[list[Shown]]:
+) -> Iterator[list[RunSignals]]:
     """Yield the runs of each point, in blocks that fit in memory."""
     from elevon.simulate import Run, simulate_batch
 
@@ -240,12 +240,13 @@ def _runs(
         runs = [Run(actuator, scenario) for point in block for scenario in point]
         try:
             with warnings.catch_warnings():
-                # What a set carries for another fidelity or drive is none of the user's doing here.
+                # What an actuator file has for another fidelity or drive is none of the caller's
+                # doing.
                 warnings.simplefilter("ignore", NotActingWarning)
                 results = iter(simulate_batch(runs, fidelity=fidelity, record=record))
         except InputError as error:
             raise InputError(f"the mission on {actuator.name}: {error}") from error
         for point in block:
-            yield [shown(next(results), actuator.wiring, fidelity) for _ in point]
+            yield [run_signals(next(results), actuator.wiring, fidelity) for _ in point]
         if progress is not None and progress((first + len(block)) / len(work)) is False:
             raise Interrupted("interrupted while the tables were made")

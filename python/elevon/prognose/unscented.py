@@ -11,7 +11,7 @@ import numpy as np
 from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.prognose.observation import Inspection
-from elevon.prognose.process import Population, Process
+from elevon.prognose.process import Process, UnitPopulation
 
 __all__ = ["UnscentedFilter"]
 
@@ -54,8 +54,8 @@ class UnscentedFilter:
             if seen is None:
                 continue
             points, mean_weight, weight = _sigma(self.mean, self.covariance)
-            shown = self.process.severity(np.maximum(points[:, : len(self.process.laws)], 0.0))
-            at = shown[:, k]
+            severities = self.process.severity(np.maximum(points[:, : len(self.process.laws)], 0.0))
+            at = severities[:, k]
             centre = float(mean_weight @ at)
             level = min(centre, 3.0 * seen.high) if seen.severity is None else seen.severity
             deviation = seen.low if level < centre else seen.high
@@ -64,14 +64,14 @@ class UnscentedFilter:
             self.mean = self.mean + gain * (level - centre)
             self.covariance = _even(self.covariance - np.outer(gain, gain) * variance)
 
-    def sampled(self, count: int, rng: np.random.Generator) -> Population:
+    def sampled(self, count: int, rng: np.random.Generator) -> UnitPopulation:
         """Draw units from the mean and the covariance, to look ahead with."""
         size = len(self.process.laws)
         rows = rng.multivariate_normal(self.mean, self.covariance, size=count, method="eigh")
         return self._population(rows[:, :size], rows[:, size:])
 
-    def _population(self, damage: Floats, growth: Floats) -> Population:
-        return Population.of(np.maximum(damage, 0.0), growth, usage=self.usage)
+    def _population(self, damage: Floats, growth: Floats) -> UnitPopulation:
+        return UnitPopulation.of(np.maximum(damage, 0.0), growth, usage=self.usage)
 
     def _grow(self, usage: float) -> None:
         if usage <= self.usage:
@@ -82,12 +82,12 @@ class UnscentedFilter:
         after = self.process.to(before, usage, None)
         grown = np.column_stack((after.damage, after.growth))
         self.mean = mean_weight @ grown
-        rest = grown - self.mean
+        residual = grown - self.mean
         added = mean_weight @ (after.damage - before.damage)
         grain = np.array([law.grain for law in self.process.laws])
         wander = self.process.drift**2 * np.log(usage / self.usage) if self.usage > 0.0 else 0.0
         noise = np.concatenate((np.maximum(added, 0.0) * grain, np.full(size, wander)))
-        self.covariance = _even((rest.T * weight) @ rest + np.diag(noise))
+        self.covariance = _even((residual.T * weight) @ residual + np.diag(noise))
         self.usage = usage
 
 

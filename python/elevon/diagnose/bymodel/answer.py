@@ -35,7 +35,7 @@ class Cause:
     probability: float
     severity: float
     interval: tuple[float, float]
-    equivalents: tuple[tuple[str, str], ...]
+    ambiguous_with: tuple[tuple[str, str], ...]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
@@ -46,7 +46,7 @@ class Cause:
             "severity": self.severity,
             "unit": self.unit,
             "interval": list(self.interval),
-            "equivalents": [{"kind": k, "place": p} for k, p in self.equivalents],
+            "ambiguous_with": [{"kind": k, "place": p} for k, p in self.ambiguous_with],
         }
 
 
@@ -98,7 +98,7 @@ class Alternative:
     unit : str
         Of it.
     log, name : str
-        Log and number of the evidence that it explains worst.
+        Log and feature that it explains worst.
     left : float
         What it leaves of that number, in deviations with its own model error.
     """
@@ -118,7 +118,7 @@ class Alternative:
 
 @dataclass(frozen=True)
 class Moved:
-    """One number of the evidence against the healthy unit."""
+    """One feature against the healthy unit."""
 
     log: str
     name: str
@@ -172,11 +172,11 @@ class Diagnosis:
     unobservable : tuple of dict
         ``kind``, ``place``, ``reason``.
     detectable : dict of str to float
-        Smallest severity of each fault that moves the evidence by `SEEN` deviations.
+        Smallest severity of each fault that moves the features by `SEEN` deviations.
     moved : tuple of Moved
-        The evidence.
+        The features.
     findings : tuple of str
-        What the user should know.
+        What the caller should know.
     seconds : float
         Wall time from the logs in memory to the answer.
     hypotheses : tuple of Explanation
@@ -186,7 +186,7 @@ class Diagnosis:
     units : mapping of str to str
         Unit of each candidate's severity, by ``KIND@PLACE``.
     p_other : float
-        Probability of a fault that is not weighed; part of `p_fault`. Where it is the most
+        Probability of a fault that is no candidate; part of `p_fault`. Where it is the most
         probable, a faulty unit has an empty `best`.
     """
 
@@ -222,7 +222,7 @@ class Diagnosis:
             "alternatives": [item.to_dict() for item in self.alternatives],
             "unobservable": [dict(item) for item in self.unobservable],
             "detectable": dict(self.detectable),
-            "evidence": [item.to_dict() for item in self.moved],
+            "features": [item.to_dict() for item in self.moved],
             "findings": list(self.findings),
             "logs": list(self.logs),
             "seconds": self.seconds,

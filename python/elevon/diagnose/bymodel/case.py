@@ -1,4 +1,4 @@
-"""One log against its healthy unit: evidence, expectation, what each fault would do to it."""
+"""One log against its healthy unit: features, expectation, what each fault would do to it."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.candidates import Candidate
+from elevon.diagnose.bymodel.candidates import CandidateFault
 from elevon.diagnose.bymodel.detection import Detector
-from elevon.diagnose.bymodel.evidence import OWN_ERROR, SHARES, SIZES, Evidence
+from elevon.diagnose.bymodel.features import OWN_ERROR, SHARES, SIZES, FeatureVector
 from elevon.diagnose.bymodel.healthy import Elsewhere, Healthy, healthy
 from elevon.diagnose.bymodel.log import TestLog
-from elevon.diagnose.bymodel.replay import Replay, logged_evidence, modelled, replay
+from elevon.diagnose.bymodel.replay import Replay, logged_features, modelled, replay
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["Case", "case_of", "detector_of", "doubt_of", "joined", "shift_of"]
+__all__ = ["LogCase", "case_of", "detector_of", "joined", "shift_of", "uncertainty_of"]
 
 SUSPECT = 1e-3  # chance of a baseline below which it is called faulty
 _SAME = 0.2  # relative difference of two logs' motion up to which they are one test
@@ -27,36 +27,36 @@ _NOTED = 0.02  # of two noted parameters
 _SHARE = 3.0  # a unit's value over the model's, either way, that a shift is scaled by at most
 
 
-#: Deviations that a fault moves the evidence by at least where its direction counts: what one
-#: direction alone asks at 5 % of false alarms; a smaller fault is not called by itself.
-_SHOWN = 2.0
+#: Deviations that a fault moves the features by at least where its direction counts: what one
+#: direction alone needs at 5 % of false alarms; a smaller fault is not called by itself.
+_DIRECTED = 2.0
 
 
 @dataclass(frozen=True)
-class Case:
+class LogCase:
     """One log against its healthy unit, before whitening.
 
     Attributes
     ----------
     name : str
         The log.
-    shown : Evidence
+    shown : FeatureVector
         Of the log.
     unit : Healthy
         What a healthy unit would show.
     model : Replay
-        What faults do to the evidence.
+        What faults do to the features.
     """
 
     name: str
-    shown: Evidence
+    features: FeatureVector
     unit: Healthy
     model: Replay
 
     @property
     def covariance(self) -> Floats:
-        """Of the healthy unit's evidence with this log's noise, shape (k, k)."""
-        return self.unit.covariance + np.diag(self.shown.std**2)
+        """Of the healthy unit's features with this log's noise, shape (k, k)."""
+        return self.unit.covariance + np.diag(self.features.std**2)
 
     @property
     def errors(self) -> Floats:
@@ -64,24 +64,24 @@ class Case:
         return np.array([OWN_ERROR.get(name, 0.0) for name in self.unit.names])
 
     def shift(self, key: str, severity: Floats) -> Floats:
-        """Return what severities, shape (m,), do to this unit's evidence, shape (m, k)."""
+        """Return what severities, shape (m,), do to this unit's features, shape (m, k)."""
         at = [self.model.healthy.names.index(n) for n in self.unit.names]
         out = self.model.shift(key, severity)[:, at]
         for k, name in enumerate(self.unit.names):
-            own, modelled = float(self.unit.mean[k]), float(self.model.healthy.values[at[k]])
+            unit_value, modelled = float(self.unit.mean[k]), float(self.model.healthy.values[at[k]])
             if name in SIZES:
-                out[:, k] = np.hypot(max(own, 0.0), out[:, k]) - max(own, 0.0)
-            elif name in SHARES and own * modelled > 0.0:
-                out[:, k] *= min(max(own / modelled, 1.0 / _SHARE), _SHARE)
+                out[:, k] = np.hypot(max(unit_value, 0.0), out[:, k]) - max(unit_value, 0.0)
+            elif name in SHARES and unit_value * modelled > 0.0:
+                out[:, k] *= min(max(unit_value / modelled, 1.0 / _SHARE), _SHARE)
         return out
 
-    def doubt(self, key: str, severity: float) -> Floats:
-        """Return the deviation that a severity gives this unit's evidence, shape (k,)."""
+    def uncertainty(self, key: str, severity: float) -> Floats:
+        """Return the deviation that a severity gives this unit's features, shape (k,)."""
         at = [self.model.healthy.names.index(n) for n in self.unit.names]
-        return self.model.doubt(key, severity)[at]
+        return self.model.uncertainty(key, severity)[at]
 
 
-#: Evidence that only a measured torque current gives.
+#: Features that only a measured torque current gives.
 _OF_THE_CURRENT = frozenset(
     ["dry_current", "viscous_current", "inertia_current", "brake_current", "current_order_1",
      "current_order_2", "current_shaft", "current_sideband", "voltage_per_current"]
@@ -91,50 +91,52 @@ _OF_THE_CURRENT = frozenset(
 def case_of(
     item: TestLog,
     actuator: Actuator,
-    candidates: Sequence[Candidate],
+    candidates: Sequence[CandidateFault],
     baselines: Sequence[TestLog],
     findings: list[str],
-) -> Case:
+) -> LogCase:
     """Hold a log against the model and the baselines; what it lacks goes to the findings."""
-    shown = logged_evidence(item, actuator)
+    features = logged_features(item, actuator)
     same = [b for b in baselines if _same_test(item, b)]
     model = replay(item, actuator, candidates, same)
-    proofs = [(b.name, _as_here(b, actuator, model.healthy)) for b in same]
-    names = [n for n in shown.names if n in model.healthy.names]
-    names = [n for n in names if all(n in e.names for _, e in proofs)]
+    references = [(b.name, _transferred(b, actuator, model.healthy)) for b in same]
+    names = [n for n in features.names if n in model.healthy.names]
+    names = [n for n in names if all(n in e.names for _, e in references)]
     if any(log.log.current_signal == "current_ref" for log in (item, *same)):
         # A set point has the derivative's spikes, which the motor's current never follows.
         names = [n for n in names if n not in _OF_THE_CURRENT]
     elsewhere = [
-        Elsewhere(logged_evidence(b, actuator), modelled(b, actuator))
+        Elsewhere(logged_features(b, actuator), modelled(b, actuator))
         for b in baselines
-        if all(b is not s for s in same) and b.log.current_signal != "current_ref" and not b.held
+        if all(b is not s for s in same)
+        and b.log.current_signal != "current_ref"
+        and not b.brake_unknown
     ]
-    sound = _sound(model, names, proofs, candidates, findings, held=item.held)
+    sound = _sound(model, names, references, candidates, findings, brake_unknown=item.brake_unknown)
     _lost(item, same, findings)
-    if shown.floats:
+    if features.floats:
         findings.append(
             f"{item.name}: the output is not carried through its backlash by friction but flies in "
             "it on its own; "
             "the backlash is read from the width of the two positions' difference"
         )
-    unit = healthy(model, names, sound, elsewhere, held=item.held)
-    return Case(item.name, shown.only(names), unit, model)
+    unit = healthy(model, names, sound, elsewhere, brake_unknown=item.brake_unknown)
+    return LogCase(item.name, features.only(names), unit, model)
 
 
-def _as_here(item: TestLog, actuator: Actuator, here: Evidence) -> Evidence:
-    """Return a baseline's evidence, moved by what the model says of the two logs' commands."""
-    shown, there = logged_evidence(item, actuator), modelled(item, actuator)
-    values = shown.values.copy()
-    for k, name in enumerate(shown.names):
+def _transferred(item: TestLog, actuator: Actuator, here: FeatureVector) -> FeatureVector:
+    """Return a baseline's features, moved by what the model says of the two logs' commands."""
+    features, there = logged_features(item, actuator), modelled(item, actuator)
+    values = features.values.copy()
+    for k, name in enumerate(features.names):
         if name in here.names and name in there.names and name not in SIZES:
             values[k] += float((here.only([name]).values - there.only([name]).values)[0])
-    return replace(shown, values=values)
+    return replace(features, values=values)
 
 
 def _same_test(a: TestLog, b: TestLog) -> bool:
-    """Whether two logs are of one test: by their notes, else brake, travel and speed alike."""
-    if a.braked != b.braked or a.held != b.held:
+    """Whether two logs are of one test: by their notes, else by brake, motion and speed."""
+    if a.braked != b.braked or a.brake_unknown != b.brake_unknown:
         return False
     notes = (a.log.note, b.log.note)
     if notes[0] is not None and notes[1] is not None and notes[0].waveform and notes[1].waveform:
@@ -156,37 +158,41 @@ def _near(a: float, b: float, share: float) -> bool:
 def _sound(
     model: Replay,
     names: Sequence[str],
-    proofs: Sequence[tuple[str, Evidence]],
-    candidates: Sequence[Candidate],
+    references: Sequence[tuple[str, FeatureVector]],
+    candidates: Sequence[CandidateFault],
     findings: list[str],
     *,
-    held: bool,
-) -> list[Evidence]:
-    """Leave out baselines that stand off the model and off the other baselines alike.
+    brake_unknown: bool,
+) -> list[FeatureVector]:
+    """Leave out baselines that deviate from the model and from the other baselines alike.
 
-    One that a weighed fault explains no better than none or another thing is not faulty: it says
-    how far the unit stands off the model.
+    One that a candidate explains no better than none or another thing is not faulty: it shows
+    how far the unit deviates from the model.
     """
     sound = []
-    for k, (name, shown) in enumerate(proofs):
-        others = [e for j, (_, e) in enumerate(proofs) if j != k]
-        alone = _chance(model, names, shown, [], candidates, held=held)
-        beside = alone
+    for k, (name, features) in enumerate(references):
+        others = [e for j, (_, e) in enumerate(references) if j != k]
+        alone = _chance(model, names, features, [], candidates, brake_unknown=brake_unknown)
+        pooled = alone
         if others:
-            beside = _chance(model, names, shown, others, candidates, held=held)
-        if max(alone, beside) >= SUSPECT:
-            sound.append(shown)
+            pooled = _chance(
+                model, names, features, others, candidates, brake_unknown=brake_unknown
+            )
+        if max(alone, pooled) >= SUSPECT:
+            sound.append(features)
             continue
-        if not _faulty(model, names, shown, candidates, held=held):
-            sound.append(shown)
+        if not _faulty(model, names, features, candidates, brake_unknown=brake_unknown):
+            sound.append(features)
             findings.append(
-                f"baseline {name} stands off the model further than is assumed of a calibrated "
-                "set, and no fault explains it: what it shows is held to be the healthy unit's"
+                f"baseline {name} deviates from the model by more than is assumed of a calibrated "
+                "actuator file, and no fault explains it: it is taken as the healthy unit's"
             )
             continue
+        reason = "it is unlike the other baselines"
+        if not others:
+            reason = "the actuator file is not calibrated to this unit"
         findings.append(
-            f"baseline {name} looks faulty itself, or {'' if others else 'the set is not '}"
-            f"{'unlike the other baselines' if others else 'calibrated to this unit'} "
+            f"baseline {name} looks faulty itself, or {reason} "
             f"(a healthy unit deviates as much in less than {100 * SUSPECT:g} % of logs); "
             "it is left out"
         )
@@ -196,24 +202,26 @@ def _sound(
 def _faulty(
     model: Replay,
     names: Sequence[str],
-    shown: Evidence,
-    candidates: Sequence[Candidate],
+    features: FeatureVector,
+    candidates: Sequence[CandidateFault],
     *,
-    held: bool,
+    brake_unknown: bool,
 ) -> bool:
-    """Whether one fault is more probable than none, or than one that is not weighed."""
+    """Whether one fault is more probable than none, or than one that is no candidate."""
     from elevon.diagnose.bymodel.posterior import posterior
 
-    case = Case("", shown.only(names), healthy(model, names, [], held=held), model)
-    rest, covariance = joined([case])
+    case = LogCase(
+        "", features.only(names), healthy(model, names, [], brake_unknown=brake_unknown), model
+    )
+    residual, covariance = joined([case])
     result = posterior(
-        rest,
+        residual,
         covariance,
         case.unit.degrees,
         candidates,
         case.shift,
         errors=case.errors,
-        doubt=case.doubt,
+        uncertainty=case.uncertainty,
         pairs=False,
         other=True,
     )
@@ -223,30 +231,32 @@ def _faulty(
 def _chance(
     model: Replay,
     names: Sequence[str],
-    shown: Evidence,
-    others: Sequence[Evidence],
-    candidates: Sequence[Candidate],
+    features: FeatureVector,
+    others: Sequence[FeatureVector],
+    candidates: Sequence[CandidateFault],
     *,
-    held: bool,
+    brake_unknown: bool,
 ) -> float:
-    case = Case("", shown.only(names), healthy(model, names, others, held=held), model)
-    rest, root, detector = detector_of([case], candidates)
-    return detector.chance(float(detector.score((root @ rest)[None, :])[0]))
+    case = LogCase(
+        "", features.only(names), healthy(model, names, others, brake_unknown=brake_unknown), model
+    )
+    residual, root, detector = detector_of([case], candidates)
+    return detector.chance(float(detector.score((root @ residual)[None, :])[0]))
 
 
 def _lost(item: TestLog, same: Sequence[TestLog], findings: list[str]) -> None:
-    """Say what a log lacks and what it costs."""
+    """Note what a log lacks and what it costs."""
     if not same:
         findings.append(
-            f"{item.name}: no baseline of this test: how far a healthy unit stands off the model "
-            "is assumed, small faults are not seen"
+            f"{item.name}: no baseline of this test: how far a healthy unit deviates from the "
+            "model is assumed, small faults are not seen"
         )
     if item.log.current_signal == "current_ref":
         findings.append(
             f"{item.name}: no measured torque current (r78): friction, current ripple and faults "
             "of the drive's current loop and of current sensors are not seen"
         )
-    if item.held:
+    if item.brake_unknown:
         findings.append(
             f"{item.name}: the brake acted and its torque is not known (no load-cell file, or no "
             "arm): friction is held against baselines of this test only"
@@ -266,38 +276,38 @@ def _lost(item: TestLog, same: Sequence[TestLog], findings: list[str]) -> None:
 
 
 def detector_of(
-    cases: Sequence[Case], candidates: Sequence[Candidate], anywhere: float = 0.0
+    cases: Sequence[LogCase], candidates: Sequence[CandidateFault], anywhere: float = 0.0
 ) -> tuple[Floats, Floats, Detector]:
     """Return the deviation from healthy, what whitens it, and the test of healthy or not.
 
     `anywhere` is the share of the false alarms for what no candidate does. A shift shorter than
     `_SHOWN` has no direction that is known: the runs' rounding is as large, and another in each.
     """
-    rest, covariance = joined(cases)
+    residual, covariance = joined(cases)
     root = np.linalg.inv(np.linalg.cholesky(covariance))
     rows, both = [], []
     for c in candidates:
         at = cases[0].model.severities[c.key]
         moved = shift_of(cases, c.key, at[at != 0.0]) @ root.T
-        rows.append(moved[np.linalg.norm(moved, axis=1) >= _SHOWN])
+        rows.append(moved[np.linalg.norm(moved, axis=1) >= _DIRECTED])
         both += [False] * len(rows[-1])
     degrees = min(case.unit.degrees for case in cases)
-    return rest, root, Detector(np.vstack(rows), both, degrees, anywhere)
+    return residual, root, Detector(np.vstack(rows), both, degrees, anywhere)
 
 
-def joined(cases: Sequence[Case]) -> tuple[Floats, Floats]:
+def joined(cases: Sequence[LogCase]) -> tuple[Floats, Floats]:
     """Stack the logs; what changes from run to run is independent between them."""
     from scipy.linalg import block_diag
 
-    rest = np.concatenate([case.shown.values - case.unit.mean for case in cases])
-    return rest, np.asarray(block_diag(*[case.covariance for case in cases]))
+    residual = np.concatenate([case.features.values - case.unit.mean for case in cases])
+    return residual, np.asarray(block_diag(*[case.covariance for case in cases]))
 
 
-def shift_of(cases: Sequence[Case], key: str, severity: Floats) -> Floats:
-    """Return what severities, shape (m,), do to the evidence of all logs, shape (m, k)."""
+def shift_of(cases: Sequence[LogCase], key: str, severity: Floats) -> Floats:
+    """Return what severities, shape (m,), do to the features of all logs, shape (m, k)."""
     return np.hstack([case.shift(key, severity) for case in cases])
 
 
-def doubt_of(cases: Sequence[Case], key: str, severity: float) -> Floats:
-    """Return the deviation that a severity gives the evidence of all logs, shape (k,)."""
-    return np.concatenate([case.doubt(key, severity) for case in cases])
+def uncertainty_of(cases: Sequence[LogCase], key: str, severity: float) -> Floats:
+    """Return the deviation that a severity gives the features of all logs, shape (k,)."""
+    return np.concatenate([case.uncertainty(key, severity) for case in cases])

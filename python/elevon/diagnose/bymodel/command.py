@@ -17,12 +17,12 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.evidence import regress
+from elevon.diagnose.bymodel.features import regress
 
 if TYPE_CHECKING:
     from elevon.calibrate.log import BenchLog
 
-__all__ = ["NotedCommand", "noted_command"]
+__all__ = ["NotedWaveform", "noted_command"]
 
 Bools = npt.NDArray[np.bool_]
 #: Unknown and instants to the phase [rad] and what the unknown does to it.
@@ -38,7 +38,7 @@ _OUTLIER = 8.0  # robust deviations beyond which an early sample was under anoth
 
 
 @dataclass(frozen=True)
-class NotedCommand:
+class NotedWaveform:
     """What the note and the set point say together.
 
     Attributes
@@ -57,7 +57,7 @@ class NotedCommand:
     window: tuple[float, float]
 
 
-def noted_command(log: BenchLog, limit: float) -> NotedCommand | None:
+def noted_command(log: BenchLog, limit: float) -> NotedWaveform | None:
     """Fit the noted waveform; None where there is no note, or it does not explain the log.
 
     Parameters
@@ -120,19 +120,19 @@ def _scanned(log: BenchLog, inside: Bools, phase: Phase) -> float:
     return float(starts[int(np.argmin(costs))])
 
 
-def _solved(log: BenchLog, inside: Bools, first: float, phase: Phase) -> NotedCommand | None:
+def _solved(log: BenchLog, inside: Bools, first: float, phase: Phase) -> NotedWaveform | None:
     """Gauss and Newton in the one unknown, first on the late half, then on all it explains."""
     assert log.output is not None
     value = first
     at = np.flatnonzero(inside & (log.time > 0.5 * log.duration))
     for final in (False, True):
         for _ in range(_STEPS):
-            beta, covariance, rest, step = _step(log, at, value, phase)
+            beta, covariance, residual, step = _step(log, at, value, phase)
             value += step
         if not final:
-            spread = 1.4826 * float(np.median(np.abs(rest - np.median(rest))))
+            spread = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
             at = _explained(log, np.flatnonzero(inside), phase(value, log.time)[0], beta, spread)
-    if len(at) < _LEAST or float(rest.std()) > _SMALL * float(np.std(log.output)):
+    if len(at) < _LEAST or float(residual.std()) > _SMALL * float(np.std(log.output)):
         return None
     if not beta[3] > 0.0:
         return None
@@ -140,7 +140,7 @@ def _solved(log: BenchLog, inside: Bools, first: float, phase: Phase) -> NotedCo
     wave = beta[0] * np.sin(turn) + beta[1] * np.cos(turn) + beta[2]
     std = float(np.sqrt(max(covariance[3, 3], 0.0)))
     window = (float(log.time[at[0]]), float(log.time[at[-1]]))
-    return NotedCommand(1.0 / float(beta[3]), std / float(beta[3]) ** 2, wave, window)
+    return NotedWaveform(1.0 / float(beta[3]), std / float(beta[3]) ** 2, wave, window)
 
 
 def _step(
@@ -153,8 +153,8 @@ def _step(
     beta, _ = regress(columns, log.output[at])
     bend = slope * (beta[0] * columns[1] - beta[1] * columns[0])
     both, covariance = regress([*columns, bend], log.output[at])
-    rest = log.output[at] - both @ np.stack([*columns, bend])
-    return beta, covariance, rest, float(both[-1])
+    residual = log.output[at] - both @ np.stack([*columns, bend])
+    return beta, covariance, residual, float(both[-1])
 
 
 def _explained(

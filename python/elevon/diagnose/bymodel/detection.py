@@ -1,6 +1,6 @@
 """Healthy or not at a set rate of false alarms: the best fault's likelihood ratio, by draws.
 
-Beside it, for a share of the rate, how far the evidence stands off in any direction: a fault that
+Beside it, for a share of the rate, how far the features deviate in any direction: a fault that
 is not among the candidates is none of a healthy unit either.
 """
 
@@ -23,7 +23,7 @@ class Detector:
     Parameters
     ----------
     directions : ndarray, shape (d, k)
-        Shifts of the candidates in the whitened evidence; length is of no matter.
+        Shifts of the candidates in the whitened features; length is of no matter.
     both : sequence of bool
         Whether the shift may have either sign.
     degrees : float
@@ -47,34 +47,34 @@ class Detector:
         self._ratios = np.sort(self.ratio(healthy))
         self._healthy = np.sort(self.score(healthy)) if anywhere else self._ratios
 
-    def ratio(self, rest: Floats) -> Floats:
-        """Log likelihood ratio of whitened evidence, shape (m, k) to (m,)."""
+    def ratio(self, residual: Floats) -> Floats:
+        """Log likelihood ratio of whitened features, shape (m, k) to (m,)."""
         if not len(self._ways):
-            return np.zeros(len(rest))
-        along = rest @ self._ways.T
+            return np.zeros(len(residual))
+        along = residual @ self._ways.T
         along = np.where(self._both, np.abs(along), np.maximum(along, 0.0))
-        square = np.sum(rest**2, axis=1)
+        square = np.sum(residual**2, axis=1)
         gain = np.maximum(square - along.max(axis=1) ** 2, 0.0)
-        power = 0.5 * (self._degrees + rest.shape[1])
+        power = 0.5 * (self._degrees + residual.shape[1])
         return np.asarray(
             power * (np.log1p(square / self._degrees) - np.log1p(gain / self._degrees))
         )
 
-    def score(self, rest: Floats) -> Floats:
-        """What is judged of whitened evidence, shape (m, k) to (m,): the more seldom of the two.
+    def score(self, residual: Floats) -> Floats:
+        """What is judged of whitened features, shape (m, k) to (m,): the more seldom of the two.
 
         The ratio, where nothing is set aside for other directions; else less the log of a chance.
         The squared length over k follows Fisher's distribution.
         """
         from scipy.stats import f as fisher
 
-        ratio = self.ratio(rest)
+        ratio = self.ratio(residual)
         if not self._anywhere:
             return ratio
         above = len(self._ratios) - np.searchsorted(self._ratios, ratio)
         along = np.maximum(above, 1) / len(self._ratios) / (1.0 - self._anywhere)
-        square = np.mean(rest**2, axis=1)
-        off = fisher.sf(square, rest.shape[1], self._degrees) / self._anywhere
+        square = np.mean(residual**2, axis=1)
+        off = fisher.sf(square, residual.shape[1], self._degrees) / self._anywhere
         return np.asarray(-np.log(np.minimum(along, np.maximum(off, 1e-300))), dtype=np.float64)
 
     def threshold(self, rate: float) -> float:

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.diagnose.bymodel.answer import Diagnosis
-from elevon.diagnose.bymodel.candidates import Candidate, chosen
+from elevon.diagnose.bymodel.candidates import CandidateFault, chosen
 from elevon.diagnose.bymodel.case import (
-    Case,
+    LogCase,
     case_of,
     detector_of,
-    doubt_of,
     joined,
     shift_of,
+    uncertainty_of,
 )
 from elevon.diagnose.bymodel.explain import (
-    NOTHING_WEIGHED,
+    NO_CANDIDATE,
     alternatives,
     causes,
     explanations,
@@ -28,17 +28,17 @@ from elevon.diagnose.bymodel.explain import (
     moved,
     unexplained,
 )
+from elevon.diagnose.bymodel.likelihood import Hypothesis
 from elevon.diagnose.bymodel.log import TestLog, prepared
 from elevon.diagnose.bymodel.not_modelled import not_modelled
 from elevon.diagnose.bymodel.posterior import Posterior, posterior
-from elevon.diagnose.bymodel.weigh import Hypothesis
 from elevon.errors import InputError
 from elevon.threads import one_blas_thread
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["ANYWHERE", "answer_of", "check_asked", "diagnose"]
+__all__ = ["ANYWHERE", "answer_of", "check_request", "diagnose"]
 
 ANYWHERE = 0.2  # of the false alarms: what no candidate does. ASSUMED
 
@@ -63,7 +63,7 @@ def diagnose(
     baselines : sequence of TestLog
         Of the healthy unit; those of the same test serve.
     faults : sequence of str, optional
-        ``KIND@PLACE`` of the candidates; default: all that are weighed.
+        ``KIND@PLACE`` of the candidates; default: all.
     false_alarm : float
         Rate at which a healthy unit may be called faulty.
 
@@ -73,7 +73,7 @@ def diagnose(
         A log that cannot be diagnosed, no candidate, a rate outside 0 to 1.
     """
     begin = clock.perf_counter()
-    check_asked(logs, actuator, false_alarm, "diagnosis by the model")
+    check_request(logs, actuator, false_alarm, "diagnosis by the model")
     candidates = chosen(faults)
     findings: list[str] = []
     healthy_logs = [prepared(item, actuator) for item in baselines]
@@ -88,7 +88,7 @@ def diagnose(
     return replace(result, unobservable=blind, seconds=clock.perf_counter() - begin)
 
 
-def check_asked(logs: Sequence[TestLog], actuator: Actuator, rate: float, who: str) -> None:
+def check_request(logs: Sequence[TestLog], actuator: Actuator, rate: float, who: str) -> None:
     """Refuse what no method for rotary actuators can answer; `who` is the method."""
     if not logs:
         raise InputError("diagnosis needs at least one log")
@@ -101,8 +101,8 @@ def check_asked(logs: Sequence[TestLog], actuator: Actuator, rate: float, who: s
 
 
 def answer_of(
-    cases: Sequence[Case],
-    candidates: Sequence[Candidate],
+    cases: Sequence[LogCase],
+    candidates: Sequence[CandidateFault],
     rate: float,
     findings: Sequence[str],
     *,
@@ -113,28 +113,28 @@ def answer_of(
 
     Parameters
     ----------
-    cases : sequence of Case
+    cases : sequence of LogCase
         One a log.
-    candidates : sequence of Candidate
+    candidates : sequence of CandidateFault
         Faults.
     rate : float
         Of false alarms.
     findings : sequence of str
         What was seen before.
     most : int, optional
-        Pairs of faults that are weighed, the most promising of a log that is called faulty;
+        Pairs of faults that are scored, the most promising of a log that is called faulty;
         default: all.
     other : bool
-        Whether something that is not weighed may be there.
+        Whether something that is no candidate may be there.
     """
     begin = clock.perf_counter()
-    rest, root, detector = detector_of(cases, candidates, ANYWHERE if other else 0.0)
-    score = float(detector.score((root @ rest)[None, :])[0])
+    residual, root, detector = detector_of(cases, candidates, ANYWHERE if other else 0.0)
+    score = float(detector.score((root @ residual)[None, :])[0])
     blind, least = limits(cases, candidates, root)
-    # What the logs cannot show would keep its prior, whatever they say: it is told apart.
+    # What the logs cannot show would keep its prior, whatever they say: it is left out.
     seen = [c for c in candidates if c.key in least] or candidates
     faulty = score > detector.threshold(rate)
-    result = _weighed(cases, seen, pairs=faulty or most is None, most=most, other=other)
+    result = _posterior_of(cases, seen, pairs=faulty or most is None, most=most, other=other)
     best = _best(result, faulty=faulty)
     known = {c.key: c for c in candidates}
     named = [(known[key], value) for key, value in zip(best.keys, best.best, strict=True)]
@@ -176,34 +176,34 @@ def _probability(result: Posterior, best: Hypothesis, *, faulty: bool) -> float:
 
 def _left(
     result: Posterior,
-    cases: Sequence[Case],
-    named: Sequence[tuple[Candidate, float]],
+    cases: Sequence[LogCase],
+    named: Sequence[tuple[CandidateFault, float]],
     *,
     faulty: bool,
 ) -> tuple[str, ...]:
     """Return what is to be said of what the named faults leave."""
     if faulty and not named:
-        return (f"{NOTHING_WEIGHED} (probability {result.other:.2g})",)
+        return (f"{NO_CANDIDATE} (probability {result.other:.2g})",)
     return unexplained(cases, named)
 
 
-def _weighed(
-    cases: Sequence[Case],
-    candidates: Sequence[Candidate],
+def _posterior_of(
+    cases: Sequence[LogCase],
+    candidates: Sequence[CandidateFault],
     *,
     pairs: bool,
     most: int | None,
     other: bool,
 ) -> Posterior:
-    rest, covariance = joined(cases)
+    residual, covariance = joined(cases)
     return posterior(
-        rest,
+        residual,
         covariance,
         min(case.unit.degrees for case in cases),
         candidates,
         lambda k, s: shift_of(cases, k, s),
         errors=np.concatenate([case.errors for case in cases]),
-        doubt=lambda k, s: doubt_of(cases, k, s),
+        uncertainty=lambda k, s: uncertainty_of(cases, k, s),
         pairs=pairs,
         other=other,
         most=most,

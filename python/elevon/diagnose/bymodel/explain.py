@@ -1,4 +1,4 @@
-"""What an answer says beside its most probable set: causes, equivalents, limits, what moved."""
+"""What an answer says beside its most probable set: causes, ambiguous ones, limits, what moved."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.bymodel.answer import SEEN, Alternative, Cause, Explanation, Moved
-from elevon.diagnose.bymodel.candidates import Candidate
-from elevon.diagnose.bymodel.case import Case, doubt_of, joined, shift_of
-from elevon.diagnose.bymodel.evidence import UNITS
+from elevon.diagnose.bymodel.candidates import CandidateFault
+from elevon.diagnose.bymodel.case import LogCase, joined, shift_of, uncertainty_of
+from elevon.diagnose.bymodel.features import UNITS
 from elevon.diagnose.bymodel.posterior import Posterior, marginals, quantiles
 
 __all__ = [
-    "NOTHING_WEIGHED",
+    "NO_CANDIDATE",
     "alternatives",
     "causes",
     "explanations",
@@ -30,11 +30,11 @@ ALIKE = 1.0  # deviations between two faults' shifts below which no log separate
 
 
 #: The finding of a faulty unit with a fault that is not among the candidates.
-NOTHING_WEIGHED = "no fault that is weighed explains these logs, nor is this the healthy unit"
+NO_CANDIDATE = "no candidate explains these logs, nor is this the healthy unit"
 
 
 def unexplained(
-    cases: Sequence[Case], faults: Sequence[tuple[Candidate, float]]
+    cases: Sequence[LogCase], faults: Sequence[tuple[CandidateFault, float]]
 ) -> tuple[str, ...]:
     """Return the finding that the named faults do not explain the logs, where they do not.
 
@@ -48,12 +48,12 @@ def unexplained(
     if float(fisher.sf(square, len(left), degrees)) > UNLIKELY:
         return ()
     return (
-        "what is named does not explain all of the logs: another fault, or a set that is not "
+        "what is named does not explain all of the logs: another fault, or an actuator file not "
         f"calibrated to this unit (rest {np.sqrt(square):.1f} deviations RMS)",
     )
 
 
-def _sum(cases: Sequence[Case], keys: Sequence[str], values: Sequence[float]) -> Floats:
+def _sum(cases: Sequence[LogCase], keys: Sequence[str], values: Sequence[float]) -> Floats:
     total = np.zeros(sum(len(case.unit.names) for case in cases))
     for key, value in zip(keys, values, strict=True):
         total = total + shift_of(cases, key, np.array([value]))[0]
@@ -62,8 +62,8 @@ def _sum(cases: Sequence[Case], keys: Sequence[str], values: Sequence[float]) ->
 
 def causes(
     result: Posterior,
-    cases: Sequence[Case],
-    candidates: Sequence[Candidate],
+    cases: Sequence[LogCase],
+    candidates: Sequence[CandidateFault],
     root: Floats,
     best: Sequence[str],
 ) -> tuple[Cause, ...]:
@@ -76,31 +76,36 @@ def causes(
         if c.key in covered or (probability < LISTED and c.key not in best):
             continue
         low, middle, high = quantiles(*marginals(result, c.key), (0.05, 0.5, 0.95))
-        alike = [o for o in _alike(cases, c, middle, candidates, root) if o.key not in best]
-        covered |= {o.key for o in alike}
-        probability = min(probability + sum(result.of(o.key) for o in alike), 1.0)
-        names = [(c.kind, place) for place in c.same] + list(c.akin)
-        names += [n for o in alike for n in (*((o.kind, p) for p in (o.place, *o.same)), *o.akin)]
+        ambiguous = [o for o in _ambiguous(cases, c, middle, candidates, root) if o.key not in best]
+        covered |= {o.key for o in ambiguous}
+        probability = min(probability + sum(result.of(o.key) for o in ambiguous), 1.0)
+        names = [(c.kind, place) for place in c.same] + list(c.ambiguous)
+        names += [
+            n for o in ambiguous for n in (*((o.kind, p) for p in (o.place, *o.same)), *o.ambiguous)
+        ]
         out.append(Cause(c.kind, c.place, c.unit, probability, middle, (low, high), tuple(names)))
     return tuple(sorted(out, key=lambda cause: -cause.probability))
 
 
 def _left(
-    cases: Sequence[Case], faults: Sequence[tuple[Candidate, float]]
+    cases: Sequence[LogCase], faults: Sequence[tuple[CandidateFault, float]]
 ) -> tuple[Floats, Floats]:
-    """Return what faults leave of the evidence, and its covariance with their model errors."""
+    """Return what faults leave of the features, and its covariance with their model errors."""
     errors = np.concatenate([case.errors for case in cases])
     left, wide = joined(cases)
     for c, severity in faults:
         shift = shift_of(cases, c.key, np.array([severity]))[0]
         left = left - shift
-        own = (errors * shift) ** 2 + doubt_of(cases, c.key, severity) ** 2
-        wide = wide + np.diag(own) + c.error**2 * np.outer(shift, shift)
+        variance = (errors * shift) ** 2 + uncertainty_of(cases, c.key, severity) ** 2
+        wide = wide + np.diag(variance) + c.error**2 * np.outer(shift, shift)
     return left, wide
 
 
 def alternatives(
-    result: Posterior, cases: Sequence[Case], candidates: Sequence[Candidate], best: Sequence[str]
+    result: Posterior,
+    cases: Sequence[LogCase],
+    candidates: Sequence[CandidateFault],
+    best: Sequence[str],
 ) -> tuple[Alternative, ...]:
     """Return the healthy unit and the single faults that are not the answer, likely ones first."""
     known = {c.key: c for c in candidates}
@@ -119,7 +124,9 @@ def alternatives(
     return tuple(out)
 
 
-def explanations(result: Posterior, candidates: Sequence[Candidate]) -> tuple[Explanation, ...]:
+def explanations(
+    result: Posterior, candidates: Sequence[CandidateFault]
+) -> tuple[Explanation, ...]:
     """Return the sets of faults that are still possible."""
     known = {c.key: c for c in candidates}
     out = []
@@ -133,16 +140,16 @@ def explanations(result: Posterior, candidates: Sequence[Candidate]) -> tuple[Ex
     return tuple(out)
 
 
-def _alike(
-    cases: Sequence[Case],
-    candidate: Candidate,
+def _ambiguous(
+    cases: Sequence[LogCase],
+    candidate: CandidateFault,
     severity: float,
-    candidates: Sequence[Candidate],
+    candidates: Sequence[CandidateFault],
     root: Floats,
-) -> list[Candidate]:
-    """Candidates that shift the evidence as this one does at this severity, to `ALIKE`.
+) -> list[CandidateFault]:
+    """Candidates that shift the features as this one does at this severity, to `ALIKE`.
 
-    What the model does not know of the shift, number by number, tells nobody apart.
+    What the model does not know of the shift, feature by feature, separates no two.
     """
     shift = shift_of(cases, candidate.key, np.array([severity]))[0]
     if np.linalg.norm(root @ shift) < SEEN:
@@ -150,20 +157,20 @@ def _alike(
     extra = root * (np.concatenate([case.errors for case in cases]) * shift)
     lower = np.linalg.cholesky(np.eye(len(root)) + extra @ extra.T)
     whiter: Floats = np.asarray(np.linalg.solve(lower, root), dtype=np.float64)
-    own = whiter @ shift
+    target = whiter @ shift
     out = []
     for other in candidates:
         if other.key == candidate.key:
             continue
         grid = np.linspace(other.low, other.high, 401)
         moved = shift_of(cases, other.key, grid) @ whiter.T
-        if float(np.linalg.norm(moved - own, axis=1).min()) < ALIKE:
+        if float(np.linalg.norm(moved - target, axis=1).min()) < ALIKE:
             out.append(other)
     return out
 
 
 def limits(
-    cases: Sequence[Case], candidates: Sequence[Candidate], root: Floats
+    cases: Sequence[LogCase], candidates: Sequence[CandidateFault], root: Floats
 ) -> tuple[tuple[dict[str, str], ...], dict[str, float]]:
     """Return what the logs cannot show, and the least severity of what they can."""
     blind, limits = [], {}
@@ -178,13 +185,15 @@ def limits(
             f"up to {c.high:g} {c.unit if c.unit != '1' else ''}".rstrip()
             + f" it moves nothing here by {SEEN:g} deviations of a healthy unit"
         )
-        names = ((c.kind, c.place), *c.akin)
+        names = ((c.kind, c.place), *c.ambiguous)
         blind += [{"kind": kind, "place": place, "reason": reason} for kind, place in names]
     return tuple(blind), limits
 
 
-def moved(cases: Sequence[Case], keys: Sequence[str], values: Sequence[float]) -> tuple[Moved, ...]:
-    """Return the evidence with what the named faults make of it."""
+def moved(
+    cases: Sequence[LogCase], keys: Sequence[str], values: Sequence[float]
+) -> tuple[Moved, ...]:
+    """Return the features with what the named faults make of it."""
     out = []
     for case in cases:
         std = np.sqrt(np.diag(case.covariance))
@@ -195,7 +204,7 @@ def moved(cases: Sequence[Case], keys: Sequence[str], values: Sequence[float]) -
                     case.name,
                     name,
                     UNITS[name][0] if name in UNITS else "",
-                    float(case.shown.values[k]),
+                    float(case.features.values[k]),
                     float(case.unit.mean[k]),
                     float(std[k]),
                     float(explained[k]),

@@ -1,4 +1,4 @@
-"""What a healthy unit's evidence is in one test: the model's, moved and scaled by baselines."""
+"""What a healthy unit's features are in one test: the model's, moved and scaled by baselines."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.evidence import Evidence
+from elevon.diagnose.bymodel.features import FeatureVector
 from elevon.diagnose.bymodel.replay import Replay
 
 __all__ = ["DEGREES", "FLOOR", "MISMATCH", "POOLED", "Elsewhere", "Healthy", "healthy"]
@@ -16,8 +16,9 @@ __all__ = ["DEGREES", "FLOOR", "MISMATCH", "POOLED", "Elsewhere", "Healthy", "he
 _FAR = 2.0  # deviations
 DEGREES = 10.0  # ASSUMED: worth of the stated spread, in runs
 
-#: How far a calibrated low model may stand off a healthy unit: share of the value, and SI. ASSUMED,
-#: from logs of benches with another drive and friction law; baselines of the same test replace it.
+#: How far a calibrated reduced-order model may deviate from a healthy unit: share of the value, and
+#: SI. ASSUMED, from logs of benches with another drive and friction law; baselines of the same test
+#: replace it.
 MISMATCH: Mapping[str, tuple[float, float]] = {
     "lost_motion": (0.03, 1e-4),
     "position_scale": (0.0, 1e-3),
@@ -32,13 +33,13 @@ MISMATCH: Mapping[str, tuple[float, float]] = {
     "voltage_per_current": (1.0, 10.0),
     "voltage_order_1": (0.0, 0.006),
     "voltage_order_2": (0.0, 0.006),
-    "speed_gain": (0.30, 0.0),  # spikes of a derivative: 20 % off for a drive with hysteresis
+    "speed_gain": (0.30, 0.0),  # spikes of a derivative: 20 % apart for a drive with hysteresis
     "following_gain": (0.004, 0.0),
     "current_sideband": (0.0, 0.006),
     "voltage_sideband": (0.0, 0.006),
 }
 #: With a brake of unknown torque: many times the unit's own friction.
-_HELD: Mapping[str, tuple[float, float]] = {
+_BRAKE_UNKNOWN: Mapping[str, tuple[float, float]] = {
     "dry_current": (10.0, 0.0),
     "viscous_current": (10.0, 0.0),
 }
@@ -72,7 +73,7 @@ class Healthy:
     Attributes
     ----------
     names : tuple of str
-        The evidence.
+        The features.
     mean : ndarray, shape (k,)
         Expected.
     covariance : ndarray, shape (k, k)
@@ -85,7 +86,7 @@ class Healthy:
         Spread over the stated one: what baselines made of it.
     offset : ndarray, shape (k, k), or None
         The part of the covariance that is the same in all logs of the unit: what is not known of
-        how far it stands off the model.
+        how far it deviates from the model.
     """
 
     names: tuple[str, ...]
@@ -97,7 +98,7 @@ class Healthy:
     offset: Floats | None = None
 
 
-#: Evidence that stands off the model by one share in all tests of a unit, and the deviation of
+#: Features that deviate from the model by one share in all tests of a unit, and the deviation of
 #: that share between tests. ASSUMED: one friction law acts in all of them, at other speeds.
 POOLED: Mapping[str, float] = {"dry_current": 0.04}
 
@@ -106,53 +107,53 @@ POOLED: Mapping[str, float] = {"dry_current": 0.04}
 class Elsewhere:
     """A baseline of another test, and what the model shows there."""
 
-    shown: Evidence
-    model: Evidence
+    features: FeatureVector
+    model: FeatureVector
 
 
 def healthy(
     model: Replay,
     names: Sequence[str],
-    baselines: Sequence[Evidence],
+    baselines: Sequence[FeatureVector],
     elsewhere: Sequence[Elsewhere] = (),
     *,
-    held: bool = False,
+    brake_unknown: bool = False,
 ) -> Healthy:
     """Join the model's spread with baselines.
 
     The offset of a unit from the model is Gaussian with `MISMATCH`; the mean of the baselines of
     the same test narrows it, those of other tests narrow what is `POOLED`. The spread's scale is
     that stated, worth `DEGREES` runs, and the baselines' scatter. Where baselines stand further
-    off the model than was assumed, the assumption yields. In a test that is `held` by a brake whose
-    torque is not known, the model says nothing of friction.
+    off the model than was assumed, the assumption yields. In a test that is a brake of unknown
+    torque loads (`brake_unknown`), the model says nothing of friction.
     """
     at = [model.healthy.names.index(name) for name in names]
     draws = model.draws[:, at]
     mean = draws.mean(axis=0)
-    own = np.cov(draws.T).reshape(len(at), len(at)) + np.diag(_sizes(FLOOR, names, mean) ** 2)
-    table = {**MISMATCH, **_HELD} if held else MISMATCH
+    spread = np.cov(draws.T).reshape(len(at), len(at)) + np.diag(_sizes(FLOOR, names, mean) ** 2)
+    table = {**MISMATCH, **_BRAKE_UNKNOWN} if brake_unknown else MISMATCH
     off = np.diag(_sizes(table, names, mean) ** 2)
     count = len(baselines)
     scale = np.ones(len(at))
     left, moved = off, np.zeros(len(at))
     if count:
-        rest = np.array([b.only(names).values for b in baselines]) - mean
+        residual = np.array([b.only(names).values for b in baselines]) - mean
         noise = np.array([b.only(names).std ** 2 for b in baselines]).mean(axis=0)
-        centre = rest.mean(axis=0)
-        scatter = np.sum((rest - centre) ** 2, axis=0) / (np.diag(own) + noise)
+        centre = residual.mean(axis=0)
+        scatter = np.sum((residual - centre) ** 2, axis=0) / (np.diag(spread) + noise)
         scale = (DEGREES + scatter) / (DEGREES + count - 1)
-        own *= np.sqrt(np.outer(scale, scale))
-        off = _yielding(off, own + np.diag(noise), centre, count)
-        gain = off @ np.linalg.inv(off + (own + np.diag(noise)) / count)
+        spread *= np.sqrt(np.outer(scale, scale))
+        off = _yielding(off, spread + np.diag(noise), centre, count)
+        gain = off @ np.linalg.inv(off + (spread + np.diag(noise)) / count)
         left, moved = off - gain @ off, gain @ centre
-    for k, said, std in _pooled(names, mean, () if held else elsewhere):
-        gain = left[:, k] / (left[k, k] + own[k, k] + std**2)
-        moved = moved + gain * (said - moved[k])
+    for k, offset, std in _pooled(names, mean, () if brake_unknown else elsewhere):
+        gain = left[:, k] / (left[k, k] + spread[k, k] + std**2)
+        moved = moved + gain * (offset - moved[k])
         left = left - np.outer(gain, left[k])
     return Healthy(
         tuple(names),
         mean + moved,
-        own + 0.5 * (left + left.T),
+        spread + 0.5 * (left + left.T),
         DEGREES + max(count - 1, 0),
         count,
         np.sqrt(scale),
@@ -173,22 +174,22 @@ def _pooled(
     """Yield what other tests say of a number's offset: its place, the offset, its deviation."""
     for name, between in POOLED.items():
         for other in elsewhere:
-            said = _said_elsewhere(name, other) if name in names else None
-            if said is not None:
+            offset = _offset_elsewhere(name, other) if name in names else None
+            if offset is not None:
                 k = list(names).index(name)
                 size = abs(float(mean[k]))
-                yield k, said[0] * float(mean[k]), size * float(np.hypot(said[1], between))
+                yield k, offset[0] * float(mean[k]), size * float(np.hypot(offset[1], between))
 
 
-def _said_elsewhere(name: str, other: Elsewhere) -> tuple[float, float] | None:
-    """Share by which a number stands off the model in another test, and its deviation."""
-    if name not in other.shown.names or name not in other.model.names:
+def _offset_elsewhere(name: str, other: Elsewhere) -> tuple[float, float] | None:
+    """Share by which a feature deviates from the model in another test, and its deviation."""
+    if name not in other.features.names or name not in other.model.names:
         return None
     modelled = float(other.model.only([name]).values[0])
     if not modelled > 0.0:
         return None
-    shown = other.shown.only([name])
-    return float(shown.values[0]) / modelled - 1.0, float(shown.std[0]) / modelled
+    features = other.features.only([name])
+    return float(features.values[0]) / modelled - 1.0, float(features.std[0]) / modelled
 
 
 def _sizes(table: Mapping[str, tuple[float, float]], names: Sequence[str], mean: Floats) -> Floats:

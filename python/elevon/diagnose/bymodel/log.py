@@ -15,8 +15,8 @@ from elevon.calibrate.kinematics import command_fit
 from elevon.calibrate.log import BenchLog, bench_log
 from elevon.calibrate.thin import group_means, groups_of
 from elevon.diagnose.bymodel.command import noted_command
-from elevon.diagnose.bymodel.evidence import regress
-from elevon.diagnose.bymodel.lost_motion import dragged
+from elevon.diagnose.bymodel.features import regress
+from elevon.diagnose.bymodel.lost_motion import carried
 from elevon.errors import InputError
 from elevon.logs.command.reconstruct import reconstruct
 
@@ -70,7 +70,7 @@ class TestLog:
         return self.log.brake.measured
 
     @property
-    def held(self) -> bool:
+    def brake_unknown(self) -> bool:
         """Whether a brake acted whose torque is not known."""
         return self.log.brake.known in ("force", "on")
 
@@ -179,7 +179,7 @@ def _check_motion(log: BenchLog, good: npt.NDArray[np.bool_], actuator: Actuator
     # Past the backlash only, and with the direction beside the position: backlash would tilt the
     # line of a short motion.
     gap = log.motor / ratio - log.output
-    past = moving & dragged(log.motor / ratio, float(np.ptp(gap[moving])))
+    past = moving & carried(log.motor / ratio, float(np.ptp(gap[moving])))
     moving = past if past.sum() > 100 else moving
     columns = [log.output[moving], np.sign(log.speed[moving]), np.ones(int(moving.sum()))]
     slope = float(regress(columns, log.motor[moving])[0][0])

@@ -1,4 +1,4 @@
-"""Lost motion from the difference of the two positions: of an output that is dragged, or flies."""
+"""Lost motion from the difference of two positions: the output that friction carries, or flies."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 
-__all__ = ["dragged", "floats", "spanned"]
+__all__ = ["carried", "floats", "spanned"]
 
 Bools = npt.NDArray[np.bool_]
-_AFLOAT = 0.15  # of the difference's width: what it scatters in one direction if nothing drags it
+_AFLOAT = 0.15  # of the difference's width: what it scatters in one direction if it is free
 _LEAST = 3e-4  # rad of that scatter: four counts of the bench's encoder, more than rounding leaves
 _ROUNDS = 4  # of which end is nearer, and of the slope
 
 
-def dragged(driver: Floats, width: float) -> Bools:
+def carried(driver: Floats, width: float) -> Bools:
     """Return the samples after the driver has passed the whole gap since it turned."""
     way = np.sign(np.gradient(driver))
     last = np.zeros(len(driver), dtype=np.intp)
@@ -66,9 +66,9 @@ def _ends(gap: Floats, output: Floats) -> tuple[float, float]:
     """Width of the difference, and its slope over the output's position at either end."""
     centred, slope = output - float(np.mean(output)), 0.0
     for _ in range(_ROUNDS):
-        rest = gap - slope * centred
-        low, high = np.percentile(rest, [5.0, 95.0])
-        end = np.sign(rest - 0.5 * (low + high))
+        residual = gap - slope * centred
+        low, high = np.percentile(residual, [5.0, 95.0])
+        end = np.sign(residual - 0.5 * (low + high))
         columns = np.column_stack([centred, end, np.ones_like(gap)])
         slope = float(np.linalg.lstsq(columns, gap, rcond=None)[0][0])
     return _width(gap - slope * centred), slope

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from elevon.diagnose.bymodel.words import by_reason, sentence, severity_text
-from elevon.diagnose.pictures import evidence_figure, traces_figure
+from elevon.diagnose.pictures import features_figure, traces_figure
 from elevon.report import Report, Table
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def diagnosis_page(
     result : Diagnosis
         The answer.
     actuator : str
-        Name of the set.
+        Name of the actuator.
     date : str, optional
         Printed on the page.
     traces : sequence of Traces, optional
@@ -39,7 +39,7 @@ def diagnosis_page(
     report = Report(f"Diagnosis of {actuator}", sentence(result), date=date)
     _causes(report, result)
     _signals(report, traces[:_DRAWN])
-    _evidence(report, result)
+    _features(report, result)
     if result.alternatives:
         _alternatives(report, result)
     limits = report.section("What these logs can tell")
@@ -53,7 +53,7 @@ def diagnosis_page(
             seen + blind,
             "Least severity from which on 95 % of held-out single faults were named."
             if _by_network(result)
-            else "Least severity that moves the evidence by three deviations of a healthy unit.",
+            else "Least severity that moves the features by three deviations of a healthy unit.",
         )
     )
     for text in result.findings:
@@ -68,14 +68,14 @@ def _causes(report: Report, result: Diagnosis) -> None:
             c.probability,
             severity_text(c.severity, c.unit),
             f"{severity_text(c.interval[0], c.unit)} to {severity_text(c.interval[1], c.unit)}",
-            ", ".join(f"{kind}@{place}" for kind, place in c.equivalents),
+            ", ".join(f"{kind}@{place}" for kind, place in c.ambiguous_with),
         )
         for c in result.faults
     ]
     causes = report.section("Causes")
     causes.table(
         Table(
-            ("cause", "probability", "severity", "90 % interval", "not separable from"),
+            ("cause", "probability", "severity", "90 % interval", "ambiguous with"),
             rows,
             f"Logs: {', '.join(result.logs)}. A cause that is not listed has less than 2 %.",
             digits=3,
@@ -103,7 +103,7 @@ def _alternatives(report: Report, result: Diagnosis) -> None:
         Table(
             ("alternative", "probability", "fits best at", "explains worst", "left"),
             rows,
-            "Alone, at the severity that fits best. Left: what it leaves of the evidence that it "
+            "Alone, at the severity that fits best. Left: what it leaves of the feature that it "
             "explains worst, in deviations of a healthy unit with the model's own error. Beyond "
             "three it speaks against the alternative; within, only the prior and the sum do.",
             digits=2,
@@ -122,23 +122,31 @@ def _signals(report: Report, traces: Sequence[Traces]) -> None:
         section.figure(traces_figure(item), f"{text}; means of short stretches.")
 
 
-def _evidence(report: Report, result: Diagnosis) -> None:
+def _features(report: Report, result: Diagnosis) -> None:
     ranked = sorted(result.moved, key=lambda item: -abs(item.score))
     rows: list[tuple[object, ...]] = [
         (m.log, m.name, m.unit, m.value, m.expected, m.score, m.explained / m.deviation)
         for m in ranked
     ]
-    names: tuple[str, ...] = ("log", "evidence", "unit", "value", "healthy", "off by", "explained")
+    names: tuple[str, ...] = (
+        "log",
+        "feature",
+        "unit",
+        "value",
+        "healthy",
+        "deviates by",
+        "explained",
+    )
     formats: tuple[str, ...] = ("", "", "", "", "", "+.2f", "+.2f")
-    text = "Off by: in deviations of a healthy unit from run to run."
+    text = "Deviates by: in deviations of a healthy unit from run to run."
     if _by_network(result):
         rows, names, formats = [row[:-1] for row in rows], names[:-1], formats[:-1]
     else:
         text += " Explained: what the most probable cause accounts for, in the same measure."
-    section = report.section("Evidence")
+    section = report.section("Features")
     section.figure(
-        evidence_figure(result.moved),
-        "How far the numbers of the logs are off a healthy unit: bars, in its deviations from run "
-        "to run; diamonds, what the most probable cause accounts for.",
+        features_figure(result.moved),
+        "How far the features of the logs deviate from a healthy unit: bars, in its deviations "
+        "from run to run; diamonds, what the most probable cause accounts for.",
     )
     section.table(Table(names, rows, text, digits=4, formats=formats))

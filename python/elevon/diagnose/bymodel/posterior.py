@@ -1,6 +1,6 @@
-"""Which faults explain the evidence: single faults and pairs, by a Gaussian in the evidence.
+"""Which faults explain the features: single faults and pairs, by a Gaussian in the features.
 
-The evidence of a log is y = m + shift(severities) + r. The covariance of r sums the spread from
+The features of a log is y = m + shift(severities) + r. The covariance of r sums the spread from
 run to run, the noise within the log, what is not known of the healthy mean m, and the model's own
 error, which grows with the shift. Integrals over severities are sums over grids, fine where the
 likelihood is: with one or two severities that is exact to the grid, and no sampling is needed.
@@ -15,14 +15,14 @@ from itertools import combinations
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.candidates import Candidate
-from elevon.diagnose.bymodel.weigh import (
+from elevon.diagnose.bymodel.candidates import CandidateFault
+from elevon.diagnose.bymodel.likelihood import (
     Frame,
     Hypothesis,
-    beside,
     healthy_alone,
     one_fault,
     outside,
+    second_faults,
     two_faults,
 )
 
@@ -30,9 +30,9 @@ __all__ = ["Posterior", "marginals", "posterior", "quantiles"]
 
 Shift = Callable[[str, Floats], Floats]
 PRIOR_FAULTY = 0.5  # ASSUMED: a log is diagnosed since somebody doubts
-OTHER = 0.02  # ASSUMED: a faulty unit has a fault that is not weighed
+OTHER = 0.02  # ASSUMED: a faulty unit has a fault that is no candidate
 SECOND = 0.1  # ASSUMED: a faulty unit has a second fault
-_FIRST = 6  # faults that a second one is sought beside, where not all pairs are weighed
+_FIRST = 6  # faults that a second one is sought beside, where not all pairs are scored
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,9 @@ class Posterior:
     Attributes
     ----------
     hypotheses, probabilities : tuple
-        What is weighed.
+        What is scored.
     other : float
-        Probability of none of them: something moves the evidence that they do not explain.
+        Probability of none of them: something moves the features that they do not explain.
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -64,46 +64,46 @@ class Posterior:
 
 
 def posterior(
-    rest: Floats,
+    residual: Floats,
     covariance: Floats,
     degrees: float,
-    candidates: Sequence[Candidate],
+    candidates: Sequence[CandidateFault],
     shift: Shift,
     *,
     errors: Floats | None = None,
-    doubt: Callable[[str, float], Floats] | None = None,
+    uncertainty: Callable[[str, float], Floats] | None = None,
     pairs: bool = True,
     other: bool = False,
     most: int | None = None,
 ) -> Posterior:
-    """Weigh the hypotheses.
+    """Score the hypotheses.
 
     Parameters
     ----------
-    rest : ndarray, shape (k,)
-        Evidence less its healthy mean.
+    residual : ndarray, shape (k,)
+        Features less its healthy mean.
     covariance : ndarray, shape (k, k)
         Of it, for a healthy unit.
     degrees : float
         Of freedom of Student's distribution: how well the spread is known.
-    candidates : sequence of Candidate
+    candidates : sequence of CandidateFault
         Faults.
     shift : callable
-        Key and severities, shape (m,), to what they do to the evidence, shape (m, k).
+        Key and severities, shape (m,), to what they do to the features, shape (m, k).
     errors : ndarray, shape (k,), optional
         Deviation of each number's shift on its own, as a share of it; default: none.
-    doubt : callable, optional
-        Key and severity to a deviation that the fault gives the evidence, shape (k,).
+    uncertainty : callable, optional
+        Key and severity to a deviation that the fault gives the features, shape (k,).
     pairs : bool
-        Whether two faults at once are weighed.
+        Whether two faults at once are scored.
     other : bool
-        Whether something else may be there that moves the evidence anyhow.
+        Whether something else may be there that moves the features anyhow.
     most : int, optional
-        Pairs that are weighed: those that a coarse search beside the likeliest single faults finds
+        Pairs that are scored: those that a coarse search beside the likeliest single faults finds
         best; the others count as impossible. Default: all.
     """
-    own = np.zeros(len(rest)) if errors is None else errors
-    frame = Frame(rest, covariance, degrees, shift, own, doubt)
+    shares = np.zeros(len(residual)) if errors is None else errors
+    frame = Frame(residual, covariance, degrees, shift, shares, uncertainty)
     total = sum(c.rate for c in candidates)
     out = [healthy_alone(frame, 1.0 - PRIOR_FAULTY)]
     for c in candidates:
@@ -127,16 +127,16 @@ def posterior(
 
 
 def _promising(
-    frame: Frame, candidates: Sequence[Candidate], singles: Sequence[Hypothesis], most: int
-) -> list[tuple[Candidate, Candidate]]:
-    """Pairs that may explain the evidence best: a second fault beside each of the likeliest."""
+    frame: Frame, candidates: Sequence[CandidateFault], singles: Sequence[Hypothesis], most: int
+) -> list[tuple[CandidateFault, CandidateFault]]:
+    """Pairs that may explain the features best: a second fault beside each of the likeliest."""
     known = {c.key: c for c in candidates}
     order = {c.key: k for k, c in enumerate(candidates)}
     ranked = sorted(singles, key=lambda h: -(h.evidence + float(np.log(h.prior))))
     scores: dict[tuple[str, str], float] = {}
     for h in ranked[:_FIRST]:
         first = known[h.keys[0]]
-        for key, score in beside(frame, first, h.best[0], candidates).items():
+        for key, score in second_faults(frame, first, h.best[0], candidates).items():
             pair = (key, first.key) if order[key] < order[first.key] else (first.key, key)
             scores[pair] = max(score, scores.get(pair, -np.inf))
     best = sorted(scores, key=lambda pair: -scores[pair])[:most]

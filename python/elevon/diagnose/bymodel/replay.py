@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any, TypedDict
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.candidates import Candidate
-from elevon.diagnose.bymodel.evidence import SIZES, Evidence, Signals, evidence
+from elevon.diagnose.bymodel.candidates import CandidateFault
+from elevon.diagnose.bymodel.features import SIZES, DriveSignals, FeatureVector, features_of
 from elevon.diagnose.bymodel.log import TestLog
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
 __all__ = [
-    "SPREAD", "Replay", "Unit", "logged_evidence", "modelled", "replay", "runs", "signals_of",
+    "SPREAD", "Replay", "ReplayUnit", "logged_features", "modelled", "replay", "runs", "signals_of",
 ]  # fmt: skip
 
 _SIGNALS = (
@@ -46,45 +46,45 @@ SPREAD: Mapping[str, tuple[float, str]] = {
 
 
 class Replay:
-    """Evidence of the model in one test.
+    """Features of the model in one test.
 
     Attributes
     ----------
-    healthy : Evidence
-        Of the set as it is.
+    healthy : FeatureVector
+        Of the actuator file as it is.
     severities : mapping of str to ndarray, shape (m,)
         Key of the candidate to the severities that were run.
     shifts : mapping of str to ndarray, shape (m, k)
-        What they do to the evidence; of sizes (`SIZES`) the part at a right angle.
+        What they do to the features; of sizes (`SIZES`) the part at a right angle.
     draws : ndarray, shape (d, k)
-        Evidence of healthy units as they differ from run to run.
-    doubts : mapping of str to ndarray, shape (m, k)
-        What severities do to evidence that depends on an angle no log tells, by key: its deviation.
+        Features of healthy units as they differ from run to run.
+    uncertainties : mapping of str to ndarray, shape (m, k)
+        What severities do to features that depends on an angle no log shows, by key: its deviation.
     """
 
     def __init__(
         self,
-        healthy: Evidence,
+        healthy: FeatureVector,
         severities: Mapping[str, Floats],
         shifts: Mapping[str, Floats],
         draws: Floats,
-        doubts: Mapping[str, Floats] | None = None,
+        uncertainties: Mapping[str, Floats] | None = None,
     ) -> None:
         self.healthy = healthy
         self.severities = severities
         self.shifts = shifts
         self.draws = draws
-        self.doubts = {} if doubts is None else doubts
+        self.uncertainties = {} if uncertainties is None else uncertainties
 
     def shift(self, key: str, severity: Floats) -> Floats:
-        """Return what severities of shape (m,) do to the evidence, shape (m, k)."""
+        """Return what severities of shape (m,) do to the features, shape (m, k)."""
         return _read(self.severities[key], self.shifts[key], severity)
 
-    def doubt(self, key: str, severity: float) -> Floats:
-        """Return the deviation that a severity gives the evidence, shape (k,)."""
-        if key not in self.doubts:
+    def uncertainty(self, key: str, severity: float) -> Floats:
+        """Return the deviation that a severity gives the features, shape (k,)."""
+        if key not in self.uncertainties:
             return np.zeros(len(self.healthy.names))
-        table = _read(self.severities[key], self.doubts[key], np.array([severity]))
+        table = _read(self.severities[key], self.uncertainties[key], np.array([severity]))
         return np.asarray(table[0], dtype=np.float64)
 
 
@@ -93,19 +93,19 @@ def _read(at: Floats, table: Floats, severity: Floats) -> Floats:
     return np.asarray(np.column_stack(columns), dtype=np.float64)
 
 
-def logged_evidence(item: TestLog, actuator: Actuator) -> Evidence:
-    """Return the evidence of a log."""
-    return evidence(signals_of(item), **_constants(actuator))
+def logged_features(item: TestLog, actuator: Actuator) -> FeatureVector:
+    """Return the features of a log."""
+    return features_of(signals_of(item), **_constants(actuator))
 
 
-def signals_of(item: TestLog) -> Signals:
+def signals_of(item: TestLog) -> DriveSignals:
     """Return what a prepared log shows."""
     log = item.log
     assert log.output is not None
     assert log.motor is not None
     assert item.good is not None
     brake = np.interp(log.time, log.brake.time, log.brake.level) if item.braked else None
-    return Signals(
+    return DriveSignals(
         log.time, log.output, log.motor, log.speed_ref, log.speed, log.current_target,
         log.current, item.voltage, brake, None, item.gain, item.good,
     )  # fmt: skip
@@ -114,7 +114,7 @@ def signals_of(item: TestLog) -> Signals:
 def replay(
     item: TestLog,
     actuator: Actuator,
-    candidates: Sequence[Candidate],
+    candidates: Sequence[CandidateFault],
     baselines: Sequence[TestLog] = (),
 ) -> Replay:
     """Run the test on the model: healthy, each candidate at several severities, and the spread.
@@ -129,7 +129,7 @@ def replay(
         Prepared.
     actuator : Actuator
         The healthy unit.
-    candidates : sequence of Candidate
+    candidates : sequence of CandidateFault
         Faults.
     baselines : sequence of TestLog
         Prepared; whose runs may serve.
@@ -139,22 +139,22 @@ def replay(
     return made if alike is item else _about(made, modelled(item, actuator))
 
 
-def modelled(item: TestLog, actuator: Actuator) -> Evidence:
-    """Return the evidence of the healthy model in a log's test."""
+def modelled(item: TestLog, actuator: Actuator) -> FeatureVector:
+    """Return the features of the healthy model in a log's test."""
     return _remembered(item, actuator, ()).healthy
 
 
-def _about(made: Replay, own: Evidence) -> Replay:
+def _about(made: Replay, healthy: FeatureVector) -> Replay:
     """Return the runs of another log of the test about a log's own healthy run."""
-    names = tuple(n for n in made.healthy.names if n in own.names)
+    names = tuple(n for n in made.healthy.names if n in healthy.names)
     at = [made.healthy.names.index(n) for n in names]
-    own = own.only(names)
+    healthy = healthy.only(names)
     return Replay(
-        own,
+        healthy,
         made.severities,
         {key: table[:, at] for key, table in made.shifts.items()},
-        made.draws[:, at] + own.values - made.healthy.values[at],
-        {key: table[:, at] for key, table in made.doubts.items()},
+        made.draws[:, at] + healthy.values - made.healthy.values[at],
+        {key: table[:, at] for key, table in made.uncertainties.items()},
     )
 
 
@@ -162,7 +162,7 @@ _REMEMBERED = 32  # logs
 _RECENT: dict[Any, Replay] = {}  # by all that the runs depend on; the latest asked for is the last
 
 
-def _remembered(item: TestLog, actuator: Actuator, candidates: Sequence[Candidate]) -> Replay:
+def _remembered(item: TestLog, actuator: Actuator, candidates: Sequence[CandidateFault]) -> Replay:
     key = (actuator.hash, tuple(candidates), _digest(item))
     made = _RECENT.pop(key, None) or _replayed(item, actuator, candidates)
     _RECENT[key] = made
@@ -205,28 +205,31 @@ def _same_runs(a: TestLog, b: TestLog) -> bool:
     return all(alike) and all(abs(x - y) <= e * max(abs(x), abs(y)) for x, y, e in pairs)
 
 
-def _replayed(item: TestLog, actuator: Actuator, candidates: Sequence[Candidate]) -> Replay:
+def _replayed(item: TestLog, actuator: Actuator, candidates: Sequence[CandidateFault]) -> Replay:
     severities = {c.key: _severities(c) for c in candidates}
-    units = [Unit(actuator)]
+    units = [ReplayUnit(actuator)]
     for c in candidates:
-        units += [Unit(actuator, (c.text(float(s)),)) for s in severities[c.key] if s != 0.0]
+        units += [ReplayUnit(actuator, (c.text(float(s)),)) for s in severities[c.key] if s != 0.0]
     if candidates:
         units += [_drawn(actuator, np.random.default_rng([15, k])) for k in range(_DRAWS)]
     constants = _constants(actuator)
-    shown = [evidence(run, **constants, deviations=False) for run in runs(item, units)]
-    names = tuple(n for n in shown[0].names if all(n in s.names for s in shown))
-    rows = np.array([s.only(names).values for s in shown])
-    shifts, doubts, at = {}, {}, 1
+    features = [features_of(run, **constants, deviations=False) for run in runs(item, units)]
+    names = tuple(n for n in features[0].names if all(n in s.names for s in features))
+    rows = np.array([s.only(names).values for s in features])
+    shifts, uncertainties, at = {}, {}, 1
     for c in candidates:
         zero = severities[c.key] == 0.0
         table = np.zeros((len(zero), len(names)))
         count = int((~zero).sum())
         table[~zero] = _moved_by(rows[at : at + count], rows[0], names)
-        shifts[c.key] = table * [n not in c.still and (not c.sure or n in c.sure) for n in names]
-        if c.sure:
-            doubts[c.key] = np.abs(table * [n not in c.sure for n in names])
+        shifts[c.key] = table * [
+            n not in c.fixed_features and (not c.known_features or n in c.known_features)
+            for n in names
+        ]
+        if c.known_features:
+            uncertainties[c.key] = np.abs(table * [n not in c.known_features for n in names])
         at += count
-    return Replay(shown[0].only(names), severities, shifts, rows[at:], doubts)
+    return Replay(features[0].only(names), severities, shifts, rows[at:], uncertainties)
 
 
 def _moved_by(rows: Floats, healthy: Floats, names: Sequence[str]) -> Floats:
@@ -240,7 +243,7 @@ def _moved_by(rows: Floats, healthy: Floats, names: Sequence[str]) -> Floats:
 
 
 class _Constants(TypedDict):
-    """Of the set, for the regressions."""
+    """Of the actuator, for the regressions."""
 
     ratio: float
     pole_pairs: float
@@ -256,7 +259,7 @@ def _constants(actuator: Actuator) -> _Constants:
     }
 
 
-def _severities(candidate: Candidate) -> Floats:
+def _severities(candidate: CandidateFault) -> Floats:
     """Zero, and severities that grow by squares from it to each end of the range."""
     steps = np.linspace(0.0, 1.0, _POINTS) ** 2
     low = candidate.low * steps[:0:-1] if candidate.low < 0.0 else np.zeros(0)
@@ -264,7 +267,7 @@ def _severities(candidate: Candidate) -> Floats:
 
 
 @dataclass(frozen=True)
-class Unit:
+class ReplayUnit:
     """A unit of the replay: values, faults, brake over the logged one, where its motor starts."""
 
     actuator: Actuator
@@ -273,7 +276,7 @@ class Unit:
     turn: float = 0.0
 
 
-def runs(item: TestLog, units: Sequence[Unit]) -> Iterator[Signals]:
+def runs(item: TestLog, units: Sequence[ReplayUnit]) -> Iterator[DriveSignals]:
     """Run all units through the log's test, on the log's instants.
 
     Names and units are the scenario's; the arrays are exchanged in what goes to the core, since
@@ -302,10 +305,12 @@ def runs(item: TestLog, units: Sequence[Unit]) -> Iterator[Signals]:
     plan = ready[0].plan[0]
     for result in simulate_prepared(ready, fidelity="low"):
         rows = result["clocks"][plan.name]
-        yield _shown(rows["time"], dict(zip(plan.signals, rows["values"].T, strict=False)), item)
+        yield _signals_on_log(
+            rows["time"], dict(zip(plan.signals, rows["values"].T, strict=False)), item
+        )
 
 
-def _with_arrays(core: Mapping[str, Any], item: TestLog, unit: Unit) -> dict[str, Any]:
+def _with_arrays(core: Mapping[str, Any], item: TestLog, unit: ReplayUnit) -> dict[str, Any]:
     log = item.log
     assert log.output is not None
     assert item.replay is not None
@@ -330,7 +335,7 @@ def _table(term: Mapping[str, Any], times: Floats, values: Floats) -> dict[str, 
     return {**term, "times": np.ascontiguousarray(times), "values": np.ascontiguousarray(values)}
 
 
-def _drawn(actuator: Actuator, rng: np.random.Generator) -> Unit:
+def _drawn(actuator: Actuator, rng: np.random.Generator) -> ReplayUnit:
     """Return a healthy unit of another day; `turn` moves its motor: no log tells the zero."""
     values: dict[str, float | str] = {}
     faults, brake = [], 1.0
@@ -344,8 +349,8 @@ def _drawn(actuator: Actuator, rng: np.random.Generator) -> Unit:
             old = actuator.parameters.value(path)
             values[path] = old + step if way == "add" else old * max(1.0 + step, 0.05)
             if path == "friction.dynamic":
-                still = actuator.parameters.value("friction.static")
-                values["friction.static"] = still * max(1.0 + step, 0.05)
+                static = actuator.parameters.value("friction.static")
+                values["friction.static"] = static * max(1.0 + step, 0.05)
     value = actuator.parameters.value
     # Within the backlash: further off the output would not be where the motor holds it.
     most = min(
@@ -353,16 +358,16 @@ def _drawn(actuator: Actuator, rng: np.random.Generator) -> Unit:
     )
     turn = float(rng.uniform(-most, most))
     unit = actuator.with_values(values, source="run-to-run spread")
-    return Unit(unit, tuple(faults), brake, turn)
+    return ReplayUnit(unit, tuple(faults), brake, turn)
 
 
-def _shown(clock: Floats, values: Mapping[str, Floats], item: TestLog) -> Signals:
+def _signals_on_log(clock: Floats, values: Mapping[str, Floats], item: TestLog) -> DriveSignals:
     log = item.log
     assert item.good is not None
     seen = {name: np.interp(log.time, clock, values[name]) for name in _SIGNALS.split(",")}
     brake = np.interp(log.time, log.brake.time, log.brake.level) if item.braked else None
     voltage = None if item.voltage is None else seen["voltage_q_ref"]
-    return Signals(
+    return DriveSignals(
         log.time, seen["encoder_position"], seen["motor_position"], seen["speed_ref"],
         seen["motor_speed"], seen["current_ref"], seen[log.current_signal], voltage, brake,
         item.replay, None, item.good,

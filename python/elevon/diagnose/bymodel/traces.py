@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.evidence import Signals
+from elevon.diagnose.bymodel.features import DriveSignals
 from elevon.diagnose.bymodel.log import TestLog, prepared
-from elevon.diagnose.bymodel.replay import Unit, runs, signals_of
-from elevon.diagnose.pictures import Panel, Traces, named_faults
+from elevon.diagnose.bymodel.replay import ReplayUnit, runs, signals_of
+from elevon.diagnose.pictures import SignalPanel, Traces, named_faults
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -33,26 +33,28 @@ def traces_of(logs: Sequence[TestLog], actuator: Actuator, result: Diagnosis) ->
         The answer.
     """
     texts = tuple(f"{key}={value!r}" for key, value in named_faults(result).items())
-    units = [Unit(actuator)] + ([Unit(actuator, texts)] if texts else [])
+    units = [ReplayUnit(actuator)] + ([ReplayUnit(actuator, texts)] if texts else [])
     return [_traces(prepared(log, actuator), actuator, units) for log in logs]
 
 
-def _traces(item: TestLog, actuator: Actuator, units: Sequence[Unit]) -> Traces:
-    shown = [signals_of(item), *runs(item, units)]
+def _traces(item: TestLog, actuator: Actuator, units: Sequence[ReplayUnit]) -> Traces:
+    sources = [signals_of(item), *runs(item, units)]
     ratio = actuator.parameters.value("gear.ratio")
-    good = shown[0].good
+    good = sources[0].good
     panels = []
     for name, unit, read in (
         ("Difference of the two positions", "deg", lambda s: _gap(s, ratio)),
         ("Torque current", "A", lambda s: s.current),
         ("Motor speed", "rad/s", lambda s: s.speed),
     ):
-        lines = [np.asarray(read(signals))[good] for signals in shown]
-        panels.append(Panel(name, unit, lines[0], lines[1], lines[2] if len(lines) > 2 else None))
+        lines = [np.asarray(read(signals))[good] for signals in sources]
+        panels.append(
+            SignalPanel(name, unit, lines[0], lines[1], lines[2] if len(lines) > 2 else None)
+        )
     return Traces(item.name, item.log.time[good], panels)
 
 
-def _gap(signals: Signals, ratio: float) -> Floats:
+def _gap(signals: DriveSignals, ratio: float) -> Floats:
     """Motor less output [deg] about the middle of its ends: where the zeros are does not matter."""
     gap = np.degrees(signals.motor / ratio - signals.output)
     low, high = np.percentile(gap[signals.good], [1.0, 99.0])

@@ -23,8 +23,8 @@ _NAMES = {
     "unbalance@motor.rotor": "The rotor is out of balance by",
     "gain_drift@control.position": "The position gain has drifted by",
     "gain_drift@control.speed": "The speed gain has drifted by",
-    "gain@sensor.encoder": "The encoder's gain is off by",
-    "gain@sensor.current_a": "The gain of one current sensor is off by",
+    "gain@sensor.encoder": "The encoder's gain deviates by",
+    "gain@sensor.current_a": "The gain of one current sensor deviates by",
     "eccentricity_dynamic@motor": "The rotor turns out of centre (dynamic) by",
     "tooth_wear@gear": "Worn teeth have added a backlash of",
     "sag@supply": "The supply has lost",
@@ -36,13 +36,13 @@ _NAMES = {
     "lubrication_loss@screw": "The screw has lost lubricant:",
     "adapter_gap@adapter": "The adapter's gap has grown by",
 }
-UNEXPLAINED = "does not explain"  # of the finding that the named faults leave a rest
+UNEXPLAINED = "does not explain"  # of the finding that the named faults leave a residual
 
 
 def severity_text(value: float, unit: str) -> str:
-    """Return a severity as a person says it: angles in degrees, lengths in mm, shares in %."""
-    shown = "%" if unit == "1" else shown_unit(unit)
-    return f"{float(to_display(value, shown)):.3g} {shown}"
+    """Return a severity for display: angles in degrees, lengths in mm, shares in %."""
+    display_unit = "%" if unit == "1" else shown_unit(unit)
+    return f"{float(to_display(value, display_unit)):.3g} {display_unit}"
 
 
 def by_reason(items: Sequence[Mapping[str, str]]) -> list[tuple[str, str]]:
@@ -50,7 +50,7 @@ def by_reason(items: Sequence[Mapping[str, str]]) -> list[tuple[str, str]]:
     names: dict[str, list[str]] = {}
     for item in items:
         names.setdefault(item["reason"], []).append(f"{item['kind']}@{item['place']}")
-    return [(", ".join(own), reason) for reason, own in names.items()]
+    return [(", ".join(keys), reason) for reason, keys in names.items()]
 
 
 def sentence(result: Diagnosis) -> str:
@@ -58,7 +58,7 @@ def sentence(result: Diagnosis) -> str:
     left = any(UNEXPLAINED in text for text in result.findings)
     if result.status == "healthy" and left:
         return (
-            "No fault that is weighed stands out, but these are not logs of the healthy unit "
+            "No candidate stands out, but these are not logs of the healthy unit "
             f"either: {next(t for t in result.findings if UNEXPLAINED in t)}."
         )
     if result.status == "healthy":
@@ -70,22 +70,22 @@ def sentence(result: Diagnosis) -> str:
     if not result.best:
         worst = max(result.moved, key=lambda m: abs(m.score))
         return (
-            f"Something is wrong that none of the weighed faults explains (probability "
-            f"{result.p_best:.3g}); furthest off the healthy unit is {_spoken(worst.name)}, by "
+            f"Something is wrong that none of the candidates explains (probability "
+            f"{result.p_best:.3g}); furthest from the healthy unit is {_spoken(worst.name)}, by "
             f"{abs(worst.score):.2g} deviations."
         )
     causes = {f"{c.kind}@{c.place}": c for c in result.faults}
     parts = [_clause(key, causes[key]) for key in result.best if key in causes]
     parts[1:] = [text[0].lower() + text[1:] for text in parts[1:]]
-    rest = (
+    ending = (
         "nothing else is needed to explain the logs"
         if not left
         else "but that does not explain all of the logs"
     )
-    return f"{' and '.join(parts)}; {rest} (probability {result.p_best:.3g})."
+    return f"{' and '.join(parts)}; {ending} (probability {result.p_best:.3g})."
 
 
-def _said(key: str) -> str:
+def _opening(key: str) -> str:
     """How a cause begins a sentence; of one without words of its own, by kind and place."""
     kind, _, place = key.partition("@")
     part = place.replace(".", " ").replace("_", " ")
@@ -95,7 +95,7 @@ def _said(key: str) -> str:
 
 
 def _spoken(name: str) -> str:
-    from elevon.diagnose.bymodel.evidence import UNITS
+    from elevon.diagnose.bymodel.features import UNITS
 
     return f"{name} ({UNITS[name][1]})" if name in UNITS else name
 
@@ -104,10 +104,10 @@ def _clause(key: str, cause: Cause) -> str:
     low, high = (severity_text(v, cause.unit) for v in cause.interval)
     unit = low.partition(" ")[2]
     text = (
-        f"{_said(key)} {severity_text(cause.severity, cause.unit)} "
+        f"{_opening(key)} {severity_text(cause.severity, cause.unit)} "
         f"({low.removesuffix(f' {unit}')} to {high})"
     )
-    if not cause.equivalents:
+    if not cause.ambiguous_with:
         return text
-    names = ", ".join(f"{kind}@{place}" for kind, place in cause.equivalents)
-    return f"{text}, not to be told from {names}"
+    names = ", ".join(f"{kind}@{place}" for kind, place in cause.ambiguous_with)
+    return f"{text}, ambiguous with {names}"

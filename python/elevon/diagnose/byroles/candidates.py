@@ -1,4 +1,4 @@
-"""Every fault of an actuator's catalogue that its low model has, as a candidate."""
+"""Every fault of an actuator's catalogue that its reduced-order model has, as a candidate."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from elevon.diagnose.bymodel.candidates import Candidate
+from elevon.diagnose.bymodel.candidates import CandidateFault
 from elevon.errors import unknown
 
 if TYPE_CHECKING:
@@ -25,7 +25,9 @@ _RATE = 1e-5  # per hour, ASSUMED alike for all
 _ERROR = 0.1  # of a shift, ASSUMED
 
 
-def candidates_of(actuator: Actuator, texts: Sequence[str] | None = None) -> tuple[Candidate, ...]:
+def candidates_of(
+    actuator: Actuator, texts: Sequence[str] | None = None
+) -> tuple[CandidateFault, ...]:
     """Return the candidates, one for places that differ by a phase only.
 
     Parameters
@@ -38,7 +40,7 @@ def candidates_of(actuator: Actuator, texts: Sequence[str] | None = None) -> tup
     Raises
     ------
     UnknownNameError
-        None of that name can be told by the low model.
+        None of that name is in the reduced-order model.
     """
     from elevon.faults import catalogue
 
@@ -61,11 +63,11 @@ def candidates_of(actuator: Actuator, texts: Sequence[str] | None = None) -> tup
 
 
 def not_modelled_of(actuator: Actuator) -> list[dict[str, str]]:
-    """Return the faults that the low model has not, with its reason."""
+    """Return the faults that the reduced-order model has not, with its reason."""
     from elevon.faults import catalogue
 
     return [
-        {"kind": record.kind, "place": place, "reason": f"low model: {reason}"}
+        {"kind": record.kind, "place": place, "reason": f"reduced-order model: {reason}"}
         for record in catalogue(actuator.wiring)
         if "low" not in record.fidelities
         for place in record.places
@@ -74,7 +76,7 @@ def not_modelled_of(actuator: Actuator) -> list[dict[str, str]]:
 
 
 def counted_of(actuator: Actuator) -> frozenset[str]:
-    """Return the kinds whose severity is a whole number; one is weighed against none."""
+    """Return the kinds whose severity is a whole number; one is compared with none."""
     return frozenset(item["kind"] for item in _records(actuator.wiring) if item["whole"])
 
 
@@ -101,10 +103,10 @@ def _groups(places: Sequence[str]) -> list[tuple[str, ...]]:
     return [tuple(group) for group in groups.values()]
 
 
-def _candidate(record: FaultRecord, places: tuple[str, ...]) -> Candidate:
+def _candidate(record: FaultRecord, places: tuple[str, ...]) -> CandidateFault:
     unit = record.unit or "1"
     most = _MOST.get(unit, _SHARE)
     top = record.maximum if math.isfinite(record.maximum) else most
     high = 0.95 * top if unit == "1" and top <= 1.0 else min(top, most)
     low = max(record.minimum, -0.5 if unit == "1" else -most) if record.minimum < 0.0 else 0.0
-    return Candidate(record.kind, places[0], unit, low, high, _RATE, _ERROR, places[1:])
+    return CandidateFault(record.kind, places[0], unit, low, high, _RATE, _ERROR, places[1:])

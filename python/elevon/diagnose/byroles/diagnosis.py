@@ -11,34 +11,36 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.case import SUSPECT, Case
+from elevon.diagnose.bymodel.case import SUSPECT, LogCase
 from elevon.diagnose.bymodel.diagnosis import answer_of
-from elevon.diagnose.bymodel.evidence import Evidence
-from elevon.diagnose.byroles.alike import with_alike
-from elevon.diagnose.byroles.asked import same_test
+from elevon.diagnose.bymodel.features import FeatureVector
+from elevon.diagnose.byroles.ambiguous import with_ambiguous
 from elevon.diagnose.byroles.candidates import candidates_of, not_modelled_of
+from elevon.diagnose.byroles.channels import driven, numbers_of_log
 from elevon.diagnose.byroles.healthy import healthy_of
 from elevon.diagnose.byroles.log import RoleLog, role_log
 from elevon.diagnose.byroles.noise import noise_of
+from elevon.diagnose.byroles.role_test import same_test
 from elevon.diagnose.byroles.runs import RoleReplay, replay_by_roles
-from elevon.diagnose.byroles.shown import driven, numbers_of_log
 from elevon.errors import InputError
 from elevon.threads import one_blas_thread
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.diagnose.bymodel.answer import Diagnosis
-    from elevon.diagnose.bymodel.candidates import Candidate
+    from elevon.diagnose.bymodel.candidates import CandidateFault
     from elevon.recording import Recording
 
 __all__ = ["RoleCase", "diagnose_by_roles"]
 
-PAIRS = 16  # of faults at once that are weighed
-OWN_ERROR = 0.15  # of what a fault does to one number: the low model shows sizes, not waveforms
+PAIRS = 16  # of faults at once that are scored
+OWN_ERROR = (
+    0.15  # of what a fault does to one number: the reduced-order model shows sizes, not waveforms
+)
 
 
 @dataclass(frozen=True)
-class RoleCase(Case):
+class RoleCase(LogCase):
     """A log's numbers against a healthy unit's."""
 
     @property
@@ -52,7 +54,7 @@ class RoleCase(Case):
         return [there[name] for name in self.unit.names]
 
     def shift(self, key: str, severity: Floats) -> Floats:
-        """Return what severities, shape (m,), do to the evidence, shape (m, k)."""
+        """Return what severities, shape (m,), do to the features, shape (m, k)."""
         return np.asarray(self.model.shift(key, severity)[:, self._places], dtype=np.float64)
 
 
@@ -74,7 +76,8 @@ def diagnose_by_roles(
     actuator : Actuator
         The healthy unit.
     faults : sequence of str, optional
-        ``KIND@PLACE`` of the candidates; default: the catalogue, as far as the low model has it.
+        ``KIND@PLACE`` of the candidates; default: the catalogue, as far as the reduced-order model
+        has it.
     false_alarm : float
         Rate at which a healthy unit may be called faulty.
 
@@ -96,7 +99,7 @@ def diagnose_by_roles(
         for name, recording in logs
     ]
     result = answer_of(cases, candidates, false_alarm, findings, most=PAIRS)
-    result = with_alike(result, cases, candidates)
+    result = with_ambiguous(result, cases, candidates)
     blind = (*result.unobservable, *(not_modelled_of(actuator) if not faults else ()))
     return replace(result, unobservable=blind, seconds=clock.perf_counter() - begin)
 
@@ -104,7 +107,7 @@ def diagnose_by_roles(
 def _case(
     item: RoleLog,
     actuator: Actuator,
-    candidates: Sequence[Candidate],
+    candidates: Sequence[CandidateFault],
     baselines: Sequence[RoleLog],
     findings: list[str],
 ) -> RoleCase:
@@ -113,73 +116,76 @@ def _case(
     seconds = min(log.test.seconds for log in (item, *same))
     item, *same = [log.within(seconds) for log in (item, *same)]
     model = replay_by_roles(same[0] if same else item, actuator, candidates)
-    shown = _evidence(item, actuator)
-    proofs = [(b.name, _evidence(b, actuator)) for b in same]
+    features = _features(item, actuator)
+    references = [(b.name, _features(b, actuator)) for b in same]
     names = [
         name
         for name in model.healthy.names
-        if name in shown.names and all(name in e.names for _, e in proofs)
+        if name in features.names and all(name in e.names for _, e in references)
     ]
     findings += item.findings
     if driven(item, actuator):
         findings.append(
             f"{item.name}: the load drives the output part of the time and holds it at one end of "
-            "its backlash, where the low model has it carried by friction: backlash may be named "
-            "as something else, "
+            "its backlash, where the reduced-order model has it carried by friction: backlash may "
+            "be named as something else, "
             "and its limit does not hold"
         )
     if not same:
         findings.append(
-            f"{item.name}: no baseline of this test, asked and loaded alike and about as long at "
-            "least: how far a healthy unit stands off the model is assumed, small faults are not "
-            "seen"
+            f"{item.name}: no baseline of this test, commanded and loaded alike and about as long "
+            "at least: how far a healthy unit deviates from the model is assumed, small faults are "
+            "not seen"
         )
-    sound = _sound(model, names, proofs, findings)
-    return RoleCase(item.name, shown.only(names), healthy_of(model, names, sound), model)
+    sound = _sound(model, names, references, findings)
+    return RoleCase(item.name, features.only(names), healthy_of(model, names, sound), model)
 
 
-def _evidence(item: RoleLog, actuator: Actuator) -> Evidence:
+def _features(item: RoleLog, actuator: Actuator) -> FeatureVector:
     """Numbers of a log, and their deviation by its noise."""
-    shown = numbers_of_log(item, actuator, item.channels).values
-    std = noise_of(item, actuator, shown)
-    return Evidence(tuple(shown), np.array(list(shown.values())), std)
+    features = numbers_of_log(item, actuator, item.channels).values
+    std = noise_of(item, actuator, features)
+    return FeatureVector(tuple(features), np.array(list(features.values())), std)
 
 
 def _sound(
     model: RoleReplay,
     names: Sequence[str],
-    proofs: Sequence[tuple[str, Evidence]],
+    references: Sequence[tuple[str, FeatureVector]],
     findings: list[str],
-) -> list[Evidence]:
-    """Leave out baselines that stand off the model and off the other baselines alike."""
+) -> list[FeatureVector]:
+    """Leave out baselines that deviate from the model and from the other baselines alike."""
     sound = []
-    for k, (name, shown) in enumerate(proofs):
-        others = [e for j, (_, e) in enumerate(proofs) if j != k]
-        chance = _chance(model, names, shown, [])
+    for k, (name, features) in enumerate(references):
+        others = [e for j, (_, e) in enumerate(references) if j != k]
+        chance = _chance(model, names, features, [])
         if chance < SUSPECT and others:
-            chance = _chance(model, names, shown, others)
+            chance = _chance(model, names, features, others)
         if chance >= SUSPECT:
-            sound.append(shown)
+            sound.append(features)
             continue
         findings.append(
-            f"baseline {name} looks faulty itself, or the set is not calibrated to this unit "
-            f"(a healthy unit deviates as much in less than {100 * SUSPECT:g} % of logs); "
+            f"baseline {name} looks faulty itself, or the actuator file is not calibrated to this "
+            f"unit (a healthy unit deviates as much in less than {100 * SUSPECT:g} % of logs); "
             "it is left out"
         )
     return sound
 
 
 def _chance(
-    model: RoleReplay, names: Sequence[str], shown: Evidence, others: Sequence[Evidence]
+    model: RoleReplay,
+    names: Sequence[str],
+    features: FeatureVector,
+    others: Sequence[FeatureVector],
 ) -> float:
     """How often a healthy unit deviates as much, in all numbers together or in one of them."""
     from scipy.special import fdtrc, stdtr
 
     unit = healthy_of(model, names, others)
-    rest = shown.only(names).values - unit.mean
-    wide = unit.covariance + np.diag(shown.only(names).std ** 2)
-    square = float(rest @ np.linalg.solve(wide, rest)) / len(rest)
-    together = float(fdtrc(len(rest), unit.degrees, square))
-    most = float(np.max(np.abs(rest) / np.sqrt(np.diag(wide))))
-    alone = 1.0 - (1.0 - 2.0 * float(stdtr(unit.degrees, -most))) ** len(rest)
+    residual = features.only(names).values - unit.mean
+    wide = unit.covariance + np.diag(features.only(names).std ** 2)
+    square = float(residual @ np.linalg.solve(wide, residual)) / len(residual)
+    together = float(fdtrc(len(residual), unit.degrees, square))
+    most = float(np.max(np.abs(residual) / np.sqrt(np.diag(wide))))
+    alone = 1.0 - (1.0 - 2.0 * float(stdtr(unit.degrees, -most))) ** len(residual)
     return min(2.0 * min(together, alone), 1.0)

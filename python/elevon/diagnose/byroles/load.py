@@ -21,12 +21,12 @@ _ROUGH = 0.01  # of the load's size: what straight lines may miss
 _NOISE = 5.0  # deviations of its noise that a load's RMS must reach to be one
 _LOADED = 0.15  # of the load's size, RMS; a load that follows the motion differs with the unit
 _KNOTS = 9  # of the model's load over its stroke
-_TIED = 1e-3  # of a knot's neighbours, where no sample tells a knot
+_TIED = 1e-3  # of a knot's neighbours, where no sample determines a knot
 
 
 @dataclass(frozen=True)
 class OverStroke:
-    """A load that follows the position, as stands load an actuator that is asked by actions.
+    """A load that follows the position, as stands load an actuator that actions command.
 
     Attributes
     ----------
@@ -53,19 +53,19 @@ class OverStroke:
         value = actuator.parameters.value
         factor = value("load.factor")
         paths = [f"load.force_{k}" for k in range(_KNOTS)]
-        own = {p: factor * value(p) - f for p, f in zip(paths, self.forces, strict=True)}
-        return {"load.factor": 1.0, **own}
+        forces = {p: factor * value(p) - f for p, f in zip(paths, self.forces, strict=True)}
+        return {"load.factor": 1.0, **forces}
 
 
 def read_load(
-    actuator: Actuator, time: Floats, shown: Mapping[str, Floats]
+    actuator: Actuator, time: Floats, channels: Mapping[str, Floats]
 ) -> tuple[tuple[Floats, Floats] | None, OverStroke | None]:
     """Return a log's load over time as straight lines, and over the position where that is known.
 
     With a load over the position, the one over time is what that leaves. None where the log's
     load is its noise.
     """
-    load = shown["load"]
+    load = channels["load"]
     width = max(1, round(_SMOOTH / float(time[1] - time[0])))
     smooth = smoothed(load, width)
     if float(np.sqrt(np.mean(smooth**2))) < _NOISE * noise_deviation(load) / np.sqrt(width):
@@ -73,8 +73,8 @@ def read_load(
     size = float(np.abs(smooth).max())
     known = actuator.parameters
     over = None
-    if f"load.force_{_KNOTS - 1}" in known and "output_position" in shown:
-        position = shown["output_position"]
+    if f"load.force_{_KNOTS - 1}" in known and "output_position" in channels:
+        position = channels["output_position"]
         over = _over_stroke(position, load, known.value("lever.stroke"))
         smooth = smoothed(load - over.at(position), width)
     return lines(time, smooth, _ROUGH * size), over

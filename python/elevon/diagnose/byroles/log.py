@@ -1,4 +1,4 @@
-"""A log by its roles, from the instant at which something was first asked."""
+"""A log by its roles, from the instant at which something was first commanded."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.byroles.asked import RoleTest, action_numbers, test_of
+from elevon.diagnose.byroles.role_test import RoleTest, action_numbers, test_of
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 
 __all__ = ["RoleLog", "role_log"]
 
-#: What is put in, not shown.
+#: What is put in, not measured.
 _INPUTS = frozenset(["command", "load"])
 _LEAST = 200  # samples
 _MISSING = 0.2  # share of samples above which a channel is left out
-_FASTEST = 1000.0  # Hz; faster logs are averaged down: the low model shows no more
+_FASTEST = 1000.0  # Hz; faster logs are averaged down: the reduced-order model shows no more
 _LONGEST = 60.0  # s after the onset that are read
 BEFORE = 0.1  # s before the onset that are read
 _LADDER = 0.1  # of the log's length: the lengths after the onset that are read differ by it
-_REST = 1e-3  # of the command's range: below it nothing is asked
+_QUIET = 1e-3  # of the command's range: below it nothing is commanded
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class RoleLog:
     time : ndarray, shape (n,)
         s from the onset; the first is ``-BEFORE``.
     command : ndarray, shape (n,)
-        What was asked.
+        What was commanded.
     channels : mapping of str to ndarray, shape (n,)
         Role to values, SI; gaps bridged.
     units : mapping of str to str
@@ -48,7 +48,7 @@ class RoleLog:
     rate : float
         Hz.
     test : RoleTest
-        What was asked and what loaded it, for the model.
+        What was commanded and what loaded it, for the model.
     findings : tuple of str
         What the user should know.
     """
@@ -80,24 +80,24 @@ def role_log(recording: Recording, name: str, actuator: Actuator) -> RoleLog:
     Raises
     ------
     InputError
-        No command, nothing asked, nothing shown, too short, or nothing moves.
+        No command, nothing commanded, nothing recorded, too short, or nothing moves.
     """
-    time, shown, units, lost = _channels(recording, name)
-    command = shown["command"]
+    time, channels, units, lost = _channels(recording, name)
+    command = channels["command"]
     actions = action_numbers(actuator.wiring)
     first = _onset(time, command, sequence=bool(actions), name=name)
     rate = 1.0 / float(np.median(np.diff(time)))
     seconds = _length(float(time[-1] - time[0]), float(time[-1] - first))
     clock = np.arange(-round(BEFORE * rate), round(seconds * rate) + 1) / rate
     at = np.clip(clock + first, time[0], time[-1])
-    used = {r: _on(at, time, v, held=units[r] == "1") for r, v in shown.items()}
+    used = {r: _on(at, time, v, sample_hold=units[r] == "1") for r, v in channels.items()}
     _check_motion(used, name)
     test = test_of(recording, actuator, clock, used, seconds)
     seen = {r: v for r, v in used.items() if r not in _INPUTS or (r == "load" and test.own_load)}
-    said = [f"{name}: too many samples missing, left out: {', '.join(lost)}"] if lost else []
+    findings = [f"{name}: too many samples missing, left out: {', '.join(lost)}"] if lost else []
     if time[-1] - first > _LONGEST * (1.0 + _LADDER):
-        said.append(f"{name}: read up to {_LONGEST:g} s after the first command")
-    return RoleLog(name, clock, used["command"], seen, units, rate, test, tuple(said))
+        findings.append(f"{name}: read up to {_LONGEST:g} s after the first command")
+    return RoleLog(name, clock, used["command"], seen, units, rate, test, tuple(findings))
 
 
 def _channels(
@@ -113,7 +113,7 @@ def _channels(
     time = np.asarray(recording.role("command").clock.time, dtype=np.float64)
     if len(time) < _LEAST:
         raise InputError(f"{name}: {len(time)} samples; {_LEAST} are needed")
-    shown, units, lost = {}, {}, []
+    channels, units, lost = {}, {}, []
     for role in roles:
         channel = recording.role(role)
         values = np.array(channel.values, dtype=np.float64)
@@ -122,48 +122,48 @@ def _channels(
             lost.append(role)
             continue
         at = np.asarray(channel.time, dtype=np.float64)[good]
-        shown[role] = _on(time, at, values[good], held=channel.unit == "1")
+        channels[role] = _on(time, at, values[good], sample_hold=channel.unit == "1")
         units[role] = channel.unit
     if "command" in lost:
         raise InputError(f"{name}: too many samples of the command are missing")
-    return *_slower(time, shown, units), units, lost
+    return *_slower(time, channels, units), units, lost
 
 
-def _on(time: Floats, at: Floats, values: Floats, *, held: bool) -> Floats:
+def _on(time: Floats, at: Floats, values: Floats, *, sample_hold: bool) -> Floats:
     if len(at) == len(time) and at[0] == time[0] and at[-1] == time[-1]:
         return values
-    if held:
+    if sample_hold:
         return np.asarray(values[(np.searchsorted(at, time + 1e-9, side="right") - 1).clip(0)])
     return np.asarray(np.interp(time, at, values), dtype=np.float64)
 
 
 def _slower(
-    time: Floats, shown: Mapping[str, Floats], units: Mapping[str, str]
+    time: Floats, channels: Mapping[str, Floats], units: Mapping[str, str]
 ) -> tuple[Floats, dict[str, Floats]]:
     """A fast log, averaged down; states and the command are read as they stand."""
     step = max(1, int(1.0 / (float(np.median(np.diff(time))) * _FASTEST) + 1e-6))
     count = len(time) // step * step
     if step == 1:
-        return time, dict(shown)
+        return time, dict(channels)
     out = {
         role: v[:count:step]
         if role == "command" or units[role] == "1"
         else v[:count].reshape(-1, step).mean(axis=1)
-        for role, v in shown.items()
+        for role, v in channels.items()
     }
     return time[:count:step], out
 
 
 def _onset(time: Floats, command: Floats, *, sequence: bool, name: str) -> float:
-    """Instant at which something is first asked; of a motion that goes on, where it passes its mid.
+    """Instant at which something is first commanded; of a motion that goes on, its middle.
 
     Everything is counted from there, so logs may begin at any instant before it.
     """
     reach = float(np.ptp(command))
     if reach == 0.0:
-        raise InputError(f"{name}: nothing is asked: the command never changes")
+        raise InputError(f"{name}: nothing is commanded: the command never changes")
     off = np.abs(command - command[0])
-    away = int(np.flatnonzero(off > _REST * reach)[0])
+    away = int(np.flatnonzero(off > _QUIET * reach)[0])
     if sequence:
         return float(time[away])
     if away > 2:

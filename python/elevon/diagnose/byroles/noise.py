@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
+from elevon.diagnose.byroles.channels import numbers_of_log
 from elevon.diagnose.byroles.log import RoleLog
 from elevon.diagnose.byroles.series import noise_deviation
-from elevon.diagnose.byroles.shown import numbers_of_log
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -20,7 +20,7 @@ __all__ = ["noise_of"]
 _AGAIN = 8  # logs with noise added
 
 
-def noise_of(item: RoleLog, actuator: Actuator, shown: Mapping[str, float]) -> Floats:
+def noise_of(item: RoleLog, actuator: Actuator, numbers: Mapping[str, float]) -> Floats:
     """Return each number's deviation by the noise of the log's channels, shape (k,).
 
     What of a channel changes from sample to sample counts as its noise; ripple faster than the
@@ -41,5 +41,5 @@ def noise_of(item: RoleLog, actuator: Actuator, shown: Mapping[str, float]) -> F
             for role, values in item.channels.items()
         }
         noisy = numbers_of_log(item, actuator, channels).values
-        rows.append([noisy.get(name, value) for name, value in shown.items()])
+        rows.append([noisy.get(name, value) for name, value in numbers.items()])
     return np.asarray(np.std(rows, axis=0, ddof=1), dtype=np.float64)

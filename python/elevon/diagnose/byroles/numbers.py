@@ -28,7 +28,7 @@ _TEMPERATURES = ("temperature", "surface_temperature", "nut_temperature", "drive
 _FEATURES = ("level", "friction", "transmission", "orders", "bands")
 #: What levels here say already, and what a single moment decides.
 _LEFT_OUT = ("mean", "kurtosis", "peak", "moving")
-_TRAVEL = 0.02  # of the travel's RMS: size of a lost motion where there is none
+_TRAVEL = 0.02  # of the position's RMS: size of a lost motion where there is none
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,10 @@ class Kind:
     least : float
         The same, in the number's unit. ASSUMED.
     mismatch : float
-        How far a healthy unit may stand off the low model, over that least deviation. ASSUMED,
-        from logs of the high model: what compliance and current loops do, the low model lacks.
+        How far a healthy unit may deviate from the reduced-order model, over that least deviation.
+        ASSUMED,
+        from logs of the switching model: what compliance and current loops do, the reduced-order
+        model lacks.
     """
 
     share: float
@@ -103,12 +105,12 @@ class Numbers:
             self.units[name] = unit
 
 
-def floors(shown: Numbers, names: Sequence[str], values: Floats) -> Floats:
+def floors(numbers: Numbers, names: Sequence[str], values: Floats) -> Floats:
     """Least deviation of each number from day to day, shape (k,)."""
     out: list[float] = []
     for name, value in zip(names, values.tolist(), strict=True):
-        kind = KINDS[shown.kinds[name]]
-        size = max(abs(value), LEAST.get(shown.kinds[name], 0.0) * shown.sizes[name])
+        kind = KINDS[numbers.kinds[name]]
+        size = max(abs(value), LEAST.get(numbers.kinds[name], 0.0) * numbers.sizes[name])
         out.append(max(kind.share * size, kind.least, 1e-12))
     return np.array(out, dtype=np.float64)
 
@@ -118,7 +120,7 @@ class _Slow:
     """Means of a log over hundredths of a second."""
 
     time: Floats
-    shown: Mapping[str, Floats]
+    channels: Mapping[str, Floats]
     command: Floats
     speed: Floats | None
     forward: npt.NDArray[np.bool_]
@@ -156,7 +158,7 @@ def numbers_of(
     channels : mapping of str to ndarray, shape (n,)
         Role to values.
     command, time : ndarray, shape (n,)
-        What was asked; s from the onset.
+        What was commanded; s from the onset.
     units : mapping of str to str
         Role to unit.
     pole_pairs : float or None
@@ -191,20 +193,20 @@ def _slowed(
         return np.asarray(values[:count].reshape(-1, step).mean(axis=1), dtype=np.float64)
 
     clock = mean(time)
-    shown = {role: mean(v) for role, v in channels.items() if units[role] != "1"}
-    speed = shown.get("motor_speed", shown.get("output_speed"))
-    if speed is None and "output_position" in shown:
-        speed = np.gradient(shown["output_position"], clock)
+    channels = {role: mean(v) for role, v in channels.items() if units[role] != "1"}
+    speed = channels.get("motor_speed", channels.get("output_speed"))
+    if speed is None and "output_position" in channels:
+        speed = np.gradient(channels["output_position"], clock)
     if speed is None:
         none = np.zeros(len(clock), dtype=np.bool_)
-        return _Slow(clock, shown, mean(command), None, none, none)
+        return _Slow(clock, channels, mean(command), None, none, none)
     size = _MOVING * float(np.quantile(np.abs(speed), 0.95))
-    return _Slow(clock, shown, mean(command), speed, speed > size, speed < -size, size)
+    return _Slow(clock, channels, mean(command), speed, speed > size, speed < -size, size)
 
 
 def _levels(out: Numbers, role: str, slow: _Slow, unit: str) -> None:
     """Means by direction; of a motion one way, by its parts."""
-    values = slow.shown[role]
+    values = slow.channels[role]
     size = float(np.sqrt(np.mean(values**2)))
     out.add(f"{role}: rms", size, "level", size, unit)
     if slow.both:
@@ -242,11 +244,11 @@ def _fit(y: Floats, columns: Mapping[str, Floats]) -> dict[str, tuple[float, flo
     names: list[str] = []
     basis: list[Floats] = []
     for name, x in columns.items():
-        rest = x - sum((q * float(q @ x) for q in basis), np.zeros(len(x)))
-        size = float(np.linalg.norm(rest))
+        residual = x - sum((q * float(q @ x) for q in basis), np.zeros(len(x)))
+        size = float(np.linalg.norm(residual))
         if size > _APART * float(np.linalg.norm(x)):
             names.append(name)
-            basis.append(rest / size)
+            basis.append(residual / size)
     if not names or len(y) < 4 * (len(names) + 1):
         return {}
     design = np.column_stack([columns[n] for n in names])
@@ -258,7 +260,7 @@ def _fit(y: Floats, columns: Mapping[str, Floats]) -> dict[str, tuple[float, flo
 
 def _current(out: Numbers, slow: _Slow) -> None:
     """Current by direction, speed and acceleration."""
-    if "torque_current" not in slow.shown or slow.speed is None:
+    if "torque_current" not in slow.channels or slow.speed is None:
         return
     moving = slow.forward | slow.backward
     columns = {"dry": np.sign(slow.speed)} if slow.both else {}
@@ -268,7 +270,7 @@ def _current(out: Numbers, slow: _Slow) -> None:
         "speed": slow.speed,
     }
     for name, (value, size) in _fit(
-        slow.shown["torque_current"][moving], {n: x[moving] for n, x in columns.items()}
+        slow.channels["torque_current"][moving], {n: x[moving] for n, x in columns.items()}
     ).items():
         kind = "offset" if name == "constant" else "slope"
         out.add(f"torque_current: by {name}", value, kind, size, "A")
@@ -276,50 +278,50 @@ def _current(out: Numbers, slow: _Slow) -> None:
 
 def _voltage(out: Numbers, slow: _Slow) -> None:
     """Voltage by speed and current; the link's voltage by the current that is drawn."""
-    shown = slow.shown
+    channels = slow.channels
     moving = slow.forward | slow.backward
-    if slow.speed is not None and {"torque_voltage", "torque_current"} <= shown.keys():
-        columns = {"speed": slow.speed[moving], "current": shown["torque_current"][moving]}
-        for name, (value, size) in _fit(shown["torque_voltage"][moving], columns).items():
+    if slow.speed is not None and {"torque_voltage", "torque_current"} <= channels.keys():
+        columns = {"speed": slow.speed[moving], "current": channels["torque_current"][moving]}
+        for name, (value, size) in _fit(channels["torque_voltage"][moving], columns).items():
             out.add(f"torque_voltage: by {name}", value, "slope", 0.2 * size, "V")
-    if {"supply_voltage", "supply_current"} <= shown.keys():
-        columns = {"constant": np.ones(len(slow.time)), "current": shown["supply_current"]}
-        for name, (value, size) in _fit(shown["supply_voltage"], columns).items():
+    if {"supply_voltage", "supply_current"} <= channels.keys():
+        columns = {"constant": np.ones(len(slow.time)), "current": channels["supply_current"]}
+        for name, (value, size) in _fit(channels["supply_voltage"], columns).items():
             out.add(f"supply_voltage: by {name}", value, "gain", 0.02 * size, "V")
 
 
 def _loops(out: Numbers, channels: Mapping[str, Floats], slow: _Slow) -> None:
     """Gain of the position loop (set point by error) and of the speed loop (steps of both)."""
-    shown = slow.shown
-    if {"speed_ref", "output_position"} <= shown.keys() and np.ptp(shown["speed_ref"]) > 0.0:
-        ref = shown["speed_ref"]
+    channels = slow.channels
+    if {"speed_ref", "output_position"} <= channels.keys() and np.ptp(channels["speed_ref"]) > 0.0:
+        ref = channels["speed_ref"]
         free = np.abs(ref) < _FULL * np.abs(ref).max()
-        error = slow.command - shown["output_position"]
+        error = slow.command - channels["output_position"]
         # The error by the set point: noise of the position is in the error.
         columns = {"set point": ref[free], "constant": np.ones(int(free.sum()))}
         for name, (value, size) in _fit(error[free], columns).items():
             kind = "gain" if name == "set point" else "offset"
             out.add(f"position error: by {name}", value, kind, size, "s")
-    asked = "current_ref" if "current_ref" in channels else "torque_current"
-    if {"speed_ref", "motor_speed", asked} <= channels.keys():
+    target = "current_ref" if "current_ref" in channels else "torque_current"
+    if {"speed_ref", "motor_speed", target} <= channels.keys():
         error = channels["speed_ref"] - channels["motor_speed"]
         columns = {"step": np.diff(error), "error": error[1:]}
-        fitted = _fit(np.diff(channels[asked]), columns)
+        fitted = _fit(np.diff(channels[target]), columns)
         if "step" in fitted:
             value, size = fitted["step"]
-            out.add(f"{asked}: by step of speed error", value, "ripple", 0.2 * size, "A s/rad")
+            out.add(f"{target}: by step of speed error", value, "ripple", 0.2 * size, "A s/rad")
 
 
 def _ratios(out: Numbers, slow: _Slow) -> None:
     """Speed shown over the change of the position shown: gains of sensors."""
-    shown = slow.shown
+    channels = slow.channels
     pairs = (("motor_speed", "motor_position"), ("motor_position", "output_position"))
     moving = slow.forward | slow.backward
     for one, other in pairs:
-        if one not in shown or other not in shown or not moving.any():
+        if one not in channels or other not in channels or not moving.any():
             continue
-        y = shown[one] if one == "motor_speed" else np.gradient(shown[one], slow.time)
-        x = np.gradient(shown[other], slow.time)
+        y = channels[one] if one == "motor_speed" else np.gradient(channels[one], slow.time)
+        x = np.gradient(channels[other], slow.time)
         if np.ptp(x[moving]) > 0.0:
             value, size = _fit(y[moving], {"rate": x[moving]}).get("rate", (np.nan, 0.0))
             out.add(f"{one}: by {other}", value, "gain", 0.1 * size)
@@ -367,7 +369,7 @@ def _features(
 
 
 def _channel_size(name: str, family: str, served: Mapping[str, Floats]) -> float:
-    """RMS of the channel that a feature is read from; of a lost motion a part of the travel."""
+    """RMS of the channel that a feature is read from; of a lost motion a part of the amplitude."""
     main = {"friction": "torque_current", "transmission": "output_position"}.get(family)
     main = main or next((role for role in served if name.startswith(role)), None)
     if main is None or name in ("friction_loop_area", "transmission_slope"):

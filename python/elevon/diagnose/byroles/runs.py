@@ -1,4 +1,4 @@
-"""Runs of the low model through a log's test: healthy, with each fault, on other days."""
+"""Runs of the reduced-order model through a log's test: healthy, with each fault, on other days."""
 
 from __future__ import annotations
 
@@ -10,14 +10,20 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.bymodel.answer import SEEN
-from elevon.diagnose.bymodel.candidates import Candidate
-from elevon.diagnose.bymodel.evidence import Evidence
+from elevon.diagnose.bymodel.candidates import CandidateFault
+from elevon.diagnose.bymodel.features import FeatureVector
 from elevon.diagnose.bymodel.replay import Replay
-from elevon.diagnose.byroles.asked import RoleTest, action_numbers, same_test
 from elevon.diagnose.byroles.candidates import counted_of, switched_of
+from elevon.diagnose.byroles.channels import (
+    RoleUnit,
+    as_on_stand,
+    deflection_under,
+    numbers_by,
+    numbers_of_log,
+)
 from elevon.diagnose.byroles.log import RoleLog
 from elevon.diagnose.byroles.numbers import Numbers, floors
-from elevon.diagnose.byroles.shown import Unit, as_on_stand, give_under, numbers_of_log, shown_by
+from elevon.diagnose.byroles.role_test import RoleTest, action_numbers, same_test
 from elevon.diagnose.byroles.spread import daily, factors_of
 
 if TYPE_CHECKING:
@@ -42,30 +48,30 @@ class RoleReplay(Replay):
 
     Attributes
     ----------
-    shown : Numbers
+    numbers : Numbers
         Of the healthy unit, with their kinds and sizes.
     spread : ndarray, shape (k, k)
         Covariance of the numbers from day to day.
     switched : frozenset of str
         Kinds of faults that are there or not.
-    give : ndarray, shape (k,)
-        What the stated give of the output under the log's load does to the numbers.
+    compliance : ndarray, shape (k,)
+        What the output's stated compliance under the log's load does to the numbers.
     """
 
     def __init__(
-        self, shown: Numbers, severities: Mapping[str, Floats], shifts: Mapping[str, Floats],
-        *, draws: Floats, spread: Floats, switched: frozenset[str], give: Floats,
+        self, numbers: Numbers, severities: Mapping[str, Floats], shifts: Mapping[str, Floats],
+        *, draws: Floats, spread: Floats, switched: frozenset[str], compliance: Floats,
     ) -> None:  # fmt: skip
-        super().__init__(_evidence(shown), severities, shifts, draws)
-        self.shown = shown
+        super().__init__(_features(numbers), severities, shifts, draws)
+        self.numbers = numbers
         self.spread = spread
         self.switched = switched
-        self.give = give
+        self.compliance = compliance
 
     def shift(self, key: str, severity: Floats) -> Floats:
-        """Return what severities of shape (m,) do to the evidence, shape (m, k)."""
+        """Return what severities of shape (m,) do to the features, shape (m, k)."""
         at, table = self.severities[key], self.shifts[key]
-        if key.partition("@")[0] in self.switched:  # as `Candidate.switched`
+        if key.partition("@")[0] in self.switched:  # as `CandidateFault.switched`
             severity = (severity >= _ACTS).astype(np.float64)
         low = np.clip(np.searchsorted(at, severity, side="right") - 1, 0, len(at) - 2)
         part = np.clip((severity - at[low]) / (at[low + 1] - at[low]), 0.0, 1.0)[:, None]
@@ -77,7 +83,7 @@ class _Remembered:
     """A replay and what it served."""
 
     actuator: str
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[CandidateFault, ...]
     roles: tuple[str, ...]
     clock: tuple[int, int]
     test: RoleTest
@@ -88,13 +94,13 @@ _RECENT: list[_Remembered] = []
 
 
 def replay_by_roles(
-    item: RoleLog, actuator: Actuator, candidates: Sequence[Candidate]
+    item: RoleLog, actuator: Actuator, candidates: Sequence[CandidateFault]
 ) -> RoleReplay:
     """Run the test: healthy, each candidate at several severities, and the spread.
 
     Logs of one test share the runs of the first of them.
     """
-    own = _Remembered(
+    entry = _Remembered(
         actuator.hash,
         tuple(candidates),
         tuple(item.channels),
@@ -104,29 +110,29 @@ def replay_by_roles(
     )
     for past in _RECENT:
         alike = all(
-            getattr(past, name) == getattr(own, name)
+            getattr(past, name) == getattr(entry, name)
             for name in ("actuator", "candidates", "roles", "clock")
         )
         if alike and past.test.settings == item.test.settings and same_test(past.test, item.test):
             return past.made
-    gives = _gives(item, actuator)
-    model = _replayed(item, actuator, candidates, gives=gives)
-    made = _refined(model, item, actuator, candidates, gives=gives)
-    _RECENT.append(replace(own, made=made))
+    compliant = _deflects(item, actuator)
+    model = _replayed(item, actuator, candidates, compliant=compliant)
+    made = _refined(model, item, actuator, candidates, compliant=compliant)
+    _RECENT.append(replace(entry, made=made))
     del _RECENT[:-_REMEMBERED]
     return made
 
 
-def _gives(item: RoleLog, actuator: Actuator) -> bool:
-    """Whether a log is nearer to a model that gives: what faults do to a number depends on it."""
-    if give_under(item, as_on_stand(actuator, item.test)) is None:
+def _deflects(item: RoleLog, actuator: Actuator) -> bool:
+    """Whether a log is nearer to a compliant model: what faults do to a number depends on it."""
+    if deflection_under(item, as_on_stand(actuator, item.test)) is None:
         return True
-    own = numbers_of_log(item, actuator, item.channels).values
-    units = [Unit({}), Unit({}, gives=False)]
-    both = list(shown_by(item, actuator, units))
-    names = [name for name in both[0].values if name in own]
+    logged = numbers_of_log(item, actuator, item.channels).values
+    units = [RoleUnit({}), RoleUnit({}, compliant=False)]
+    both = list(numbers_by(item, actuator, units))
+    names = [name for name in both[0].values if name in logged]
     values = np.array(
-        [[n.get(name, np.nan) for name in names] for n in (own, *(b.values for b in both))]
+        [[n.get(name, np.nan) for name in names] for n in (logged, *(b.values for b in both))]
     )
     least = floors(both[0], names, values[0])
     soft, rigid = (float(np.nansum(((values[0] - v) / least) ** 2)) for v in values[1:])
@@ -134,20 +140,22 @@ def _gives(item: RoleLog, actuator: Actuator) -> bool:
 
 
 def _replayed(
-    item: RoleLog, actuator: Actuator, candidates: Sequence[Candidate], *, gives: bool
+    item: RoleLog, actuator: Actuator, candidates: Sequence[CandidateFault], *, compliant: bool
 ) -> RoleReplay:
     severities = {c.key: _severities(c, actuator) for c in candidates}
-    units = [Unit({}), Unit({})]
+    units = [RoleUnit({}), RoleUnit({})]
     for c in candidates:
-        units += [Unit({}, (c.text(float(s)),)) for s in severities[c.key] if s != 0.0]
+        units += [RoleUnit({}, (c.text(float(s)),)) for s in severities[c.key] if s != 0.0]
     ready = as_on_stand(actuator, item.test)
     steps = _steps_of_days(len(factors_of(ready)))
     units += _days(ready, steps)
-    units = [replace(u, gives=gives if k != 1 else not gives) for k, u in enumerate(units)]
-    shown = list(shown_by(item, actuator, units))
-    names = tuple(shown[0].values)
-    rows = np.array([[s.values.get(n, np.nan) for n in names] for s in shown])
-    most = _MOST * floors(shown[0], names, rows[0])
+    units = [
+        replace(u, compliant=compliant if k != 1 else not compliant) for k, u in enumerate(units)
+    ]
+    results = list(numbers_by(item, actuator, units))
+    names = tuple(results[0].values)
+    rows = np.array([[s.values.get(n, np.nan) for n in names] for s in results])
+    most = _MOST * floors(results[0], names, rows[0])
     shifts, at = {}, 2
     for c in candidates:
         zero = severities[c.key] == 0.0
@@ -158,13 +166,13 @@ def _replayed(
         at += count
     draws = np.where(np.isfinite(rows[at:]), rows[at:], rows[0])
     return RoleReplay(
-        shown[0],
+        results[0],
         severities,
         shifts,
         draws=draws,
         spread=spread_of(draws, steps),
         switched=switched_of(actuator),
-        give=np.nan_to_num(rows[0] - rows[1]),
+        compliance=np.nan_to_num(rows[0] - rows[1]),
     )
 
 
@@ -179,12 +187,12 @@ def _steps_of_days(factors: int) -> Floats:
     return np.column_stack([wide, rng.standard_normal(_DRAWS), phase])
 
 
-def _days(ready: Actuator, steps: Floats) -> list[Unit]:
+def _days(ready: Actuator, steps: Floats) -> list[RoleUnit]:
     """Healthy units of other days; an action is seen at a sample, so it has no other lateness."""
     factors = factors_of(ready)
     late = 0.0 if action_numbers(ready.wiring) else _LATE
     return [
-        Unit(
+        RoleUnit(
             daily(ready, dict(zip(factors, row, strict=False))),
             late=late * row[-2],
             phase=row[-1] / np.sqrt(12.0),
@@ -198,36 +206,36 @@ def _refined(
     model: RoleReplay,
     item: RoleLog,
     actuator: Actuator,
-    candidates: Sequence[Candidate],
+    candidates: Sequence[CandidateFault],
     *,
-    gives: bool,
+    compliant: bool,
 ) -> RoleReplay:
     """Run one more severity of each fault that is seen where straight lines say little."""
     names, values = model.healthy.names, model.healthy.values
-    least = floors(model.shown, names, values)
+    least = floors(model.numbers, names, values)
     # With one baseline, as which most logs are judged.
     root = np.linalg.inv(np.linalg.cholesky(2.0 * (model.spread + np.diag(least**2))))
     more = [(c, s) for c in candidates for s in _between(model, c, root)]
-    units = [Unit({}, (c.text(s),), gives=gives) for c, s in more]
+    units = [RoleUnit({}, (c.text(s),), compliant=compliant) for c, s in more]
     severities, shifts = dict(model.severities), dict(model.shifts)
-    for (c, severity), numbers in zip(more, shown_by(item, actuator, units), strict=True):
+    for (c, severity), numbers in zip(more, numbers_by(item, actuator, units), strict=True):
         row = np.array([numbers.values.get(name, np.nan) for name in names])
         row = np.clip(np.nan_to_num(row - values), -_MOST * least, _MOST * least)
         at = int(np.searchsorted(severities[c.key], severity))
         severities[c.key] = np.insert(severities[c.key], at, severity)
         shifts[c.key] = np.insert(shifts[c.key], at, row, axis=0)
     return RoleReplay(
-        model.shown,
+        model.numbers,
         severities,
         shifts,
         draws=model.draws,
         spread=model.spread,
         switched=model.switched,
-        give=model.give,
+        compliance=model.compliance,
     )
 
 
-def _between(model: RoleReplay, c: Candidate, root: Floats) -> list[float]:
+def _between(model: RoleReplay, c: CandidateFault, root: Floats) -> list[float]:
     """A severity between those that were run: where it is first seen, or where it sets in."""
     if len(model.severities[c.key]) == 2:  # there or not, or counted
         return []
@@ -253,13 +261,13 @@ def spread_of(draws: Floats, steps: Floats) -> Floats:
     """
     design = np.column_stack([np.ones(len(steps)), steps])
     slopes = np.linalg.lstsq(design, draws, rcond=None)[0]
-    rest = draws - design @ slopes
+    residual = draws - design @ slopes
     free = max(len(steps) - design.shape[1], 1)
-    own = np.sum(rest**2, axis=0) / free
-    return np.asarray(slopes[1:].T @ slopes[1:] + np.diag(own), dtype=np.float64)
+    scatter = np.sum(residual**2, axis=0) / free
+    return np.asarray(slopes[1:].T @ slopes[1:] + np.diag(scatter), dtype=np.float64)
 
 
-def _severities(c: Candidate, actuator: Actuator) -> Floats:
+def _severities(c: CandidateFault, actuator: Actuator) -> Floats:
     """Those that are run, from the least to the greatest; what is counted or there or not: one."""
     if c.kind in counted_of(actuator) | switched_of(actuator):
         return np.array([0.0, 1.0])
@@ -268,6 +276,6 @@ def _severities(c: Candidate, actuator: Actuator) -> Floats:
     return np.concatenate((low, c.high * steps))
 
 
-def _evidence(shown: Numbers) -> Evidence:
-    values = np.array(list(shown.values.values()))
-    return Evidence(tuple(shown.values), values, np.zeros(len(values)))
+def _features(numbers: Numbers) -> FeatureVector:
+    values = np.array(list(numbers.values.values()))
+    return FeatureVector(tuple(numbers.values), values, np.zeros(len(values)))

@@ -53,7 +53,7 @@ def factors_of(actuator: Actuator) -> tuple[str, ...]:
 
 
 def daily(actuator: Actuator, steps: Mapping[str, float]) -> dict[str, float]:
-    """Return what a healthy unit has when its factors stand off by so many deviations, by path."""
+    """Return what a healthy unit has when its factors deviate by so much, by path."""
     values = {}
     for path in actuator.parameters:
         for name in _named(path):

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
+from elevon.diagnose.byroles.channels import RoleUnit, channels_by
 from elevon.diagnose.byroles.log import RoleLog, role_log
-from elevon.diagnose.byroles.shown import Unit, channels_by
-from elevon.diagnose.pictures import Panel, Traces, named_faults
+from elevon.diagnose.pictures import SignalPanel, Traces, named_faults
 from elevon.units import to_display
 
 if TYPE_CHECKING:
@@ -42,18 +42,20 @@ def traces_by_roles(
         The answer.
     """
     texts = tuple(f"{key}={value!r}" for key, value in named_faults(result).items())
-    units = [Unit({})] + ([Unit({}, texts)] if texts else [])
+    units = [RoleUnit({})] + ([RoleUnit({}, texts)] if texts else [])
     items = [role_log(recording, name, actuator) for name, recording in logs]
     return [_traces(item, actuator, units) for item in items]
 
 
-def _traces(item: RoleLog, actuator: Actuator, units: Sequence[Unit]) -> Traces:
-    shown: list[Mapping[str, Floats]] = [item.channels, *channels_by(item, actuator, units)]
-    roles = [role for role in _DRAWN if all(role in channels for channels in shown)]
+def _traces(item: RoleLog, actuator: Actuator, units: Sequence[RoleUnit]) -> Traces:
+    sources: list[Mapping[str, Floats]] = [item.channels, *channels_by(item, actuator, units)]
+    roles = [role for role in _DRAWN if all(role in channels for channels in sources)]
     panels = []
     for role in roles[:_MOST]:
         unit = "mm" if item.units[role] == "m" else item.units[role]
-        lines = [np.asarray(to_display(channels[role], unit)) for channels in shown]
+        lines = [np.asarray(to_display(channels[role], unit)) for channels in sources]
         name = role.replace("_", " ").capitalize()
-        panels.append(Panel(name, unit, lines[0], lines[1], lines[2] if len(lines) > 2 else None))
+        panels.append(
+            SignalPanel(name, unit, lines[0], lines[1], lines[2] if len(lines) > 2 else None)
+        )
     return Traces(item.name, item.time, panels)

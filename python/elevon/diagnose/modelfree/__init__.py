@@ -4,7 +4,7 @@ from elevon.diagnose.modelfree.baseline import HealthyBaseline
 from elevon.diagnose.modelfree.discriminant import Discriminant
 from elevon.diagnose.modelfree.features import FULL, TRANSFER, FeatureTable, feature_table
 from elevon.diagnose.modelfree.model import ModelFree
-from elevon.diagnose.modelfree.strokes import Stroke, find_strokes
+from elevon.diagnose.modelfree.strokes import StrokeSpan, find_strokes
 
 __all__ = [
     "FULL",
@@ -13,7 +13,7 @@ __all__ = [
     "FeatureTable",
     "HealthyBaseline",
     "ModelFree",
-    "Stroke",
+    "StrokeSpan",
     "feature_table",
     "find_strokes",
 ]

@@ -126,12 +126,12 @@ def _checked(
 def _fit(x: Floats, y: npt.NDArray[np.str_], shrinkage: float, temperature: float) -> Discriminant:
     classes = np.unique(y)
     means = np.array([x[y == name].mean(axis=0) for name in classes])
-    rest = x - means[np.searchsorted(classes, y)]
+    residual = x - means[np.searchsorted(classes, y)]
     freedom = max(1, len(x) - len(classes))
-    scale = np.sqrt((rest**2).sum(axis=0) / freedom)
+    scale = np.sqrt((residual**2).sum(axis=0) / freedom)
     # A feature that does not vary (one recording a class) must not divide by zero.
     scale = np.where(scale > 0.0, scale, np.maximum(np.abs(means).max(axis=0), 1.0))
-    unit = rest / scale
+    unit = residual / scale
     scatter = (1.0 - shrinkage) * unit.T @ unit / freedom + shrinkage * np.eye(x.shape[1])
     return Discriminant(
         tuple(str(name) for name in classes), means / scale, scale, np.linalg.inv(scatter),

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.modelfree.strokes import LEAST_HOLD, Stroke, find_strokes
+from elevon.diagnose.modelfree.strokes import LEAST_HOLD, StrokeSpan, find_strokes
 from elevon.errors import FormatError, InputError, unknown
 from elevon.recording import Recording
 
@@ -181,7 +181,7 @@ def _finite(error: Floats, current: Floats, start: int, end: int) -> bool:
 
 
 def _hold(
-    strokes: list[Stroke], error: Floats, current: Floats, period: float, recording: Recording
+    strokes: list[StrokeSpan], error: Floats, current: Floats, period: float, recording: Recording
 ) -> dict[str, float]:
     """Standstill between strokes: its current, the noise of both sensors, how they go together."""
     skip, keep = round(_SETTLED / period), round(_BEFORE_START / period)
@@ -216,7 +216,7 @@ def _noise(values: Floats, parts: list[slice]) -> float:
 
 
 def _one_way(
-    strokes: list[Stroke], error: Floats, current: Floats, period: float, hold: dict[str, float]
+    strokes: list[StrokeSpan], error: Floats, current: Floats, period: float, hold: dict[str, float]
 ) -> dict[str, float]:
     begin, end = round(_STEADY / period), round(_BEFORE_STOP / period)
     steady = [slice(stroke.start + begin, stroke.stop - end) for stroke in strokes]
@@ -266,8 +266,8 @@ def _band_powers(values: Floats, parts: list[slice], period: float) -> dict[str,
 def _spectrum(values: Floats, period: float) -> tuple[Floats, Floats]:
     count = len(values)
     base = np.arange(count) - 0.5 * (count - 1)
-    rest = values - np.polyval(np.polyfit(base, values, 2), base)
-    power: Floats = np.abs(np.fft.rfft(rest * np.hanning(count))) ** 2 / count
+    residual = values - np.polyval(np.polyfit(base, values, 2), base)
+    power: Floats = np.abs(np.fft.rfft(residual * np.hanning(count))) ** 2 / count
     return np.asarray(np.fft.rfftfreq(count, period), np.float64), power
 
 

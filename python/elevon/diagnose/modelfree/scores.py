@@ -12,15 +12,15 @@ __all__ = ["accuracy", "confusion", "macro_f1", "resamples", "share_interval"]
 Codes = npt.NDArray[np.int64]
 
 
-def macro_f1(truth: npt.ArrayLike, said: npt.ArrayLike) -> float:
+def macro_f1(truth: npt.ArrayLike, predicted: npt.ArrayLike) -> float:
     """Return the mean of F1 = 2 TP / (2 TP + FP + FN) over the classes that `truth` holds.
 
     Parameters
     ----------
-    truth, said : array of int or str
+    truth, predicted : array of int or str
         Of each recording.
     """
-    right, answer = np.asarray(truth), np.asarray(said)
+    right, answer = np.asarray(truth), np.asarray(predicted)
     scores = []
     for name in np.unique(right):
         of, called = right == name, answer == name
@@ -28,14 +28,16 @@ def macro_f1(truth: npt.ArrayLike, said: npt.ArrayLike) -> float:
     return float(np.mean(scores))
 
 
-def accuracy(truth: npt.ArrayLike, said: npt.ArrayLike) -> float:
+def accuracy(truth: npt.ArrayLike, predicted: npt.ArrayLike) -> float:
     """Return the share of recordings that are right."""
-    return float(np.mean(np.asarray(truth) == np.asarray(said)))
+    return float(np.mean(np.asarray(truth) == np.asarray(predicted)))
 
 
-def confusion(truth: npt.ArrayLike, said: npt.ArrayLike, classes: Sequence[str]) -> list[list[int]]:
+def confusion(
+    truth: npt.ArrayLike, predicted: npt.ArrayLike, classes: Sequence[str]
+) -> list[list[int]]:
     """Count recordings: a row for each true class, a column for each answer."""
-    right, answer = np.asarray(truth), np.asarray(said)
+    right, answer = np.asarray(truth), np.asarray(predicted)
     return [[int(((right == a) & (answer == b)).sum()) for b in classes] for a in classes]
 
 

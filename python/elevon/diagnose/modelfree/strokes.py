@@ -11,7 +11,7 @@ import numpy.typing as npt
 from elevon.errors import FormatError
 from elevon.recording import Recording
 
-__all__ = ["LEAST_HOLD", "LEAST_STROKE", "Stroke", "find_strokes"]
+__all__ = ["LEAST_HOLD", "LEAST_STROKE", "StrokeSpan", "find_strokes"]
 
 LEAST_STROKE = 2.6
 """Shortest stroke that is used [s]: 1.6 s until the start has passed, then 1 s of steady motion."""
@@ -20,7 +20,7 @@ LEAST_HOLD = 2.4
 
 
 @dataclass(frozen=True, slots=True)
-class Stroke:
+class StrokeSpan:
     """One motion in one direction.
 
     Attributes
@@ -39,7 +39,7 @@ class Stroke:
     direction: int
 
 
-def find_strokes(recording: Recording) -> list[Stroke]:
+def find_strokes(recording: Recording) -> list[StrokeSpan]:
     """Find the strokes in which the reference moves at one speed for long enough.
 
     Parameters
@@ -75,7 +75,7 @@ def find_strokes(recording: Recording) -> list[Stroke]:
     return strokes
 
 
-def _in_segment(reference: npt.NDArray[np.float64], first: int, last: int) -> list[Stroke]:
+def _in_segment(reference: npt.NDArray[np.float64], first: int, last: int) -> list[StrokeSpan]:
     values = reference[first:last]
     if len(values) < 3 or not np.isfinite(values).all():
         return []
@@ -90,7 +90,7 @@ def _in_segment(reference: npt.NDArray[np.float64], first: int, last: int) -> li
     bounds = [0, *changes.tolist(), len(signs)]
     parts = list(pairwise(bounds))
     return [
-        Stroke(first + a, first + b, first + _rest_end(signs, parts, index), int(signs[a]))
+        StrokeSpan(first + a, first + b, first + _rest_end(signs, parts, index), int(signs[a]))
         for index, (a, b) in enumerate(parts)
         if signs[a] != 0
     ]

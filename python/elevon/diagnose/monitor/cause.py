@@ -8,11 +8,11 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.bymodel.answer import SEEN, Cause
-from elevon.diagnose.bymodel.candidates import Candidate
+from elevon.diagnose.bymodel.candidates import CandidateFault
+from elevon.diagnose.bymodel.likelihood import prior_density
 from elevon.diagnose.bymodel.posterior import quantiles
-from elevon.diagnose.bymodel.weigh import prior_density
 from elevon.diagnose.monitor.filter import Change
-from elevon.diagnose.monitor.reference import Reference
+from elevon.diagnose.monitor.reference import WindowReference
 
 __all__ = ["likely_causes"]
 
@@ -23,7 +23,7 @@ _DEEP = 14.0  # of the log likelihood below its top that a grid covers
 
 
 def likely_causes(
-    change: Change, reference: Reference, candidates: Sequence[Candidate]
+    change: Change, reference: WindowReference, candidates: Sequence[CandidateFault]
 ) -> tuple[Cause, ...]:
     """Return single faults with their probability, given that one of them has begun."""
     seen = [c for c in candidates if _seen(change, reference, c)] or list(candidates)
@@ -35,24 +35,24 @@ def likely_causes(
     ]
     total = sum(float(m.sum()) for m in mass)
     out = []
-    for c, (grid, _), own in zip(seen, lines, mass, strict=True):
-        probability = float(own.sum()) / total
+    for c, (grid, _), weights in zip(seen, lines, mass, strict=True):
+        probability = float(weights.sum()) / total
         if probability < LISTED:
             continue
-        low, middle, high = quantiles(grid, own / own.sum(), (0.05, 0.5, 0.95))
+        low, middle, high = quantiles(grid, weights / weights.sum(), (0.05, 0.5, 0.95))
         alike = tuple((c.kind, place) for place in c.same)
         out.append(Cause(c.kind, c.place, c.unit, probability, middle, (low, high), alike))
     return tuple(sorted(out, key=lambda cause: -cause.probability))
 
 
-def _seen(change: Change, reference: Reference, c: Candidate) -> bool:
+def _seen(change: Change, reference: WindowReference, c: CandidateFault) -> bool:
     """Whether some severity would show in the windows since the change."""
     shift = reference.shift(c.key, np.array([c.low, c.high]))
     size = np.einsum("mk,kl,ml->m", shift, change.information, shift)
     return bool(size.max() > SEEN**2)
 
 
-def _line(change: Change, reference: Reference, c: Candidate) -> tuple[Floats, Floats]:
+def _line(change: Change, reference: WindowReference, c: CandidateFault) -> tuple[Floats, Floats]:
     """Severities, dense where they are likely, and their log likelihood ratio."""
     low, high = c.low, c.high
     for _ in range(_ZOOMS):
@@ -65,7 +65,9 @@ def _line(change: Change, reference: Reference, c: Candidate) -> tuple[Floats, F
     return grid, log
 
 
-def _log_likelihood(change: Change, reference: Reference, c: Candidate, grid: Floats) -> Floats:
+def _log_likelihood(
+    change: Change, reference: WindowReference, c: CandidateFault, grid: Floats
+) -> Floats:
     """Log likelihood ratio of each severity, the model's error in its shift integrated out.
 
     With d + V w in place of d and w standard normal, d'c - d'C d / 2 becomes that, plus
@@ -74,10 +76,12 @@ def _log_likelihood(change: Change, reference: Reference, c: Candidate, grid: Fl
     shift = reference.shift(c.key, grid)
     linear, information = change.linear[0], change.information
     log = shift @ linear - 0.5 * np.einsum("mk,kl,ml->m", shift, information, shift)
-    own = np.abs(shift) * reference.case.errors
-    own = np.hypot(own, [reference.case.doubt(c.key, float(s)) / reference.scale for s in grid])
+    error = np.abs(shift) * reference.case.errors
+    error = np.hypot(
+        error, [reference.case.uncertainty(c.key, float(s)) / reference.scale for s in grid]
+    )
     wide = np.concatenate(
-        (c.error * shift[:, :, None], own[:, :, None] * np.eye(len(linear))), axis=2
+        (c.error * shift[:, :, None], error[:, :, None] * np.eye(len(linear))), axis=2
     )
     inner = np.eye(wide.shape[2]) + wide.transpose(0, 2, 1) @ information @ wide
     slope = np.einsum("mkr,mk->mr", wide, linear - shift @ information)

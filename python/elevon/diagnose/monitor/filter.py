@@ -1,10 +1,10 @@
 """Generalised likelihood ratio of a change at an unknown instant, on windows of a stream.
 
-The evidence of window t, less what a healthy unit shows, is
+The features of window t, less a healthy unit's, are
 
     x_t = u + b_t + d [t >= tau] + e_t,
 
-u: how this unit stands off what is expected, once for all; b_t: what its day does to it, with a
+u: how this unit deviates from what is expected, once for all; b_t: what its day does to it, with a
 memory (an Ornstein-Uhlenbeck process); e_t: noise of a window; d: what a fault does from window tau
 on. A Kalman filter follows u and b_t; the fault's trace in its innovations is linear in d, so that
 the log likelihood ratio of (tau, d) is d'c - d'C d / 2 with a vector c and a matrix C that are
@@ -20,11 +20,11 @@ import numpy as np
 
 from elevon.arrays import Floats
 
-__all__ = ["Change", "ChangeFilter", "Spread"]
+__all__ = ["Change", "ChangeFilter", "WindowSpread"]
 
 
 @dataclass(frozen=True)
-class Spread:
+class WindowSpread:
     """How healthy windows vary.
 
     Attributes
@@ -75,7 +75,7 @@ class ChangeFilter:
 
     Parameters
     ----------
-    spread : Spread
+    spread : WindowSpread
         Of healthy windows.
     directions : ndarray, shape (d, k)
         What faults do; length is of no matter.
@@ -85,7 +85,9 @@ class ChangeFilter:
         Changes within a day that are followed; older ones are dropped.
     """
 
-    def __init__(self, spread: Spread, directions: Floats, *, streams: int, last: int) -> None:
+    def __init__(
+        self, spread: WindowSpread, directions: Floats, *, streams: int, last: int
+    ) -> None:
         k = len(spread.noise)
         self._spread, self._directions, self._last = spread, directions, last
         self._state = np.zeros((streams, 2 * k))
@@ -108,15 +110,15 @@ class ChangeFilter:
             change.moved[k:] = 0.0
         self._opening = True
 
-    def step(self, shown: Floats) -> None:
+    def step(self, deviations: Floats) -> None:
         """Take one window of every stream, shape (m, k); NaN where a number is not there."""
-        self._begin(len(shown))
-        rows = np.isfinite(shown[0])
-        seen, k = self._seen[rows], shown.shape[1]
+        self._begin(len(deviations))
+        rows = np.isfinite(deviations[0])
+        seen, k = self._seen[rows], deviations.shape[1]
         noise = self._spread.noise[np.ix_(rows, rows)]
         inverse = np.linalg.inv(seen @ self._covariance @ seen.T + noise)
         gain = self._covariance @ seen.T @ inverse
-        surprise = shown[:, rows] - self._state @ seen.T
+        surprise = deviations[:, rows] - self._state @ seen.T
         for change in self.changes:
             trace = np.eye(k)[rows] - seen @ change.moved
             weight = trace.T @ inverse
@@ -133,14 +135,14 @@ class ChangeFilter:
         """Greatest log likelihood ratio of a change at a day's start and within it, shape (m,)."""
         out = []
         for opening in (True, False):
-            own = [self._ratio(c).max(axis=1) for c in self.changes if c.opening is opening]
-            out.append(np.max(own, axis=0) if own else np.zeros(len(self._state)))
+            changes = [self._ratio(c).max(axis=1) for c in self.changes if c.opening is opening]
+            out.append(np.max(changes, axis=0) if changes else np.zeros(len(self._state)))
         return out[0], out[1]
 
     def best(self, stream: int = 0, *, opening: bool) -> Change:
         """Return the change of the greatest ratio in one stream."""
-        own = [c for c in self.changes if c.opening is opening]
-        return max(own, key=lambda c: float(self._ratio(c)[stream].max()))
+        changes = [c for c in self.changes if c.opening is opening]
+        return max(changes, key=lambda c: float(self._ratio(c)[stream].max()))
 
     def _ratio(self, change: Change) -> Floats:
         """Best amplitude of each direction, none below zero: (u'c)^2 / (2 u'C u)."""
@@ -153,8 +155,8 @@ class ChangeFilter:
         blank = (np.zeros((streams, k)), np.zeros((k, k)), np.zeros((2 * k, k)))
         self.changes.append(Change(self.windows, self._opening, *blank))
         for opening in (True, False):
-            own = [c for c in self.changes if c.opening is opening]
-            for old in own[: -self._last]:
+            changes = [c for c in self.changes if c.opening is opening]
+            for old in changes[: -self._last]:
                 self.changes.remove(old)
 
     def _forget(self) -> None:

@@ -15,8 +15,8 @@ from elevon.diagnose.bymodel.candidates import chosen
 from elevon.diagnose.bymodel.log import TestLog
 from elevon.diagnose.monitor.cause import likely_causes
 from elevon.diagnose.monitor.filter import ChangeFilter
-from elevon.diagnose.monitor.reference import Reference, reference
-from elevon.diagnose.monitor.threshold import Thresholds, simulated
+from elevon.diagnose.monitor.reference import WindowReference, reference
+from elevon.diagnose.monitor.threshold import AlarmThresholds, simulated
 from elevon.diagnose.monitor.windows import (
     CHANNELS,
     cut,
@@ -25,24 +25,24 @@ from elevon.diagnose.monitor.windows import (
     period,
     run_in,
     top_speed,
-    window_evidence,
+    window_features,
 )
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["Alarm", "Monitor", "Step"]
+__all__ = ["Alarm", "Monitor", "MonitorStep"]
 
 FALSE_ALARM_TIME = 3600.0  # s
-_WINDOWS = 40  # of a stream whose length is not said, and the most that are simulated of a day
+_WINDOWS = 40  # of a stream of unknown length, and the most that are simulated of a day
 _DAYS = 10  # the most that are simulated
 _LAST = 16  # windows back to which a change is sought
 _SAME = 0.2  # relative difference of motion up to which a window is of the baselines' motion
 
 
 @dataclass(frozen=True)
-class Step:
+class MonitorStep:
     """One window.
 
     Attributes
@@ -154,7 +154,7 @@ class Monitor:
     days: int = 1
     longest: float | None = None
     alarm: Alarm | None = field(init=False, default=None)
-    steps: list[Step] = field(init=False, default_factory=list)
+    steps: list[MonitorStep] = field(init=False, default_factory=list)
     findings: list[str] = field(init=False, default_factory=list)
 
     def __post_init__(self) -> None:
@@ -178,28 +178,28 @@ class Monitor:
         self.alarm, self.steps = None, []
         spread, directions = self._reference.spread, self._reference.directions
         self._filter = ChangeFilter(spread, directions, streams=1, last=_LAST)
-        self._used: list[Step] = []
-        self._held: dict[str, list[Floats]] = {}
+        self._used: list[MonitorStep] = []
+        self._pending: dict[str, list[Floats]] = {}
         self._moves = False  # whether what the day begins with is past
 
     @property
-    def reference(self) -> Reference:
+    def reference(self) -> WindowReference:
         """What healthy windows show."""
         return self._reference
 
     def new_day(self) -> None:
         """Say that the unit was stopped: its temperatures and friction are another day's."""
-        self._held.clear()
+        self._pending.clear()
         self._moves = False
         self._filter.new_day()
 
-    def feed_log(self, item: TestLog) -> list[Step]:
+    def feed_log(self, item: TestLog) -> list[MonitorStep]:
         """Take a whole log, as a day of its own; return a step for each whole window."""
         self.new_day()
         parts = cut(item, self.width, start=run_in(item, self._top) or 0.0)
         return [self.feed_window(part, start) for start, part in parts]
 
-    def feed(self, samples: Mapping[str, Floats]) -> list[Step]:
+    def feed(self, samples: Mapping[str, Floats]) -> list[MonitorStep]:
         """Take samples as they come, in any number; return the steps that became complete.
 
         Parameters
@@ -218,29 +218,29 @@ class Monitor:
         if missing:
             raise InputError(f"stream: {', '.join(missing)} missing")
         for name, values in samples.items():
-            self._held.setdefault(name, []).append(np.asarray(values, dtype=np.float64))
-        held = {name: np.concatenate(parts) for name, parts in self._held.items()}
-        out, time = [], held["time"]
+            self._pending.setdefault(name, []).append(np.asarray(values, dtype=np.float64))
+        pending = {name: np.concatenate(parts) for name, parts in self._pending.items()}
+        out, time = [], pending["time"]
         while len(time) and time[-1] >= time[0] + self.width:
             inside = time < time[0] + self.width - 0.5 * (time[1] - time[0])
-            part = {name: values[inside] for name, values in held.items()}
+            part = {name: values[inside] for name, values in pending.items()}
             item = of_samples(part, self.baselines[0].log.note, "stream")
             if not self._moves:
                 lead = run_in(item, self._top)
                 self._moves = lead is not None
                 later = time >= time[0] + (self.width if lead is None else lead)
-                held = {name: values[later] for name, values in held.items()}
-                time = held["time"]
+                pending = {name: values[later] for name, values in pending.items()}
+                time = pending["time"]
                 continue
             out.append(self.feed_window(item, float(time[0])))
-            held = {name: values[~inside] for name, values in held.items()}
-            time = held["time"]
-        self._held = {name: [values] for name, values in held.items()}
+            pending = {name: values[~inside] for name, values in pending.items()}
+            time = pending["time"]
+        self._pending = {name: [values] for name, values in pending.items()}
         return out
 
-    def feed_window(self, item: TestLog, start: float = 0.0) -> Step:
+    def feed_window(self, item: TestLog, start: float = 0.0) -> MonitorStep:
         """Take one window, which begins at `start` [s]; return what it says."""
-        step = self._weighed(item, start)
+        step = self._step(item, start)
         self.steps.append(step)
         if step.alarm and self.alarm is None:
             self.alarm = self._alarm(step, opening=self._opening)
@@ -271,7 +271,7 @@ class Monitor:
                 f"mean time between false alarms {self.false_alarm_time:g} s: must be above zero"
             )
 
-    def _simulated(self) -> Thresholds:
+    def _simulated(self) -> AlarmThresholds:
         windows = _WINDOWS if self.longest is None else int(self.longest / self.width)
         return simulated(
             self._reference.spread,
@@ -296,27 +296,29 @@ class Monitor:
                 "partly assumed"
             )
 
-    def _weighed(self, item: TestLog, start: float) -> Step:
+    def _step(self, item: TestLog, start: float) -> MonitorStep:
         end = start + self.width
         if any(
             abs(a - b) > _SAME * max(abs(a), abs(b))
             for a, b in zip(motion(item), self._motion, strict=True)
         ):
-            return Step(item.name, start, end, 0.0, 0.0, False, "not the baselines' motion")
-        shown = window_evidence(item, self.actuator)
-        if shown is None:
-            return Step(item.name, start, end, 0.0, 0.0, False, "hardly any motion, or no samples")
-        self._filter.step(self._reference.rest(shown)[None, :])
+            return MonitorStep(item.name, start, end, 0.0, 0.0, False, "not the baselines' motion")
+        features = window_features(item, self.actuator)
+        if features is None:
+            return MonitorStep(
+                item.name, start, end, 0.0, 0.0, False, "hardly any motion, or no samples"
+            )
+        self._filter.step(self._reference.deviation(features)[None, :])
         ratios = [float(r[0]) for r in self._filter.ratios()]
         levels = [self.thresholds.opening, self.thresholds.within]
         parts = [r / level for r, level in zip(ratios, levels, strict=True)]
         top = int(np.argmax(parts))
         self._opening = top == 0
-        step = Step(item.name, start, end, ratios[top], parts[top], parts[top] > 1.0)
+        step = MonitorStep(item.name, start, end, ratios[top], parts[top], parts[top] > 1.0)
         self._used.append(step)
         return step
 
-    def _alarm(self, step: Step, *, opening: bool) -> Alarm:
+    def _alarm(self, step: MonitorStep, *, opening: bool) -> Alarm:
         change = self._filter.best(opening=opening)
         first = self._used[change.window]
         return Alarm(

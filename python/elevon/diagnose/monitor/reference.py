@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.candidates import Candidate
-from elevon.diagnose.bymodel.case import Case
-from elevon.diagnose.bymodel.evidence import Evidence
+from elevon.diagnose.bymodel.candidates import CandidateFault
+from elevon.diagnose.bymodel.case import LogCase
+from elevon.diagnose.bymodel.features import FeatureVector
 from elevon.diagnose.bymodel.healthy import DEGREES, healthy
 from elevon.diagnose.bymodel.log import RUN_IN, TestLog, prepared
 from elevon.diagnose.bymodel.replay import replay
-from elevon.diagnose.monitor.filter import Spread
-from elevon.diagnose.monitor.windows import cut, run_in, stretch, top_speed, window_evidence
+from elevon.diagnose.monitor.filter import WindowSpread
+from elevon.diagnose.monitor.windows import cut, run_in, stretch, top_speed, window_features
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["MEMORY", "Reference", "reference"]
+__all__ = ["MEMORY", "WindowReference", "reference"]
 
 MEMORY = 3600.0  # s, ASSUMED: time in which a day's temperatures and friction become another day's
 _MODELLED = 20.0  # s of a baseline that the model runs
@@ -30,16 +30,16 @@ _LEAST = 3  # windows of the baselines together
 
 
 @dataclass(frozen=True)
-class Reference:
+class WindowReference:
     """A healthy unit's windows, each number in units of `scale`.
 
     Attributes
     ----------
     names : tuple of str
-        The evidence.
-    case : Case
+        The features.
+    case : LogCase
         Healthy unit and faults, SI.
-    spread : Spread
+    spread : WindowSpread
         Of healthy windows.
     scale : ndarray, shape (k,)
         Deviation of a healthy window, SI.
@@ -50,8 +50,8 @@ class Reference:
     """
 
     names: tuple[str, ...]
-    case: Case
-    spread: Spread
+    case: LogCase
+    spread: WindowSpread
     scale: Floats
     directions: Floats
     windows: int
@@ -61,9 +61,9 @@ class Reference:
         """How well the noise of windows is known, in degrees of freedom."""
         return DEGREES + self.windows - 1
 
-    def rest(self, shown: Evidence) -> Floats:
-        """Return a window's evidence less the healthy mean, NaN where it is not there."""
-        known = dict(zip(shown.names, shown.values.tolist(), strict=True))
+    def deviation(self, features: FeatureVector) -> Floats:
+        """Return a window's features less the healthy mean, NaN where it is not there."""
+        known = dict(zip(features.names, features.values.tolist(), strict=True))
         values = np.array([known.get(name, np.nan) for name in self.names])
         return (values - self.case.unit.mean) / self.scale
 
@@ -75,9 +75,9 @@ class Reference:
 def reference(
     actuator: Actuator,
     baselines: Sequence[TestLog],
-    candidates: Sequence[Candidate],
+    candidates: Sequence[CandidateFault],
     width: float,
-) -> Reference:
+) -> WindowReference:
     """Join the model's spread with the windows of the baselines.
 
     Raises
@@ -86,25 +86,26 @@ def reference(
         Fewer than three windows in which the unit moves.
     """
     parts = [cut(b, width, start=run_in(b, top_speed(b)) or 0.0) for b in baselines]
-    shown = [[e for _, w in part if (e := window_evidence(w, actuator))] for part in parts]
-    count = sum(map(len, shown))
+    features = [[e for _, w in part if (e := window_features(w, actuator))] for part in parts]
+    count = sum(map(len, features))
     if count < _LEAST:
         raise InputError(
             f"the baselines have {count} windows of {width:g} s in which the unit moves both "
             f"ways; {_LEAST} are needed, better thirty; a motion that does not repeat within a "
             "baseline is not watched: elevon diagnose takes its log as a whole"
         )
-    shown = [own for own in shown if own]
+    features = [log for log in features if log]
     reach = max(_MODELLED, 2.0 * width) + RUN_IN
     model = replay(prepared(stretch(baselines[0], 0.0, reach), actuator), actuator, candidates)
-    names = [n for n in model.healthy.names if all(n in e.names for own in shown for e in own)]
-    rows = [np.array([e.only(names).values for e in own]) for own in shown]
-    noise = _noise(rows, np.array([e.only(names).std for own in shown for e in own]))
+    names = [n for n in model.healthy.names if all(n in e.names for log in features for e in log)]
+    rows = [np.array([e.only(names).values for e in log]) for log in features]
+    noise = _noise(rows, np.array([e.only(names).std for log in features for e in log]))
     means = [
-        Evidence(tuple(names), own.mean(axis=0), np.sqrt(np.diag(noise) / len(own))) for own in rows
+        FeatureVector(tuple(names), log.mean(axis=0), np.sqrt(np.diag(noise) / len(log)))
+        for log in rows
     ]
     unit = healthy(model, names, means)
-    case = Case(baselines[0].name, replace(means[0]), unit, model)
+    case = LogCase(baselines[0].name, replace(means[0]), unit, model)
     return _scaled(case, noise, width, candidates, count)
 
 
@@ -113,22 +114,22 @@ def _noise(rows: Sequence[Floats], std: Floats) -> Floats:
 
     The baselines' scatter, and what each window says of itself, worth `DEGREES` windows.
     """
-    scatter = sum((own - own.mean(axis=0)).T @ (own - own.mean(axis=0)) for own in rows)
-    free = sum(len(own) - 1 for own in rows)
-    own = np.diag(np.mean(std**2, axis=0))
-    return np.asarray((DEGREES * own + scatter) / (DEGREES + free))
+    scatter = sum((log - log.mean(axis=0)).T @ (log - log.mean(axis=0)) for log in rows)
+    free = sum(len(log) - 1 for log in rows)
+    error = np.diag(np.mean(std**2, axis=0))
+    return np.asarray((DEGREES * error + scatter) / (DEGREES + free))
 
 
 def _scaled(
-    case: Case, noise: Floats, width: float, candidates: Sequence[Candidate], count: int
-) -> Reference:
+    case: LogCase, noise: Floats, width: float, candidates: Sequence[CandidateFault], count: int
+) -> WindowReference:
     unit = case.unit
     assert unit.offset is not None
     scale = np.sqrt(np.diag(unit.covariance) + np.diag(noise))
     outer = np.outer(scale, scale)
     memory = float(np.exp(-width / MEMORY))
     day = unit.covariance - unit.offset
-    spread = Spread(unit.offset / outer, day / outer, noise / outer, memory)
+    spread = WindowSpread(unit.offset / outer, day / outer, noise / outer, memory)
     rows = []
     for c in candidates:
         at = case.model.severities[c.key]
@@ -136,4 +137,6 @@ def _scaled(
     directions = np.vstack(rows)
     size = np.linalg.norm(directions, axis=1)
     seen = size > 1e-6
-    return Reference(unit.names, case, spread, scale, directions[seen] / size[seen, None], count)
+    return WindowReference(
+        unit.names, case, spread, scale, directions[seen] / size[seen, None], count
+    )

@@ -8,9 +8,9 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.bymodel.healthy import DEGREES
-from elevon.diagnose.monitor.filter import ChangeFilter, Spread
+from elevon.diagnose.monitor.filter import ChangeFilter, WindowSpread
 
-__all__ = ["Thresholds", "simulated"]
+__all__ = ["AlarmThresholds", "simulated"]
 
 STREAMS = 2000
 _TAIL = 0.05  # share of the streams that gives the tail
@@ -18,7 +18,7 @@ _LEAST = 10  # streams above a threshold that is read off; beyond, the tail is d
 
 
 @dataclass(frozen=True)
-class Thresholds:
+class AlarmThresholds:
     """Of the log likelihood ratio.
 
     Attributes
@@ -36,7 +36,7 @@ class Thresholds:
 
 
 def simulated(
-    spread: Spread,
+    spread: WindowSpread,
     directions: Floats,
     *,
     days: int,
@@ -45,12 +45,12 @@ def simulated(
     time: float,
     noise_degrees: float,
     last: int,
-) -> Thresholds:
+) -> AlarmThresholds:
     """Return thresholds at which healthy streams alarm once in a mean time.
 
     Parameters
     ----------
-    spread : Spread
+    spread : WindowSpread
         Of healthy windows; the unit's and the day's part are known to `DEGREES` degrees of
         freedom, the noise to `noise_degrees`, so a stream's own spread is drawn, too.
     directions : ndarray, shape (d, k)
@@ -70,12 +70,12 @@ def simulated(
     top = [np.zeros(STREAMS), np.zeros(STREAMS)]
     for _ in range(days):
         watch.new_day()
-        for shown in draw.day(windows):
-            watch.step(shown)
+        for deviations in draw.day(windows):
+            watch.step(deviations)
             top = [np.maximum(a, b) for a, b in zip(top, watch.ratios(), strict=True)]
     chance = -np.expm1(-0.5 * days * windows * width / time)
     levels = [_level(values, float(chance)) for values in top]
-    return Thresholds(levels[0], levels[1], bool(chance * STREAMS < _LEAST))
+    return AlarmThresholds(levels[0], levels[1], bool(chance * STREAMS < _LEAST))
 
 
 def _level(values: Floats, chance: float) -> float:
@@ -91,7 +91,9 @@ def _level(values: Floats, chance: float) -> float:
 class _Drawn:
     """Healthy streams."""
 
-    def __init__(self, spread: Spread, noise_degrees: float, rng: np.random.Generator) -> None:
+    def __init__(
+        self, spread: WindowSpread, noise_degrees: float, rng: np.random.Generator
+    ) -> None:
         self._rng, self._memory = rng, spread.memory
         self._day, self._noise = _root(spread.day), _root(spread.noise)
         self._slow, self._fast = self._scale(DEGREES), self._scale(noise_degrees)
@@ -105,11 +107,11 @@ class _Drawn:
 
     def day(self, windows: int) -> list[Floats]:
         """Return the windows of one day, shape (m, k) each."""
-        out, own = [], self._slow * self._normal(self._day)
+        out, day = [], self._slow * self._normal(self._day)
         renewed = np.sqrt(1.0 - self._memory**2)
         for _ in range(windows):
-            out.append(self._unit + own + self._fast * self._normal(self._noise))
-            own = self._memory * own + renewed * self._slow * self._normal(self._day)
+            out.append(self._unit + day + self._fast * self._normal(self._noise))
+            day = self._memory * day + renewed * self._slow * self._normal(self._day)
         return out
 
 

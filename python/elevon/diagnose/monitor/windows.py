@@ -1,4 +1,4 @@
-"""Windows of a stream: stretches of a log, and the evidence of each."""
+"""Windows of a stream: stretches of a log, and the features of each."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.bymodel.command import noted_command
-from elevon.diagnose.bymodel.evidence import Evidence
+from elevon.diagnose.bymodel.features import FeatureVector
 from elevon.diagnose.bymodel.log import RUN_IN, TestLog
-from elevon.diagnose.bymodel.replay import logged_evidence
+from elevon.diagnose.bymodel.replay import logged_features
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CHANNELS", "cut", "motion", "of_samples", "period", "run_in", "stretch", "top_speed",
-    "window_evidence",
+    "window_features",
 ]  # fmt: skip
 
 _LEAST = 400  # samples of a window that may be used
@@ -122,8 +122,8 @@ def stretch(item: TestLog, first: float, last: float) -> TestLog:
     return TestLog(part, None if item.voltage is None else item.voltage[at])
 
 
-def window_evidence(item: TestLog, actuator: Actuator) -> Evidence | None:
-    """Return the evidence of a window; None where it does not move both ways or lacks samples."""
+def window_features(item: TestLog, actuator: Actuator) -> FeatureVector | None:
+    """Return the features of a window; None where it does not move both ways or lacks samples."""
     log = item.log
     if log.output is None or log.motor is None:
         raise InputError(f"{item.name}: watching needs both positions")
@@ -134,7 +134,7 @@ def window_evidence(item: TestLog, actuator: Actuator) -> Evidence | None:
         return None
     noted = noted_command(log, actuator.parameters.value("control.speed_limit"))
     gain = None if noted is None else (noted.gain, noted.gain_std)
-    return logged_evidence(TestLog(log, item.voltage, gain, None, good), actuator)
+    return logged_features(TestLog(log, item.voltage, gain, None, good), actuator)
 
 
 def motion(item: TestLog) -> tuple[float, float, float]:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.candidates import CANDIDATES, Candidate
+from elevon.diagnose.bymodel.candidates import CANDIDATES, CandidateFault
 from elevon.diagnose.bymodel.posterior import PRIOR_FAULTY, SECOND
 from elevon.errors import FormatError, InputError
 
@@ -74,7 +74,7 @@ class Belief:
         return cls(tuple(replace(p, weight=p.weight / total) for p in possible))
 
     @classmethod
-    def prior(cls, candidates: Sequence[Candidate] = CANDIDATES) -> Belief:
+    def prior(cls, candidates: Sequence[CandidateFault] = CANDIDATES) -> Belief:
         """Return what is believed before any test: as diagnosis by the model weighs it."""
         total = sum(c.rate for c in candidates)
         out = [Possible((), 1.0 - PRIOR_FAULTY)]
@@ -116,9 +116,9 @@ class Belief:
         return Belief.of([p for p in self.possible if p.weight >= least])
 
 
-def _merged(possible: Possible, said: Sequence[Possible]) -> Possible:
+def _merged(possible: Possible, results: Sequence[Possible]) -> Possible:
     """Join severities by their precision."""
-    known = [s for s in said if all(map(math.isfinite, s.deviation))]
+    known = [s for s in results if all(map(math.isfinite, s.deviation))]
     if not known or not possible.keys:
         return possible
     centres = np.array([s.centre for s in known])
@@ -155,17 +155,17 @@ class Answered:
     ----------
     possible : dict
         The sets it lists, by their keys.
-    rest : float
+    remaining : float
         Weight of all other sets together.
-    weighed : frozenset of str
-        Faults that it weighed; what its log cannot show is not among them.
+    candidates : frozenset of str
+        Faults that it scored; what its log cannot show is not among them.
     prior : dict
         Weight of every set before its log.
     """
 
     possible: dict[tuple[str, ...], Possible]
-    rest: float
-    weighed: frozenset[str]
+    remaining: float
+    candidates: frozenset[str]
     prior: dict[tuple[str, ...], float]
 
     @classmethod
@@ -173,19 +173,19 @@ class Answered:
         """Read a result."""
         possible = {one.keys: one for one in map(_possible, result["hypotheses"])}
         seen = {*result["detectable"], *chain.from_iterable(possible)}
-        weighed = [c for c in CANDIDATES if c.key in seen]
-        prior = {p.keys: p.weight for p in Belief.prior(weighed).possible}
+        candidates = [c for c in CANDIDATES if c.key in seen]
+        prior = {p.keys: p.weight for p in Belief.prior(candidates).possible}
         if result.get("method") == "surrogate":
             prior = {keys: _trained(len(keys)) for keys in prior}
-        rest = max(1.0 - sum(p.weight for p in possible.values()), _LEAST)
-        return cls(possible, rest, frozenset(c.key for c in weighed), prior)
+        remaining = max(1.0 - sum(p.weight for p in possible.values()), _LEAST)
+        return cls(possible, remaining, frozenset(c.key for c in candidates), prior)
 
     def ratio(self, before: Possible) -> float:
         """How far it moved the weight of a set."""
-        keys = tuple(key for key in before.keys if key in self.weighed)
+        keys = tuple(key for key in before.keys if key in self.candidates)
         if keys in self.possible:
             return self.possible[keys].weight / self.prior[keys]
-        return self.rest / sum(w for k, w in self.prior.items() if k not in self.possible)
+        return self.remaining / sum(w for k, w in self.prior.items() if k not in self.possible)
 
 
 def _trained(count: int) -> float:

@@ -1,4 +1,4 @@
-"""The next test: all of them weighed."""
+"""The next test: all of them ranked."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from typing import TYPE_CHECKING, Any
 from elevon.diagnose.bymodel.candidates import CANDIDATES
 from elevon.diagnose.nexttest.belief import Belief
 from elevon.diagnose.nexttest.information import expected_information, planned
-from elevon.diagnose.nexttest.profiles import Profile, profiles
+from elevon.diagnose.nexttest.profiles import BenchProfile, profiles
 from elevon.errors import InputError, Interrupted
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.progress import Progress
 
-__all__ = ["Proposal", "Weighed", "next_test"]
+__all__ = ["NextTest", "RankedTest", "next_test"]
 
 
 @dataclass(frozen=True)
-class Weighed:
+class RankedTest:
     """A test and the information [bit] it is expected to give."""
 
-    profile: Profile
+    profile: BenchProfile
     information: float
 
     def to_dict(self) -> dict[str, Any]:
@@ -39,12 +39,12 @@ class Weighed:
 
 
 @dataclass(frozen=True)
-class Proposal:
+class NextTest:
     """The answer.
 
     Attributes
     ----------
-    tests : tuple of Weighed
+    tests : tuple of RankedTest
         Most informative first.
     belief : Belief
         What is possible now.
@@ -52,7 +52,7 @@ class Proposal:
         Time it took.
     """
 
-    tests: tuple[Weighed, ...]
+    tests: tuple[RankedTest, ...]
     belief: Belief
     seconds: float
 
@@ -75,8 +75,8 @@ def next_test(
     results: Sequence[Mapping[str, Any]] = (),
     *,
     progress: Progress | None = None,
-) -> Proposal:
-    """Weigh the bench's tests by what they are expected to tell.
+) -> NextTest:
+    """Rank the bench's tests by the information they are expected to give.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def next_test(
     results : sequence of mapping
         Diagnoses so far, as `elevon diagnose --json` prints them, of different logs.
     progress : callable, optional
-        Told the done fraction; returns False to stop.
+        Called with the done fraction; returns False to stop.
 
     Raises
     ------
@@ -106,6 +106,6 @@ def next_test(
         if progress is not None and progress(number / len(every)) is False:
             raise Interrupted("interrupted between two tests")
         case = planned(profile, actuator, candidates)
-        out.append(Weighed(profile, expected_information(case, belief)))
+        out.append(RankedTest(profile, expected_information(case, belief)))
     out.sort(key=lambda item: -item.information)
-    return Proposal(tuple(out), belief, clock.perf_counter() - begin)
+    return NextTest(tuple(out), belief, clock.perf_counter() - begin)

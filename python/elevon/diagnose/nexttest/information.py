@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.candidates import CANDIDATES, Candidate
-from elevon.diagnose.bymodel.case import Case
+from elevon.diagnose.bymodel.candidates import CANDIDATES, CandidateFault
+from elevon.diagnose.bymodel.case import LogCase
 from elevon.diagnose.bymodel.healthy import healthy
+from elevon.diagnose.bymodel.likelihood import Frame
 from elevon.diagnose.bymodel.log import prepared
-from elevon.diagnose.bymodel.replay import logged_evidence, replay
-from elevon.diagnose.bymodel.weigh import Frame
+from elevon.diagnose.bymodel.replay import logged_features, replay
 from elevon.diagnose.nexttest.belief import Belief, Possible
 from elevon.diagnose.virtual import traced
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from elevon.actuator import Actuator
-    from elevon.diagnose.nexttest.profiles import Profile
+    from elevon.diagnose.nexttest.profiles import BenchProfile
 
 __all__ = ["expected_information", "likelihoods", "planned", "updated"]
 
@@ -30,7 +30,9 @@ _SAMPLES = 64  # severities of a set of faults
 _KNOWN = {c.key: c for c in CANDIDATES}
 
 
-def planned(profile: Profile, actuator: Actuator, candidates: Sequence[Candidate]) -> Case:
+def planned(
+    profile: BenchProfile, actuator: Actuator, candidates: Sequence[CandidateFault]
+) -> LogCase:
     """Return a test before it is run, as diagnosis by the model will see its log.
 
     A healthy log of a standard test is taken to be at hand; a variant's stands against the
@@ -44,21 +46,21 @@ def planned(profile: Profile, actuator: Actuator, candidates: Sequence[Candidate
     setup = setups(profile.procedure, actuator, seed=0)[0]
     record = recorded(list(signal_records(actuator.wiring, "low")))
     run = Run(setup.actuator, setup.scenario)
-    shown = simulate_batch([run], fidelity="low", record=record)[0]
-    item = prepared(traced(setup, shown), actuator)
+    recording = simulate_batch([run], fidelity="low", record=record)[0]
+    item = prepared(traced(setup, recording), actuator)
     model = replay(item, actuator, candidates)
-    logged = logged_evidence(item, actuator)
+    logged = logged_features(item, actuator)
     names = [n for n in logged.names if n in model.healthy.names]
     logged = logged.only(names)
     unit = healthy(model, names, [logged] if profile.standard else [])
-    return Case(profile.name, replace(logged, values=unit.mean), unit, model)
+    return LogCase(profile.name, replace(logged, values=unit.mean), unit, model)
 
 
-def _frame(case: Case, possible: Possible, severity: Floats) -> Frame:
-    """Return what whitens the evidence under a set of faults: the model's own errors with it."""
+def _frame(case: LogCase, possible: Possible, severity: Floats) -> Frame:
+    """Return what whitens the features under a set of faults: the model's own errors with it."""
     plain = Frame(
         np.zeros(len(case.unit.names)), case.covariance, case.unit.degrees, case.shift,
-        case.errors, case.doubt,
+        case.errors, case.uncertainty,
     )  # fmt: skip
     typical = [
         (_KNOWN[key], centre if np.isfinite(deviation) else float(np.mean(severity[:, k])))
@@ -70,7 +72,7 @@ def _frame(case: Case, possible: Possible, severity: Floats) -> Frame:
 
 
 def _seen(
-    case: Case, possible: Possible, count: int, seed: int
+    case: LogCase, possible: Possible, count: int, seed: int
 ) -> tuple[Frame, Floats, list[Floats]]:
     """Frame, whitened shift of drawn severities, shape (count, k), and each fault's model error."""
     severity = possible.severities(count, np.random.default_rng([seed, len(possible.keys)]))
@@ -83,7 +85,7 @@ def _seen(
     return frame, total, errors
 
 
-def _likelihoods(case: Case, belief: Belief, outcomes: Floats) -> Floats:
+def _likelihoods(case: LogCase, belief: Belief, outcomes: Floats) -> Floats:
     """Log likelihood of outcomes off the healthy unit, shape (n, k), per set, shape (n, sets)."""
     columns = []
     for number, possible in enumerate(belief.possible):
@@ -94,7 +96,7 @@ def _likelihoods(case: Case, belief: Belief, outcomes: Floats) -> Floats:
     return np.stack(columns, axis=1)
 
 
-def expected_information(case: Case, belief: Belief, seed: int = 0) -> float:
+def expected_information(case: LogCase, belief: Belief, seed: int = 0) -> float:
     """Return the information [bit] that a test is expected to give on the set of faults.
 
     Mutual information of set and outcome, by drawing outcomes: sets, severities, the unit's spread
@@ -106,12 +108,12 @@ def expected_information(case: Case, belief: Belief, seed: int = 0) -> float:
     outcomes, sets = [], []
     for number in np.unique(drawn):
         count = int((drawn == number).sum())
-        own = int(rng.integers(2**31))
-        frame, shift, errors = _seen(case, belief.possible[number], count, own)
+        draw_seed = int(rng.integers(2**31))
+        frame, shift, errors = _seen(case, belief.possible[number], count, draw_seed)
         chi = np.sqrt(rng.chisquare(case.unit.degrees, count) / case.unit.degrees)
         noise = rng.standard_normal(shift.shape) / chi[:, None]
-        shown = shift + noise + sum(e * rng.standard_normal((count, 1)) for e in errors)
-        outcomes.append(np.linalg.solve(frame.root, shown.T).T)
+        outcome = shift + noise + sum(e * rng.standard_normal((count, 1)) for e in errors)
+        outcomes.append(np.linalg.solve(frame.root, outcome.T).T)
         sets += [number] * count
     log = _likelihoods(case, belief, np.vstack(outcomes))
     mixed = np.logaddexp.reduce(log + np.log(weights), axis=1)
@@ -119,12 +121,12 @@ def expected_information(case: Case, belief: Belief, seed: int = 0) -> float:
     return float(np.mean(own_log - mixed) / np.log(2.0))
 
 
-def likelihoods(case: Case, belief: Belief, values: Floats) -> Floats:
+def likelihoods(case: LogCase, belief: Belief, values: Floats) -> Floats:
     """Return the log likelihood of each set, from values by `case.unit.names`."""
     return np.asarray(_likelihoods(case, belief, (values - case.unit.mean)[None, :])[0])
 
 
-def updated(case: Case, belief: Belief, values: Floats) -> Belief:
+def updated(case: LogCase, belief: Belief, values: Floats) -> Belief:
     """Return what is believed after a test that showed these values, by `case.unit.names`."""
     log = likelihoods(case, belief, values)
     weights = np.array([p.weight for p in belief.possible]) * np.exp(log - log.max())

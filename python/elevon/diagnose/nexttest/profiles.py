@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from elevon.bench.procedure import BrakeStep, Procedure, TraceStep, load_procedure
 from elevon.diagnose.virtual import first_trace
 
-__all__ = ["Profile", "profiles"]
+__all__ = ["BenchProfile", "profiles"]
 
 
 @dataclass(frozen=True)
-class Profile:
+class BenchProfile:
     """A test.
 
     Attributes
@@ -44,19 +44,19 @@ _VARIANTS: Mapping[str, tuple[str, Mapping[str, str], Mapping[str, str]]] = {
 _STANDARD = ("backlash", "chirp", "loaded")
 
 
-def profiles() -> tuple[Profile, ...]:
+def profiles() -> tuple[BenchProfile, ...]:
     """Return the tests in the order of the bench's list, variants after them.
 
-    The bench's other procedures ask for a torque, not for a position: diagnosis does not read
+    The bench's other procedures command a torque, not a position: diagnosis does not read
     their logs.
     """
     out = []
     for name in _STANDARD:
         procedure = first_trace(load_procedure(name))
-        out.append(Profile(name, procedure, _parameters(procedure)))
+        out.append(BenchProfile(name, procedure, _parameters(procedure)))
     for name, (base, command, brake) in _VARIANTS.items():
         procedure = _varied(first_trace(load_procedure(base)), command, brake)
-        out.append(Profile(name, procedure, _parameters(procedure), standard=False))
+        out.append(BenchProfile(name, procedure, _parameters(procedure), standard=False))
     return tuple(out)
 
 
@@ -76,13 +76,13 @@ def _parameters(procedure: Procedure) -> dict[str, str]:
     out: dict[str, str] = {}
     for step in procedure.step:
         if isinstance(step, TraceStep):
-            out |= _said("command", step.command.terms[0])
+            out |= _stated("command", step.command.terms[0])
             out["duration"] = str(step.duration)
         elif isinstance(step, BrakeStep) and step.terms:
-            out |= _said("brake", step.terms[0])
+            out |= _stated("brake", step.terms[0])
     return out
 
 
-def _said(prefix: str, term: object) -> dict[str, str]:
+def _stated(prefix: str, term: object) -> dict[str, str]:
     values = term.model_dump(exclude_unset=True, mode="json")  # type: ignore[attr-defined]
     return {f"{prefix}.{name}": str(value) for name, value in values.items()}

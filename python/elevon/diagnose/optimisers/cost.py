@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from elevon.bench.rig import Setup
     from elevon.diagnose.bymodel.log import TestLog
 
-__all__ = ["CAUSES", "Monitor"]
+__all__ = ["CAUSES", "MonitoringModel"]
 
 #: The faults of the vector, by key; the short stands for that of any phase.
 CAUSES = (
@@ -49,8 +49,8 @@ _RATE = 100.0  # Hz at which log and monitor are compared
 _FROM = 1.0  # s left out
 
 
-class Monitor:
-    """The low model in a log's own test, its command and start known to the last bit.
+class MonitoringModel:
+    """The reduced-order model in a log's own test, its command and start known to the last bit.
 
     Parameters
     ----------
@@ -81,8 +81,8 @@ class Monitor:
         self._limits = limits()
         self.evaluations = 0
         self._keep = np.zeros(0, dtype=np.bool_)
-        self._shown = np.zeros((0, 3))
-        self._shown, self._scale = self._of(log, setup)
+        self._columns = np.zeros((0, 3))
+        self._columns, self._scale = self._of(log, setup)
 
     def _of(self, log: TestLog, setup: Setup) -> tuple[Floats, Floats]:
         bench = log.log
@@ -90,12 +90,12 @@ class Monitor:
         assert bench.motor is not None
         clock = np.arange(0.0, bench.duration + 1e-9, 1.0 / _RATE)
         self._keep = clock >= _FROM
-        columns = (bench.current, bench.output, bench.motor / self._ratio - bench.output)
-        shown = np.column_stack([np.interp(clock, bench.time, c) for c in columns])
+        channels = (bench.current, bench.output, bench.motor / self._ratio - bench.output)
+        columns = np.column_stack([np.interp(clock, bench.time, c) for c in channels])
         gain = setup.actuator.parameters.value("control.position_gain")
         followed = float(np.sqrt(np.mean(bench.speed_ref**2))) / gain
         sizes = (float(np.std(bench.current)), followed, float(np.std(columns[2])))
-        return shown[self._keep], np.array(sizes)
+        return columns[self._keep], np.array(sizes)
 
     def severities(self, vector: Floats) -> dict[str, float]:
         """Return the severities of a vector in [0, 1], by `CAUSES`; the worst of the phases."""
@@ -134,9 +134,9 @@ class Monitor:
         if result["status"] != "ok" or len(samples) < len(self._keep):
             return 1e6
         current, output, motor = samples.T[:3]
-        shown = np.column_stack((current, output, motor / self._ratio - output))[self._keep]
-        rest = (shown - self._shown) / self._scale
-        return float(np.mean(rest**2)) if np.isfinite(rest).all() else 1e6
+        columns = np.column_stack((current, output, motor / self._ratio - output))[self._keep]
+        residual = (columns - self._columns) / self._scale
+        return float(np.mean(residual**2)) if np.isfinite(residual).all() else 1e6
 
 
 def limits() -> dict[str, tuple[float, float]]:

@@ -10,8 +10,8 @@ from itertools import chain, combinations
 from typing import TYPE_CHECKING
 
 from elevon.diagnose.bymodel.answer import Cause, Diagnosis, Explanation
-from elevon.diagnose.bymodel.candidates import Candidate, chosen
-from elevon.diagnose.bymodel.diagnosis import check_asked
+from elevon.diagnose.bymodel.candidates import CandidateFault, chosen
+from elevon.diagnose.bymodel.diagnosis import check_request
 from elevon.diagnose.bymodel.explain import POSSIBLE
 from elevon.diagnose.surrogate.model import Surrogate
 from elevon.diagnose.surrogate.population import FAULTS, learned
@@ -63,41 +63,43 @@ def diagnose_by_surrogate(
         A fault that is no candidate.
     """
     begin = clock.perf_counter()
-    check_asked(logs, actuator, false_alarm, "the surrogate")
+    check_request(logs, actuator, false_alarm, "the surrogate")
     candidates = _known(faults)
-    said = proposed(logs, actuator, baselines=baselines, surrogate=surrogate)
-    faulty = said.chance <= false_alarm
-    best = _best(said, candidates, faulty=faulty)
-    shares = [said.probability[c.key] for c in learned()]
+    proposal = proposed(logs, actuator, baselines=baselines, surrogate=surrogate)
+    faulty = proposal.chance <= false_alarm
+    best = _best(proposal, candidates, faulty=faulty)
+    shares = [proposal.probability[c.key] for c in learned()]
     p_best = math.prod(
         p if c.key in best else 1.0 - p for c, p in zip(learned(), shares, strict=True)
     )
-    findings = list(said.findings)
-    if said.outside:
+    findings = list(proposal.findings)
+    if proposal.outside:
         findings.append(
             "outside the training set, do not trust this answer (--method model): "
-            + "; ".join(said.outside)
+            + "; ".join(proposal.outside)
         )
     return Diagnosis(
-        logs=said.logs,
+        logs=proposal.logs,
         status="faulty" if faulty else "healthy",
-        p_fault=said.p_fault,
+        p_fault=proposal.p_fault,
         false_alarm=false_alarm,
-        chance=said.chance,
-        faults=_causes(said, candidates, best),
+        chance=proposal.chance,
+        faults=_causes(proposal, candidates, best),
         best=best,
         p_best=p_best,
-        unobservable=_blind(said, candidates),
-        detectable={k: v for k, v in said.detectable.items() if k in {c.key for c in candidates}},
-        moved=said.moved,
+        unobservable=_blind(proposal, candidates),
+        detectable={
+            k: v for k, v in proposal.detectable.items() if k in {c.key for c in candidates}
+        },
+        moved=proposal.moved,
         findings=tuple(findings),
         seconds=clock.perf_counter() - begin,
-        hypotheses=_explanations(said, candidates),
+        hypotheses=_explanations(proposal, candidates),
         units={c.key: c.unit for c in candidates},
     )
 
 
-def _known(faults: Sequence[str] | None) -> list[Candidate]:
+def _known(faults: Sequence[str] | None) -> list[CandidateFault]:
     """Return the candidates that the surrogate was trained on."""
     candidates = learned() if not faults else [c for c in chosen(faults) if c.key in FAULTS]
     if not candidates:
@@ -105,55 +107,59 @@ def _known(faults: Sequence[str] | None) -> list[Candidate]:
     return candidates
 
 
-def _best(said: Proposal, candidates: Sequence[Candidate], *, faulty: bool) -> tuple[str, ...]:
+def _best(
+    proposal: Proposal, candidates: Sequence[CandidateFault], *, faulty: bool
+) -> tuple[str, ...]:
     """The faults more likely there than not, two at most; the likeliest if none is."""
     if not faulty:
         return ()
-    ranked = sorted(candidates, key=lambda c: -said.probability[c.key])
-    likely = [c.key for c in ranked if said.probability[c.key] > 0.5]
+    ranked = sorted(candidates, key=lambda c: -proposal.probability[c.key])
+    likely = [c.key for c in ranked if proposal.probability[c.key] > 0.5]
     return tuple(likely[:2]) or (ranked[0].key,)
 
 
 def _causes(
-    said: Proposal, candidates: Sequence[Candidate], best: Sequence[str]
+    proposal: Proposal, candidates: Sequence[CandidateFault], best: Sequence[str]
 ) -> tuple[Cause, ...]:
     out = []
     for c in candidates:
-        p = said.probability[c.key]
+        p = proposal.probability[c.key]
         if p >= LISTED or c.key in best:
-            middle, low, high = said.severity[c.key]
+            middle, low, high = proposal.severity[c.key]
             alike = tuple((c.kind, place) for place in c.same)
             out.append(Cause(c.kind, c.place, c.unit, p, middle, (low, high), alike))
     return tuple(sorted(out, key=lambda cause: -cause.probability))
 
 
-def _explanations(said: Proposal, candidates: Sequence[Candidate]) -> tuple[Explanation, ...]:
+def _explanations(
+    proposal: Proposal, candidates: Sequence[CandidateFault]
+) -> tuple[Explanation, ...]:
     """Sets of up to two faults, as if the faults were independent; they share `p_fault`."""
     rows = []
     for keys in chain(combinations(candidates, 1), combinations(candidates, 2)):
-        odds = math.prod(_odds(said.probability[c.key]) for c in keys)
+        odds = math.prod(_odds(proposal.probability[c.key]) for c in keys)
         rows.append((odds, keys))
     total = sum(odds for odds, _ in rows)
-    shares = [(said.p_fault * odds / total, keys) for odds, keys in rows]
-    shares.append((1.0 - said.p_fault, ()))
+    shares = [(proposal.p_fault * odds / total, keys) for odds, keys in rows]
+    shares.append((1.0 - proposal.p_fault, ()))
     return tuple(
         Explanation(
             tuple((c.kind, c.place, c.unit) for c in keys),
             share,
-            tuple(said.severity[c.key][0] for c in keys),
-            tuple(said.severity[c.key][1:] for c in keys),
+            tuple(proposal.severity[c.key][0] for c in keys),
+            tuple(proposal.severity[c.key][1:] for c in keys),
         )
         for share, keys in sorted(shares, key=lambda row: -row[0])
         if share >= POSSIBLE
     )
 
 
-def _blind(said: Proposal, candidates: Sequence[Candidate]) -> tuple[dict[str, str], ...]:
+def _blind(proposal: Proposal, candidates: Sequence[CandidateFault]) -> tuple[dict[str, str], ...]:
     reason = "no severity of it was named in 95 % of held-out runs of this test"
     return tuple(
         {"kind": c.kind, "place": c.place, "reason": reason}
         for c in candidates
-        if c.key not in said.detectable
+        if c.key not in proposal.detectable
     )
 
 
@@ -166,7 +172,7 @@ def diagnose_by_both(
     false_alarm: float = 0.05,
     surrogate: Surrogate | None = None,
 ) -> Diagnosis:
-    """Let the surrogate propose causes and the model weigh those; as `diagnose_by_surrogate`.
+    """Let the surrogate propose causes and the model score those; as `diagnose_by_surrogate`.
 
     Where the surrogate cannot speak, or says that the logs lie outside its training set, the
     model weighs all causes.
@@ -174,7 +180,7 @@ def diagnose_by_both(
     from elevon.diagnose.bymodel import diagnose
 
     begin = clock.perf_counter()
-    check_asked(logs, actuator, false_alarm, "the surrogate")
+    check_request(logs, actuator, false_alarm, "the surrogate")
     candidates = chosen(faults)
     keys, note = _proposal(logs, actuator, baselines, candidates, surrogate)
     result = diagnose(logs, actuator, baselines=baselines, faults=keys, false_alarm=false_alarm)
@@ -185,30 +191,34 @@ def _proposal(
     logs: Sequence[TestLog],
     actuator: Actuator,
     baselines: Sequence[TestLog],
-    candidates: Sequence[Candidate],
+    candidates: Sequence[CandidateFault],
     surrogate: Surrogate | None,
 ) -> tuple[list[str], str]:
     """Return the keys for the model and a finding."""
     every = [c.key for c in candidates]
     try:
-        said = proposed(logs, actuator, baselines=baselines, surrogate=surrogate)
+        proposal = proposed(logs, actuator, baselines=baselines, surrogate=surrogate)
     except ElevonError as error:
-        return every, f"surrogate: no proposal ({error}); the model weighed all causes"
-    if said.outside:
+        return every, f"surrogate: no proposal ({error}); the model scored all causes"
+    if proposal.outside:
         return every, (
-            "surrogate: outside its training set; the model weighed all causes: "
-            + "; ".join(said.outside)
+            "surrogate: outside its training set; the model scored all causes: "
+            + "; ".join(proposal.outside)
         )
-    ranked = sorted(every, key=lambda key: -said.probability.get(key, 1.0))
+    ranked = sorted(every, key=lambda key: -proposal.probability.get(key, 1.0))
     keys = [
         key
         for k, key in enumerate(ranked)
-        if k < LEAST_PROPOSED or said.probability.get(key, 1.0) >= LISTED
+        if k < LEAST_PROPOSED or proposal.probability.get(key, 1.0) >= LISTED
     ]
-    shares = ", ".join(f"{k} {said.probability[k]:.2g}" for k in keys if k in said.probability)
-    others = ", ".join(k for k in keys if k not in said.probability)
-    beside = f"; weighed beside them, since it was not trained on them: {others}" if others else ""
-    return keys, f"surrogate: proposed {shares}{beside}"
+    shares = ", ".join(
+        f"{k} {proposal.probability[k]:.2g}" for k in keys if k in proposal.probability
+    )
+    others = ", ".join(k for k in keys if k not in proposal.probability)
+    untrained = (
+        f"; scored beside them, since it was not trained on them: {others}" if others else ""
+    )
+    return keys, f"surrogate: proposed {shares}{untrained}"
 
 
 def _odds(probability: float) -> float:

@@ -16,12 +16,12 @@ from elevon.arrays import Floats
 from elevon.bench.procedure import load_procedure
 from elevon.bench.rig import Setup, setups
 from elevon.bench.traces import recorded
-from elevon.diagnose.surrogate.features import NAMES, LogFeatures, log_features
+from elevon.diagnose.surrogate.features import NAMES, SurrogateFeatures, log_features
 from elevon.diagnose.surrogate.population import (
     ALIKE,
     FAULTS,
     NOISE,
-    Day,
+    UnitDay,
     build_of,
     day_of,
     drawn_faults,
@@ -36,14 +36,14 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.recording import Recording
 
-__all__ = ["ASKED", "HEALTHY_DAYS", "TESTS", "Table", "gathered"]
+__all__ = ["HEALTHY_DAYS", "SINGLE_FAULTS", "TESTS", "TrainingTable", "gathered"]
 
 #: Procedures of the bench that are learned; the first trace of each, with the unit's own backlash.
 TESTS = ("backlash", "loaded")
 HEALTHY_DAYS = 3
 FAULTY_DAYS = 7
-#: Severities at which a fault on its own is to be told, by test; SI. What units are judged at.
-ASKED: Mapping[str, Mapping[str, float]] = {
+#: Severities at which a fault on its own is to be named, by test; SI. What units are judged at.
+SINGLE_FAULTS: Mapping[str, Mapping[str, float]] = {
     test: {
         "backlash@transmission": math.radians(0.13),
         "friction@transmission": 0.25,
@@ -53,13 +53,13 @@ ASKED: Mapping[str, Mapping[str, float]] = {
     }
     for test in TESTS
 }
-_DAY_ASKED = 100  # number of the first day with a fault of `ASKED`
+_DAY_SINGLE = 100  # number of the first day with a fault of `ASKED`
 _UNITS = 16  # of a block: what is run, and written, at a time
 _VERSION = 2
 
 
 @dataclass(frozen=True)
-class Table:
+class TrainingTable:
     """What the runs of one test showed.
 
     Attributes
@@ -73,7 +73,7 @@ class Table:
     values : ndarray, shape (n, k)
         By `NAMES`.
     about : ndarray, shape (n, 2)
-        Travel and speed of `LogFeatures`.
+        Travel and speed of `SurrogateFeatures`.
     """
 
     unit: npt.NDArray[np.int64]
@@ -83,10 +83,10 @@ class Table:
     about: Floats
 
     @staticmethod
-    def joined(parts: Sequence[Table]) -> Table:
+    def joined(parts: Sequence[TrainingTable]) -> TrainingTable:
         """Stack tables."""
         names = ("unit", "baseline", "severity", "values", "about")
-        return Table(*(np.concatenate([getattr(p, n) for p in parts]) for n in names))
+        return TrainingTable(*(np.concatenate([getattr(p, n) for p in parts]) for n in names))
 
 
 def gathered(
@@ -96,10 +96,10 @@ def gathered(
     units: int,
     seed: int,
     fidelity: str = "high",
-    asked: bool = False,
+    single: bool = False,
     folder: Path | None = None,
     progress: Progress | None = None,
-) -> Table:
+) -> TrainingTable:
     """Run drawn units through a test and gather what the logs show.
 
     Parameters
@@ -114,7 +114,7 @@ def gathered(
         Of everything that is drawn.
     fidelity : str
         ``high`` or ``low``.
-    asked : bool
+    single : bool
         One day for each fault of `ASKED` instead.
     folder : path, optional
         Finished blocks are kept there, and used when they are there already.
@@ -132,7 +132,7 @@ def gathered(
         raise InputError(f"{actuator.name}: the surrogate learns rotary actuators so far")
     if test not in TESTS:
         raise InputError(f"test {test!r}: one of {', '.join(TESTS)}")
-    plan = _Plan(actuator, test, seed, fidelity, asked)
+    plan = _Plan(actuator, test, seed, fidelity, single)
     parts = []
     blocks = list(_blocks(units))
     for number, block in enumerate(blocks):
@@ -144,7 +144,7 @@ def gathered(
         parts.append(_block(plan, block, share))
         if path is not None:
             _write(path, parts[-1])
-    return Table.joined(parts)
+    return TrainingTable.joined(parts)
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ class _Plan:
     test: str
     seed: int
     fidelity: str
-    asked: bool
+    single: bool
 
 
 def _blocks(units: int) -> Iterator[range]:
@@ -170,17 +170,19 @@ def _share(progress: Progress | None, number: int, total: int) -> Progress | Non
 def _file(plan: _Plan, block: range) -> str:
     name = f"{plan.actuator.hash[:12]}-v{_VERSION}-s{plan.seed}"
     kind = "" if plan.fidelity == "high" else f"-{plan.fidelity}"
-    if plan.asked:
-        kind += "-asked"
+    if plan.single:
+        kind += "-single"
     return f"{plan.test}{kind}-{name}-{block.start:05d}-{block.stop:05d}.npz"
 
 
-def _read(path: Path) -> Table:
+def _read(path: Path) -> TrainingTable:
     with np.load(path, allow_pickle=False) as data:
-        return Table(*(data[n] for n in ("unit", "baseline", "severity", "values", "about")))
+        return TrainingTable(
+            *(data[n] for n in ("unit", "baseline", "severity", "values", "about"))
+        )
 
 
-def _write(path: Path, table: Table) -> None:
+def _write(path: Path, table: TrainingTable) -> None:
     import io
 
     from elevon.files import write_bytes
@@ -190,7 +192,7 @@ def _write(path: Path, table: Table) -> None:
     write_bytes(path, stream.getvalue())
 
 
-def _block(plan: _Plan, block: range, progress: Progress | None) -> Table:
+def _block(plan: _Plan, block: range, progress: Progress | None) -> TrainingTable:
     """Simulate some units; runs that trip or diverge give no row."""
     from elevon.scenario.compile import signal_records
     from elevon.simulate import Run, simulate_batch
@@ -201,12 +203,12 @@ def _block(plan: _Plan, block: range, progress: Progress | None) -> Table:
     with warnings.catch_warnings():
         # Units are drawn for both fidelities: what does not act in one of them is no news.
         warnings.simplefilter("ignore", ElevonWarning)
-        shown = simulate_batch(runs, fidelity=plan.fidelity, record=record, progress=progress)
+        recordings = simulate_batch(runs, fidelity=plan.fidelity, record=record, progress=progress)
     rows = []
-    for p, recording in zip(planned, shown, strict=True):
+    for p, recording in zip(planned, recordings, strict=True):
         if recording.status == "ok" and (row := _row(p, recording)) is not None:
             rows.append((p, row))
-    return Table(
+    return TrainingTable(
         np.array([p.unit for p, _ in rows], dtype=np.int64),
         np.array([p.baseline for p, _ in rows], dtype=np.bool_),
         np.array([[p.faults.get(key, 0.0) for key in FAULTS] for p, _ in rows]).reshape(
@@ -221,7 +223,7 @@ def _block(plan: _Plan, block: range, progress: Progress | None) -> Table:
 class _Planned:
     unit: int
     baseline: bool
-    day: Day
+    day: UnitDay
     faults: dict[str, float]
     noise: dict[str, float]
     setup: Setup
@@ -230,15 +232,15 @@ class _Planned:
 def _unit_runs(plan: _Plan, number: int) -> Iterator[_Planned]:
     """One unit, drawn alike for every test, and its days, which are not."""
     seed, test = plan.seed, plan.test
-    own = np.random.default_rng([seed, number])
+    unit_rng = np.random.default_rng([seed, number])
     build = build_of(np.random.default_rng([seed, len(TESTS), number // ALIKE]))
-    unit = unit_of(plan.actuator, build, own)
-    noise = {name: most * float(own.random()) for name, most in NOISE.items()}
+    unit = unit_of(plan.actuator, build, unit_rng)
+    noise = {name: most * float(unit_rng.random()) for name, most in NOISE.items()}
     procedure, candidates = first_trace(load_procedure(test)), learned()
-    for k, asked in _days(plan):
+    for k, single in _days(plan):
         rng = np.random.default_rng([seed, number, TESTS.index(test), k])
         day = day_of(unit, rng)
-        faults = drawn_faults(rng, candidates) if asked is None else asked
+        faults = drawn_faults(rng, candidates) if single is None else single
         texts = [_text(key, severity, rng) for key, severity in faults.items()]
         setup = setups(procedure, day.actuator, faults=texts, seed=int(rng.integers(2**31)))[0]
         yield _Planned(number, k < HEALTHY_DAYS, day, faults, noise, setup)
@@ -246,9 +248,9 @@ def _unit_runs(plan: _Plan, number: int) -> Iterator[_Planned]:
 
 def _days(plan: _Plan) -> Iterator[tuple[int, dict[str, float] | None]]:
     """Numbers of a unit's days with the faults there; None: they are drawn."""
-    if plan.asked:
-        for k, (key, severity) in enumerate(ASKED[plan.test].items()):
-            yield _DAY_ASKED + k, {key: severity}
+    if plan.single:
+        for k, (key, severity) in enumerate(SINGLE_FAULTS[plan.test].items()):
+            yield _DAY_SINGLE + k, {key: severity}
         return
     for k in range(HEALTHY_DAYS + FAULTY_DAYS):
         yield k, {} if k < HEALTHY_DAYS else None
@@ -263,7 +265,7 @@ def _text(key: str, severity: float, rng: np.random.Generator) -> str:
     return f"{key}={severity!r}"
 
 
-def _row(planned: _Planned, recording: Recording) -> LogFeatures | None:
+def _row(planned: _Planned, recording: Recording) -> SurrogateFeatures | None:
     try:
         log = traced(planned.setup, recording, cell=planned.day.cell, noise=planned.noise)
         return log_features(log, planned.setup.actuator)

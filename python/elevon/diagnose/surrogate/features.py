@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.evidence import Signals, evidence, median
+from elevon.diagnose.bymodel.features import DriveSignals, features_of, median
 from elevon.diagnose.bymodel.log import RUN_IN, TestLog
 from elevon.errors import InputError
 
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.calibrate.log import BenchLog
 
-__all__ = ["NAMES", "SCALES", "VOLTAGE", "LogFeatures", "changes", "log_features"]
+__all__ = ["NAMES", "SCALES", "VOLTAGE", "SurrogateFeatures", "changes", "log_features"]
 
 
-#: Keys of `elevon.diagnose.bymodel.evidence.UNITS`, in the surrogate's order.
+#: Keys of `elevon.diagnose.bymodel.features.UNITS`, in the surrogate's order.
 NAMES = (
     "lost_motion",
     "position_scale",
@@ -53,7 +53,7 @@ _FAR = 8.0  # median deviations
 
 
 @dataclass(frozen=True, eq=False)
-class LogFeatures:
+class SurrogateFeatures:
     """What one log shows.
 
     Attributes
@@ -75,7 +75,7 @@ class LogFeatures:
     speed: float
 
 
-def log_features(item: TestLog, actuator: Actuator) -> LogFeatures:
+def log_features(item: TestLog, actuator: Actuator) -> SurrogateFeatures:
     """Compute the features of a log.
 
     Parameters
@@ -100,21 +100,21 @@ def log_features(item: TestLog, actuator: Actuator) -> LogFeatures:
     if top < 1.0:
         raise InputError(f"{log.name}: nothing moves (motor up to {top:.3g} rad/s)")
     brake = np.interp(log.time, log.brake.time, log.brake.level) if item.braked else None
-    signals = Signals(
+    signals = DriveSignals(
         log.time, log.output, log.motor, log.speed_ref, log.speed, log.current_target,
         log.current, item.voltage, brake, None, None, good,
     )  # fmt: skip
     value = actuator.parameters.value
     ratio, pole_pairs = value("gear.ratio"), value("motor.pole_pairs")
-    shown = evidence(
+    features = features_of(
         signals, ratio=ratio, pole_pairs=pole_pairs, emf=1.0, deviations=False, shaft=False
     )
-    rows = dict(zip(shown.names, shown.values.tolist(), strict=True))
-    for name in ("voltage_order_1", "voltage_order_2"):  # of the log's own EMF, not the set's
+    rows = dict(zip(features.names, features.values.tolist(), strict=True))
+    for name in ("voltage_order_1", "voltage_order_2"):  # of the log's own EMF, not the actuator's
         if name in rows:
             rows[name] /= abs(rows["voltage_per_speed"])
     rows["following_gain"] = _following(log, good)
-    return LogFeatures(
+    return SurrogateFeatures(
         log.name,
         np.array([rows.get(name, math.nan) for name in NAMES]),
         item.braked,
@@ -168,8 +168,8 @@ def _gain(centre: Floats, output: Floats, set_point: Floats, rate: float) -> flo
     first = _solved(gram, 4)
     rows[4] = centre * (first[1] * rows[2] - first[2] * rows[1])  # by the rate
     gram[4] = gram[:, 4] = rows @ rows[4]
-    rest = np.abs(output - _solved(gram, 5) @ rows[:5])
-    far = rows[:, rest >= _FAR * median(rest) + 1e-12]
+    residual = np.abs(output - _solved(gram, 5) @ rows[:5])
+    far = rows[:, residual >= _FAR * median(residual) + 1e-12]
     return float(_solved(gram - far @ far.T, 5)[0]) / scale
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.diagnose.surrogate.campaign import Table
+from elevon.diagnose.surrogate.campaign import TrainingTable
 from elevon.diagnose.surrogate.features import NAMES, SCALES, changes
 from elevon.diagnose.surrogate.model import Head, Surrogate, TestModel
 from elevon.diagnose.surrogate.network import (
@@ -27,10 +27,10 @@ from elevon.diagnose.surrogate.sampling import Rows, sizes
 from elevon.diagnose.surrogate.view import VIEWS, View
 from elevon.progress import Progress, part
 
-__all__ = ["Plan", "fitted", "scores"]
+__all__ = ["TrainingPlan", "fitted", "scores"]
 
 FALSE_ALARM = 0.05
-HIGH = 0.25  # of a batch at least are runs of the high model
+HIGH = 0.25  # of a batch at least are runs of the switching model
 _KNOWN = 1000  # training runs kept to tell what is unlike them
 _FAR = 0.995  # of held-out runs lie nearer to a training run
 _ROOM = 0.1  # of the trained range beyond its ends
@@ -38,7 +38,7 @@ _LEAST = 0.2  # of the healthy median: what a share is taken of at least
 
 
 @dataclass(frozen=True)
-class Plan:
+class TrainingPlan:
     """How it is trained.
 
     Attributes
@@ -60,9 +60,9 @@ class Plan:
 
 
 def fitted(
-    high: Mapping[str, Table],
-    low: Mapping[str, Table],
-    plan: Plan,
+    high: Mapping[str, TrainingTable],
+    low: Mapping[str, TrainingTable],
+    plan: TrainingPlan,
     report: Mapping[str, Any],
     progress: Progress | None = None,
 ) -> Surrogate:
@@ -70,33 +70,33 @@ def fitted(
 
     Parameters
     ----------
-    high, low : mapping of str to Table
-        Test to runs of the high model and, beside them, of the low one. The high ones alone are
-        calibrated on.
-    plan : Plan
+    high, low : mapping of str to TrainingTable
+        Test to runs of the switching model and, beside them, of the reduced-order one. Those of the
+        switching model alone are calibrated on.
+    plan : TrainingPlan
         How.
     report : mapping
         Kept in the file, what calibration says beside it.
     progress : callable, optional
-        Told the done fraction; False stops.
+        Called with the done fraction; False stops.
     """
-    tests, said = {}, {}
+    tests, validation = {}, {}
     steps = len(high) * len(VIEWS)
     for number, (name, table) in enumerate(high.items()):
         heads = {}
         for at, view in enumerate(VIEWS, number * len(VIEWS)):
-            heads[view], said[f"{name}.{view}"] = _head(
+            heads[view], validation[f"{name}.{view}"] = _head(
                 Rows.of(table), Rows.of(low[name]) if name in low else None, view == "relative",
                 plan, part(progress, at / steps, (at + 1) / steps),
             )  # fmt: skip
         first = np.flatnonzero(table.baseline)
         travel, speed = np.median(table.about[first], axis=0)
         tests[name] = TestModel(name == "loaded", float(travel), float(speed), heads)
-    return Surrogate(tests, {**report, "cross_validation": said})
+    return Surrogate(tests, {**report, "cross_validation": validation})
 
 
 def _head(
-    high: Rows, low: Rows | None, relative: bool, plan: Plan, progress: Progress | None
+    high: Rows, low: Rows | None, relative: bool, plan: TrainingPlan, progress: Progress | None
 ) -> tuple[Head, dict[str, Any]]:
     rng = np.random.default_rng([plan.seed, 99])
     view = _view(high, relative, rng)
@@ -117,14 +117,14 @@ def _head(
                 )
             )
         )
-        held = usable[fold == k]
-        parts.append((held, ensembles[-1].says(high.inputs(view, held, rng))))
-    rows = np.concatenate([held for held, _ in parts])
-    held = _Held(
-        rows, np.concatenate([np.full(len(own), k) for k, (own, _) in enumerate(parts)]),
-        _stacked([said for _, said in parts]),
+        validation = usable[fold == k]
+        parts.append((validation, ensembles[-1].says(high.inputs(view, validation, rng))))
+    rows = np.concatenate([validation for validation, _ in parts])
+    validation = _Validation(
+        rows, np.concatenate([np.full(len(numbers), k) for k, (numbers, _) in enumerate(parts)]),
+        _stacked([opinion for _, opinion in parts]),
     )  # fmt: skip
-    return _calibrated(high, low, view, _union(ensembles), held=held, rng=rng)
+    return _calibrated(high, low, view, _union(ensembles), validation=validation, rng=rng)
 
 
 def _folds(unit: npt.NDArray[np.int64], folds: int) -> npt.NDArray[np.int64]:
@@ -134,7 +134,7 @@ def _folds(unit: npt.NDArray[np.int64], folds: int) -> npt.NDArray[np.int64]:
 
 
 @dataclass(frozen=True)
-class _Held:
+class _Validation:
     """Runs, shape (n,), the part each is of, and what networks say that have not seen it."""
 
     rows: npt.NDArray[np.int64]
@@ -146,15 +146,15 @@ class _Held:
         out = np.empty(len(union))
         for k in set(self.fold.tolist()):
             part = self.fold == k
-            own = np.sort(union[part & healthy])
-            out[part] = 1.0 - np.searchsorted(own, union[part]) / max(len(own), 1)
+            scores = np.sort(union[part & healthy])
+            out[part] = 1.0 - np.searchsorted(scores, union[part]) / max(len(scores), 1)
         return out
 
 
 def _sampler(
     high: Rows, rows: npt.NDArray[np.int64], low: Rows | None, view: View, size: int
 ) -> Callable[[np.random.Generator], Batch]:
-    """Batches of both models' runs: as many of each as there are, a quarter high ones at least."""
+    """Batches of both models' runs, as they are; a quarter of the switching model at least."""
     others = None if low is None else low.usable()
     share = 1.0 if others is None else max(HIGH, len(rows) / (len(rows) + len(others)))
 
@@ -190,8 +190,8 @@ def _view(high: Rows, relative: bool, rng: np.random.Generator) -> View:
     over = np.nan_to_num(changes(healthy, centre, floor))
     view = View(relative, centre, floor, *(np.ones(len(NAMES)) for _ in range(4)))
     rows = high.usable()
-    own = rows[table.baseline[rows]]
-    spread = _changes(high, view, own, rng).std(axis=0)
+    baselines = rows[table.baseline[rows]]
+    spread = _changes(high, view, baselines, rng).std(axis=0)
     spread = np.where(spread > 0.0, spread, 1.0)
     wide = _changes(high, view, rows, rng).std(axis=0)
     return View(
@@ -206,29 +206,32 @@ def _calibrated(
     view: View,
     ensemble: Ensemble,
     *,
-    held: _Held,
+    validation: _Validation,
     rng: np.random.Generator,
 ) -> tuple[Head, dict[str, Any]]:
-    rows, opinion = held.rows, held.opinion
+    rows, opinion = validation.rows, validation.opinion
     severity = high.table.severity[rows]
     there = severity != 0.0
     faulty = there.any(axis=1)
-    own = [_calibration(opinion.presence[:, k], there[:, k]) for k in range(there.shape[1])]
-    union = either(honest(np.array(own), opinion.presence))
-    scaling = np.array([*own, _calibration(union, faulty)])
+    calibrations = [
+        _calibration(opinion.presence[:, k], there[:, k]) for k in range(there.shape[1])
+    ]
+    union = either(honest(np.array(calibrations), opinion.presence))
+    scaling = np.array([*calibrations, _calibration(union, faulty)])
     score = np.abs(sizes(severity) - opinion.size) / opinion.deviation
     conformal = np.array([_quantile(score[there[:, k], k]) for k in range(there.shape[1])])
     change = _changes(high, view, rows, rng)
     known = _known(high, low, view, rng)
     head = Head(
-        view, ensemble, scaling, conformal, union[~faulty], held.fold[~faulty].astype(float), known,
+        view, ensemble, scaling, conformal, union[~faulty], validation.fold[~faulty].astype(float),
+        known,
         *_ends(np.vstack((change, np.sinh(known)))), *_unit_ends(high, low, view),
         np.full(len(FAULTS), np.nan), np.inf,
     )  # fmt: skip
     named = _named(opinion, scaling, severity)
     reach = float(np.quantile(_to_neighbour(head, change), _FAR))
     head = Head(**{**vars(head), "named": named, "reach": reach})
-    return head, scores(head, opinion, severity, held.chances(union, ~faulty))
+    return head, scores(head, opinion, severity, validation.chances(union, ~faulty))
 
 
 def _changes(
@@ -250,9 +253,9 @@ def _known(high: Rows, low: Rows | None, view: View, rng: np.random.Generator) -
 
 def _to_neighbour(head: Head, change: Floats) -> Floats:
     """Distance to the second nearest of the known runs: the nearest may be the run itself."""
-    own = np.arcsinh(change)
-    square = (own**2).sum(axis=1)[:, None] + (head.known**2).sum(axis=1)[None, :]
-    square = np.maximum(square - 2.0 * own @ head.known.T, 0.0)
+    scaled = np.arcsinh(change)
+    square = (scaled**2).sum(axis=1)[:, None] + (head.known**2).sum(axis=1)[None, :]
+    square = np.maximum(square - 2.0 * scaled @ head.known.T, 0.0)
     return np.asarray(np.sqrt(np.partition(square, 1, axis=1))[:, 1])
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.diagnose.surrogate.campaign import ASKED, Table
+from elevon.diagnose.surrogate.campaign import SINGLE_FAULTS, TrainingTable
 from elevon.diagnose.surrogate.fit import FALSE_ALARM, scores
 from elevon.diagnose.surrogate.model import Head, Surrogate
 from elevon.diagnose.surrogate.network import Opinion, honest
@@ -20,14 +20,14 @@ __all__ = ["judged", "judged_at"]
 Index = npt.NDArray[np.int64]
 
 
-def judged(surrogate: Surrogate, tables: Mapping[str, Table]) -> dict[str, Any]:
+def judged(surrogate: Surrogate, tables: Mapping[str, TrainingTable]) -> dict[str, Any]:
     """Return the scores of a surrogate on drawn units: as trained, and with one baseline each.
 
     Parameters
     ----------
     surrogate : Surrogate
         It.
-    tables : mapping of str to Table
+    tables : mapping of str to TrainingTable
         Test to runs.
     """
     out = {}
@@ -37,15 +37,15 @@ def judged(surrogate: Surrogate, tables: Mapping[str, Table]) -> dict[str, Any]:
         for view, head in surrogate.tests[name].heads.items():
             for text, most in ((view, None), ("one baseline", 1)):
                 if most is None or head.view.relative:
-                    said = _said(head, rows_of, rows, most)
-                    chance = head.chances(said)
-                    said_of = scores(head, said, table.severity[rows], chance)
+                    opinion = _opinion(head, rows_of, rows, most)
+                    chance = head.chances(opinion)
+                    said_of = scores(head, opinion, table.severity[rows], chance)
                     out[f"{name}.{text}"] = {**said_of, "outside": _outside(head, rows_of, rows)}
     return out
 
 
 def judged_at(
-    surrogate: Surrogate, tables: Mapping[str, Table], asked: Mapping[str, Table]
+    surrogate: Surrogate, tables: Mapping[str, TrainingTable], singles: Mapping[str, TrainingTable]
 ) -> dict[str, Any]:
     """Return how often each fault of `ASKED` is called and named, alone, with one baseline.
 
@@ -53,24 +53,24 @@ def judged_at(
     ----------
     surrogate : Surrogate
         It.
-    tables, asked : mapping of str to Table
+    tables, singles : mapping of str to TrainingTable
         Test to runs of drawn units, and to runs of the same units with those faults.
     """
     out = {}
-    for name, table in asked.items():
-        rows_of = Rows.of(Table.joined([tables[name], table]))
+    for name, table in singles.items():
+        rows_of = Rows.of(TrainingTable.joined([tables[name], table]))
         rows = len(tables[name].unit) + np.arange(len(table.unit))
         rows = rows[rows_of.others[rows, 0] >= 0]
         head = surrogate.tests[name].heads["relative"]
-        said = _said(head, rows_of, rows, 1)
-        for key, severity in ASKED[name].items():
+        opinion = _opinion(head, rows_of, rows, 1)
+        for key, severity in SINGLE_FAULTS[name].items():
             at = FAULTS.index(key)
-            own = np.flatnonzero(rows_of.table.severity[rows, at] != 0.0)
-            out[f"{name}.{key}"] = _of_fault(head, _only(said, own), at, severity)
+            at_severity = np.flatnonzero(rows_of.table.severity[rows, at] != 0.0)
+            out[f"{name}.{key}"] = _of_fault(head, _only(opinion, at_severity), at, severity)
     return out
 
 
-def _said(head: Head, rows_of: Rows, rows: Index, most: int | None) -> Opinion:
+def _opinion(head: Head, rows_of: Rows, rows: Index, most: int | None) -> Opinion:
     inputs = rows_of.inputs(head.view, rows, np.random.default_rng(0), most=most)
     return head.ensemble.says(inputs)
 
@@ -86,21 +86,22 @@ def _outside(head: Head, rows_of: Rows, rows: Index) -> int:
     return sum(bool(head.outside(*both)) for both in zip(change, context, strict=True))
 
 
-def _only(said: Opinion, rows: Index) -> Opinion:
+def _only(opinion: Opinion, rows: Index) -> Opinion:
     return Opinion(
-        said.presence[rows], said.faulty[rows], said.size[rows], said.deviation[rows],
-        said.each[:, rows],
+        opinion.presence[rows], opinion.faulty[rows], opinion.size[rows], opinion.deviation[rows],
+        opinion.each[:, rows],
     )  # fmt: skip
 
 
-def _of_fault(head: Head, said: Opinion, at: int, severity: float) -> dict[str, Any]:
+def _of_fault(head: Head, opinion: Opinion, at: int, severity: float) -> dict[str, Any]:
     """Scores of runs with one fault of one severity, given as at the upper end of its range."""
-    logit = honest(head.scaling[:-1], said.presence)
-    alarm = head.chances(said) <= FALSE_ALARM
+    logit = honest(head.scaling[:-1], opinion.presence)
+    alarm = head.chances(opinion) <= FALSE_ALARM
     first = logit.argmax(axis=1) == at
     alone = (logit > 0.0).sum(axis=1) == (logit[:, at] > 0.0)
     middle, low, high = (
-        severities(said.size + k * head.conformal * said.deviation)[:, at] for k in (0.0, -1.0, 1.0)
+        severities(opinion.size + k * head.conformal * opinion.deviation)[:, at]
+        for k in (0.0, -1.0, 1.0)
     )
     return {
         "severity": severity,

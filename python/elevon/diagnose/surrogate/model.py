@@ -16,14 +16,14 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.diagnose.surrogate.features import NAMES, LogFeatures
+from elevon.diagnose.surrogate.features import NAMES, SurrogateFeatures
 from elevon.diagnose.surrogate.network import Ensemble, Opinion, either, honest
 from elevon.diagnose.surrogate.pack import packed, unpacked
 from elevon.diagnose.surrogate.population import FAULTS
 from elevon.diagnose.surrogate.view import VIEWS, View
 from elevon.errors import FormatError
 
-__all__ = ["Head", "Said", "Surrogate", "TestModel", "shipped"]
+__all__ = ["Head", "LogOpinion", "Surrogate", "TestModel", "shipped"]
 
 _FORMAT, _VERSION = "elevon-surrogate", 2
 _MOST_BYTES = 50_000_000
@@ -35,7 +35,7 @@ _STORED = (
 
 
 @dataclass(frozen=True)
-class Said:
+class LogOpinion:
     """What the surrogate says of one log.
 
     Attributes
@@ -107,7 +107,7 @@ class Head:
     named: Floats
     reach: float
 
-    def says(self, values: Floats, baselines: Sequence[Floats]) -> Said:
+    def says(self, values: Floats, baselines: Sequence[Floats]) -> LogOpinion:
         """Return what it says of one log's features against those of baselines."""
         row = values[None, :]
         healthy = np.mean(baselines, axis=0)[None, :] if self.view.relative else None
@@ -115,7 +115,7 @@ class Head:
         opinion = self.ensemble.says(inputs)
         change = self.view.change(row, healthy)[0]
         presence = honest(self.scaling[:-1], opinion.presence)[0]
-        return Said(
+        return LogOpinion(
             presence,
             float(honest(self.scaling[-1:], either(presence)[None])[0]),
             float(self.chances(opinion)[0]),
@@ -135,8 +135,8 @@ class Head:
         each = opinion.each.reshape(parts, -1, *opinion.presence.shape).mean(axis=1)
         score = either(honest(self.scaling[:-1], each))
         above = sum(
-            len(own) - np.searchsorted(np.sort(own), score[k])
-            for k, own in ((k, self.healthy[self.fold == k]) for k in range(parts))
+            len(scores) - np.searchsorted(np.sort(scores), score[k])
+            for k, scores in ((k, self.healthy[self.fold == k]) for k in range(parts))
         )
         return np.asarray((above + 1.0) / (len(self.healthy) + 1.0))
 
@@ -181,10 +181,14 @@ class TestModel:
     speed: float
     heads: Mapping[str, Head]
 
-    def matches(self, shown: LogFeatures) -> bool:
+    def matches(self, features: SurrogateFeatures) -> bool:
         """Whether a log is of this test: brake, travel and speed alike."""
-        near = abs(shown.travel / self.travel - 1.0) < _TEST
-        return shown.braked == self.braked and near and abs(shown.speed / self.speed - 1.0) < _TEST
+        near = abs(features.travel / self.travel - 1.0) < _TEST
+        return (
+            features.braked == self.braked
+            and near
+            and abs(features.speed / self.speed - 1.0) < _TEST
+        )
 
 
 @dataclass(frozen=True)
@@ -202,9 +206,9 @@ class Surrogate:
     tests: Mapping[str, TestModel]
     report: Mapping[str, Any]
 
-    def test_of(self, shown: LogFeatures) -> str | None:
+    def test_of(self, features: SurrogateFeatures) -> str | None:
         """Return the name of the test a log is of, None for a test that was not trained."""
-        return next((name for name, test in self.tests.items() if test.matches(shown)), None)
+        return next((name for name, test in self.tests.items() if test.matches(features)), None)
 
     def save(self, path: str | os.PathLike[str], *, force: bool = False) -> Path:
         """Write one NumPy archive: arrays, and a JSON text; nothing executable.
@@ -283,12 +287,12 @@ def _arrays(head: Head) -> dict[str, npt.NDArray[Any]]:
 
 
 def _head(data: Mapping[str, Floats], key: str, reach: float) -> Head:
-    own = {n.removeprefix(f"{key}."): a for n, a in data.items() if n.startswith(f"{key}.")}
-    view = View.build(key.endswith("relative"), own)
-    arrays = {n: own[n] for n in _STORED}
-    arrays["named"] = np.where(own["named"] < 0.0, np.nan, own["named"])
-    layers = [own[f"layer{k}"] for k in range(sum(n.startswith("layer") for n in own))]
-    return Head(view=view, ensemble=Ensemble(layers), reach=reach, **arrays)
+    arrays = {n.removeprefix(f"{key}."): a for n, a in data.items() if n.startswith(f"{key}.")}
+    view = View.build(key.endswith("relative"), arrays)
+    stored = {n: arrays[n] for n in _STORED}
+    stored["named"] = np.where(arrays["named"] < 0.0, np.nan, arrays["named"])
+    layers = [arrays[f"layer{k}"] for k in range(sum(n.startswith("layer") for n in arrays))]
+    return Head(view=view, ensemble=Ensemble(layers), reach=reach, **stored)
 
 
 @lru_cache(maxsize=1)

@@ -94,12 +94,12 @@ class Ensemble:
         out = _forward(self.weights, np.asarray(inputs)[None, :, :])[-1]
         count = (out.shape[2] - 1) // 3
         size, log = out[..., count : 2 * count], out[..., 2 * count : 3 * count]
-        own = np.exp(2.0 * np.clip(log, _LEAST_LOG, _MOST_LOG)).mean(axis=0)
+        variance = np.exp(2.0 * np.clip(log, _LEAST_LOG, _MOST_LOG)).mean(axis=0)
         return Opinion(
             out[..., :count].mean(axis=0),
             out[..., -1].mean(axis=0),
             size.mean(axis=0),
-            np.sqrt(own),
+            np.sqrt(variance),
             out[..., :count],
         )
 
@@ -166,8 +166,8 @@ def honest(scaling: Numbers, logit: Numbers) -> Numbers:
     logit : ndarray, shape (..., k)
         As the networks give it.
     """
-    rest, there = -np.logaddexp(0.0, -logit), np.logaddexp(0.0, logit)
-    return np.asarray(scaling[:, 0] * rest + scaling[:, 1] * there + scaling[:, 2])
+    absent, there = -np.logaddexp(0.0, -logit), np.logaddexp(0.0, logit)
+    return np.asarray(scaling[:, 0] * absent + scaling[:, 1] * there + scaling[:, 2])
 
 
 def either(logit: Numbers) -> Numbers:

@@ -28,9 +28,9 @@ def packed(arrays: Mapping[str, npt.NDArray[Any]]) -> tuple[dict[str, Any], list
     """
     out, index = {}, []
     for kind, of in _KINDS.items():
-        own = {name: a for name, a in arrays.items() if a.dtype == of}
-        out[kind] = np.concatenate([np.zeros(0, dtype=of), *(a.ravel() for a in own.values())])
-        index += [[name, kind, list(a.shape)] for name, a in own.items()]
+        parts = {name: a for name, a in arrays.items() if a.dtype == of}
+        out[kind] = np.concatenate([np.zeros(0, dtype=of), *(a.ravel() for a in parts.values())])
+        index += [[name, kind, list(a.shape)] for name, a in parts.items()]
     return out, index
 
 
@@ -49,10 +49,10 @@ def unpacked(
         values = np.asarray(data[kind], dtype=np.float64)
         if not np.isfinite(values).all():
             raise ValueError("an array is not finite")
-        own = [(name, shape) for name, of, shape in index if of == kind]
-        ends = np.cumsum([int(np.prod(shape)) for _, shape in own])
-        if len(values) != (ends[-1] if own else 0):
+        parts = [(name, shape) for name, of, shape in index if of == kind]
+        ends = np.cumsum([int(np.prod(shape)) for _, shape in parts])
+        if len(values) != (ends[-1] if parts else 0):
             raise ValueError(f"{len(values)} values of {kind} precision, not those of the index")
-        for (name, shape), part in zip(own, np.split(values, ends[:-1]), strict=True):
+        for (name, shape), part in zip(parts, np.split(values, ends[:-1]), strict=True):
             out[name] = part.reshape(shape)
     return out

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elevon.diagnose.bymodel.candidates import CANDIDATES, Candidate
+from elevon.diagnose.bymodel.candidates import CANDIDATES, CandidateFault
 from elevon.diagnose.bymodel.replay import SPREAD
 from elevon.errors import InputError
 
@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
 __all__ = [
-    "ALIKE", "FAULTS", "NOISE", "Day", "build_of", "day_of", "drawn_faults", "learned", "unit_of",
+    "ALIKE", "FAULTS", "NOISE", "UnitDay", "build_of", "day_of", "drawn_faults", "learned",
+    "unit_of",
 ]  # fmt: skip
 
 #: What the surrogate knows, in the order of its answers.
@@ -86,7 +87,7 @@ _SHARES: Mapping[str, tuple[tuple[str, ...], tuple[float, ...]]] = {
 _SAMPLED = (0.0, 125e-6, 1e-3)  # s; of the controller, 0: continuous. ASSUMED, equally often
 _STRIBECK, _BRISTLES = (0.5, 3.0), (100.0, 300.0)  # rad/s; N m/rad. ASSUMED
 #: What makes runs eight times faster: semi-implicit steps [s], and the derivative's filter that
-#: they ask for. The features are those of steps of 1 us but for the voltage's ripple, which is up
+#: they need. The features are those of steps of 1 us but for the voltage's ripple, which is up
 #: to three times as large in a healthy unit: the carrier's edges fall on whole steps.
 _STEPS: Mapping[str, float] = {"pwm": 2.5e-6, "hysteresis": 5e-6}
 _DERIVATIVE_FILTER = 100.0
@@ -95,7 +96,7 @@ _SHORTEST = 1e-4  # s of derivative time
 
 
 @dataclass(frozen=True)
-class Day:
+class UnitDay:
     """A unit on one day.
 
     Attributes
@@ -103,14 +104,14 @@ class Day:
     actuator : Actuator
         The unit, as warm as it is.
     cell : float
-        Brake torque shown over the true one.
+        Brake torque measured over the true one.
     """
 
     actuator: Actuator
     cell: float
 
 
-def learned() -> list[Candidate]:
+def learned() -> list[CandidateFault]:
     """Return the candidates in the order of `FAULTS`."""
     known = {c.key: c for c in CANDIDATES}
     return [known[key] for key in FAULTS]
@@ -119,7 +120,7 @@ def learned() -> list[Candidate]:
 def build_of(rng: np.random.Generator) -> dict[str, float | str]:
     """Return how units are built: drive, backlash, friction's law, controller.
 
-    Units that are built alike run side by side in lanes.
+    Units that are built alike run side by side in a batch.
     """
     out: dict[str, float | str] = {}
     for path, (names, shares) in _SHARES.items():
@@ -163,7 +164,7 @@ def _stable(unit: Actuator) -> Actuator:
     return unit
 
 
-def day_of(unit: Actuator, rng: np.random.Generator) -> Day:
+def day_of(unit: Actuator, rng: np.random.Generator) -> UnitDay:
     """Return the unit as it is on another day."""
     values: dict[str, float | str] = {}
     cell = 1.0
@@ -176,12 +177,14 @@ def day_of(unit: Actuator, rng: np.random.Generator) -> Day:
         old = unit.parameters.value(name)
         values[name] = old + step if way == "add" else old * max(1.0 + step, 0.05)
         if path == "friction.dynamic":
-            still = unit.parameters.value("friction.static")
-            values["friction.static"] = still * max(1.0 + step, 0.05)
-    return Day(unit.with_values(values, source="day"), cell)
+            static = unit.parameters.value("friction.static")
+            values["friction.static"] = static * max(1.0 + step, 0.05)
+    return UnitDay(unit.with_values(values, source="day"), cell)
 
 
-def drawn_faults(rng: np.random.Generator, candidates: Sequence[Candidate]) -> dict[str, float]:
+def drawn_faults(
+    rng: np.random.Generator, candidates: Sequence[CandidateFault]
+) -> dict[str, float]:
     """Return severities of no, one or two faults; small ones are drawn more often than large."""
     share = rng.random()
     count = 0 if share < HEALTHY else 1 if share < HEALTHY + SINGLE else 2

@@ -11,9 +11,9 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.bymodel.answer import Moved
-from elevon.diagnose.bymodel.evidence import UNITS
-from elevon.diagnose.surrogate.features import NAMES, SCALES, LogFeatures, log_features
-from elevon.diagnose.surrogate.model import Head, Said, Surrogate, TestModel, shipped
+from elevon.diagnose.bymodel.features import UNITS
+from elevon.diagnose.surrogate.features import NAMES, SCALES, SurrogateFeatures, log_features
+from elevon.diagnose.surrogate.model import Head, LogOpinion, Surrogate, TestModel, shipped
 from elevon.diagnose.surrogate.population import FAULTS
 from elevon.diagnose.surrogate.sampling import severities
 from elevon.errors import InputError
@@ -65,11 +65,11 @@ class Proposal:
 class _Read:
     """One log with its head and baselines."""
 
-    shown: LogFeatures
+    features: SurrogateFeatures
     head: Head
     baselines: list[Floats]
-    said: Said
-    doubted: tuple[LogFeatures, ...] = ()
+    opinion: LogOpinion
+    doubted: tuple[SurrogateFeatures, ...] = ()
 
 
 def proposed(
@@ -83,9 +83,9 @@ def proposed(
     trained = surrogate or shipped()
     healthy = [log_features(item, actuator) for item in baselines]
     read = [_read(log_features(item, actuator), trained, healthy) for item in logs]
-    logits = _joint([r.said.presence for r in read])
-    faulty = float(_joint([np.array([r.said.faulty]) for r in read])[0])
-    chance = 1.0 - (1.0 - min(r.said.chance for r in read)) ** len(read)
+    logits = _joint([r.opinion.presence for r in read])
+    faulty = float(_joint([np.array([r.opinion.faulty]) for r in read])[0])
+    chance = 1.0 - (1.0 - min(r.opinion.chance for r in read)) ** len(read)
     sizes, reach = _sizes(read)
     ends = [severities(sizes + k * reach) for k in (0.0, -1.0, 1.0)]
     severity = {
@@ -93,25 +93,27 @@ def proposed(
         for k, key in enumerate(FAULTS)
     }
     return Proposal(
-        tuple(r.shown.name for r in read),
+        tuple(r.features.name for r in read),
         {key: _logistic(float(logits[k])) for k, key in enumerate(FAULTS)},
         _logistic(faulty),
         chance,
         severity,
         _detectable(read),
         tuple(m for r in read for m in _moved(r)),
-        tuple(f"{r.shown.name}: {text}" for r in read for text in r.said.outside),
+        tuple(f"{r.features.name}: {text}" for r in read for text in r.opinion.outside),
         tuple(text for r in read for text in _findings(r)),
     )
 
 
-def _read(shown: LogFeatures, trained: Surrogate, healthy: Sequence[LogFeatures]) -> _Read:
-    name = trained.test_of(shown)
+def _read(
+    features: SurrogateFeatures, trained: Surrogate, healthy: Sequence[SurrogateFeatures]
+) -> _Read:
+    name = trained.test_of(features)
     if name is None:
         raise InputError(
-            f"{shown.name}: the surrogate was not trained on such a test (travel "
-            f"{math.degrees(shown.travel):.3g} deg, motor {shown.speed:.3g} rad/s, brake "
-            f"{'on' if shown.braked else 'off'}); it knows {', '.join(trained.tests)}; "
+            f"{features.name}: the surrogate was not trained on such a test (travel "
+            f"{math.degrees(features.travel):.3g} deg, motor {features.speed:.3g} rad/s, brake "
+            f"{'on' if features.braked else 'off'}); it knows {', '.join(trained.tests)}; "
             "--method model serves any test"
         )
     test = trained.tests[name]
@@ -119,16 +121,16 @@ def _read(shown: LogFeatures, trained: Surrogate, healthy: Sequence[LogFeatures]
     doubted = _doubted(test, same)
     baselines = [b.values for b in same if b not in doubted or len(doubted) == len(same)]
     head = test.heads["relative" if baselines else "absolute"]
-    return _Read(shown, head, baselines, head.says(shown.values, baselines), tuple(doubted))
+    return _Read(features, head, baselines, head.says(features.values, baselines), tuple(doubted))
 
 
-def _doubted(test: TestModel, same: Sequence[LogFeatures]) -> list[LogFeatures]:
+def _doubted(test: TestModel, same: Sequence[SurrogateFeatures]) -> list[SurrogateFeatures]:
     """Return baselines that look faulty: against the others, or, alone, against all units."""
     out = []
     for item in same:
         others = [b.values for b in same if b is not item]
-        said = test.heads["relative" if others else "absolute"].says(item.values, others)
-        if said.chance < SUSPECT and (said.presence > 0.0).any():
+        opinion = test.heads["relative" if others else "absolute"].says(item.values, others)
+        if opinion.chance < SUSPECT and (opinion.presence > 0.0).any():
             out.append(item)
     if len(out) > 1 and len(out) == len(same):
         # They contradict each other: those that all units make less likely are doubted.
@@ -141,7 +143,7 @@ def _findings(read: _Read) -> list[str]:
     out = []
     if not read.baselines:
         out.append(
-            f"{read.shown.name}: no baseline of this test: held against all units that were "
+            f"{read.features.name}: no baseline of this test: held against all units that were "
             "trained; small faults are not seen"
         )
     for item in read.doubted:
@@ -162,8 +164,8 @@ def _joint(logits: Sequence[Floats]) -> Floats:
 
 def _sizes(read: Sequence[_Read]) -> tuple[Floats, Floats]:
     """Weigh the logs' sizes by their intervals."""
-    weight = np.array([1.0 / r.said.reach**2 for r in read])
-    size = (weight * np.array([r.said.size for r in read])).sum(axis=0) / weight.sum(axis=0)
+    weight = np.array([1.0 / r.opinion.reach**2 for r in read])
+    size = (weight * np.array([r.opinion.size for r in read])).sum(axis=0) / weight.sum(axis=0)
     return size, 1.0 / np.sqrt(weight.sum(axis=0))
 
 
@@ -177,17 +179,17 @@ def _detectable(read: Sequence[_Read]) -> dict[str, float]:
 
 
 def _moved(read: _Read) -> list[Moved]:
-    view, shown = read.head.view, read.shown
+    view, features = read.head.view, read.features
     healthy = np.mean(read.baselines, axis=0) if read.baselines else view.centre
     share = np.array([name in SCALES for name in NAMES])
     size = np.where(share, np.maximum(np.abs(healthy), view.floor), 1.0)
     return [
         Moved(
-            shown.name, name, UNITS[name][0], float(shown.values[k]), float(healthy[k]),
+            features.name, name, UNITS[name][0], float(features.values[k]), float(healthy[k]),
             float(view.spread[k] * size[k]), math.nan,
         )
         for k, name in enumerate(NAMES)
-        if math.isfinite(shown.values[k]) and math.isfinite(healthy[k])
+        if math.isfinite(features.values[k]) and math.isfinite(healthy[k])
     ]  # fmt: skip
 
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.diagnose.bymodel.healthy import FLOOR
-from elevon.diagnose.surrogate.campaign import Table
+from elevon.diagnose.surrogate.campaign import TrainingTable
 from elevon.diagnose.surrogate.features import NAMES
 from elevon.diagnose.surrogate.network import Batch
 from elevon.diagnose.surrogate.population import learned
@@ -55,7 +55,7 @@ class Rows:
 
     Attributes
     ----------
-    table : Table
+    table : TrainingTable
         Rows.
     deviation : ndarray, shape (n, k)
         Of what is drawn.
@@ -63,12 +63,12 @@ class Rows:
         Rows of the baselines; -1 where there is none.
     """
 
-    table: Table
+    table: TrainingTable
     deviation: Floats
     others: npt.NDArray[np.int64]
 
     @classmethod
-    def of(cls, table: Table) -> Rows:
+    def of(cls, table: TrainingTable) -> Rows:
         """Find the baselines of rows."""
         base = {int(u): np.flatnonzero(table.baseline & (table.unit == u)) for u in set(table.unit)}
         width = max((len(v) for v in base.values()), default=1)

@@ -7,8 +7,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from elevon.diagnose.surrogate.campaign import TESTS, Table, gathered
-from elevon.diagnose.surrogate.fit import Plan, fitted
+from elevon.diagnose.surrogate.campaign import TESTS, TrainingTable, gathered
+from elevon.diagnose.surrogate.fit import TrainingPlan, fitted
 from elevon.diagnose.surrogate.judge import judged, judged_at
 from elevon.diagnose.surrogate.model import Surrogate
 from elevon.errors import InputError
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["trained"]
 
-_LOW, _TEST = 100, 7  # added to the seed: units of the low model, and those that judge
+_LOW, _TEST = 100, 7  # added to the seed: units of the reduced-order model, and those that judge
 _RUNS = 0.7  # of the work
 
 
@@ -41,7 +41,8 @@ def trained(
     actuator : Actuator
         Units are drawn about it.
     units, low_units, test_units : int
-        On the high model, on the low one beside them, and on the high one for the test.
+        On the switching model, on the reduced-order one beside them, and on the former for the
+        test.
     rounds : int
         Training steps of a network.
     seed : int
@@ -58,17 +59,17 @@ def trained(
     Interrupted
         `progress` returned False.
     """
-    plan = Plan(rounds=rounds, seed=seed)
+    plan = TrainingPlan(rounds=rounds, seed=seed)
     if units < 2 * plan.folds:
         raise InputError(f"--units {units}: at least {2 * plan.folds}")
     jobs = {
         "high": _Job(units, seed),
         "low": _Job(low_units, seed + _LOW, fidelity="low"),
         "test": _Job(test_units, seed + _TEST),
-        "asked": _Job(test_units, seed + _TEST, asked=True),
+        "single_faults": _Job(test_units, seed + _TEST, single=True),
     }
     jobs = {name: job for name, job in jobs.items() if job.units}
-    tables: dict[str, dict[str, Table]] = {}
+    tables: dict[str, dict[str, TrainingTable]] = {}
     for number, (name, job) in enumerate(jobs.items()):
         share = part(progress, _RUNS * number / len(jobs), _RUNS * (number + 1) / len(jobs))
         tables[name] = _tables(actuator, job, folder, share)
@@ -84,7 +85,7 @@ def trained(
         return result
     more = {
         "test": judged(result, tables["test"]),
-        "asked": judged_at(result, tables["test"], tables["asked"]),
+        "single_faults": judged_at(result, tables["test"], tables["single_faults"]),
     }
     return Surrogate(result.tests, {**result.report, **more})
 
@@ -94,15 +95,16 @@ class _Job:
     units: int
     seed: int
     fidelity: str = "high"
-    asked: bool = False
+    single: bool = False
 
 
 def _tables(
     actuator: Actuator, job: _Job, folder: Path | None, progress: Progress | None
-) -> dict[str, Table]:
+) -> dict[str, TrainingTable]:
     return {
         test: gathered(
-            actuator, test, units=job.units, seed=job.seed, fidelity=job.fidelity, asked=job.asked,
+            actuator, test, units=job.units, seed=job.seed, fidelity=job.fidelity,
+            single=job.single,
             folder=folder, progress=part(progress, k / len(TESTS), (k + 1) / len(TESTS)),
         )
         for k, test in enumerate(TESTS)

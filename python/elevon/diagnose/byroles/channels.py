@@ -1,4 +1,4 @@
-"""What the low model shows of a log's test, by the same roles."""
+"""What the reduced-order model shows of a log's test, by the same roles."""
 
 from __future__ import annotations
 
@@ -9,39 +9,39 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.byroles.asked import RoleTest, action_numbers
 from elevon.diagnose.byroles.log import BEFORE, RoleLog
 from elevon.diagnose.byroles.numbers import Numbers, numbers_of
+from elevon.diagnose.byroles.role_test import RoleTest, action_numbers
 from elevon.diagnose.byroles.series import averaged
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
 __all__ = [
-    "Unit",
+    "RoleUnit",
     "as_on_stand",
     "channels_by",
+    "deflection_under",
     "driven",
-    "give_under",
+    "numbers_by",
     "numbers_of_log",
-    "shown_by",
 ]
 
 _CHUNK = 64  # runs held at once
 _OVER = 4  # samples of the model to one of the log, which are averaged: loggers filter, too
-_ELASTIC = 1.0  # backlash.model: a contact that gives
+_ELASTIC = 1.0  # backlash.model: an elastic contact
 _PUSHED = 0.1  # of the greatest load, of the fastest motion, and share of the time
 _SET_POINT = "_ref"  # end of roles that a drive knows as numbers: nothing filters them
 
 
 @dataclass(frozen=True)
-class Unit:
+class RoleUnit:
     """A unit of the replay.
 
     Attributes
     ----------
     values : mapping of str to float
-        What differs from the set.
+        What differs from the actuator.
     faults : tuple of str
         As in ``--fault``.
     late : float
@@ -51,8 +51,9 @@ class Unit:
         the command fall between samples.
     number : int
         Of its random numbers; healthy days differ in them, faults do not.
-    gives : bool
-        Whether its output gives way under the log's load, which the low model does not know.
+    compliant : bool
+        Whether its output deflects under the log's load, which the reduced-order model does not
+        know.
     """
 
     values: Mapping[str, float]
@@ -60,7 +61,7 @@ class Unit:
     late: float = 0.0
     phase: float = 0.0
     number: int = 0
-    gives: bool = True
+    compliant: bool = True
 
 
 def as_on_stand(actuator: Actuator, test: RoleTest) -> Actuator:
@@ -78,14 +79,14 @@ def numbers_of_log(item: RoleLog, actuator: Actuator, channels: Mapping[str, Flo
     return numbers_of(channels, item.command, item.time, item.units, pairs)
 
 
-def shown_by(item: RoleLog, actuator: Actuator, units: Sequence[Unit]) -> Iterator[Numbers]:
+def numbers_by(item: RoleLog, actuator: Actuator, units: Sequence[RoleUnit]) -> Iterator[Numbers]:
     """Run units through a log's test; numbers of each by the log's roles."""
     for channels in channels_by(item, actuator, units):
         yield numbers_of_log(item, actuator, channels)
 
 
 def channels_by(
-    item: RoleLog, actuator: Actuator, units: Sequence[Unit]
+    item: RoleLog, actuator: Actuator, units: Sequence[RoleUnit]
 ) -> Iterator[dict[str, Floats]]:
     """Run units through a log's test; what each shows by the log's roles, on its instants.
 
@@ -99,41 +100,42 @@ def channels_by(
     signals = _signals(item, actuator)
     over = _over(item.rate, solver_step(ready, "low"))
     record = f"{','.join(signals.values())}@{over * item.rate:.12g} Hz"
-    base = prepare(Run(ready, _scenario(item, actuator)), "low", record, doubts=False)
+    base = prepare(Run(ready, _scenario(item, actuator)), "low", record, notices=False)
     base = replace(base, core=_with_arrays(base.core, item, actuator))
     places = {path: k for k, path in enumerate(ready.parameters)}
     actions = action_numbers(actuator.wiring)
-    give = give_under(item, ready)
+    deflection = deflection_under(item, ready)
     for first in range(0, len(units), _CHUNK):
         runs = [
             replace(base, core=_of_unit(base.core, unit, places, item, actuator.wiring))
             for unit in units[first : first + _CHUNK]
         ]
-        shown = simulate_prepared(runs, fidelity="low")
-        for unit, result in zip(units[first : first + _CHUNK], shown, strict=True):
+        results = simulate_prepared(runs, fidelity="low")
+        for unit, result in zip(units[first : first + _CHUNK], results, strict=True):
             rows = result["clocks"][base.plan[0].name]
             late = unit.late if actions else unit.late + unit.phase
             shows = _channels(item, rows, base.plan[0].signals, signals, late / item.rate)
-            if give is not None and unit.gives and "output_position" in shows:
-                shows["output_position"] = shows["output_position"] - give
+            if deflection is not None and unit.compliant and "output_position" in shows:
+                shows["output_position"] = shows["output_position"] - deflection
             yield shows
 
 
 def driven(item: RoleLog, ready: Actuator) -> bool:
     """Whether a load drives the output of an elastic backlash over a tenth of the motion."""
-    give = give_under(item, ready)
-    if give is None:
+    deflection = deflection_under(item, ready)
+    if deflection is None:
         return False
     speed = np.gradient(item.command, item.time)
-    pushed = give * np.sign(speed) < -_PUSHED * np.abs(give).max()
+    pushed = deflection * np.sign(speed) < -_PUSHED * np.abs(deflection).max()
     moving = np.abs(speed) > _PUSHED * np.abs(speed).max()
     return bool(np.mean(pushed[moving]) > _PUSHED)
 
 
-def give_under(item: RoleLog, ready: Actuator) -> Floats | None:
+def deflection_under(item: RoleLog, ready: Actuator) -> Floats | None:
     """Return how far the output stands back under the log's load, shape (n,): force by stiffness.
 
-    The low model's backlash is rigid. None without a load, or where the unit's contact is rigid.
+    The reduced-order model's backlash is rigid. None without a load, or where the unit's contact is
+    rigid.
     """
     known = ready.parameters
     if (
@@ -148,7 +150,7 @@ def give_under(item: RoleLog, ready: Actuator) -> Floats | None:
 
 
 def _of_unit(
-    core: Mapping[str, Any], unit: Unit, places: Mapping[str, int], item: RoleLog, wiring: str
+    core: Mapping[str, Any], unit: RoleUnit, places: Mapping[str, int], item: RoleLog, wiring: str
 ) -> dict[str, Any]:
     from elevon.faults import Fault
 
@@ -201,7 +203,7 @@ def _over(rate: float, step: float) -> int:
 
 
 def _signals(item: RoleLog, actuator: Actuator) -> dict[str, str]:
-    """Role to the low model's signal, what a sensor shows before what is true."""
+    """Role to the reduced-order model's signal, what a sensor shows before what is true."""
     from elevon import _core
 
     played: dict[str, str] = {}

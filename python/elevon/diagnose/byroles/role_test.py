@@ -1,4 +1,4 @@
-"""The test behind a log: what was asked, what loaded it, and where it began, for the model."""
+"""The test behind a log: what was commanded, what loaded it, and where it began, for the model."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class RoleTest:
     stroke : OverStroke or None
         Load over the position, for a model that has one.
     own_load : bool
-        Whether the model loads itself: the log's load is then shown, not put in.
+        Whether the model loads itself: the log's load is then an output, not an input.
     initial : mapping of str to float or str
         Signal to where it starts.
     settings : mapping of str to object
@@ -64,7 +64,7 @@ class RoleTest:
 
 
 def action_numbers(wiring: str) -> tuple[str, ...]:
-    """Return the actions that a wiring is asked by; none where it is asked for a position."""
+    """Return the actions that command a wiring; none where a position is commanded."""
     from elevon import _core
 
     return tuple(next(w for w in _core.wirings() if w["name"] == wiring)["actions"])
@@ -74,25 +74,29 @@ def test_of(
     recording: Recording,
     actuator: Actuator,
     time: Floats,
-    shown: Mapping[str, Floats],
+    channels: Mapping[str, Floats],
     seconds: float,
 ) -> RoleTest:
     """Return the test of a log whose roles stand on instants counted from the onset."""
     stand = recording.meta.get("stand")
-    said: Mapping[str, Any] = stand if isinstance(stand, Mapping) else {}
-    own = not said and "scenario" in recording.meta and _shows_load(actuator.wiring)
-    settings = {p: v for p, v in said.get("parameters", {}).items() if p in actuator.parameters}
-    none = own or "load" not in shown
-    load, stroke = (None, None) if none else read_load(actuator, time, shown)
+    stand_data: Mapping[str, Any] = stand if isinstance(stand, Mapping) else {}
+    loads_itself = not stand_data and "scenario" in recording.meta and _shows_load(actuator.wiring)
+    settings = {
+        p: v for p, v in stand_data.get("parameters", {}).items() if p in actuator.parameters
+    }
+    none = loads_itself or "load" not in channels
+    load, stroke = (None, None) if none else read_load(actuator, time, channels)
     return RoleTest(
         seconds,
-        _asked(time, shown["command"], sequence=bool(action_numbers(actuator.wiring))),
+        _command_of(time, channels["command"], sequence=bool(action_numbers(actuator.wiring))),
         load,
         stroke,
-        own,
-        {**_initial(actuator, shown), **_stated(actuator.wiring, said.get("initial", {}))},
+        loads_itself,
+        {**_initial(actuator, channels), **_stated(actuator.wiring, stand_data.get("initial", {}))},
         settings,
-        f"{said['name']}: {recording.meta['log']}" if said and "log" in recording.meta else "",
+        f"{stand_data['name']}: {recording.meta['log']}"
+        if stand_data and "log" in recording.meta
+        else "",
     )
 
 
@@ -102,7 +106,7 @@ def _shows_load(wiring: str) -> bool:
     return any(signal["role"] == "load" for signal in _core.signals(wiring, "low"))
 
 
-def _asked(time: Floats, command: Floats, *, sequence: bool) -> tuple[Floats, Floats]:
+def _command_of(time: Floats, command: Floats, *, sequence: bool) -> tuple[Floats, Floats]:
     if sequence:
         level = np.rint(command)
         turns = np.concatenate(([0], np.flatnonzero(np.diff(level)) + 1))
@@ -110,12 +114,12 @@ def _asked(time: Floats, command: Floats, *, sequence: bool) -> tuple[Floats, Fl
     return lines(time, command, _EXACT * float(np.ptp(command)))
 
 
-def _initial(actuator: Actuator, shown: Mapping[str, Floats]) -> dict[str, float | str]:
+def _initial(actuator: Actuator, channels: Mapping[str, Floats]) -> dict[str, float | str]:
     """Where the model starts, as far as the log shows it."""
     from elevon import _core
 
     names = _core.initial(actuator.wiring, "low")
-    start = {role: float(np.mean(values[:3])) for role, values in shown.items()}
+    start = {role: float(np.mean(values[:3])) for role, values in channels.items()}
     if "output_position" not in start:
         return {}
     position = start["output_position"]
@@ -143,7 +147,7 @@ def _stated(wiring: str, given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def same_test(a: RoleTest, b: RoleTest) -> bool:
-    """Whether a second log, a baseline, was asked for the same as a first, and loaded alike.
+    """Whether a second log, a baseline, was commanded the same as a first, and loaded alike.
 
     It may go on for longer, as it is read as far as the first, and end a little sooner: a bench
     that is started by hand cuts a short log's end off.
@@ -155,7 +159,7 @@ def same_test(a: RoleTest, b: RoleTest) -> bool:
         return False
     grid = np.linspace(0.0, seconds, 200)
     size = max(float(np.ptp(a.command[1])), 1e-12)
-    apart = _held_or_lines(a, grid) - _held_or_lines(b, grid)
+    apart = _command_change(a, grid) - _command_change(b, grid)
     if float(np.sqrt(np.mean(apart**2))) > _ALIKE * size:
         return False
     if a.note and a.note == b.note and a.settings == b.settings:
@@ -163,7 +167,7 @@ def same_test(a: RoleTest, b: RoleTest) -> bool:
     return load_alike((a.load, a.stroke), (b.load, b.stroke), grid)
 
 
-def _held_or_lines(test: RoleTest, grid: Floats) -> Floats:
+def _command_change(test: RoleTest, grid: Floats) -> Floats:
     """A command relative to where it began; actions are few and start alike."""
     times, values = test.command
     return np.asarray(np.interp(grid, times, values) - values[0], dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Evidence of one log: a dozen numbers by linear regression, alike for logs and for model runs.
+"""Features of one log: a dozen numbers by linear regression, alike for logs and for model runs.
 
 None is physics of its own: each is what a linear regression of one logged signal on others says.
 What a fault does to them comes from model runs that pass through the same regressions.
@@ -14,16 +14,16 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.lost_motion import dragged, floats, spanned
+from elevon.diagnose.bymodel.lost_motion import carried, floats, spanned
 
 __all__ = [
     "OWN_ERROR",
     "SHARES",
     "SIZES",
     "UNITS",
-    "Evidence",
-    "Signals",
-    "evidence",
+    "DriveSignals",
+    "FeatureVector",
+    "features_of",
     "median",
     "regress",
 ]
@@ -64,9 +64,9 @@ SHARES = frozenset(
     ["dry_current", "viscous_current", "inertia_current", "brake_current", "speed_gain",
      "following_gain"]
 )  # fmt: skip
-#: Error of what the low model says a fault does to one number, as a share of the shift. ASSUMED,
-#: from the high model's drives: how much of a ripple shows in current and voltage depends on the
-#: current loop, which the low model has not.
+#: Error of what the reduced-order model says a fault does to one number, as a share of the shift.
+#: ASSUMED, from the switching model's drives: how much of a ripple shows in current and voltage
+#: depends on the current loop, which the reduced-order model has not.
 OWN_ERROR: Mapping[str, float] = {
     "current_order_1": 0.10,
     "current_order_2": 0.35,
@@ -86,7 +86,7 @@ _BRAKE = 8  # place of the brake torque among the columns that explain the curre
 
 
 @dataclass(frozen=True)
-class Signals:
+class DriveSignals:
     """What a log or a model run shows, shape (n,) each, SI; currents peak, positions as logged.
 
     Attributes
@@ -116,7 +116,7 @@ class Signals:
 
 
 @dataclass(frozen=True)
-class Evidence:
+class FeatureVector:
     """Numbers of one log.
 
     Attributes
@@ -135,35 +135,35 @@ class Evidence:
     std: Floats
     floats: bool = False
 
-    def only(self, names: Sequence[str]) -> Evidence:
+    def only(self, names: Sequence[str]) -> FeatureVector:
         """Return some of it, in the order given."""
         at = [self.names.index(name) for name in names]
-        return Evidence(tuple(names), self.values[at], self.std[at], self.floats)
+        return FeatureVector(tuple(names), self.values[at], self.std[at], self.floats)
 
 
-def evidence(
-    signals: Signals,
+def features_of(
+    signals: DriveSignals,
     *,
     ratio: float,
     pole_pairs: float,
     emf: float,
     deviations: bool = True,
     shaft: bool = True,
-) -> Evidence:
+) -> FeatureVector:
     """Regress.
 
     Parameters
     ----------
-    signals : Signals
+    signals : DriveSignals
         Of a log or a run.
     ratio : float
         Gear ratio.
     pole_pairs : float
         Electrical angle over shaft angle.
     emf : float
-        Of the set [V s/rad]: what the voltage's ripple is a share of.
+        Of the actuator [V s/rad]: what the voltage's ripple is a share of.
     deviations : bool
-        Whether deviations are asked for; without them `Evidence.std` is NaN, in a third of the
+        Whether deviations are needed; without them `FeatureVector.std` is NaN, in a third of the
         time.
     shaft : bool
         Whether what turns with the shaft is sought.
@@ -173,13 +173,13 @@ def evidence(
     rows, flies = _positions(signals, moving, ratio, deviations)
     cosine, sine = np.cos(pole_pairs * signals.motor), np.sin(pole_pairs * signals.motor)
     waves = (cosine, sine, cosine**2 - sine**2, 2.0 * cosine * sine)
-    beside = (2.0 * pole_pairs + 1.0) * signals.motor if shaft else None
-    rows |= _currents(signals, moving, (waves, beside), width, deviations)
+    sideband = (2.0 * pole_pairs + 1.0) * signals.motor if shaft else None
+    rows |= _currents(signals, moving, (waves, sideband), width, deviations)
     if signals.voltage is not None:
-        rows |= _voltages(signals, moving, (waves, beside), emf, deviations)
+        rows |= _voltages(signals, moving, (waves, sideband), emf, deviations)
     rows |= _control(signals, width, deviations)
     names = tuple(name for name in UNITS if name in rows)
-    return Evidence(
+    return FeatureVector(
         names,
         np.array([rows[name][0] for name in names]),
         np.array([rows[name][1] for name in names]),
@@ -260,11 +260,11 @@ def _root(variance: float) -> float:
 
 
 def _positions(
-    signals: Signals, moving: Bools, ratio: float, deviations: bool
+    signals: DriveSignals, moving: Bools, ratio: float, deviations: bool
 ) -> tuple[dict[str, tuple[float, float]], bool]:
     """Lost motion and scale, and whether the output flies in its backlash on its own."""
     gap = signals.motor / ratio - signals.output
-    use = moving & dragged(signals.motor / ratio, float(np.ptp(gap[moving])))
+    use = moving & carried(signals.motor / ratio, float(np.ptp(gap[moving])))
     if use.sum() < _LEAST:
         use = moving
     centred = signals.output - float(np.mean(signals.output[use]))
@@ -282,7 +282,7 @@ _Turns = tuple[Sequence[Floats], Floats | None]
 
 
 def _currents(
-    signals: Signals, moving: Bools, turns: _Turns, width: float, deviations: bool
+    signals: DriveSignals, moving: Bools, turns: _Turns, width: float, deviations: bool
 ) -> dict[str, tuple[float, float]]:
     half = max(1, round(0.5 * _SMOOTH / width))
     rate = _slope(signals.speed, half) / width
@@ -303,11 +303,11 @@ def _currents(
         return rows
     # What turns with the shaft is sought in what is left: in a short motion its turn looks like
     # the acceleration, and the sideband like its neighbour.
-    rest = signals.current - sum(b * column for b, column in zip(fit[0], columns, strict=True))
+    residual = signals.current - sum(b * column for b, column in zip(fit[0], columns, strict=True))
     shaft = [np.cos(signals.motor), np.sin(signals.motor)]
-    beside = [level * np.cos(turns[1]), level * np.sin(turns[1])]
-    rows["current_shaft"] = _size(_fit(shaft, rest, moving, deviations), 0)
-    rows["current_sideband"] = _size(_fit(beside, rest, moving, deviations), 0)
+    sideband = [level * np.cos(turns[1]), level * np.sin(turns[1])]
+    rows["current_shaft"] = _size(_fit(shaft, residual, moving, deviations), 0)
+    rows["current_sideband"] = _size(_fit(sideband, residual, moving, deviations), 0)
     return rows
 
 
@@ -325,7 +325,7 @@ def _mean(values: Floats, half: int) -> Floats:
 
 
 def _voltages(
-    signals: Signals, moving: Bools, turns: _Turns, emf: float, deviations: bool
+    signals: DriveSignals, moving: Bools, turns: _Turns, emf: float, deviations: bool
 ) -> dict[str, tuple[float, float]]:
     assert signals.voltage is not None
     use = moving & np.isfinite(signals.voltage)
@@ -341,13 +341,15 @@ def _voltages(
         "voltage_order_2": _size(fit, 5, emf),
     }
     if turns[1] is not None:
-        rest = signals.voltage - sum(b * c for b, c in zip(fit[0], columns, strict=True))
-        beside = [signals.speed * np.cos(turns[1]), signals.speed * np.sin(turns[1])]
-        rows["voltage_sideband"] = _size(_fit(beside, rest, use, deviations), 0, emf)
+        residual = signals.voltage - sum(b * c for b, c in zip(fit[0], columns, strict=True))
+        sideband = [signals.speed * np.cos(turns[1]), signals.speed * np.sin(turns[1])]
+        rows["voltage_sideband"] = _size(_fit(sideband, residual, use, deviations), 0, emf)
     return rows
 
 
-def _control(signals: Signals, width: float, deviations: bool) -> dict[str, tuple[float, float]]:
+def _control(
+    signals: DriveSignals, width: float, deviations: bool
+) -> dict[str, tuple[float, float]]:
     error = signals.speed_ref - signals.speed
     size = np.abs(signals.speed_ref)
     inside = signals.good & (size < 0.999 * float(size.max()))

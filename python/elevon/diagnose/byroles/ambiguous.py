@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.case import Case, joined, shift_of
+from elevon.diagnose.bymodel.case import LogCase, joined, shift_of
 
 if TYPE_CHECKING:
     from elevon.diagnose.bymodel.answer import Cause, Diagnosis
-    from elevon.diagnose.bymodel.candidates import Candidate
+    from elevon.diagnose.bymodel.candidates import CandidateFault
 
-__all__ = ["with_alike"]
+__all__ = ["with_ambiguous"]
 
 ALIKE = 2.0  # deviations between two faults' shifts, the model's error among them
 _POINTS = 101
 
 
-def with_alike(
-    result: Diagnosis, cases: Sequence[Case], candidates: Sequence[Candidate]
+def with_ambiguous(
+    result: Diagnosis, cases: Sequence[LogCase], candidates: Sequence[CandidateFault]
 ) -> Diagnosis:
     """Return the answer with causes joined that stand within `ALIKE` of each other.
 
@@ -41,7 +41,7 @@ def with_alike(
             for other in _close(cause, cases, candidates, covariance, errors)
             if other.key not in result.best  # a second fault beside it is no name for it
         ]
-        known = {(cause.kind, cause.place), *cause.equivalents}
+        known = {(cause.kind, cause.place), *cause.ambiguous_with}
         more = [
             (other.kind, place)
             for other in others
@@ -51,12 +51,12 @@ def with_alike(
         joint = [c for c in result.faults if (c.kind, c.place) in more]
         covered |= {(c.kind, c.place) for c in joint}
         total = min(1.0, cause.probability + sum(c.probability for c in joint))
-        names = (*cause.equivalents, *more)
-        out.append(_there(replace(cause, probability=total, equivalents=names), candidates))
+        names = (*cause.ambiguous_with, *more)
+        out.append(_there(replace(cause, probability=total, ambiguous_with=names), candidates))
     return replace(result, faults=tuple(out))
 
 
-def _there(cause: Cause, candidates: Sequence[Candidate]) -> Cause:
+def _there(cause: Cause, candidates: Sequence[CandidateFault]) -> Cause:
     """What is there or not has a severity of one."""
     if any(c.switched for c in candidates if (c.kind, c.place) == (cause.kind, cause.place)):
         return replace(cause, severity=1.0, interval=(1.0, 1.0))
@@ -65,19 +65,21 @@ def _there(cause: Cause, candidates: Sequence[Candidate]) -> Cause:
 
 def _close(
     cause: Cause,
-    cases: Sequence[Case],
-    candidates: Sequence[Candidate],
+    cases: Sequence[LogCase],
+    candidates: Sequence[CandidateFault],
     covariance: Floats,
     errors: Floats,
-) -> list[Candidate]:
-    """Candidates with a severity at which they shift the evidence as this cause does."""
-    own = next(c for c in candidates if (c.kind, c.place) == (cause.kind, cause.place))
-    moved = shift_of(cases, own.key, np.array([cause.severity]))[0]
-    loose = covariance + np.diag((errors * moved) ** 2) + own.error**2 * np.outer(moved, moved)
+) -> list[CandidateFault]:
+    """Candidates with a severity at which they shift the features as this cause does."""
+    candidate = next(c for c in candidates if (c.kind, c.place) == (cause.kind, cause.place))
+    moved = shift_of(cases, candidate.key, np.array([cause.severity]))[0]
+    loose = (
+        covariance + np.diag((errors * moved) ** 2) + candidate.error**2 * np.outer(moved, moved)
+    )
     root = np.linalg.inv(np.linalg.cholesky(loose))
     out = []
     for other in candidates:
-        if other.key == own.key:
+        if other.key == candidate.key:
             continue
         grid = np.linspace(other.low, other.high, _POINTS)
         grid = np.sort(np.concatenate((grid, 0.05 * grid)))
