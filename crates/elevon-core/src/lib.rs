@@ -9,6 +9,7 @@ pub mod features;
 pub mod inverter;
 pub mod motor;
 pub mod noise;
+pub mod panics;
 pub mod piecewise;
 pub mod registry;
 pub mod scalar;

@@ -1,6 +1,7 @@
 //! What the core knows of its actuators, as plain dictionaries.
 
-use crate::spec::{bad, model, vector, Resolver};
+use crate::seam::{bad, guarded};
+use crate::spec::{model, vector, Resolver};
 use elevon_core::command::{self, Term, Wave};
 use elevon_core::fault::{profiles as fault_profiles, Attribute};
 use elevon_core::registry::KINDS;
@@ -29,39 +30,43 @@ pub fn dicts<'py, T>(
 }
 
 #[pyfunction]
-pub fn version() -> &'static str {
-    env!("CARGO_PKG_VERSION")
+pub fn version() -> PyResult<&'static str> {
+    guarded(|| Ok(env!("CARGO_PKG_VERSION")))
 }
 
 #[pyfunction]
 pub fn widths(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
-    let dict = PyDict::new(py);
-    let widest = Width::detect();
-    for name in Width::NAMES {
-        if let Some(width) = Width::by_name(name) {
-            dict.set_item(name, width.lanes())?;
+    guarded(|| {
+        let dict = PyDict::new(py);
+        let widest = Width::detect();
+        for name in Width::NAMES {
+            if let Some(width) = Width::by_name(name) {
+                dict.set_item(name, width.lanes())?;
+            }
         }
-    }
-    dict.set_item("auto", widest.lanes())?;
-    dict.set_item("widest", widest.name())?;
-    Ok(dict)
+        dict.set_item("auto", widest.lanes())?;
+        dict.set_item("widest", widest.name())?;
+        Ok(dict)
+    })
 }
 
 #[pyfunction]
 pub fn wirings(py: Python<'_>) -> Dicts<'_> {
-    dicts(py, KINDS, |d, kind| {
-        d.set_item("name", kind.name)?;
-        d.set_item("text", kind.text)?;
-        let model = kind.fidelities[0].1;
-        d.set_item("modes", model.modes().to_vec())?;
-        let command = model.ports().iter().find(|p| p.name == "command").map_or("", |p| p.unit);
-        let units = PyDict::new(py);
-        for (mode, unit) in model.modes().iter().zip(model.mode_units()) {
-            units.set_item(mode, if unit.is_empty() { command } else { unit })?;
-        }
-        d.set_item("mode_units", units)?;
-        d.set_item("actions", model.actions().to_vec())?;
-        d.set_item("fidelities", kind.fidelities.iter().map(|f| f.0).collect::<Vec<_>>())
+    guarded(|| {
+        dicts(py, KINDS, |d, kind| {
+            d.set_item("name", kind.name)?;
+            d.set_item("text", kind.text)?;
+            let model = kind.fidelities[0].1;
+            d.set_item("modes", model.modes().to_vec())?;
+            let command = model.ports().iter().find(|p| p.name == "command").map_or("", |p| p.unit);
+            let units = PyDict::new(py);
+            for (mode, unit) in model.modes().iter().zip(model.mode_units()) {
+                units.set_item(mode, if unit.is_empty() { command } else { unit })?;
+            }
+            d.set_item("mode_units", units)?;
+            d.set_item("actions", model.actions().to_vec())?;
+            d.set_item("fidelities", kind.fidelities.iter().map(|f| f.0).collect::<Vec<_>>())
+        })
     })
 }
 
@@ -81,59 +86,67 @@ fn carried(d: &Bound<'_, PyDict>, not_modelled: impl Fn(Fidelity) -> Option<&'st
 
 #[pyfunction]
 pub fn parameters<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
-    dicts(py, records(model(wiring, "high")?.groups()), |d, (path, v)| {
-        let (minimum, maximum, open) = v.range.bounds();
-        d.set_item("path", path)?;
-        d.set_item("symbol", v.symbol)?;
-        d.set_item("unit", v.unit)?;
-        d.set_item("minimum", minimum)?;
-        d.set_item("maximum", maximum)?;
-        d.set_item("minimum_open", open)?;
-        d.set_item("maximum_open", false)?;
-        d.set_item("text", v.text)?;
-        d.set_item("register", v.register.name())?;
-        d.set_item("default", v.default)?;
-        let choices = if let Range::Choice(names) = v.range { Some(names.to_vec()) } else { None };
-        d.set_item("choices", choices)?;
-        d.set_item("when", v.acts.when.iter().map(ToString::to_string).collect::<Vec<_>>())?;
-        carried(d, |fidelity| v.acts.not_modelled(fidelity))
+    guarded(|| {
+        dicts(py, records(model(wiring, "high")?.groups()), |d, (path, v)| {
+            let (minimum, maximum, open) = v.range.bounds();
+            d.set_item("path", path)?;
+            d.set_item("symbol", v.symbol)?;
+            d.set_item("unit", v.unit)?;
+            d.set_item("minimum", minimum)?;
+            d.set_item("maximum", maximum)?;
+            d.set_item("minimum_open", open)?;
+            d.set_item("maximum_open", false)?;
+            d.set_item("text", v.text)?;
+            d.set_item("register", v.register.name())?;
+            d.set_item("default", v.default)?;
+            let choices = if let Range::Choice(names) = v.range { Some(names.to_vec()) } else { None };
+            d.set_item("choices", choices)?;
+            d.set_item("when", v.acts.when.iter().map(ToString::to_string).collect::<Vec<_>>())?;
+            carried(d, |fidelity| v.acts.not_modelled(fidelity))
+        })
     })
 }
 
 #[pyfunction]
 pub fn signals<'py>(py: Python<'py>, wiring: &str, fidelity: &str) -> Dicts<'py> {
-    dicts(py, model(wiring, fidelity)?.signals(), |d, s| {
-        d.set_item("name", s.name)?;
-        d.set_item("symbol", s.symbol)?;
-        d.set_item("unit", s.unit)?;
-        d.set_item("text", s.text)?;
-        d.set_item("role", s.role.map(Role::name))
+    guarded(|| {
+        dicts(py, model(wiring, fidelity)?.signals(), |d, s| {
+            d.set_item("name", s.name)?;
+            d.set_item("symbol", s.symbol)?;
+            d.set_item("unit", s.unit)?;
+            d.set_item("text", s.text)?;
+            d.set_item("role", s.role.map(Role::name))
+        })
     })
 }
 
 /// What signals may be to an actuator, in whose units.
 #[pyfunction]
 pub fn roles(py: Python<'_>) -> Dicts<'_> {
-    dicts(py, Role::ALL, |d, role| {
-        d.set_item("name", role.name())?;
-        d.set_item("units", role.units().to_vec())?;
-        d.set_item("text", role.text())
+    guarded(|| {
+        dicts(py, Role::ALL, |d, role| {
+            d.set_item("name", role.name())?;
+            d.set_item("units", role.units().to_vec())?;
+            d.set_item("text", role.text())
+        })
     })
 }
 
 #[pyfunction]
 pub fn ports<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
-    dicts(py, model(wiring, "high")?.ports(), |d, p| {
-        d.set_item("name", p.name)?;
-        d.set_item("unit", p.unit)?;
-        d.set_item("text", p.text)?;
-        d.set_item("parameter", p.parameter)
+    guarded(|| {
+        dicts(py, model(wiring, "high")?.ports(), |d, p| {
+            d.set_item("name", p.name)?;
+            d.set_item("unit", p.unit)?;
+            d.set_item("text", p.text)?;
+            d.set_item("parameter", p.parameter)
+        })
     })
 }
 
 #[pyfunction]
 pub fn initial(wiring: &str, fidelity: &str) -> PyResult<Vec<&'static str>> {
-    Ok(model(wiring, fidelity)?.initial().to_vec())
+    guarded(|| Ok(model(wiring, fidelity)?.initial().to_vec()))
 }
 
 /// An attribute ranges over what its parameter does; one without is the period of a pulse.
@@ -153,25 +166,27 @@ fn attribute<'py>(d: &Bound<'py, PyDict>, a: &Attribute, groups: &[Group]) -> Py
 
 #[pyfunction]
 pub fn faults<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
-    let model = model(wiring, "high")?;
-    dicts(py, model.catalogue(), |d, f| {
-        let (minimum, maximum, open) = f.range.bounds();
-        d.set_item("kind", f.kind)?;
-        d.set_item("places", f.places.iter().map(|p| p.name).collect::<Vec<_>>())?;
-        d.set_item("unit", f.unit)?;
-        d.set_item("minimum", minimum)?;
-        d.set_item("maximum", maximum)?;
-        d.set_item("minimum_open", open)?;
-        d.set_item("effect", f.effect)?;
-        d.set_item("source", f.source)?;
-        d.set_item("attributes", dicts(py, f.attributes, |d, a| attribute(d, a, model.groups()))?)?;
-        let targets = PyDict::new(py);
-        for place in f.places {
-            targets.set_item(place.name, place.targets.iter().map(|t| t.path).collect::<Vec<_>>())?;
-        }
-        d.set_item("targets", targets)?;
-        d.set_item("whole", f.counted())?;
-        carried(d, |fidelity| f.not_modelled(model.groups(), fidelity))
+    guarded(|| {
+        let model = model(wiring, "high")?;
+        dicts(py, model.catalogue(), |d, f| {
+            let (minimum, maximum, open) = f.range.bounds();
+            d.set_item("kind", f.kind)?;
+            d.set_item("places", f.places.iter().map(|p| p.name).collect::<Vec<_>>())?;
+            d.set_item("unit", f.unit)?;
+            d.set_item("minimum", minimum)?;
+            d.set_item("maximum", maximum)?;
+            d.set_item("minimum_open", open)?;
+            d.set_item("effect", f.effect)?;
+            d.set_item("source", f.source)?;
+            d.set_item("attributes", dicts(py, f.attributes, |d, a| attribute(d, a, model.groups()))?)?;
+            let targets = PyDict::new(py);
+            for place in f.places {
+                targets.set_item(place.name, place.targets.iter().map(|t| t.path).collect::<Vec<_>>())?;
+            }
+            d.set_item("targets", targets)?;
+            d.set_item("whole", f.counted())?;
+            carried(d, |fidelity| f.not_modelled(model.groups(), fidelity))
+        })
     })
 }
 
@@ -188,10 +203,12 @@ fn rows<'py>(py: Python<'py>, parameters: impl IntoIterator<Item = ParameterRow>
 
 #[pyfunction]
 pub fn waveforms(py: Python<'_>) -> Dicts<'_> {
-    dicts(py, command::catalogue(), |d, w| {
-        d.set_item("kind", w.kind)?;
-        d.set_item("text", w.text)?;
-        d.set_item("parameters", rows(py, w.parameters.iter().map(|p| (p.name, p.unit, p.default, p.text)))?)
+    guarded(|| {
+        dicts(py, command::catalogue(), |d, w| {
+            d.set_item("kind", w.kind)?;
+            d.set_item("text", w.text)?;
+            d.set_item("parameters", rows(py, w.parameters.iter().map(|p| (p.name, p.unit, p.default, p.text)))?)
+        })
     })
 }
 
@@ -203,40 +220,46 @@ pub fn waveform<'py>(
     parameters: Vec<f64>,
     time: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let record = command::catalogue().iter().find(|w| w.kind == kind && w.wave != Wave::Table);
-    let record = record.ok_or_else(|| bad(format!("no waveform {kind:?} without points")))?;
-    if parameters.len() != record.parameters.len() {
-        return Err(bad(format!("{kind}: {} parameters given, {} expected", parameters.len(), record.parameters.len())));
-    }
-    let term = Term { wave: record.wave, enabled: true, parameters, times: [].into(), values: [].into() };
-    Ok(PyArray1::from_vec(py, time.as_slice()?.iter().map(|&t| term.at(t)).collect()))
+    guarded(|| {
+        let record = command::catalogue().iter().find(|w| w.kind == kind && w.wave != Wave::Table);
+        let record = record.ok_or_else(|| bad(format!("no waveform {kind:?} without points")))?;
+        if parameters.len() != record.parameters.len() {
+            return Err(bad(format!("{kind}: {} parameters given, {} expected", parameters.len(), record.parameters.len())));
+        }
+        let term = Term { wave: record.wave, enabled: true, parameters, times: [].into(), values: [].into() };
+        Ok(PyArray1::from_vec(py, time.as_slice()?.iter().map(|&t| term.at(t)).collect()))
+    })
 }
 
 /// Derivatives that one pass of `sensitivities` carries.
 #[pyfunction]
-pub fn derivatives_per_pass() -> usize {
-    derivatives()
+pub fn derivatives_per_pass() -> PyResult<usize> {
+    guarded(|| Ok(derivatives()))
 }
 
 #[pyfunction]
 pub fn profiles(py: Python<'_>) -> Dicts<'_> {
-    dicts(py, fault_profiles(), |d, p| {
-        d.set_item("kind", p.kind)?;
-        d.set_item("text", p.text)?;
-        d.set_item("parameters", rows(py, p.parameters.iter().copied())?)
+    guarded(|| {
+        dicts(py, fault_profiles(), |d, p| {
+            d.set_item("kind", p.kind)?;
+            d.set_item("text", p.text)?;
+            d.set_item("parameters", rows(py, p.parameters.iter().copied())?)
+        })
     })
 }
 
 #[pyfunction]
 pub fn check<'py>(py: Python<'py>, wiring: &str, fidelity: &str, parameters: PyReadonlyArray1<'py, f64>) -> Dicts<'py> {
-    let model = model(wiring, fidelity)?;
-    let raw = vector(model, &parameters)?;
-    dicts(py, model.check(&raw), |d, f| {
-        d.set_item("severity", f.severity.name())?;
-        d.set_item("path", f.path)?;
-        d.set_item("value", f.value)?;
-        d.set_item("limit", f.limit)?;
-        d.set_item("message", f.message)
+    guarded(|| {
+        let model = model(wiring, fidelity)?;
+        let raw = vector(model, &parameters)?;
+        dicts(py, model.check(&raw), |d, f| {
+            d.set_item("severity", f.severity.name())?;
+            d.set_item("path", f.path)?;
+            d.set_item("value", f.value)?;
+            d.set_item("limit", f.limit)?;
+            d.set_item("message", f.message)
+        })
     })
 }
 
@@ -251,11 +274,13 @@ pub fn not_acting<'py>(
     faults: &Bound<'py, PyList>,
     paths: Option<Vec<String>>,
 ) -> Dicts<'py> {
-    let resolver = Resolver::of(wiring, fidelity)?;
-    let raw = vector(resolver.model, &parameters)?;
-    let faults = resolver.faults(faults)?;
-    dicts(py, resolver.model.not_acting(&raw, &faults, paths.as_deref()), |d, (path, reason)| {
-        d.set_item("path", path)?;
-        d.set_item("reason", reason)
+    guarded(|| {
+        let resolver = Resolver::of(wiring, fidelity)?;
+        let raw = vector(resolver.model, &parameters)?;
+        let faults = resolver.faults(faults)?;
+        dicts(py, resolver.model.not_acting(&raw, &faults, paths.as_deref()), |d, (path, reason)| {
+            d.set_item("path", path)?;
+            d.set_item("reason", reason)
+        })
     })
 }

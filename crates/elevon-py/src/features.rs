@@ -1,7 +1,8 @@
 //! Features across the seam: their records, and the features of columns.
 
 use crate::describe::dicts;
-use crate::spec::{bad, need};
+use crate::seam::{bad, guarded};
+use crate::spec::need;
 use elevon_core::features::{records, Accumulator, Plan, Role, Settings};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -9,21 +10,25 @@ use pyo3::types::{PyDict, PyList};
 
 #[pyfunction]
 pub fn feature_records(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
-    dicts(py, records(), |d, r| {
-        d.set_item("name", &r.name)?;
-        d.set_item("unit", &r.unit)?;
-        d.set_item("family", r.family)?;
-        d.set_item("roles", r.roles.iter().map(|role| role.name()).collect::<Vec<_>>())?;
-        d.set_item("minimum_rate", r.minimum_rate)?;
-        d.set_item("text", &r.text)
+    guarded(|| {
+        dicts(py, records(), |d, r| {
+            d.set_item("name", &r.name)?;
+            d.set_item("unit", &r.unit)?;
+            d.set_item("family", r.family)?;
+            d.set_item("roles", r.roles.iter().map(|role| role.name()).collect::<Vec<_>>())?;
+            d.set_item("minimum_rate", r.minimum_rate)?;
+            d.set_item("text", &r.text)
+        })
     })
 }
 
 #[pyfunction]
 pub fn feature_roles(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
-    dicts(py, Role::ALL, |d, role| {
-        d.set_item("name", role.name())?;
-        d.set_item("text", role.text())
+    guarded(|| {
+        dicts(py, Role::ALL, |d, role| {
+            d.set_item("name", role.name())?;
+            d.set_item("text", role.text())
+        })
     })
 }
 
@@ -62,17 +67,19 @@ pub fn features<'py>(
     plan: &Bound<'py, PyDict>,
     columns: Vec<PyReadonlyArray1<'py, f64>>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let slices = columns.iter().map(|c| c.as_slice()).collect::<Result<Vec<_>, _>>()?;
-    let roles: Vec<String> = need(plan, "roles")?.extract()?;
-    let plan = read(plan)?;
-    let rows = slices.first().map_or(0, |c| c.len());
-    if roles.len() != slices.len() || slices.iter().any(|c| c.len() != rows) {
-        return Err(bad(format!("{} columns for {} roles, or of different lengths", slices.len(), roles.len())));
-    }
-    let values = py.detach(|| {
-        let mut sums = Accumulator::new(&plan);
-        sums.push(&plan.columns(slices.iter().copied()));
-        sums.finish()
-    });
-    Ok(PyArray1::from_vec(py, values))
+    guarded(|| {
+        let slices = columns.iter().map(|c| c.as_slice()).collect::<Result<Vec<_>, _>>()?;
+        let roles: Vec<String> = need(plan, "roles")?.extract()?;
+        let plan = read(plan)?;
+        let rows = slices.first().map_or(0, |c| c.len());
+        if roles.len() != slices.len() || slices.iter().any(|c| c.len() != rows) {
+            return Err(bad(format!("{} columns for {} roles, or of different lengths", slices.len(), roles.len())));
+        }
+        let values = py.detach(|| {
+            let mut sums = Accumulator::new(&plan);
+            sums.push(&plan.columns(slices.iter().copied()));
+            sums.finish()
+        });
+        Ok(PyArray1::from_vec(py, values))
+    })
 }

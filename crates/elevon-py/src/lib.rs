@@ -3,6 +3,7 @@
 mod describe;
 mod features;
 mod run;
+mod seam;
 mod session;
 mod spec;
 

@@ -1,9 +1,10 @@
 //! Runs without the GIL; the calling thread polls for progress and interruption.
 
-use crate::spec::{bad, Resolver};
+use crate::seam::{bad, defect, failed, guarded};
+use crate::spec::Resolver;
+use elevon_core::panics::caught;
 use elevon_core::solver::{derivatives, Clock, Monitor, RunOutput, RunSpec, Status, Width};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
-use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::collections::HashMap;
@@ -47,7 +48,7 @@ fn polled<T: Send>(
             let (sender, receiver) = sync_channel(1);
             let watched = &monitor;
             scope.spawn(move || {
-                let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(watched)));
+                let outcome = caught(|| work(watched));
                 // The receiver lives until the result has come: a failed send cannot happen.
                 let _ = sender.send(outcome);
             });
@@ -62,7 +63,8 @@ fn polled<T: Send>(
     }
     match result {
         Some(Ok(value)) => Ok(value),
-        _ => Err(PyRuntimeError::new_err("the core panicked; this is a defect of elevon")),
+        Some(Err(panicked)) => Err(defect(&panicked)),
+        None => Err(failed("the core's thread ended without a result; this is a defect of elevon, please report it")),
     }
 }
 
@@ -176,22 +178,24 @@ pub fn simulate<'py>(
     lanes: &str,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyList>> {
-    let resolver = Resolver::of(wiring, fidelity)?;
-    let specs = read_runs(resolver, runs)?;
-    let (clocks, names) = resolver.clocks(record)?;
-    let width =
-        Width::by_name(lanes).ok_or_else(|| bad(format!("lanes {lanes:?} are not known here, or this processor cannot run them")))?;
-    let model = resolver.model;
-    let steps: Vec<f64> = specs.iter().map(|r| model.step(&r.parameters)).collect();
-    let total = specs.iter().zip(&steps).map(|(r, dt)| (r.duration / dt).round() as u64).sum();
-    let outputs = polled(py, total, progress, |monitor| model.run_all(&specs, &clocks, threads, width, monitor))?;
-    let plan = RecordPlan { clocks, names, signals: model.signals().iter().map(|s| s.name).collect() };
-    let list = PyList::empty(py);
-    let mut times = Times::default();
-    for (output, dt) in outputs.into_iter().zip(steps) {
-        list.append(result(py, dt, &plan, 1, output, &mut times)?)?;
-    }
-    Ok(list)
+    guarded(|| {
+        let resolver = Resolver::of(wiring, fidelity)?;
+        let specs = read_runs(resolver, runs)?;
+        let (clocks, names) = resolver.clocks(record)?;
+        let width =
+            Width::by_name(lanes).ok_or_else(|| bad(format!("lanes {lanes:?} are not known here, or this processor cannot run them")))?;
+        let model = resolver.model;
+        let steps: Vec<f64> = specs.iter().map(|r| model.step(&r.parameters)).collect();
+        let total = specs.iter().zip(&steps).map(|(r, dt)| (r.duration / dt).round() as u64).sum();
+        let outputs = polled(py, total, progress, |monitor| model.run_all(&specs, &clocks, threads, width, monitor))?;
+        let plan = RecordPlan { clocks, names, signals: model.signals().iter().map(|s| s.name).collect() };
+        let list = PyList::empty(py);
+        let mut times = Times::default();
+        for (output, dt) in outputs.into_iter().zip(steps) {
+            list.append(result(py, dt, &plan, 1, output, &mut times)?)?;
+        }
+        Ok(list)
+    })
 }
 
 /// One run with exact derivatives. A list of results, one a pass of `derivatives_per_pass`; in each, every
@@ -209,31 +213,33 @@ pub fn sensitivities<'py>(
     faults: Vec<usize>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyList>> {
-    let resolver = Resolver::of(wiring, fidelity)?;
-    let spec = resolver.run(run)?;
-    let (clocks, names) = resolver.clocks(record)?;
-    if clocks.iter().any(|clock| clock.features.is_some()) {
-        return Err(bad("features have no derivatives here"));
-    }
-    let wanted = parameters.iter().map(|p| resolver.parameter(p)).collect::<PyResult<Vec<_>>>()?;
-    if let Some(missing) = faults.iter().find(|&&f| f >= spec.faults.len()) {
-        return Err(bad(format!("fault {missing} of {}", spec.faults.len())));
-    }
-    let model = resolver.model;
-    let dt = model.step(&spec.parameters);
-    let chosen = wanted.len() + faults.len();
-    let passes = chosen.div_ceil(derivatives()) as u64;
-    let total = (spec.duration / dt).round() as u64 * passes;
-    let outputs = polled(py, total, progress, |monitor| model.sensitivities(&spec, &wanted, &faults, &clocks, monitor))?;
-    let outputs = outputs.ok_or_else(|| {
-        bad("sensitivities need the reduced-order model (fidelity low) of an actuator without a state machine: switching has no useful derivative")
-    })?;
-    let plan = RecordPlan { clocks, names, signals: model.signals().iter().map(|s| s.name).collect() };
-    let list = PyList::empty(py);
-    let mut times = Times::default();
-    for (i, output) in outputs.into_iter().enumerate() {
-        let width = 1 + (chosen - derivatives() * i).min(derivatives());
-        list.append(result(py, dt, &plan, width, output, &mut times)?)?;
-    }
-    Ok(list)
+    guarded(|| {
+        let resolver = Resolver::of(wiring, fidelity)?;
+        let spec = resolver.run(run)?;
+        let (clocks, names) = resolver.clocks(record)?;
+        if clocks.iter().any(|clock| clock.features.is_some()) {
+            return Err(bad("features have no derivatives here"));
+        }
+        let wanted = parameters.iter().map(|p| resolver.parameter(p)).collect::<PyResult<Vec<_>>>()?;
+        if let Some(missing) = faults.iter().find(|&&f| f >= spec.faults.len()) {
+            return Err(bad(format!("fault {missing} of {}", spec.faults.len())));
+        }
+        let model = resolver.model;
+        let dt = model.step(&spec.parameters);
+        let chosen = wanted.len() + faults.len();
+        let passes = chosen.div_ceil(derivatives()) as u64;
+        let total = (spec.duration / dt).round() as u64 * passes;
+        let outputs = polled(py, total, progress, |monitor| model.sensitivities(&spec, &wanted, &faults, &clocks, monitor))?;
+        let outputs = outputs.ok_or_else(|| {
+            bad("sensitivities need the reduced-order model (fidelity low) of an actuator without a state machine: switching has no useful derivative")
+        })?;
+        let plan = RecordPlan { clocks, names, signals: model.signals().iter().map(|s| s.name).collect() };
+        let list = PyList::empty(py);
+        let mut times = Times::default();
+        for (i, output) in outputs.into_iter().enumerate() {
+            let width = 1 + (chosen - derivatives() * i).min(derivatives());
+            list.append(result(py, dt, &plan, width, output, &mut times)?)?;
+        }
+        Ok(list)
+    })
 }

@@ -1,20 +1,21 @@
 //! Runs that go on from call to call: stepped, read and changed by the caller.
 
 use crate::run::described;
-use crate::spec::{bad, Resolver};
+use crate::seam::{bad, busy, failed, guarded};
+use crate::spec::Resolver;
 use elevon_core::command::SourcePlan;
 use elevon_core::fault::FaultSpec;
-use elevon_core::solver::{Change, Live, Width};
+use elevon_core::solver::{Change, Live, Status, Width};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
+use std::sync::{Mutex, TryLockError};
 
 /// Steps of one stretch, all runs together, after which Ctrl-C is looked for: some ten milliseconds.
 const WATCHED: u64 = 100_000;
 
-/// Several runs of one wiring and fidelity, all at the same step.
-#[pyclass(module = "elevon._core")]
-pub struct Session {
+/// The runs of a session, all at the same step.
+struct Runs {
     resolver: &'static Resolver,
     blocks: Vec<(Vec<usize>, Box<dyn Live>)>,
     /// Block and place in it of each run.
@@ -23,10 +24,8 @@ pub struct Session {
     faults: Vec<Vec<FaultSpec>>,
 }
 
-#[pymethods]
-impl Session {
+impl Runs {
     /// `tunable` are paths of parameters that will change, `signals` those that will be read.
-    #[new]
     fn new(
         wiring: &str,
         fidelity: &str,
@@ -68,19 +67,17 @@ impl Session {
     }
 
     /// Solver steps done.
-    #[getter]
     fn steps(&self) -> u64 {
-        self.blocks[0].1.reached()
+        self.blocks.iter().map(|(_, block)| block.reached()).max().unwrap_or(0)
     }
 
     /// Solver step, s.
-    #[getter]
     fn step(&self) -> f64 {
         self.blocks[0].1.dt()
     }
 
-    /// Steps every run on, without the GIL.
-    fn advance(&mut self, py: Python<'_>, count: u64) -> PyResult<()> {
+    /// Steps every run on, without the GIL; the runs that have diverged by now.
+    fn advance(&mut self, py: Python<'_>, count: u64) -> PyResult<Vec<usize>> {
         let most = (WATCHED / self.places.len() as u64).max(1);
         let mut left = count;
         while left > 0 {
@@ -92,7 +89,7 @@ impl Session {
                 py.check_signals()?;
             }
         }
-        Ok(())
+        Ok((0..self.places.len()).filter(|&run| matches!(self.state(run), Status::Diverged { .. })).collect())
     }
 
     /// Signals by their index, shape (runs, signals).
@@ -119,8 +116,17 @@ impl Session {
 
     /// Status and message of a run.
     fn status(&self, run: usize) -> PyResult<(&'static str, String)> {
-        let (block, place) = self.place(run)?;
-        Ok(described(self.blocks[block].1.status(place)))
+        self.place(run)?;
+        Ok(described(self.state(run)))
+    }
+
+    /// When and in which signal a run diverged.
+    fn divergence(&self, run: usize) -> PyResult<Option<(f64, &'static str)>> {
+        self.place(run)?;
+        Ok(match self.state(run) {
+            Status::Diverged { time, signal } => Some((*time, signal)),
+            _ => None,
+        })
     }
 
     /// Gives a port of a run a sum of waveforms; false where that needs equations that are not in use.
@@ -185,9 +191,7 @@ impl Session {
             faults: self.faults.clone(),
         }
     }
-}
 
-impl Session {
     fn port(&self, name: &str) -> PyResult<usize> {
         self.resolver.model.ports().iter().position(|p| p.name == name).ok_or_else(|| bad(format!("no input {name:?}")))
     }
@@ -196,8 +200,107 @@ impl Session {
         self.places.get(run).copied().ok_or_else(|| bad(format!("run {run} of {}", self.places.len())))
     }
 
+    /// Status of a run that there is.
+    fn state(&self, run: usize) -> &Status {
+        let (block, place) = self.places[run];
+        self.blocks[block].1.status(place)
+    }
+
     fn change(&mut self, run: usize, change: Change) -> PyResult<bool> {
         let (block, place) = self.place(run)?;
         Ok(self.blocks[block].1.change(place, change).is_ok())
+    }
+}
+
+/// Several runs of one wiring and fidelity, all at the same step; of one thread at a time.
+#[pyclass(module = "elevon._core", frozen)]
+pub struct Session(Mutex<Runs>);
+
+impl Session {
+    /// Works on the runs, unless another thread does, or a panic has left them half changed.
+    fn on<T>(&self, work: impl FnOnce(&mut Runs) -> PyResult<T>) -> PyResult<T> {
+        match self.0.try_lock() {
+            Ok(mut runs) => guarded(move || work(&mut runs)),
+            Err(TryLockError::WouldBlock) => Err(busy("the session is in use by another thread; it bears one at a time")),
+            Err(TryLockError::Poisoned(_)) => Err(failed("the core panicked in this session: its state is lost; begin a new one")),
+        }
+    }
+}
+
+#[pymethods]
+impl Session {
+    /// `tunable` are paths of parameters that will change, `signals` those that will be read.
+    #[new]
+    fn new(
+        wiring: &str,
+        fidelity: &str,
+        runs: &Bound<'_, PyList>,
+        tunable: Vec<String>,
+        signals: Vec<String>,
+        lanes: &str,
+    ) -> PyResult<Self> {
+        guarded(|| Runs::new(wiring, fidelity, runs, tunable, signals, lanes).map(|runs| Self(Mutex::new(runs))))
+    }
+
+    /// Solver steps done.
+    #[getter]
+    fn steps(&self) -> PyResult<u64> {
+        self.on(|runs| Ok(runs.steps()))
+    }
+
+    /// Solver step, s.
+    #[getter]
+    fn step(&self) -> PyResult<f64> {
+        self.on(|runs| Ok(runs.step()))
+    }
+
+    /// Steps every run on, without the GIL; returns the runs that have diverged by now.
+    fn advance(&self, py: Python<'_>, count: u64) -> PyResult<Vec<usize>> {
+        self.on(|runs| runs.advance(py, count))
+    }
+
+    /// Signals by their index, shape (runs, signals).
+    fn read<'py>(&self, py: Python<'py>, signals: Vec<usize>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.on(|runs| runs.read(py, signals))
+    }
+
+    /// Do the equations in use carry these signals?
+    fn carries(&self, signals: Vec<String>) -> PyResult<bool> {
+        self.on(|runs| runs.carries(signals))
+    }
+
+    /// Status and message of a run.
+    fn status(&self, run: usize) -> PyResult<(&'static str, String)> {
+        self.on(|runs| runs.status(run))
+    }
+
+    /// When and in which signal a run diverged.
+    fn divergence(&self, run: usize) -> PyResult<Option<(f64, &'static str)>> {
+        self.on(|runs| runs.divergence(run))
+    }
+
+    /// Gives a port of a run a sum of waveforms; false where that needs equations that are not in use.
+    fn set_input(&self, run: usize, port: &str, terms: &Bound<'_, PyList>) -> PyResult<bool> {
+        self.on(|runs| runs.set_input(run, port, terms))
+    }
+
+    /// Gives a port of every run a value, held from now on; false as `set_input`.
+    fn set_values(&self, port: &str, values: Vec<f64>) -> PyResult<bool> {
+        self.on(|runs| runs.set_values(port, values))
+    }
+
+    /// Gives a parameter of a run another value, beneath its faults; false as `set_input`.
+    fn set_parameter(&self, run: usize, path: &str, value: f64) -> PyResult<bool> {
+        self.on(|runs| runs.set_parameter(run, path, value))
+    }
+
+    /// Puts a fault in a place of a run's list, or behind the last; false as `set_input`.
+    fn set_fault(&self, run: usize, place: usize, fault: &Bound<'_, PyDict>) -> PyResult<bool> {
+        self.on(|runs| runs.set_fault(run, place, fault))
+    }
+
+    /// A session in the same state, which goes on by itself.
+    fn copy(&self) -> PyResult<Self> {
+        self.on(|runs| Ok(Self(Mutex::new(runs.copy()))))
     }
 }

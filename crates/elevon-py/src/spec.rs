@@ -2,21 +2,17 @@
 //! core never sees a name or a length it does not expect.
 
 use crate::features;
+use crate::seam::bad;
 use elevon_core::actuator::Severity;
 use elevon_core::command::{catalogue, SourcePlan, Term, Wave};
 use elevon_core::fault::{whole, FaultKind, FaultSpec, Op, Profile, Write};
 use elevon_core::registry::Model;
 use elevon_core::solver::{Clock, RunSpec};
 use numpy::PyReadonlyArray1;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
-
-pub fn bad(message: impl Into<String>) -> PyErr {
-    PyValueError::new_err(message.into())
-}
 
 pub fn model(wiring: &str, fidelity: &str) -> PyResult<Model> {
     Model::find(wiring, fidelity).ok_or_else(|| bad(format!("no wiring {wiring:?} of fidelity {fidelity:?}")))

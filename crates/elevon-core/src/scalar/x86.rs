@@ -4,9 +4,12 @@
 //! are created only below `Scalar::vectorize`, and the solver chooses a type only after detecting its instruction
 //! set (`solver::width`): that is the whole of the safety argument for this file.
 
+mod mask;
+
+use self::mask::{Avx2Mask, Avx512Mask};
 use super::{Kernel, Scalar, ROUNDER};
 use std::arch::x86_64::*;
-use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+use std::ops::{Add, Div, Mul, Sub};
 
 /// # Safety
 /// The processor must have AVX2 and FMA.
@@ -64,7 +67,7 @@ macro_rules! vector_type {
             type Output = Self;
             #[inline(always)]
             fn add(self, o: Self) -> Self {
-                // SAFETY: see the head of this file; the same for every block below.
+                // SAFETY: this type exists only where the processor has its instructions (head of this file).
                 Self(unsafe { $add(self.0, o.0) })
             }
         }
@@ -72,6 +75,7 @@ macro_rules! vector_type {
             type Output = Self;
             #[inline(always)]
             fn sub(self, o: Self) -> Self {
+                // SAFETY: this type exists only where the processor has its instructions (head of this file).
                 Self(unsafe { $sub(self.0, o.0) })
             }
         }
@@ -79,6 +83,7 @@ macro_rules! vector_type {
             type Output = Self;
             #[inline(always)]
             fn mul(self, o: Self) -> Self {
+                // SAFETY: this type exists only where the processor has its instructions (head of this file).
                 Self(unsafe { $mul(self.0, o.0) })
             }
         }
@@ -86,6 +91,7 @@ macro_rules! vector_type {
             type Output = Self;
             #[inline(always)]
             fn div(self, o: Self) -> Self {
+                // SAFETY: this type exists only where the processor has its instructions (head of this file).
                 Self(unsafe { $div(self.0, o.0) })
             }
         }
@@ -94,11 +100,13 @@ macro_rules! vector_type {
             #[inline(always)]
             fn array(self) -> [f64; $lanes] {
                 let mut out = [0.0; $lanes];
+                // SAFETY: the array holds every lane; the instructions as in the head of this file.
                 unsafe { $store(out.as_mut_ptr(), self.0) };
                 out
             }
             #[inline(always)]
             fn from_array(values: [f64; $lanes]) -> Self {
+                // SAFETY: the array holds every lane; the instructions as in the head of this file.
                 Self(unsafe { $load(values.as_ptr()) })
             }
         }
@@ -111,6 +119,7 @@ macro_rules! vector_type {
 
             #[inline(always)]
             fn splat(x: f64) -> Self {
+                // SAFETY: this type exists only where the processor has its instructions (head of this file).
                 Self(unsafe { $splat(x) })
             }
             #[inline(always)]
@@ -153,6 +162,7 @@ macro_rules! vector_type {
             }
             #[inline(always)]
             fn fma(self, factor: Self, addend: Self) -> Self {
+                // SAFETY: this type exists only where the processor has its instructions (head of this file).
                 Self(unsafe { $fma(self.0, factor.0, addend.0) })
             }
             #[inline(always)]
@@ -161,6 +171,7 @@ macro_rules! vector_type {
             }
             #[inline(always)]
             fn sqrt(self) -> Self {
+                // SAFETY: this type exists only where the processor has its instructions (head of this file).
                 Self(unsafe { $sqrt(self.0) })
             }
             #[inline(always)]
@@ -180,16 +191,20 @@ macro_rules! vector_type {
             #[inline(always)]
             fn quarters(self) -> (Self, $integers) {
                 let shifted = self + Self::splat(ROUNDER);
+                // SAFETY: this type exists only where the processor has its instructions (head of this file).
                 (shifted - Self::splat(ROUNDER), unsafe { $to_bits(shifted.0) })
             }
             #[inline(always)]
             fn turn(sin: Self, cos: Self, quarters: $integers) -> (Self, Self) {
+                // SAFETY: this type exists only where the processor has its instructions (head of this file).
                 let (odd, sin_sign, cos_sign) = unsafe { $signs(quarters) };
                 let (s, c) = (Self::select(odd, cos, sin), Self::select(odd, sin, cos));
+                // SAFETY: this type exists only where the processor has its instructions (head of this file).
                 unsafe { (Self($xor(s.0, sin_sign)), Self($xor(c.0, cos_sign))) }
             }
             #[inline(always)]
             fn vectorize<K: Kernel>(kernel: K) -> K::Output {
+                // SAFETY: the solver chose this type because the processor has its instructions.
                 unsafe { $with(kernel) }
             }
         }
@@ -238,140 +253,3 @@ vector_type!(
     signs_avx512,
     _mm512_xor_pd
 );
-
-#[derive(Clone, Copy, Debug)]
-pub struct Avx2Mask(__m256d);
-
-impl Avx2Mask {
-    #[inline(always)]
-    fn less(a: Avx2x4, b: Avx2x4) -> Self {
-        Self(unsafe { _mm256_cmp_pd::<_CMP_LT_OQ>(a.0, b.0) })
-    }
-    #[inline(always)]
-    fn less_equal(a: Avx2x4, b: Avx2x4) -> Self {
-        Self(unsafe { _mm256_cmp_pd::<_CMP_LE_OQ>(a.0, b.0) })
-    }
-    #[inline(always)]
-    fn equal(a: Avx2x4, b: Avx2x4) -> Self {
-        Self(unsafe { _mm256_cmp_pd::<_CMP_EQ_OQ>(a.0, b.0) })
-    }
-    #[inline(always)]
-    fn blend(self, yes: Avx2x4, no: Avx2x4) -> Avx2x4 {
-        Avx2x4(unsafe { _mm256_blendv_pd(no.0, yes.0, self.0) })
-    }
-    #[inline(always)]
-    fn bits(self) -> i32 {
-        unsafe { _mm256_movemask_pd(self.0) }
-    }
-    #[inline(always)]
-    fn uniform(value: bool) -> Self {
-        let bits = if value { -1 } else { 0 };
-        Self(unsafe { _mm256_castsi256_pd(_mm256_set1_epi64x(bits)) })
-    }
-}
-impl BitAnd for Avx2Mask {
-    type Output = Self;
-    #[inline(always)]
-    fn bitand(self, o: Self) -> Self {
-        Self(unsafe { _mm256_and_pd(self.0, o.0) })
-    }
-}
-impl BitOr for Avx2Mask {
-    type Output = Self;
-    #[inline(always)]
-    fn bitor(self, o: Self) -> Self {
-        Self(unsafe { _mm256_or_pd(self.0, o.0) })
-    }
-}
-impl Not for Avx2Mask {
-    type Output = Self;
-    #[inline(always)]
-    fn not(self) -> Self {
-        Self(unsafe { _mm256_xor_pd(self.0, Self::uniform(true).0) })
-    }
-}
-impl Neg for Avx2x4 {
-    type Output = Self;
-    #[inline(always)]
-    fn neg(self) -> Self {
-        Self(unsafe { _mm256_xor_pd(self.0, _mm256_set1_pd(-0.0)) })
-    }
-}
-impl Avx2x4 {
-    #[inline(always)]
-    fn absolute(self) -> Self {
-        Self(unsafe { _mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0) })
-    }
-    #[inline(always)]
-    fn rounded<const MODE: i32>(self) -> Self {
-        Self(unsafe { _mm256_round_pd::<MODE>(self.0) })
-    }
-}
-
-#[derive(Clone, Copy, Debug)]
-pub struct Avx512Mask(__mmask8);
-
-impl Avx512Mask {
-    #[inline(always)]
-    fn less(a: Avx512x8, b: Avx512x8) -> Self {
-        Self(unsafe { _mm512_cmp_pd_mask::<_CMP_LT_OQ>(a.0, b.0) })
-    }
-    #[inline(always)]
-    fn less_equal(a: Avx512x8, b: Avx512x8) -> Self {
-        Self(unsafe { _mm512_cmp_pd_mask::<_CMP_LE_OQ>(a.0, b.0) })
-    }
-    #[inline(always)]
-    fn equal(a: Avx512x8, b: Avx512x8) -> Self {
-        Self(unsafe { _mm512_cmp_pd_mask::<_CMP_EQ_OQ>(a.0, b.0) })
-    }
-    #[inline(always)]
-    fn blend(self, yes: Avx512x8, no: Avx512x8) -> Avx512x8 {
-        Avx512x8(unsafe { _mm512_mask_blend_pd(self.0, no.0, yes.0) })
-    }
-    #[inline(always)]
-    fn bits(self) -> i32 {
-        i32::from(self.0)
-    }
-    #[inline(always)]
-    fn uniform(value: bool) -> Self {
-        Self(if value { 0xff } else { 0 })
-    }
-}
-impl BitAnd for Avx512Mask {
-    type Output = Self;
-    #[inline(always)]
-    fn bitand(self, o: Self) -> Self {
-        Self(self.0 & o.0)
-    }
-}
-impl BitOr for Avx512Mask {
-    type Output = Self;
-    #[inline(always)]
-    fn bitor(self, o: Self) -> Self {
-        Self(self.0 | o.0)
-    }
-}
-impl Not for Avx512Mask {
-    type Output = Self;
-    #[inline(always)]
-    fn not(self) -> Self {
-        Self(!self.0)
-    }
-}
-impl Neg for Avx512x8 {
-    type Output = Self;
-    #[inline(always)]
-    fn neg(self) -> Self {
-        Self(unsafe { _mm512_xor_pd(self.0, _mm512_set1_pd(-0.0)) })
-    }
-}
-impl Avx512x8 {
-    #[inline(always)]
-    fn absolute(self) -> Self {
-        Self(unsafe { _mm512_abs_pd(self.0) })
-    }
-    #[inline(always)]
-    fn rounded<const MODE: i32>(self) -> Self {
-        Self(unsafe { _mm512_roundscale_pd::<MODE>(self.0) })
-    }
-}

@@ -5,11 +5,11 @@ use super::kernels::Plain;
 use super::spec::{Clock, RunOutput, RunSpec, Status};
 use super::width::{with_lanes, Width};
 use crate::actuator::{Tick, Wiring, MAX_CHUNKS};
+use crate::panics::caught;
 use crate::scalar::Scalar;
 use crate::time::Steps;
 use rayon::prelude::*;
 use std::collections::HashMap;
-use std::panic::{catch_unwind, AssertUnwindSafe};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
 /// Progress out, interruption in; shared between threads.
@@ -84,7 +84,7 @@ fn run_width<W: Wiring>(width: Width, runs: &[&RunSpec], clocks: &[Clock], recor
 /// The runs of one block. What panics in company is run alone: a defect may cost the runs that have it, no others.
 fn run_caught<W: Wiring>(width: Width, runs: &[&RunSpec], clocks: &[Clock], recorded: &[usize], monitor: &Monitor) -> Vec<RunOutput> {
     let work = || run_width::<W>(width, runs, clocks, recorded, monitor);
-    match (catch_unwind(AssertUnwindSafe(work)), runs) {
+    match (caught(work), runs) {
         (Ok(outputs), _) => outputs,
         (Err(_), [run]) => vec![broken::<W>(run, clocks)],
         (Err(_), _) => runs.iter().flat_map(|run| run_caught::<W>(width, &[run], clocks, recorded, monitor)).collect(),

@@ -156,6 +156,13 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         true
     }
 
+    /// Ends the lanes that have left their limits by now, whatever happens at the present step.
+    pub(super) fn watch_divergence(&mut self, out: &mut [S]) {
+        if self.trouble {
+            self.watch(self.k, out, Self::mark_diverged);
+        }
+    }
+
     /// Have all lanes stopped?
     fn ended(&self) -> bool {
         self.stopped[..self.real].iter().all(Option::is_some)

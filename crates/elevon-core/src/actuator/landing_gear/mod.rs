@@ -45,7 +45,7 @@ fn control_tick(period: f64, dt: f64) -> Vec<Tick> {
 
 fn watch<S: Scalar>(body: &body::Body<S>, current: S) -> [Watch<S>; WATCHED] {
     [
-        Watch { name: "motor_speed", value: body.motion.motor_speed, limit: 1e6 },
+        Watch { name: "motor_speed", value: body.motion.motor_speed.abs().maximum(body.motion.fastest), limit: 1e6 },
         Watch { name: "current_line", value: current, limit: 1e6 },
         Watch { name: "supply_voltage", value: body.link, limit: 1e5 },
         // Share of the lock's strength in use.

@@ -47,6 +47,7 @@ impl<S: Scalar> Mechanics<S> {
         let fallen = self.move_shaft(&ram);
         s.motor_speed = turned.speed;
         s.nut_speed = fallen.speed;
+        s.fastest = s.fastest.maximum(turned.free.abs()).maximum((fallen.free * self.per_travel).abs());
         let tiny = S::splat(1e-300);
         let (share, share_ram) = (turned.rubbed / motor.kinetic.maximum(tiny), fallen.rubbed / ram.kinetic.maximum(tiny));
         let (work, work_ram) = (self.dt * turned.middle, self.dt * fallen.middle);

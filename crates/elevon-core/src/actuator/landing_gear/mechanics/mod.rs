@@ -61,6 +61,8 @@ pub struct Motion<S> {
     pub locked: S,
     /// Force of the rig on the ram.
     pub rig_force: S,
+    /// Largest motor speed so far, before stops: what a stop ends within a step is found, too.
+    pub fastest: S,
     pub energy: [S; ACCOUNTS],
 }
 
@@ -114,6 +116,8 @@ struct Shaft<S: Scalar> {
 #[derive(Clone, Copy)]
 struct Moved<S> {
     speed: S,
+    /// Speed before friction and stops end it.
+    free: S,
     middle: S,
     /// Work of the dry resistances.
     rubbed: S,
@@ -170,6 +174,7 @@ impl<S: Scalar> Mechanics<S> {
             carrying: S::indicator(nut.le(self.lever.stroke)),
             locked,
             rig_force: S::zero(),
+            fastest: S::zero(),
             energy: [S::zero(); ACCOUNTS],
         }
     }
@@ -264,6 +269,7 @@ impl<S: Scalar> Mechanics<S> {
             self.apart(&mut other, a, &forces);
             s.motor_speed = S::select(apart, other.motor_speed, s.motor_speed);
             s.nut_speed = S::select(apart, other.nut_speed, s.nut_speed);
+            s.fastest = S::select(apart, other.fastest, s.fastest);
             for (mine, theirs) in s.energy.iter_mut().zip(other.energy) {
                 *mine = S::select(apart, theirs, *mine);
             }
@@ -331,6 +337,7 @@ impl<S: Scalar> Mechanics<S> {
         let moved = self.move_shaft(&shaft);
         s.motor_speed = moved.speed;
         s.nut_speed = r * moved.speed;
+        s.fastest = s.fastest.maximum(moved.free.abs());
         let work = self.dt * moved.middle;
         let share = moved.rubbed / shaft.kinetic.maximum(S::splat(1e-300));
         let e = &mut s.energy;
@@ -359,6 +366,6 @@ impl<S: Scalar> Mechanics<S> {
         let residue = half * x.inertia * (x.speed + speed) * (free - speed);
         let reversed = !kept.equals(free);
         let rubbed = self.dt * dry * middle + S::select(reversed, residue, zero);
-        Moved { speed, middle, rubbed, impact: S::select(hit & !reversed, residue, zero) }
+        Moved { speed, free, middle, rubbed, impact: S::select(hit & !reversed, residue, zero) }
     }
 }

@@ -23,6 +23,7 @@ impl<S: Scalar> Mechanics<S> {
         let weight = self.mass * S::splat(GRAVITY);
         s.rig_force = S::select(apart, released, connected) - weight - f.spring;
         s.nut_speed = new;
+        s.fastest = s.fastest.maximum((new * self.per_travel).abs());
         s.motor_speed = S::select(apart, coasting.motor_speed, new * self.per_travel);
     }
 }

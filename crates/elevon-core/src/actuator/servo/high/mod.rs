@@ -125,7 +125,7 @@ impl<F: Form> Wiring for High<F> {
             + s.star.current[2].abs()
             + s.star.contact.iter().flatten().fold(S::zero(), |sum, c| sum + c.abs());
         [
-            Watch { name: "motor_speed", value: s.shaft.motor_speed, limit: 1e6 },
+            Watch { name: "motor_speed", value: s.shaft.motor_speed.abs().maximum(s.shaft.fastest), limit: 1e6 },
             Watch { name: "current_a", value: currents, limit: 1e7 },
             Watch { name: "output_position", value: s.shaft.output_position, limit: 1e9 },
             Watch { name: "torque_ref", value: s.control.integral + s.control.filtered_error, limit: 1e12 },

@@ -155,7 +155,7 @@ impl<F: Form> Wiring for Low<F> {
     #[inline(always)]
     fn watch<S: Scalar>(s: &State<S>) -> [Watch<S>; WATCHED] {
         [
-            Watch { name: "motor_speed", value: s.shaft.motor_speed, limit: 1e6 },
+            Watch { name: "motor_speed", value: s.shaft.motor_speed.abs().maximum(s.shaft.fastest), limit: 1e6 },
             Watch { name: "current_q", value: s.current, limit: 1e7 },
             Watch { name: "output_position", value: s.shaft.output_position, limit: 1e9 },
             Watch { name: "torque_ref", value: s.integral, limit: 1e12 },

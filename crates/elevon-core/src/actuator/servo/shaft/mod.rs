@@ -128,6 +128,8 @@ pub struct ShaftState<S> {
     jammed: S,
     /// Factor on the dry friction of a screw with debris in it.
     pub scatter: S,
+    /// Largest motor speed so far, before stops: what a stop ends within a step is found, too.
+    pub fastest: S,
     /// Deflection of the bristles.
     bristle: S,
     pub nut: NutState<S>,
@@ -196,6 +198,7 @@ impl<S: Scalar> Shaft<S> {
             jam_side: (output_position - self.friction.jam_position).sign(),
             jammed: S::select(S::splat(0.5).le(self.friction.jam_anywhere), S::one(), zero),
             scatter: S::one(),
+            fastest: zero,
             bristle: zero,
             nut: self.nut.start(),
             vibration: VibrationState::initial(),

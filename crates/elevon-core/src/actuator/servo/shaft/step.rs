@@ -100,6 +100,7 @@ impl<S: Scalar> Shaft<S> {
         }
         s.motor_position = position;
         s.motor_speed = end_speed;
+        s.fastest = s.fastest.maximum(new_speed.abs());
     }
 
     /// Speed that moves the position in a step.
@@ -162,6 +163,7 @@ impl<S: Scalar> Shaft<S> {
         }
         s.output_position = position;
         s.output_speed = end_speed;
+        s.fastest = s.fastest.maximum((new_speed * self.gear.ratio).abs());
     }
 
     /// Work of a step at its middle; `speeds` before, after and as the stops leave it.
