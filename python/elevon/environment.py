@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any
 
 import gymnasium
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.errors import InputError
+from elevon.errors import DivergedError, InputError
 from elevon.session import Session, SessionState
 from elevon.simulate.arguments import ActuatorLike
 from elevon.units import parse_quantity
@@ -81,7 +82,9 @@ class ActuatorEnv(gymnasium.Env[Floats, Floats]):
         """Act for one period; an episode is terminated where the drive trips or diverges."""
         share = np.clip(np.asarray(action, dtype=np.float64).reshape(1), -1.0, 1.0)
         self.session.set(command=float(share[0]) * self._limit)
-        self.session.advance(self._period)
+        # The status below ends the episode.
+        with suppress(DivergedError):
+            self.session.advance(self._period)
         seen = self._seen()
         status, message = self.session.state_of(0)
         ended = self.session.time > self._duration - 0.5 * self._period

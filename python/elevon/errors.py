@@ -108,7 +108,7 @@ class OutputExistsError(OutputError):
 
 
 class BusyError(InputError):
-    """Another process works in the folder."""
+    """Another process works in the folder, or another thread in the session."""
 
 
 class SimulationError(ElevonError):
@@ -134,12 +134,21 @@ class DivergedError(SimulationError):
         When, in simulated s.
     signal : str
         Which signal.
+    runs : tuple of int
+        Of a batch: which runs; time and signal are those of the first.
     """
 
-    def __init__(self, message: str, time: float = float("nan"), signal: str = "") -> None:
+    def __init__(
+        self,
+        message: str,
+        time: float = float("nan"),
+        signal: str = "",
+        runs: Iterable[int] = (),
+    ) -> None:
         super().__init__(message, "diverged")
         self.time = time
         self.signal = signal
+        self.runs = tuple(runs)
 
 
 class Interrupted(ElevonError):  # noqa: N818 - an interruption is wanted, it is no error
@@ -196,8 +205,10 @@ def nearest(name: str, candidates: Iterable[str], count: int = 3) -> list[str]:
         replaced a retired name comes first.
     """
     names = list(dict.fromkeys(candidates))
-    first = successors(name, names)
-    wanted = _plain(name)
+    # Some callers pass on what they were given, whatever it is.
+    given = str(name)
+    first = successors(given, names)
+    wanted = _plain(given)
     plain: dict[str, list[str]] = {}
     for candidate in names:
         plain.setdefault(_plain(candidate), []).append(candidate)

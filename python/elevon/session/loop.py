@@ -10,7 +10,7 @@ import numpy as np
 from elevon.errors import InputError, Interrupted
 from elevon.progress import Progress
 from elevon.recording import Recording
-from elevon.units import parse_quantity
+from elevon.session.values import callable_or_none, positive_seconds, text, texts
 
 if TYPE_CHECKING:
     from elevon.session.session import Session
@@ -57,14 +57,18 @@ def run_loop(
     ------
     InputError
         As `Session.advance`, `Session.set` and `Session.read`.
+    DivergedError
+        As `Session.advance`: a loop does not go on without one of its runs.
     Interrupted
         `progress` returned False.
     """
-    seconds = parse_quantity(period, "s", "period")
-    ticks = round(parse_quantity(duration, "s", "duration") / seconds)
+    seconds = positive_seconds(period, "period")
+    ticks = round(positive_seconds(duration, "duration") / seconds)
     if ticks < 1:
         raise InputError(f"duration = {duration} is shorter than a period ({seconds:g} s)")
-    names = list(record)
+    names = texts(record, "record")
+    callable_or_none(controller, "controller")
+    callable_or_none(progress, "progress")
     start = session.time
     table = np.empty((ticks + 1, len(session), len(names)))
     for tick in range(ticks):
@@ -86,7 +90,7 @@ def _sample(session: Session, names: list[str]) -> Any:
 def _act(session: Session, controller: Controller | None) -> None:
     answer = None if controller is None else controller(session)
     if isinstance(answer, Mapping):
-        session.set(**answer)
+        session.set(**{text(name, "input"): value for name, value in answer.items()})
     elif answer is not None:
         session.set(command=answer)
 

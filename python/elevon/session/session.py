@@ -7,10 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from typing import Any
 
-import numpy as np
-
 from elevon.actuator import Actuator
-from elevon.arrays import Floats
 from elevon.documents import Document, validated
 from elevon.errors import ArgumentTypeError, InputError, unknown
 from elevon.faults import Fault, find_record
@@ -19,15 +16,16 @@ from elevon.progress import Progress
 from elevon.recording import Recording
 from elevon.scenario import Term
 from elevon.scenario.compile import compile_term, port_units, signal_records
+from elevon.session.divergence import diverged_error, diverged_runs
 from elevon.session.start import SessionState, fault_places, runs_of
+from elevon.session.values import Value, one_each, quantity, text, texts, whole_steps
 from elevon.simulate.acting import report
 from elevon.simulate.arguments import ActuatorLike, ScenarioLike
 from elevon.simulate.prepare import Run, prepare, solver_step
-from elevon.units import parse_quantity, shown_unit
+from elevon.units import parse_quantity
 
 __all__ = ["Session", "Value"]
 
-Value = float | str | Sequence[float] | Floats
 _FOREVER = 4.0e15  # solver steps: a session has no end of its own
 
 
@@ -113,19 +111,17 @@ class Session:
         self._index = {name: i for i, name in enumerate(signal_records(self.wiring, fidelity))}
         from elevon import _core
 
-        try:
-            self._core = _core.Session(
-                self.wiring,
-                fidelity,
-                [{**item.core, "duration": _FOREVER * self.step} for item in prepared],
-                [*self._tunable(tunable), *self._moved(faults)],
-                [self._known(name) for name in signals],
-                lanes,
-            )
-        except ValueError as error:
-            raise InputError(str(error)) from error
+        self._core = _core.Session(
+            self.wiring,
+            fidelity,
+            [{**item.core, "duration": _FOREVER * self.step} for item in prepared],
+            [*self._tunable(tunable), *self._moved(faults)],
+            [self._known(name) for name in texts(signals, "signals")],
+            text(lanes, "lanes"),
+        )
         self._readable: dict[str, bool] = {}
         self._driven: set[str] = set()
+        self._diverged: set[int] = set()
 
     @property
     def _kind(self) -> tuple[Any, ...]:
@@ -162,7 +158,7 @@ class Session:
 
     def unit(self, port: str, run: int = 0) -> str:
         """Return the SI unit of an input; that of the command goes with its mode."""
-        if port not in self._units[run]:
+        if text(port, "input") not in self._units[run]:
             raise unknown("input", port, self._units[run], "session")
         return self._units[run][port]
 
@@ -184,16 +180,23 @@ class Session:
         ------
         InputError
             Not positive, or no whole number of steps.
+        DivergedError
+            The run has left the finite numbers, and stands where that was found. Of a batch: the
+            runs that newly have (`runs`); the others have been stepped, and the next call goes on
+            with them. With none left, every call raises.
         """
         seconds = parse_quantity(duration, "s", "advance")
-        steps = round(seconds / self.step)
-        if steps < 1 or abs(seconds - steps * self.step) > 1e-6 * self.step * max(steps, 1):
-            below = max(int(seconds / self.step), 1) * self.step
-            raise InputError(
-                f"advance: {seconds:.9g} s is no whole number of solver steps of {self.step:g} s; "
-                f"nearest: {below:.9g} s, {below + self.step:.9g} s"
-            )
-        self._core.advance(steps)
+        diverged = self._core.advance(whole_steps(seconds, self.step, _FOREVER - self._core.steps))
+        if diverged:
+            self._raise_diverged(diverged)
+
+    def _raise_diverged(self, diverged: Sequence[int]) -> None:
+        """Raise for the runs of a batch that have newly diverged, or where none is left to step."""
+        if len(diverged) < len(self):
+            diverged = [run for run in diverged if run not in self._diverged]
+        self._diverged.update(diverged)
+        if diverged:
+            raise diverged_error(self._core, diverged, many=self.many)
 
     def read(self, *names: str) -> dict[str, Any]:
         """Return signals as they stand now, SI: name to a number, or to an array of a batch.
@@ -246,8 +249,8 @@ class Session:
             terms = [compile_term(term, units[port], port) for units in self._units]
             runs = range(len(terms))
             return lambda: all(self._core.set_input(run, port, [terms[run]]) for run in runs)
-        given = zip(self._each(value), self._units, strict=True)
-        read = [_quantity(each, units[port] or "1", port) for each, units in given]
+        given = zip(one_each(value, len(self), port), self._units, strict=True)
+        read = [quantity(each, units[port] or "1", port) for each, units in given]
         return lambda: bool(self._core.set_values(port, read))
 
     def set_parameter(self, path: str, value: Value) -> None:
@@ -261,15 +264,17 @@ class Session:
             A value no run may have with the others, or one that needs equations that the session
             left out (see `tunable`).
         """
-        record = record_of(self.wiring, path)
+        record = record_of(self.wiring, text(path, "parameter"))
         changed = [
             actuator.with_values({path: given}, source="set in a session")
-            for actuator, given in zip(self.actuators, self._each(value), strict=True)
+            for actuator, given in zip(
+                self.actuators, one_each(value, len(self), path), strict=True
+            )
         ]
         with self._whole():
             for run, actuator in enumerate(changed):
                 number = record.number(actuator.parameters[path].value)
-                if not self._checked(self._core.set_parameter, run, path, number):
+                if not self._core.set_parameter(run, path, number):
                     raise self._left_out(path, "tunable")
             self.actuators = tuple(changed)
 
@@ -290,17 +295,17 @@ class Session:
         InputError
             No such fault, out of range, or one that needs equations the session left out.
         """
-        kind, _, place = name.partition("@")
+        kind, _, place = text(name, "fault").partition("@")
         faults = [
             Fault.from_dict({"kind": kind, "place": place, "severity": given, **attributes}, name)
-            for given in self._each(severity)
+            for given in one_each(severity, len(self), name)
         ]
         resolved = [fault.resolved(self.wiring, self.fidelity, name) for fault in faults]
         with self._whole():
             for run, fault in enumerate(resolved):
                 places = self._faults[run]
                 at = places.get(name, len(places))
-                if not self._checked(self._core.set_fault, run, at, fault):
+                if not self._core.set_fault(run, at, fault):
                     raise self._left_out(name, "faults")
                 places.setdefault(name, len(places))
 
@@ -337,6 +342,7 @@ class Session:
         self._faults = tuple(dict(item) for item in state.faults)
         self._readable.clear()
         self._driven.clear()
+        self._diverged = diverged_runs(self._core, len(self))
 
     @contextmanager
     def _whole(self) -> Iterator[None]:
@@ -348,23 +354,8 @@ class Session:
             self.restore(state)
             raise
 
-    def _each(self, value: Value) -> list[float | str]:
-        """Return one value a run."""
-        if isinstance(value, (int, float, str, np.floating, np.integer)):
-            return [value if isinstance(value, str) else float(value)] * len(self)
-        values = np.asarray(value, dtype=np.float64)
-        if values.shape != (len(self),):
-            raise InputError(f"{values.shape} values for {len(self)} runs; one, or one a run")
-        return [float(item) for item in values]
-
-    def _checked(self, call: Any, *arguments: Any) -> bool:
-        try:
-            return bool(call(*arguments))
-        except ValueError as error:
-            raise InputError(str(error)) from error
-
     def _known(self, name: str) -> str:
-        if name not in self._index:
+        if text(name, "signal") not in self._index:
             raise unknown("signal", name, self._index, "session")
         return name
 
@@ -384,16 +375,11 @@ class Session:
         )
 
     def _tunable(self, paths: Iterable[str]) -> list[str]:
-        return [record_of(self.wiring, path).path for path in paths]
+        return [record_of(self.wiring, path).path for path in texts(paths, "tunable")]
 
     def _moved(self, faults: Iterable[str]) -> list[str]:
         moved: list[str] = []
-        for name in faults:
+        for name in texts(faults, "faults"):
             kind, _, place = name.partition("@")
             moved += find_record(kind, place, self.wiring).targets[place]
         return moved
-
-
-def _quantity(given: float | str, unit: str, place: str) -> float:
-    """Return SI; a text without a unit is refused where a person reads another one."""
-    return parse_quantity(given, unit, place, shown_unit(unit))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -44,7 +44,8 @@ def runs_of(
         return [Run(actuator, scenario, seed)]
     if scenario is not None or mode is not None:
         raise InputError("runs have scenarios and modes of their own")
-    runs: list[Any] = list(given)
+    each: Any = given
+    runs: list[Any] = list(each) if isinstance(each, Iterable) else [each]
     kinds = [type(run).__name__ for run in runs if not isinstance(run, Run)]
     if kinds or not runs:
         raise ArgumentTypeError(

@@ -156,10 +156,11 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         true
     }
 
-    /// Ends the lanes that have left their limits by now, whatever happens at the present step.
-    pub(super) fn watch_divergence(&mut self, out: &mut [S]) {
+    /// Judges the lanes at the step reached as `events` does: for a caller who looks at them between two steps.
+    pub(super) fn judge(&mut self, out: &mut [S]) {
         if self.trouble {
             self.watch(self.k, out, Self::mark_diverged);
+            self.watch(self.k, out, Self::mark_tripped);
         }
     }
 

@@ -33,8 +33,8 @@ pub trait Live: Send + Sync {
     fn reached(&self) -> Steps;
     fn dt(&self) -> f64;
     /// Steps on by `count`, or until all runs have stopped. What happens at the step reached (ticks of the drive, changes
-    /// of inputs) waits for the next call, so that its caller may see and change what it begins with. A run that has left its
-    /// limits is `Diverged` at the return, and stands where that was found.
+    /// of inputs) waits for the next call, so that its caller may see and change what it begins with. The status of a run
+    /// is that of the step reached; one that has left its limits stands there.
     fn advance(&mut self, count: Steps);
     /// Signals of every run, row-major, as they stand now or when a run stopped.
     fn read(&self, signals: &[usize]) -> Vec<f64>;
@@ -103,7 +103,7 @@ impl<W: Wiring, S: Scalar> Live for Session<W, S> {
     fn advance(&mut self, count: Steps) {
         let mut out = vec![S::zero(); W::signals().len()];
         self.block.proceed(self.block.k + count, &Monitor::default(), &mut out);
-        self.block.watch_divergence(&mut out);
+        self.block.judge(&mut out);
     }
 
     fn read(&self, signals: &[usize]) -> Vec<f64> {
