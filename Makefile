@@ -66,6 +66,7 @@ test-long: setup ## the checks that take minutes
 	$(BIN)/python -m pytest -q -n 2 -m "long and not bench"
 
 lint: setup stubs ## formatting, style and types of both languages
+	$(BIN)/python tools/words.py
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
 	$(BIN)/mypy

@@ -152,8 +152,8 @@ def report(result: dict[str, Any], indent: str = "") -> None:
             print(f"{indent}{name}")
             report(value, indent + "    ")
         else:
-            shown = f"{value:.6g}" if isinstance(value, float) else value
-            print(f"{indent}{name:{36 - len(indent)}s} {shown}")
+            text = f"{value:.6g}" if isinstance(value, float) else value
+            print(f"{indent}{name:{36 - len(indent)}s} {text}")
 
 
 def main() -> int:

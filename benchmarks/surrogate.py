@@ -48,12 +48,12 @@ print(time.process_time() - begin, time.perf_counter() - wall)
 def logs(unit, test):
     """Return a faulty log and healthy ones of other days, of the low model."""
     procedure = first_trace(load_procedure(test))
-    asked = [[FAULT]] + [[]] * BASELINES
-    made = [setups(procedure, unit, faults=f, seed=k)[0] for k, f in enumerate(asked)]
+    faults = [[FAULT]] + [[]] * BASELINES
+    made = [setups(procedure, unit, faults=f, seed=k)[0] for k, f in enumerate(faults)]
     record = recorded(list(signal_records(unit.wiring, "low")))
     runs = [Run(s.actuator, s.scenario, s.conditions.seed) for s in made]
-    shown = simulate_batch(runs, fidelity="low", record=record)
-    return [traced(s, r) for s, r in zip(made, shown, strict=True)]
+    recordings = simulate_batch(runs, fidelity="low", record=record)
+    return [traced(s, r) for s, r in zip(made, recordings, strict=True)]
 
 
 def timed(run, rounds):
@@ -72,9 +72,11 @@ def first(unit, log, baselines):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "logs.pickle"
         path.write_bytes(pickle.dumps((unit, log, baselines)))
-        asked = [sys.executable, "-c", FRESH, str(path)]
-        said = [subprocess.run(asked, capture_output=True, check=True) for _ in range(PROCESSES)]
-    return summary([tuple(map(float, item.stdout.split())) for item in said])
+        command = [sys.executable, "-c", FRESH, str(path)]
+        outputs = [
+            subprocess.run(command, capture_output=True, check=True) for _ in range(PROCESSES)
+        ]
+    return summary([tuple(map(float, item.stdout.split())) for item in outputs])
 
 
 def summary(spent):

@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 import pytest
 
 from elevon.errors import OutputExistsError
-from elevon.report import Check, Report, Table, all_passed
+from elevon.report import Check, Report, ReportTable, all_passed
 from elevon.report.figures import COLOURS, new_figure, save_figure
 
 HOSTILE = '<script>alert("x")</script>&amp;'
@@ -39,7 +39,7 @@ def _report(title="Title", value=0.5):
     report = Report(title, HOSTILE, date="2024-02-29")
     report.fact(HOSTILE, HOSTILE, HOSTILE)
     section = report.section(HOSTILE, HOSTILE)
-    section.table(Table([HOSTILE, "number"], [[HOSTILE, 1.0], ["b", 2.5]], HOSTILE))
+    section.table(ReportTable([HOSTILE, "number"], [[HOSTILE, 1.0], ["b", 2.5]], HOSTILE))
     section.points([HOSTILE]).code(HOSTILE)
     section.figure(_figure(), HOSTILE)
     section.checks([Check(HOSTILE, value, 1.0, HOSTILE)])
@@ -140,9 +140,9 @@ def test_figure_files_have_dark_ink(tmp_path, ending):
         assert data.startswith(b"\x89PNG")
     short, long = ([[k, "x"] for k in range(n)] for n in (20, 21))
     page = Report("t")
-    page.section("s").table(Table(["a", "b"], short))
+    page.section("s").table(ReportTable(["a", "b"], short))
     assert "<details>" not in page.html()
-    page.section("more").table(Table(["a", "b"], long))
+    page.section("more").table(ReportTable(["a", "b"], long))
     html = page.html()
     assert html.count("<details>") == 1
     assert "Table of 21 rows: a, b" in html

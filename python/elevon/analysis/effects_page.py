@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elevon.analysis.effects import EQUAL_REPEATS, Effects
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,14 +35,16 @@ def effects_report(effects: Effects, folder: str, *, date: str | None = None) ->
     report.fact("Mean", f"{effects.mean:.4g} {effects.unit}")
     section = report.section("Effects")
     section.table(
-        Table(["Term", "Factors", "Effect", "Low", "High", "Aliased with"], _rows(effects))
+        ReportTable(["Term", "Factors", "Effect", "Low", "High", "Aliased with"], _rows(effects))
     )
     for text in _confounded(effects):
         section.text(text)
     section.figure(pareto(effects), "Pareto chart; the line is the margin of the interval.")
     section.figure(half_normal(effects), "Half-normal plot; effects of noise alone lie on a line.")
     factors = [[f["letter"], f["name"], f["low"], f["high"], f["unit"]] for f in effects.factors]
-    report.section("Factors").table(Table(["Letter", "Factor", "Low", "High", "Unit"], factors))
+    report.section("Factors").table(
+        ReportTable(["Letter", "Factor", "Low", "High", "Unit"], factors)
+    )
     report.provenance(
         {"Command": f"elevon campaign effects {folder} --response {effects.response}"}
     )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from elevon.calibrate.estimate import LEVEL
 from elevon.calibrate.forest import forest
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 
 if TYPE_CHECKING:
     from elevon.calibrate.by_parts import PartsCalibration
@@ -44,10 +44,10 @@ def parts_report(
     figure = forest(result.estimates)
     if figure is not None:
         section.figure(figure, "Estimates over the old values, with their intervals.")
-    section.table(Table(columns, rows, digits=5))
+    section.table(ReportTable(columns, rows, digits=5))
     missing: list[list[object]] = [[path, why] for path, why in result.undetermined.items()]
     if missing:
-        report.section("Not determined").table(Table(["Parameter", "Reason"], missing))
+        report.section("Not determined").table(ReportTable(["Parameter", "Reason"], missing))
     if provenance:
         report.provenance(provenance)
     return report

@@ -10,7 +10,7 @@ import numpy as np
 from elevon.calibrate.estimate import LEVEL
 from elevon.calibrate.forest import forest
 from elevon.calibrate.validation import SIGNALS
-from elevon.report import Check, Report, Table
+from elevon.report import Check, Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 
 if TYPE_CHECKING:
@@ -141,7 +141,7 @@ def _parameters(report: Report, result: Calibration, truth: Mapping[str, float])
     figure = forest(result.estimates, truth)
     if figure is not None:
         section.figure(figure, "Estimates over the old values, with their intervals.")
-    section.table(Table(columns, rows, "* not part of the actuator file", digits=5))
+    section.table(ReportTable(columns, rows, "* not part of the actuator file", digits=5))
 
 
 def _ranking(report: Report, result: Calibration) -> None:
@@ -155,9 +155,9 @@ def _ranking(report: Report, result: Calibration) -> None:
         "the logs do not see.",
     )
     rows = [[k + 1, float(s)] for k, s in enumerate(ranking.singular_values)]
-    section.table(Table(["", "Singular value"], rows, digits=4))
+    section.table(ReportTable(["", "Singular value"], rows, digits=4))
     section.table(
-        Table(
+        ReportTable(
             ["Candidate", "Predicted deviation"],
             sorted(ranking.predicted.items()),
             "Relative for positive parameters, SI for offsets and delays.",
@@ -191,7 +191,7 @@ def _held_out(report: Report, result: Calibration) -> None:
         "Each log predicted with values fitted without it: errors near those with all logs mean "
         "that nothing was fitted that only one log shows.",
     ).table(
-        Table(
+        ReportTable(
             [
                 "Log",
                 "Kept back",
@@ -240,7 +240,7 @@ def _agreement(report: Report, before: Validation | None, after: Validation) -> 
         if before:
             row.append(factor * old[e.log, e.signal].rms)
         rows.append(row)
-    section.table(Table([*columns, *(["RMS before"] if before else [])], rows, digits=3))
+    section.table(ReportTable([*columns, *(["RMS before"] if before else [])], rows, digits=3))
     earlier = {t.log: t for t in before.traces} if before else {}
     for trace in after.traces:
         section.figure(

@@ -8,20 +8,18 @@ from typing import Any
 from elevon.campaign.dataset import Dataset
 from elevon.campaign.describe import describe, typical_runs
 from elevon.errors import ElevonError
-from elevon.files import write_text
 from elevon.memory import format_bytes
-from elevon.report import Report, Section, Table
+from elevon.report import Report, ReportTable, Section
 
-__all__ = ["write_cards"]
+__all__ = ["card_texts"]
 
 _FAILED_LISTED = 20
 
 
-def write_cards(ds: Dataset) -> None:
-    """Write ``README.md`` and ``card.html``."""
+def card_texts(ds: Dataset) -> dict[str, str]:
+    """Return ``README.md`` and ``card.html``."""
     about = describe(ds)
-    write_text(ds.folder / "README.md", _markdown(about, ds), force=True)
-    write_text(ds.folder / "card.html", _page(about, ds), force=True)
+    return {"README.md": _markdown(about, ds), "card.html": _page(about, ds)}
 
 
 def _facts(about: dict[str, Any]) -> list[str]:
@@ -147,10 +145,12 @@ def _page(about: dict[str, Any], ds: Dataset) -> str:
     section = report.section("What is in it").points(_facts(about))
     section.code(_code(ds))
     if about["faults"]:
-        table = Table(_FAULT_TITLES, _fault_rows(about), "Severities of the runs that have it.")
+        table = ReportTable(
+            _FAULT_TITLES, _fault_rows(about), "Severities of the runs that have it."
+        )
         report.section("Faults").table(table)
     if about["varied"]:
-        report.section("Varied quantities").table(Table(_VARIED_TITLES, _varied_rows(about)))
+        report.section("Varied quantities").table(ReportTable(_VARIED_TITLES, _varied_rows(about)))
     if about["not_acting"]:
         report.section("Set, but without effect").points(about["not_acting"])
     if about["failed"]:
@@ -159,7 +159,7 @@ def _page(about: dict[str, Any], ds: Dataset) -> str:
         _pictures(report.section("Typical signals"), ds)
     for clock in about["clocks"]:
         rows = [[c["name"], c["unit"], c["text"]] for c in clock["columns"]]
-        table = Table(("column", "unit", "text"), rows, folded=f"runs/{clock['name']}")
+        table = ReportTable(("column", "unit", "text"), rows, folded=f"runs/{clock['name']}")
         report.section(f"Columns of runs/{clock['name']}").table(table)
     keys = ("version", "plan_hash", "actuator", "fidelity")
     report.provenance({key: about[key] for key in keys} | about["sources"])

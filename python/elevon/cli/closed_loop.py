@@ -102,7 +102,7 @@ def _page(result: LoopCalibration, after: Validation, date: str | None) -> Repor
     """The page: parameters, what is not determined, errors of each log."""
     import elevon
     from elevon.calibrate.parts_page import parts_report
-    from elevon.report import Table
+    from elevon.report import ReportTable
 
     page = parts_report(result, date=date)
     page.fact("Controller", f"{result.structure} ({result.why})")
@@ -111,7 +111,7 @@ def _page(result: LoopCalibration, after: Validation, date: str | None) -> Repor
         for error in after.errors
     ]
     columns = ["Log", "Signal", "RMS error", "Unit", "% of RMS", "% of range"]
-    page.section("Logs against the model").table(Table(columns, rows, digits=4))
+    page.section("Logs against the model").table(ReportTable(columns, rows, digits=4))
     page.provenance({"Elevon": elevon.__version__})
     return page
 

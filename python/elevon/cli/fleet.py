@@ -110,14 +110,14 @@ def _sentence(plan: FleetPlan) -> str:
 
 def _page(plan: FleetPlan, visit: float) -> Report:
     from elevon.prognose.fleet import fleet_figure
-    from elevon.report import Report, Table
+    from elevon.report import Report, ReportTable
 
     report = Report("Maintenance of a fleet", _sentence(plan))
     section = report.section(f"Remaining {plan.unit}")
     section.figure(
         fleet_figure(plan), "Remaining life: median and 90 %; blue: the visit at which it is done."
     )
-    section.table(Table(_COLUMNS, _rows(plan), f"A visit costs {visit:g}."))
+    section.table(ReportTable(_COLUMNS, _rows(plan), f"A visit costs {visit:g}."))
     if plan.findings:
         section.points(plan.findings)
     return report

@@ -10,7 +10,7 @@ from elevon.calibrate.validation import SIGNALS
 from elevon.calibrate.zeros import encoder_count
 from elevon.demo.bench_figure import bench_figure
 from elevon.demo.page_parameters import parameters_section
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.backlash.page import summary_figure
 from elevon.reproduce.provenance import provenance
@@ -108,7 +108,7 @@ def _bench(report: Report, demo: Demo) -> None:
         "backlash "
         "at first: 0 is the middle, \N{PLUS-MINUS SIGN}50 its ends."
     )
-    section.table(Table(columns, rows, caption, formats=formats))
+    section.table(ReportTable(columns, rows, caption, formats=formats))
 
 
 def _agreement(report: Report, demo: Demo) -> None:
@@ -135,7 +135,7 @@ def _agreement(report: Report, demo: Demo) -> None:
         "after [%]",
     ]
     caption = "RMS of model less log, and the same in percent of the range of the logged signal."
-    section.table(Table(columns, rows, caption, digits=3))
+    section.table(ReportTable(columns, rows, caption, digits=3))
     earlier = {trace.log: trace for trace in demo.before.traces}
     for trace in demo.after.traces:
         section.figure(
@@ -219,7 +219,7 @@ def _clocks(report: Report, demo: Demo) -> None:
     ]  # fmt: skip
     formats = ["", "", ".4f", ".4f", ".2f", "+.0f", "+.0f", ".0f"]
     section.table(
-        Table(
+        ReportTable(
             columns,
             rows,
             "Offset and drift of the load cell's clock, with their estimated standard deviations; "
@@ -249,7 +249,7 @@ def _times(report: Report, demo: Demo) -> None:
     rows.append(["all", demo.seconds, ""])
     resumed = any(step.reused for step in demo.steps)
     columns = ["Step", "Time [s]", "Resumed"] if resumed else ["Step", "Time [s]"]
-    table = Table(
+    table = ReportTable(
         columns,
         rows if resumed else [row[:2] for row in rows],
         "Wall time of this run; drawing and writing this page is not in it."

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elevon.calibrate.estimate import LEVEL
-from elevon.report import Table
+from elevon.report import ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.units import to_display
 
@@ -52,7 +52,7 @@ def parameters_section(report: Report, demo: Demo, rows: list[dict[str, Any]]) -
     ]  # fmt: skip
     cells = [_cells(row, _unit(demo, row)) for row in rows]
     caption = "Errors of offsets and initial positions are given in their own unit."
-    section.table(Table(columns, cells, caption))
+    section.table(ReportTable(columns, cells, caption))
     notes = _notes(demo, rows)
     if notes:
         section.text("Estimates that no actuator file holds:")

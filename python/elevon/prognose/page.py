@@ -10,7 +10,7 @@ import numpy as np
 from elevon.prognose.answer import survival
 from elevon.prognose.figures import course_figure, severity_unit, survival_figure
 from elevon.prognose.observation import Inspection
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 from elevon.units import to_display
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def prognosis_page(
         "Probability of surviving the next N; lines: median and interval of the remaining life.",
     )
     rows = [(f"{n:g}", p) for n, p in survival(result)]
-    future.table(Table((f"next N {result.unit}", "probability"), rows, digits=3))
+    future.table(ReportTable((f"next N {result.unit}", "probability"), rows, digits=3))
     _requirements(report, result)
     _faults(report, result)
     if result.findings:
@@ -81,7 +81,7 @@ def _requirements(report: Report, result: Prognosis) -> None:
             )
         )
     report.section("What must hold").table(
-        Table(
+        ReportTable(
             ("requirement", "now", "life ends at", "unit", "fails first [%]"),
             rows,
             "Evaluated with the model at the median severities; the limit includes its margin.",
@@ -105,7 +105,7 @@ def _faults(report: Report, result: Prognosis) -> None:
             )
         )
     report.section("Faults now").table(
-        Table(
+        ReportTable(
             ("fault", "severity", "growth over the law's", "inspections that saw it"),
             rows,
             f"Median and {result.level:.0%} interval.",
@@ -121,4 +121,6 @@ def _laws(report: Report, laws: Sequence[Law]) -> None:
     ]
     section = report.section("Laws of growth")
     section.points([f"{law.name}: {law.text}. {law.source}." for law in laws])
-    section.table(Table(("law", "fault", "coefficient", "value", "source"), rows, folded="Numbers"))
+    section.table(
+        ReportTable(("law", "fault", "coefficient", "value", "source"), rows, folded="Numbers")
+    )

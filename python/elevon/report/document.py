@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
-__all__ = ["Report", "Section", "Table"]
+__all__ = ["Report", "ReportTable", "Section"]
 
 _SHOWN_ROWS = 20
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class ReportTable:
     """A table of cells.
 
     Attributes
@@ -105,7 +105,7 @@ class Section:
         self.items.append({"kind": "points", "points": list(points)})
         return self
 
-    def table(self, table: Table) -> Section:
+    def table(self, table: ReportTable) -> Section:
         """Add a table."""
         self.items.append({"kind": "table", "table": table})
         return self

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.provenance import provenance
 
@@ -32,7 +32,7 @@ def compare_report(comparison: Comparison, actuator: str, *, date: str | None = 
     report.fact("Speed-up", f"{comparison.speed_up:.0f}", speed)
     _draw(report, comparison)
     numbers = [[name, value] for name, value in values.items() if isinstance(value, float)]
-    report.section("Numbers").table(Table(["Quantity", "Value"], numbers))
+    report.section("Numbers").table(ReportTable(["Quantity", "Value"], numbers))
     report.provenance(
         provenance(
             f"elevon compare {actuator} --out DIR",

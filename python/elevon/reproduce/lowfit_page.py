@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 from elevon.reproduce.provenance import provenance
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def lowfit_report(fit: LowFit, actuator: str, *, date: str | None = None) -> Rep
         report.fact(row["path"], f"{row['new']:.4g}", f"was {row['old']:.4g}")
     fitted = [[row["path"], row["old"], row["new"], row["deviation"]] for row in values["fitted"]]
     section = report.section("Numbers")
-    section.table(Table(["Number", "Old", "New", "Deviation over the cases"], fitted))
+    section.table(ReportTable(["Number", "Old", "New", "Deviation over the cases"], fitted))
     for row in values["kept"]:
         section.text(f"{row['path']} is kept: {row['reason']}.")
     names = list(values["rms_before"])
@@ -35,6 +35,6 @@ def lowfit_report(fit: LowFit, actuator: str, *, date: str | None = None) -> Rep
         [case["name"], *(100 * case[when][n] for n in names for when in ("before", "after"))]
         for case in values["cases"]
     ]
-    report.section("Cases").table(Table(["Case", *head], rows))
+    report.section("Cases").table(ReportTable(["Case", *head], rows))
     report.provenance(provenance(f"elevon fit-low {actuator} --report FILE", Hash=fit.before.hash))
     return report

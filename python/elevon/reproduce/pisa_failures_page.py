@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 from elevon.reproduce.pisa_failures import PHASES, FailureRow, FailuresResult
 from elevon.reproduce.provenance import provenance
 
@@ -79,7 +79,7 @@ def failures_report(result: FailuresResult, *, date: str | None = None) -> Repor
     section = report.section("What the unit found")
     columns, rows = summary(result)
     section.table(
-        Table(
+        ReportTable(
             [name.capitalize() for name in columns],
             [[row[0], *map(int, row[1:])] for row in rows],
             "Silent: no fault and no warning, because the move arrived or nothing moved.",
@@ -87,7 +87,7 @@ def failures_report(result: FailuresResult, *, date: str | None = None) -> Repor
     )
     section = report.section("Unsafe cases")
     if unsafe:
-        section.table(Table(_COLUMNS, _cells(unsafe), formats=_FORMATS))
+        section.table(ReportTable(_COLUMNS, _cells(unsafe), formats=_FORMATS))
         section.points(
             [f"{row.fault}, {row.phase}: {row.sensors or 'not listed'}" for row in unsafe]
         )
@@ -100,7 +100,7 @@ def failures_report(result: FailuresResult, *, date: str | None = None) -> Repor
         if mine:
             title = f"{phase.name[0].upper()}{phase.name[1:]}: {len(mine)} faults"
             section.table(
-                Table(_COLUMNS, _cells(mine), marked=marked, formats=_FORMATS, folded=title)
+                ReportTable(_COLUMNS, _cells(mine), marked=marked, formats=_FORMATS, folded=title)
             )
     report.section("Checks").checks(result.checks)
     report.provenance(

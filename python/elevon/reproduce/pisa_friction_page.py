@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.pisa_friction import FrictionResult, FrictionRow, FrictionTrace
 from elevon.reproduce.provenance import provenance
@@ -41,7 +41,7 @@ def friction_report(result: FrictionResult, *, date: str | None = None) -> Repor
     functional = [row for row in result.rows if row.quantity in ("efficiency", "mass")]
     section = report.section("From the functional runs: weight and efficiency under load")
     section.figure(_efficiency_figure(result), "Efficiency of the screw over its load (Fig. 4.9).")
-    section.table(Table(_COLUMNS, _cells(functional), digits=4))
+    section.table(ReportTable(_COLUMNS, _cells(functional), digits=4))
     _means(report.section("Mean friction"), result)
     _harmonics(report.section("Harmonics of the pitch"), result)
     _preload(report.section("Efficiency at the preload"), result)
@@ -54,7 +54,7 @@ def friction_report(result: FrictionResult, *, date: str | None = None) -> Repor
         )
     section = report.section("All quantities")
     title = f"{len(result.rows)} quantities, put in and recovered"
-    section.table(Table(_COLUMNS, _cells(result.rows), digits=4, folded=title))
+    section.table(ReportTable(_COLUMNS, _cells(result.rows), digits=4, folded=title))
     report.section("Checks").checks(result.checks)
     report.provenance(provenance("elevon reproduce pisa-friction --out DIR", Seed=result.seed))
     return report

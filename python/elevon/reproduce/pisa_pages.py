@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elevon.recording.states import code_names
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.pisa_functional import FunctionalResult, FunctionalRow
 from elevon.reproduce.pisa_gear import COMMANDED
@@ -52,7 +52,9 @@ def functional_report(result: FunctionalResult, *, date: str | None = None) -> R
     ]
     formats = ["", ".1f", ".1f", ".2f", ".2f", ".2f", ".0f", ".1f", ".0f"]
     section = report.section("Times, currents and speeds")
-    section.table(Table(columns, rows, "From the command to the end switch.", formats=formats))
+    section.table(
+        ReportTable(columns, rows, "From the command to the end switch.", formats=formats)
+    )
     section.text(
         "In extension the leg drives the actuator: the current stays near zero, and below a demand "
         "of 0.8 V the software brake shorts the windings, which holds the overrun. At 14 V the "
@@ -150,7 +152,7 @@ def hydraulic_report(result: HydraulicResult, *, date: str | None = None) -> Rep
     )
     formats = [".0f", ".1f", "", ".1f", ".1f", ".1f", ".1f", ".1f"]
     section.table(
-        Table(columns, rows, "Extension aids the load, retraction lifts it.", formats=formats)
+        ReportTable(columns, rows, "Extension aids the load, retraction lifts it.", formats=formats)
     )
     report.section("Checks").checks(result.checks)
     report.provenance(provenance("elevon reproduce pisa-hydraulic --out DIR"))

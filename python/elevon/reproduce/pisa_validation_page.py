@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.pisa_validation import DISPLAYED, ValidationResult
 from elevon.reproduce.provenance import provenance
@@ -34,7 +34,7 @@ def validation_page(result: ValidationResult, *, date: str | None = None) -> Rep
     columns = ["Stroke", "Signal", "RMS error", "Unit", "% of RMS", "% of range"]
     caption = "Percent of the measured signal's RMS about its mean, and of its range."
     formats = ["", "", ".3g", "", ".3g", ".3g"]
-    report.section("Errors").table(Table(columns, rows, caption, formats=formats))
+    report.section("Errors").table(ReportTable(columns, rows, caption, formats=formats))
     for trace in result.traces:
         section = report.section(trace.log[0].upper() + trace.log[1:])
         with new_figure(3, 1, width=8.0, height=5.4, sharex=True) as (figure, axes):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 from elevon.report.figures import new_figure
 from elevon.units import format_quantity, shown_unit, to_display
 
@@ -40,7 +40,7 @@ def signatures_page(result: SignaturesResult, date: str | None = None) -> Report
     section = report.section("All of them")
     section.checks(result.checks())
     rows = [list(item.to_dict().values()) for item in result.signatures]
-    section.table(Table(list(result.signatures[0].to_dict()), rows, digits=3))
+    section.table(ReportTable(list(result.signatures[0].to_dict()), rows, digits=3))
     return report
 
 

@@ -2,7 +2,7 @@
 //!
 //! Rows of motion follow `output = a + b angle -+ h`, the sign being that of the motion: least squares with one slope for both
 //! directions (analysis of covariance) in five sums a direction. The lost motion is `2 h`: backlash, and what the elastic parts
-//! give way to a friction that changes its sign.
+//! deflect under a friction that changes its sign.
 //!
 //! A row weighs as the square of the angle travelled since the motion last turned back: rows within the backlash,
 //! which contain part of it, hardly count (a backlash `p` in strokes `d` reads low by less than `(p/d)^2` of itself), and no backlash

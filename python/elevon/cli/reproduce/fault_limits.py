@@ -67,7 +67,7 @@ def _command(options: Options) -> str:
 
 
 def _page(result: Any, options: Options) -> Report:
-    from elevon.report import Report, Table
+    from elevon.report import Report, ReportTable
     from elevon.reproduce.provenance import provenance
 
     report = Report(
@@ -78,7 +78,7 @@ def _page(result: Any, options: Options) -> Report:
     report.section("Checks").checks(result.checks)
     rows = [[getattr(row, name) for name in (*_COLUMNS, "reason")] for row in result.limits]
     text = [["-" if cell is None else str(cell) for cell in row] for row in rows]
-    report.section("Limits").table(Table((*_COLUMNS, "reason"), text))
+    report.section("Limits").table(ReportTable((*_COLUMNS, "reason"), text))
     report.provenance(provenance(_command(options), Seed=options["seed"]))
     return report
 

@@ -13,7 +13,7 @@ from elevon.demo.life.figures import (
 from elevon.demo.life.mechanism import mechanism, motion
 from elevon.diagnose.bymodel import read_test_logs
 from elevon.prognose.figures import severity_unit
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 from elevon.reproduce.provenance import provenance
 from elevon.units import to_display
 
@@ -139,7 +139,7 @@ def _diagnoses(report: Report, demo: LifeDemo) -> None:
     columns = ["flights", "diagnosis"]
     for law in laws:
         columns += [law.kind, "truth"]
-    section.table(Table(columns, rows))
+    section.table(ReportTable(columns, rows))
 
 
 def _prediction(report: Report, demo: LifeDemo) -> None:
@@ -162,14 +162,14 @@ def _prediction(report: Report, demo: LifeDemo) -> None:
         for v in demo.visits
     ]
     columns = ("flights", "remain", "90 %", "truth", "survives 500 more", "fails first")
-    section.table(Table(columns, rows))
+    section.table(ReportTable(columns, rows))
     lines = []
     for item in demo.visits[-1].prognosis.reserve:
         unit = severity_unit(item["unit"])
         now, end = to_display(item["value"], unit), to_display(item["threshold"], unit)
         lines.append((item["name"], f"{now:.3g} {unit}", f"{end:.3g} {unit}"))
     section.table(
-        Table(
+        ReportTable(
             ("requirement", "at the last inspection", "life ends at"),
             lines,
             "By the calibrated model, at the severities diagnosed.",
@@ -193,7 +193,7 @@ def _calibration(report: Report, demo: LifeDemo) -> None:
         "The model of this unit",
         "Calibrated on three logs of the new unit. The hidden values were drawn by a seed.",
     ).table(
-        Table(
+        ReportTable(
             ("parameter", "published", "hidden truth", "estimate", "low", "high", "unit"),
             rows,
             "Estimates with 90 % intervals.",
@@ -206,5 +206,7 @@ def _times(report: Report, demo: LifeDemo) -> None:
     rows: list[list[object]] = [[step.name, step.seconds, step.reused] for step in demo.steps]
     rows.append(["all", demo.seconds, ""])
     report.section("Time of each step").table(
-        Table(("step", "time [s]", ""), rows, "Wall time of this run.", formats=["", ".1f", ""])
+        ReportTable(
+            ("step", "time [s]", ""), rows, "Wall time of this run.", formats=["", ".1f", ""]
+        )
     )

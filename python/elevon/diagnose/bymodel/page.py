@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from elevon.diagnose.bymodel.words import by_reason, sentence, severity_text
 from elevon.diagnose.pictures import features_figure, traces_figure
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -48,7 +48,7 @@ def diagnosis_page(
     ]
     blind = by_reason(result.unobservable)
     limits.table(
-        Table(
+        ReportTable(
             ("fault", "least severity seen"),
             seen + blind,
             "Least severity from which on 95 % of held-out single faults were named."
@@ -74,7 +74,7 @@ def _causes(report: Report, result: Diagnosis) -> None:
     ]
     causes = report.section("Causes")
     causes.table(
-        Table(
+        ReportTable(
             ("cause", "probability", "severity", "90 % interval", "ambiguous with"),
             rows,
             f"Logs: {', '.join(result.logs)}. A cause that is not listed has less than 2 %.",
@@ -100,7 +100,7 @@ def _alternatives(report: Report, result: Diagnosis) -> None:
         for a in result.alternatives
     ]
     report.section("Alternatives, and what speaks against each").table(
-        Table(
+        ReportTable(
             ("alternative", "probability", "fits best at", "explains worst", "left"),
             rows,
             "Alone, at the severity that fits best. Left: what it leaves of the feature that it "
@@ -149,4 +149,4 @@ def _features(report: Report, result: Diagnosis) -> None:
         "How far the features of the logs deviate from a healthy unit: bars, in its deviations "
         "from run to run; diamonds, what the most probable cause accounts for.",
     )
-    section.table(Table(names, rows, text, digits=4, formats=formats))
+    section.table(ReportTable(names, rows, text, digits=4, formats=formats))

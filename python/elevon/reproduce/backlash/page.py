@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.backlash.campaign import FREQUENCY, START, BacklashResult
 from elevon.reproduce.provenance import provenance
@@ -119,7 +119,7 @@ def _comparison(report: Report, result: BacklashResult) -> None:
         for row in result.rows
     ]
     formats = ["d", ".2f", ".4f", ".4f", ".4f", ".4f", "+.4f", ".4f", ".4f", ".3f"]
-    section.table(Table(columns, rows, "Total backlash at the output side.", formats=formats))
+    section.table(ReportTable(columns, rows, "Total backlash at the output side.", formats=formats))
     section.figure(
         _errors(result),
         "Error of the recovered backlash; the band is one count and 2 % of the backlash.",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.compliance.campaign import (
     NM_PER_RAD,
@@ -58,7 +58,7 @@ def _data(report: Report, result: ComplianceResult) -> None:
         "loss is the distance between the two positions of its row, or it is not that row's.",
     )
     rows = [[slip.row, slip.kind, slip.reason] for slip in result.slips]
-    section.table(Table(["Row", "Slip", "Evidence"], rows))
+    section.table(ReportTable(["Row", "Slip", "Evidence"], rows))
     section.text(
         "Swapping columns changes no loss that is taken as a distance. It turns the sign of a loss "
         "taken as encoder minus motor, and ruins both regressions (fourth line of the next table)."
@@ -80,7 +80,7 @@ def _estimators(report: Report, result: ComplianceResult) -> None:
     ]
     columns = ["Rows used", "Rows", "Load on loss", "Loss on load", "Theil-Sen", "r squared"]
     section.table(
-        Table(
+        ReportTable(
             columns,
             rows,
             "Stiffness in N/deg, by reading of the table and by estimator.",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.logs.formats.cranfield import DATA_DOI, PAPER_DOI
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.cranfield.result import GROUPED, STRICT, CranfieldResult
 from elevon.reproduce.provenance import provenance
@@ -68,12 +68,14 @@ def _figures(report: Report, result: CranfieldResult) -> None:
     )
     mean = [row for row in rows if row[2] in {"mean", "worst"}]
     section = report.section("Scores")
-    section.table(Table(columns, mean, caption, formats=["", "", "", ".3f", "", ""]))
+    section.table(ReportTable(columns, mean, caption, formats=["", "", "", ".3f", "", ""]))
     section.table(
-        Table(columns, rows, caption, formats=["", "", "", ".3f", "", ""], folded="Every load")
+        ReportTable(
+            columns, rows, caption, formats=["", "", "", ".3f", "", ""], folded="Every load"
+        )
     )
     section.table(
-        Table(
+        ReportTable(
             ["Answers", "Mean probability given", "Share right"],
             [[name, p, right] for name, (p, right) in result.reliability.items()],
             "A calibrated classifier gives what it says the share with which it is right.",
@@ -117,7 +119,7 @@ def _detection(report: Report, result: CranfieldResult) -> None:
         "(ASSUMED to differ by their session only; the published detection does not see them).",
     )
     section.table(
-        Table(
+        ReportTable(
             ["Condition", "Called faulty", "95 % interval", "Recordings", "Sessions allowed for"],
             [[d["condition"], d["rate"], "{:.3f} to {:.3f}".format(*d["interval"]),
               d["recordings"], d["rate_between_sessions"]] for d in rows],
@@ -148,7 +150,7 @@ def _contents(report: Report, result: CranfieldResult) -> None:
     section = report.section("What was there")
     rows = [[p["condition"], p["load_kgf"], ", ".join(map(str, p["runs"]))]  # type: ignore[call-overload]
             for p in result.data.present()]  # fmt: skip
-    section.table(Table(["Condition", "Load [kgf]", "Runs"], rows, folded="Recordings used"))
+    section.table(ReportTable(["Condition", "Load [kgf]", "Runs"], rows, folded="Recordings used"))
     left_out = [*result.data.skipped, *(f"{name}: not possible here" for name in result.missing)]
     if left_out:
         section.points(left_out)

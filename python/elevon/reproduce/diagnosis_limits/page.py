@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.diagnosis_limits.logs import TESTS
 from elevon.reproduce.diagnosis_limits.plan import FAULTS
@@ -75,11 +75,11 @@ def _curve(result: DiagnosisLimits) -> Figure:
     return figure
 
 
-def _table(rows: list[dict[str, object]]) -> Table:
+def _table(rows: list[dict[str, object]]) -> ReportTable:
     names = ("group", "test", "fault", "severity", "logs", "detected", "isolated", "error_median",
              "coverage")  # fmt: skip
     cells = [["-" if row[n] is None else _text(row[n]) for n in names] for row in rows]
-    return Table([n.replace("_", " ") for n in names], cells)
+    return ReportTable([n.replace("_", " ") for n in names], cells)
 
 
 def _text(value: object) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.nasa.baseline_rows import BaselineResult
 from elevon.reproduce.nasa.dema import DemaFit
@@ -68,7 +68,9 @@ def _thermal(result: ThermalResult, date: str | None) -> Report:
             "over 1 s) and fitted; the load changes every quarter of an hour.",
         )
         section.figure(_fit_figure(result.fit), "Surface and nut as measured and as fitted.")
-        section.table(Table(["Parameter, SI", "Put in", "Recovered", "from", "to"], rows, digits=4))
+        section.table(
+            ReportTable(["Parameter, SI", "Put in", "Recovered", "from", "to"], rows, digits=4)
+        )
     return report
 
 

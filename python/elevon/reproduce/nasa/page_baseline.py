@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.nasa.baseline import DRIFT
 from elevon.reproduce.nasa.baseline_rows import MEASURES, BaselineResult
@@ -61,7 +61,7 @@ def _corners(report: Report, result: BaselineResult) -> None:
         "The paper draws sharp corners, which ask for infinite acceleration: the current limit of "
         "20 A is then every peak. With the corners rounded the peak is that of the motion.",
     ).table(
-        Table(columns, rows, "Acceleration 0: sharp, as drawn.",
+        ReportTable(columns, rows, "Acceleration 0: sharp, as drawn.",
               formats=("", ".0f", ".1f", ".2f", ".3f", ".3f"))
     )  # fmt: skip
 
@@ -79,7 +79,7 @@ def _effects(report: Report, result: BaselineResult) -> None:
         rows = [[e.term, e.effect, e.low, e.high, _probability(e.p)] for e in effects]
         number = f"+.{digits}f"
         section.table(
-            Table(["Factor or pair", f"Effect [{unit}]", "from", "to", "p"], rows, title,
+            ReportTable(["Factor or pair", f"Effect [{unit}]", "from", "to", "p"], rows, title,
                   formats=("", number, number, number, ""))
         )  # fmt: skip
 
@@ -137,7 +137,7 @@ def _legend_above(axes: Axes) -> None:
     axes.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderpad=0.2)
 
 
-def _rows_table(result: BaselineResult) -> Table:
+def _rows_table(result: BaselineResult) -> ReportTable:
     measures = ("rms_current_a", "peak_current_a", "tracking_rms_mm", "winding_rise_k")
     columns = ["Profile", "Amplitude [mm]", "Rate [mm/s]", "Load [N]", "Direction",
                *(f"{MEASURES[name][0]} [{MEASURES[name][1]}]" for name in measures),
@@ -148,7 +148,7 @@ def _rows_table(result: BaselineResult) -> Table:
         for d in (row.to_dict() for row in result.rows)
     ]  # fmt: skip
     numbers = [f".{MEASURES[name][2]}f" for name in measures]
-    return Table(
+    return ReportTable(
         columns, rows, "Means over the replicates and the scatter between reassemblies.",
         formats=("", ".0f", ".0f", ".0f", "", *numbers, ".4f", ""),
     )  # fmt: skip

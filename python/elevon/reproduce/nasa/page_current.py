@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.nasa.current import PUBLISHED, CurrentResult
 from elevon.reproduce.provenance import provenance
@@ -22,7 +22,7 @@ def current_report(result: CurrentResult, *, date: str | None = None) -> Report:
     )
     section = report.section("Percent RMS error of the current")
     section.table(
-        Table(
+        ReportTable(
             ["Runs", "Source", "Average [%]", "Maximum [%]", "Minimum [%]"],
             [
                 [state, source, *values]
@@ -38,7 +38,7 @@ def current_report(result: CurrentResult, *, date: str | None = None) -> Report:
         )
     )
     section.table(
-        Table(
+        ReportTable(
             ["State", "Assembly", "Profile", "Load", "Error [%]", "Error [A]"],
             [[r.state, r.assembly, r.profile, r.load, r.percent_rms, r.rms_a] for r in result.rows],
             "Every run.",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.nasa.corners import ACCELERATION
 from elevon.reproduce.nasa.effect import POWER
@@ -71,7 +71,7 @@ def _groups(result: SeparationResult) -> dict[tuple[str, float], list[Separation
     return groups
 
 
-def _winners_table(result: SeparationResult) -> Table:
+def _winners_table(result: SeparationResult) -> ReportTable:
     rows: list[list[object]] = []
     for (fault, load), group in _groups(result).items():
         largest = max(group, key=lambda row: abs(row.effect.size))
@@ -87,7 +87,7 @@ def _winners_table(result: SeparationResult) -> Table:
         )  # fmt: skip
     columns = ["Fault", "Load [N]", "Feature", "Best profile", "Largest effect", "Power",
                "Draws that would name one"]  # fmt: skip
-    return Table(
+    return ReportTable(
         columns, rows,
         "Features: lines and rms of the current reference, peak of the load cell. "
         "Power: probability that the intervals of the two largest effects part in another such "
@@ -181,9 +181,13 @@ def _impact_sections(report: Report, result: SeparationResult) -> None:
     ]
     columns = ["Profile", "Load [N]", "Excess of the peak [N]", "from [N]", "to [N]"]
     section.table(
-        Table(columns, rows, "Peak of the load cell with the gap less without, 95 % intervals.",
-              formats=("", ".0f", ".0f", ".0f", ".0f"))
-    )  # fmt: skip
+        ReportTable(
+            columns,
+            rows,
+            "Peak of the load cell with the gap less without, 95 % intervals.",
+            formats=("", ".0f", ".0f", ".0f", ".0f"),
+        )
+    )
 
 
 def _trace_figure(result: SeparationResult) -> Figure:
@@ -210,10 +214,10 @@ def _population(report: Report) -> None:
         "Healthy population",
         "Nothing of it is printed: every spread is ASSUMED. Deviations are in SI units or shares "
         "of the actuator file's value; all groups, healthy and faulty, are drawn from it.",
-    ).table(Table(["Property", "Deviation", "Why this much"], rows))
+    ).table(ReportTable(["Property", "Deviation", "Why this much"], rows))
 
 
-def _rows_table(result: SeparationResult) -> Table:
+def _rows_table(result: SeparationResult) -> ReportTable:
     columns = ["Fault", "Profile", "Load [N]", "Feature", "Unit", "Healthy", "Faulty", "Effect",
                "from", "to", "Half severity", "Best"]  # fmt: skip
     rows = [
@@ -223,7 +227,7 @@ def _rows_table(result: SeparationResult) -> Table:
         for row in result.rows
     ]  # fmt: skip
     two = "+.2f"
-    return Table(
+    return ReportTable(
         columns, rows, "Every fault, load and profile.", digits=4,
         formats=("", "", ".0f", "", "", "", "", two, two, two, two, ""),
     )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from elevon.prognose.metric_figures import metrics_figure
-from elevon.report import Report, Table
+from elevon.report import Report, ReportTable
 from elevon.reproduce.prognosis.result import SHARES, PrognosisResult
 from elevon.reproduce.provenance import provenance
 
@@ -31,7 +31,7 @@ def prognosis_report(result: PrognosisResult, *, seed: int, date: str | None = N
     columns = ["law", "histories", "mean", *(f"{s:.0%}" for s in SHARES)]
     columns += ["coverage", "horizon (20 %)", "sigma points", "laws alone"]
     section.table(
-        Table(columns, rows, "Relative accuracy by share of life; horizon: median, strict.",
+        ReportTable(columns, rows, "Relative accuracy by share of life; horizon: median, strict.",
               digits=3)
     )  # fmt: skip
     for law in dict.fromkeys(u.law for u in result.units):
