@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from elevon.calibrate.direct import saturated_speed
 from elevon.calibrate.log import BenchLog
 from elevon.errors import InputError
 from elevon.logs.command.fit import FREE, WaveformFit, best_waveform, fit_waveform
-from elevon.logs.command.known import NotedCommand, align_noted
+from elevon.logs.command.known import NotedCommand, align_noted, noted_values
 from elevon.logs.command.reconstruct import reconstruct
 from elevon.logs.covariance import robust_covariance
 from elevon.waveforms import evaluate
@@ -58,6 +58,8 @@ class CommandFit:
         Amplitude over the amplitude the operator noted.
     reach : float
         Size of the following error the gain stands on [rad]: amplitude of a sine of its RMS.
+    values : ndarray, shape (n,)
+        The command at the log's instants [rad].
     """
 
     log: str
@@ -68,6 +70,7 @@ class CommandFit:
     amplitude_std: float
     factor: float | None
     reach: float
+    values: Floats = field(repr=False, compare=False)
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain types."""
@@ -130,6 +133,7 @@ def _noted_with_gain(
 ) -> CommandFit | None:
     """Gain under a command noted in full: noted = set point / gain + position, its instant free."""
     assert log.output is not None
+    assert log.note is not None
     inside = log.good & (np.abs(log.speed_ref) < 0.999 * limit) & (log.time >= noted.start)
     t, ref, output = log.time[inside], log.speed_ref[inside] / gain, log.output[inside]
     if inside.sum() < _LEAST:
@@ -156,6 +160,7 @@ def _noted_with_gain(
         amplitude_std=math.nan,
         factor=None,
         reach=math.sqrt(2.0) * float(np.std(ref)),
+        values=noted_values(log.note, "rad", log.time - start),
     )
 
 
@@ -199,6 +204,7 @@ def _with_gain(log: BenchLog, fit: WaveformFit, gain: float, limit: float) -> Co
         amplitude_std=math.nan if at is None else float(std[at]),
         factor=factor,
         reach=math.sqrt(2.0) * float(np.std(ref)),
+        values=fit.at(log.time),
     )
 
 

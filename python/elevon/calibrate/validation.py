@@ -325,10 +325,9 @@ def _command(log: BenchLog, actuator: Actuator) -> tuple[Floats, str]:
     fit = command_fit(log, gain, limit)
     if fit is None:
         return known, "rebuilt from set point and position"
-    wave = fit.waveform.at(log.time)
     inside = (log.time >= fit.waveform.window[0]) & (log.time <= fit.waveform.window[1])
     saturated = ~trace.valid & (log.time <= fit.waveform.window[1])
-    return np.where(inside | saturated, wave, known), f"{fit.waveform.kind} fitted to the log"
+    return np.where(inside | saturated, fit.values, known), f"{fit.waveform.kind} fitted to the log"
 
 
 def _errors(trace: ValidationTrace, limits: Mapping[str, float]) -> list[SignalError]:

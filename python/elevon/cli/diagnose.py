@@ -202,7 +202,7 @@ def _print(result: Diagnosis) -> None:
         )
         for c in result.faults
     ]
-    print_table(("cause", "probability", "severity", "low", "high", "not separable from"), rows)
+    print_table(("cause", "probability", "severity", "low", "high", "ambiguous with"), rows)
     for names, reason in by_reason(result.unobservable):
         say(f"not observable: {names}: {reason}")
     for text in result.findings:

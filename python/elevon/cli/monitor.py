@@ -116,5 +116,5 @@ def _print_alarm(alarm: Alarm) -> None:
         others = ", ".join(f"{kind}@{place}" for kind, place in cause.ambiguous_with)
         say(
             f"{cause.kind}@{cause.place}: {middle} ({low} to {high}), probability "
-            f"{cause.probability:.2f}" + (f"; not separable from {others}" if others else "")
+            f"{cause.probability:.2f}" + (f"; ambiguous with {others}" if others else "")
         )

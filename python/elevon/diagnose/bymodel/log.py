@@ -143,7 +143,7 @@ def prepared(item: TestLog, actuator: Actuator) -> TestLog:
     fit = command_fit(log, gain, limit)
     if fit is None:
         return TestLog(log, item.voltage, None, rebuilt, good)
-    wave = _joined(log, trace.valid, rebuilt, fit.waveform.at(log.time), fit.waveform.window)
+    wave = _joined(log, trace.valid, rebuilt, fit.values, fit.waveform.window)
     return TestLog(log, item.voltage, (fit.gain, fit.gain_std), wave, good)
 
 
