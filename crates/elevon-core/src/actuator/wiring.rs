@@ -145,6 +145,8 @@ pub struct Overheat<S> {
 pub trait Machine: Clone + Send + Sync + 'static {
     const GROUPS: &'static [Group];
     const PORTS: &'static [Port];
+    /// Ports whose drive decides which equations run, and that a session may drive at any time.
+    const LATE_PORTS: &'static [usize] = &[];
     /// What a command may set.
     const MODES: &'static [&'static str] = Mode::NAMES;
     /// Units of the command in each mode; empty: the command port's own.

@@ -6,7 +6,7 @@ use super::block::Block;
 use super::kernels::Plain;
 use super::spec::{RunSpec, Status};
 use super::width::{with_lanes, Width};
-use crate::actuator::{Signals, Wiring};
+use crate::actuator::{Machine, Signals, Wiring};
 use crate::command::SourcePlan;
 use crate::fault::FaultSpec;
 use crate::scalar::Scalar;
@@ -155,11 +155,17 @@ impl<W: Wiring, S: Scalar> Live for Session<W, S> {
 /// Blocks of runs that go on from call to call: which runs each holds, and the block. `recorded` are signals that will be
 /// read and need equations of their own.
 pub fn live<W: Wiring>(runs: &[RunSpec], recorded: &[usize], width: Width) -> Vec<(Vec<usize>, Box<dyn Live>)> {
+    let mut runs = runs.to_vec();
+    for run in &mut runs {
+        for &port in W::Machine::LATE_PORTS {
+            run.driven[port] = true;
+        }
+    }
     let one = |indices: Vec<usize>| {
         let members: Vec<RunSpec> = indices.iter().map(|&i| runs[i].clone()).collect();
         (indices, block::<W>(width, members, recorded))
     };
-    blocks::<W>(runs, recorded, width, 1).into_iter().map(one).collect()
+    blocks::<W>(&runs, recorded, width, 1).into_iter().map(one).collect()
 }
 
 fn block<W: Wiring>(width: Width, runs: Vec<RunSpec>, recorded: &[usize]) -> Box<dyn Live> {

@@ -23,6 +23,7 @@ pub struct Ballscrew;
 impl Machine for Ballscrew {
     const GROUPS: &'static [Group] = records::GROUPS;
     const PORTS: &'static [Port] = records::PORTS;
+    const LATE_PORTS: &'static [usize] = &[layout::BRAKE, layout::OUTPUT];
 
     fn faults() -> Vec<FaultKind> {
         faults::catalogue()

@@ -17,6 +17,7 @@ pub struct Rotary;
 impl Machine for Rotary {
     const GROUPS: &'static [Group] = layout::GROUPS;
     const PORTS: &'static [Port] = layout::PORTS;
+    const LATE_PORTS: &'static [usize] = &[layout::OUTPUT];
 
     fn faults() -> Vec<FaultKind> {
         faults::catalogue(faults::ROTARY)

@@ -166,7 +166,7 @@ fn energies<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, out: &
         (Q::EnergyBrake, w.brake),
         (Q::EnergyLoad, w.load),
         (Q::EnergyImpact, w.impact),
-        (Q::EnergyKinetic, m.shaft.kinetic(&s.shaft)),
+        (Q::EnergyKinetic, m.shaft.kinetic(&structure.shaft, &s.shaft)),
     ] {
         out[q as usize] = value;
     }

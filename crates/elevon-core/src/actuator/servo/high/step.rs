@@ -190,6 +190,9 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     }
 
     // Motor and transmission dynamics.
+    if FULL && structure.shaft.flanks {
+        m.shaft.hold_flank::<EXTRA>(&structure.shaft, x, &mut s.shaft, torque);
+    }
     let loads = m.shaft.loads::<FULL, EXTRA>(&structure.shaft, x, &s.shaft, torque);
     m.shaft.step::<FULL, EXTRA>(&structure.shaft, x, &mut s.shaft, &loads, torque);
     s.star.current = current;

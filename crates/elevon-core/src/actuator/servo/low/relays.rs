@@ -45,11 +45,12 @@ impl<S: Scalar, const EXTRA: bool> Pushed<'_, S, EXTRA> {
     }
 }
 
-/// What the controller demands but for its derivative, the derivative as inertia, 1/(J + eta D).
+/// What the controller demands but for its derivative, the derivative as inertia, 1/(J + eta D) and 1/J of what moves.
 pub(super) struct TorqueDemand<S> {
     pub torque: S,
     pub inertia: S,
     pub per_inertia: S,
+    pub per_shaft: S,
 }
 
 /// Acceleration under the torque that the relays leave anywhere within `band` of a current reference that contains the
@@ -68,14 +69,14 @@ pub(super) fn within_band<S: Scalar, const EXTRA: bool>(
     let emf = S::splat(2.0 / 3.0) * p.torque_constant * s.shaft.motor_speed;
     let drift = p.torque_constant * p.circuit.current(s.current, -emf);
     let band = p.torque_constant * band;
-    let coasting = by.torque(drift, m.per_inertia);
+    let coasting = by.torque(drift, demand.per_shaft);
     let gap = drift - p.efficacy * (demand.torque - demand.inertia * coasting);
     let push = gap.signed(band);
     let mut edge = by.torque(p.efficacy.fma(demand.torque, push), demand.per_inertia);
     let reference = demand.torque - demand.inertia * edge;
     let limited = m.control.torque_limit.lt(reference.abs());
     if S::any(limited) {
-        let limit = by.torque(p.efficacy.fma(reference.clamp_abs(m.control.torque_limit), push), m.per_inertia);
+        let limit = by.torque(p.efficacy.fma(reference.clamp_abs(m.control.torque_limit), push), demand.per_shaft);
         edge = S::select(limited, limit, edge);
     }
     S::select(gap.abs().le(band), coasting, edge)

@@ -158,24 +158,31 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
         &m.healthy
     };
     let (mut derivative_inertia, mut per_inertia) = (m.control.derivative_inertia, p.per_effective_inertia);
+    let (mut shaft_inertia, mut per_shaft) = (m.shaft.inertia, m.per_inertia);
+    if FULL && structure.shaft.flanks {
+        m.shaft.hold_flank::<EXTRA>(&structure.shaft, x, &mut s.shaft, s.motor_torque);
+        shaft_inertia = m.shaft.moving_inertia(&structure.shaft, &s.shaft);
+        per_shaft = S::one() / shaft_inertia;
+        per_inertia = S::one() / p.efficacy.fma(derivative_inertia, shaft_inertia);
+    }
     let mut torque = p.efficacy * demand.torque;
     let mut answer = p.efficacy;
     if EXTRA && structure.driven {
         // The windings make of a reference what they can: the torque there is, and what a step adds to it.
         answer = answer.maximum(S::zero()) * m.drive.tracking;
         torque = answer.fma(demand.torque - s.torque_ref, s.motor_torque);
-        per_inertia = S::one() / answer.fma(derivative_inertia, m.shaft.inertia);
+        per_inertia = S::one() / answer.fma(derivative_inertia, shaft_inertia);
     }
     if FULL && structure.sensing.resolver {
         // The derivative acts on the acceleration that the resolver reports.
         derivative_inertia = derivative_inertia * m.sensing.follows();
-        per_inertia = S::one() / answer.fma(derivative_inertia, m.shaft.inertia);
+        per_inertia = S::one() / answer.fma(derivative_inertia, shaft_inertia);
     }
     let mut loads = m.shaft.loads::<FULL, EXTRA>(&structure.shaft, x, &s.shaft, torque);
     let supply = supply::<S, EXTRA>(m, structure, x, s, p);
     let relays = structure.drive == DriveKind::Hysteresis && structure.control.derivative && !(EXTRA && structure.driven);
     let acceleration = if relays {
-        let demand = TorqueDemand { torque: demand.torque, inertia: derivative_inertia, per_inertia };
+        let demand = TorqueDemand { torque: demand.torque, inertia: derivative_inertia, per_inertia, per_shaft };
         within_band::<S, EXTRA>(m, structure, s, p, &demand, supply.band, &loads)
     } else {
         m.shaft.acceleration::<EXTRA>(&structure.shaft, &s.shaft, &loads, torque, per_inertia)

@@ -35,7 +35,10 @@ impl<S: Scalar> Shaft<S> {
     ) -> Loads<S> {
         let output_torque = self.output_torque(d, x, s);
         let elastic = FULL && d.elastic;
-        let through = if elastic { self.contact(d, s) } else { output_torque };
+        let mut through = if elastic { self.contact(d, s) } else { output_torque };
+        if FULL && d.flanks {
+            through = S::select(self.joined(s), through, S::zero());
+        }
         let mut load = through.fma(self.gear.per_ratio, x.shaft);
         let mut motor_side = if elastic { x.shaft } else { load };
         let mut added = x.brake;
@@ -46,7 +49,7 @@ impl<S: Scalar> Shaft<S> {
             }
             if d.load_side && !elastic {
                 // Rigid: the load side's friction is felt on the motor shaft.
-                added = added + self.load_side_friction(d, x) * self.gear.per_ratio;
+                added = added + self.felt_friction(d, x, s) * self.gear.per_ratio;
             }
             let (torque, friction, spalled) = self.disturbance(d, s, through);
             load = load - torque;
@@ -86,7 +89,7 @@ impl<S: Scalar> Shaft<S> {
                 nut = nut + preload;
             }
             if d.linear {
-                brake = if elastic { S::zero() } else { x.brake * self.gear.per_ratio };
+                brake = if elastic { S::zero() } else { self.felt(d, s, x.brake) * self.gear.per_ratio };
             }
             if d.debris {
                 static_limit = static_limit * s.scatter;
@@ -95,16 +98,17 @@ impl<S: Scalar> Shaft<S> {
             }
         }
         let speed = s.motor_speed;
-        let viscous = self.viscous::<FULL, EXTRA>(d, speed);
+        let viscous = self.viscous::<FULL, EXTRA>(d, s);
         let resist = load + speed.signed(dynamic) + viscous;
         Loads { brake, output_torque, load, motor_side, through, static_limit, dynamic, viscous, nut, resist }
     }
 
     #[inline(always)]
-    pub(super) fn viscous<const FULL: bool, const EXTRA: bool>(&self, d: &ShaftDetails, speed: S) -> S {
+    pub(super) fn viscous<const FULL: bool, const EXTRA: bool>(&self, d: &ShaftDetails, s: &ShaftState<S>) -> S {
+        let speed = s.motor_speed;
         let mut viscous = if FULL && d.sloped { self.friction.viscous_torque(speed) } else { self.friction.viscous * speed };
         if EXTRA && d.load_side && !d.elastic {
-            viscous = viscous + self.load_damping * self.gear.per_ratio * self.gear.per_ratio * speed;
+            viscous = viscous + self.felt(d, s, self.load_damping) * self.gear.per_ratio * self.gear.per_ratio * speed;
         }
         viscous
     }
@@ -116,8 +120,23 @@ impl<S: Scalar> Shaft<S> {
         if !EXTRA || !d.load_side || d.elastic {
             return through;
         }
-        let damping = self.load_damping * self.gear.per_ratio * s.motor_speed;
-        direction.fma(self.load_side_friction(d, x), through + damping)
+        let damping = self.felt(d, s, self.load_damping) * self.gear.per_ratio * s.motor_speed;
+        direction.fma(self.felt_friction(d, x, s), through + damping)
+    }
+
+    /// What of a quantity of the output reaches the motor: nothing while they are apart.
+    #[inline(always)]
+    fn felt(&self, d: &ShaftDetails, s: &ShaftState<S>, value: S) -> S {
+        if d.flanks {
+            S::select(self.joined(s), value, S::zero())
+        } else {
+            value
+        }
+    }
+
+    #[inline(always)]
+    fn felt_friction(&self, d: &ShaftDetails, x: &Instant<S>, s: &ShaftState<S>) -> S {
+        self.felt(d, s, self.load_side_friction(d, x))
     }
 
     #[inline(always)]

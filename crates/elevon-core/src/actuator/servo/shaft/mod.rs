@@ -2,11 +2,13 @@
 //! loads, the friction (dry, viscous, of a preloaded or worn screw, of the load side), unbalance, seizure, stops and backlash,
 //! and it keeps the accounts of their work.
 
+mod flank;
 mod loads;
 mod observe;
 mod step;
 mod train;
 
+use self::flank::Flank;
 pub(super) use self::loads::Loads;
 pub(super) use self::observe::ShaftSignals;
 pub(super) use self::train::TRAIN;
@@ -46,6 +48,8 @@ details! {
     }
     full {
         elastic = x.elastic;
+        /// A force or friction on the output decides which flank of the backlash carries.
+        flanks = !x.elastic && x.gapped() && x.loaded::<F>();
         loaded = F::LINEAR || Gear::<f64>::loaded(&x.parts.gear());
         sloped = Friction::<f64>::sloped(&x.parts.friction());
         jams = Friction::<f64>::jams(&x.parts.friction());
@@ -89,6 +93,22 @@ impl<'a> ShaftNeeds<'a> {
     pub(super) fn low(parts: Parts<'a>) -> Self {
         Self { parts, semi_implicit: true, elastic: false, accounts: false, low: true }
     }
+
+    /// Is there backlash, now or later?
+    fn gapped(&self) -> bool {
+        let backlash = self.parts.backlash();
+        backlash.most(BacklashParameter::Total) > 0.0
+            || backlash.most(BacklashParameter::Extra) > 0.0
+            || Teeth::<f64>::needed(&self.parts.tooth())
+    }
+
+    /// Does a force or friction act on the output, now or later?
+    fn loaded<F: Form>(&self) -> bool {
+        let driven = self.parts.0.driven;
+        driven[OUTPUT]
+            || F::LINEAR && driven[BRAKE]
+            || self.parts.load().any_away([LoadParameter::Stiffness, LoadParameter::Constant, LoadParameter::Friction])
+    }
 }
 
 /// Constants of the shaft.
@@ -107,10 +127,13 @@ pub struct Shaft<S> {
     train: Train<S>,
     /// Of the motor shaft; with a rigid transmission the output's included.
     pub inertia: S,
+    /// Of the motor shaft alone.
+    rotor_inertia: S,
     /// Of the whole train, at the motor shaft.
     pub whole_inertia: S,
     dt_per_inertia: S,
-    /// Of the second mass; none with a rigid transmission.
+    dt_per_rotor: S,
+    /// Of the second mass, where it ever moves by itself.
     pub output_inertia: S,
     per_output_inertia: S,
     /// Dry friction and damping of the load side.
@@ -134,6 +157,7 @@ pub struct ShaftState<S> {
     bristle: S,
     pub nut: NutState<S>,
     pub vibration: VibrationState<S>,
+    flank: Flank<S>,
     pub work: Work<S>,
 }
 
@@ -173,9 +197,11 @@ impl<S: Scalar> Shaft<S> {
             vibration: F::housing(raw),
             unbalance,
             inertia,
+            rotor_inertia: rotor,
             whole_inertia: rotor + reflected,
             dt_per_inertia: dt / inertia,
-            output_inertia: if d.elastic { output_inertia } else { S::zero() },
+            dt_per_rotor: dt / rotor,
+            output_inertia: if d.elastic || d.flanks { output_inertia } else { S::zero() },
             per_output_inertia: S::one() / S::select(S::zero().lt(output_inertia), output_inertia, S::one()),
             load_friction: at(LoadParameter::Friction.at()),
             load_damping: at(LoadParameter::Damping.at()),
@@ -202,6 +228,7 @@ impl<S: Scalar> Shaft<S> {
             bristle: zero,
             nut: self.nut.start(),
             vibration: VibrationState::initial(),
+            flank: Flank::at(driver - output_position, self.backlash.half),
             work: Work { friction: zero, brake: zero, load: zero, impact: zero },
         }
     }

@@ -65,7 +65,7 @@ impl<S: Scalar> Shaft<S> {
         S::select(pressed, net, zero)
     }
 
-    /// In the operator model the output moves with the motor while the backlash is taken up, else it rests.
+    /// Where nothing acts on it, the output moves with the motor while the backlash is taken up, else it rests.
     #[inline(always)]
     fn output_speed(&self, d: &ShaftDetails, s: &ShaftState<S>) -> S {
         if d.elastic {
@@ -74,7 +74,12 @@ impl<S: Scalar> Shaft<S> {
         let lag = s.motor_position * self.gear.per_ratio - s.output_position;
         let edge = self.backlash.half * S::splat(1.0 - 1e-9);
         let pushing = edge.le(lag.abs()) & S::zero().le(lag * s.motor_speed);
-        S::select(pushing, s.motor_speed * self.gear.per_ratio, S::zero())
+        let follows = S::select(pushing, s.motor_speed * self.gear.per_ratio, S::zero());
+        if d.flanks {
+            S::select(s.flank.idle(), follows, s.output_speed)
+        } else {
+            follows
+        }
     }
 
     /// Ram position and speed, the screw's torque at the motor shaft, its efficiencies.
@@ -102,7 +107,11 @@ impl<S: Scalar> Shaft<S> {
     }
 
     #[inline(always)]
-    pub(in crate::actuator::servo) fn kinetic(&self, s: &ShaftState<S>) -> S {
+    pub(in crate::actuator::servo) fn kinetic(&self, d: &ShaftDetails, s: &ShaftState<S>) -> S {
+        if d.flanks {
+            let whole = S::splat(0.5) * self.inertia * s.motor_speed * s.motor_speed;
+            return S::select(self.joined(s), whole, self.kinetic_of(s.motor_speed, s.output_speed));
+        }
         let half = S::splat(0.5);
         half * self.inertia * s.motor_speed * s.motor_speed + half * self.output_inertia * s.output_speed * s.output_speed
     }

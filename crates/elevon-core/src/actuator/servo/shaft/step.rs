@@ -55,13 +55,23 @@ impl<S: Scalar> Shaft<S> {
 
     /// New speed, and the dry friction where bristles decide it.
     #[inline(always)]
-    fn new_speed<const EXTRA: bool>(&self, d: &ShaftDetails, s: &mut ShaftState<S>, loads: &Loads<S>, torque: S) -> (S, Option<S>) {
+    fn new_speed<const FULL: bool, const EXTRA: bool>(
+        &self,
+        d: &ShaftDetails,
+        s: &mut ShaftState<S>,
+        loads: &Loads<S>,
+        torque: S,
+    ) -> (S, Option<S>) {
+        let mut dt_per_inertia = self.dt_per_inertia;
+        if FULL && d.flanks {
+            dt_per_inertia = S::select(self.joined(s), dt_per_inertia, self.dt_per_rotor);
+        }
         if EXTRA && d.train.law.bristles() {
-            let moved = self.on_bristles(d, s, loads, torque, self.dt_per_inertia);
+            let moved = self.on_bristles(d, s, loads, torque, dt_per_inertia);
             s.bristle = moved.bristle;
             return (moved.speed, Some(moved.dry));
         }
-        let free = self.dt_per_inertia.fma(self.net(d, s, loads, torque), s.motor_speed);
+        let free = dt_per_inertia.fma(self.net(d, s, loads, torque), s.motor_speed);
         (Friction::stop_at_reversal(s.motor_speed, free), None)
     }
 
@@ -76,12 +86,12 @@ impl<S: Scalar> Shaft<S> {
         torque: S,
     ) {
         let speed = s.motor_speed;
-        let (new_speed, on_bristles) = self.new_speed::<EXTRA>(d, s, loads, torque);
+        let (new_speed, on_bristles) = self.new_speed::<FULL, EXTRA>(d, s, loads, torque);
         let moved = self.dt.fma(self.advancing(d, speed, new_speed), s.motor_position);
         let (position, end_speed) = if FULL && d.elastic { (moved, new_speed) } else { self.gear.motor_stop.hold(moved, new_speed) };
         if FULL && d.accounts {
             let dry = on_bristles.unwrap_or_else(|| Friction::dry_torque(torque - loads.load, speed, loads.static_limit, loads.dynamic));
-            self.account(s, loads, [speed, new_speed, end_speed], dry);
+            self.account(d, s, loads, [speed, new_speed, end_speed], dry);
         }
         if EXTRA && d.nut {
             s.nut.collected = s.nut.collected + self.dt * self.nut.share * loads.nut * speed.abs();
@@ -92,15 +102,23 @@ impl<S: Scalar> Shaft<S> {
         }
         if FULL && d.elastic {
             self.output_step::<EXTRA>(d, x, s, loads);
-        } else {
+        } else if !(FULL && d.flanks) {
             s.output_position = self.drag::<EXTRA>(d, position, s.output_position);
+        }
+        s.motor_position = position;
+        s.motor_speed = end_speed;
+        if FULL && d.flanks {
+            self.output_at_flank::<EXTRA>(d, x, s, loads, speed);
         }
         if FULL && d.jams {
             self.friction.seize(s.output_position, &mut s.jam_side, &mut s.jammed);
         }
+<<<<<<< HEAD
         s.motor_position = position;
         s.motor_speed = end_speed;
         s.fastest = s.fastest.maximum(new_speed.abs());
+=======
+>>>>>>> c809e6d (Backlash under load: rigid flanks that carry, let go and are crossed in time)
     }
 
     /// Speed that moves the position in a step.
@@ -168,7 +186,7 @@ impl<S: Scalar> Shaft<S> {
 
     /// Work of a step at its middle; `speeds` before, after and as the stops leave it.
     #[inline(always)]
-    fn account(&self, s: &mut ShaftState<S>, loads: &Loads<S>, [old, new, end_speed]: [S; 3], dry: S) {
+    fn account(&self, d: &ShaftDetails, s: &mut ShaftState<S>, loads: &Loads<S>, [old, new, end_speed]: [S; 3], dry: S) {
         let half = S::splat(0.5);
         let middle = half * (old + new);
         // The brake takes its share of the dry friction.
@@ -176,7 +194,7 @@ impl<S: Scalar> Shaft<S> {
         s.work.brake = s.work.brake + self.dt * (dry * share) * middle;
         s.work.friction = s.work.friction + self.dt * (dry * (S::one() - share) + loads.viscous) * middle;
         s.work.load = s.work.load + self.dt * loads.motor_side * middle;
-        s.work.impact = s.work.impact + half * self.inertia * (new * new - end_speed * end_speed);
+        s.work.impact = s.work.impact + half * self.moving_inertia(d, s) * (new * new - end_speed * end_speed);
     }
 
     #[inline(always)]
