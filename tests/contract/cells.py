@@ -102,9 +102,18 @@ class Cell:
         data["parameters"] = {path: value for path, value in initial.items() if path not in given}
         if self.load:
             data["load"] = {"output": {"terms": [{"kind": "constant", "value": self.load}]}}
+            data["initial"] = {**self._pressed(), **data.get("initial", {})}
         if duration is not None:
             data["duration"] = duration
         return elevon.Scenario.from_dict({**data, "fault": list(faults)})
+
+    def _pressed(self) -> dict[str, float]:
+        """Where the load presses the parts together: no run begins with a crossing."""
+        chosen = self.actuator().parameters
+        if "backlash.total" not in chosen:
+            return {}
+        half = 0.5 * chosen.value("backlash.total")
+        return {"motor_position": 0.0, "output_position": -half if self.load > 0 else half}
 
     def of(self, variant: Variant, duration: float | None = None) -> Any:
         """The run of a variant."""
@@ -204,11 +213,11 @@ def load(name: str) -> float:
     """A load at the output that the set feels and still moves, SI: searched by the reduced-order
     model.
 
-    The largest power of two that leaves the way gone within 5 % of that without a load, so that
-    no actuator's strength stands here by hand.
+    The largest power of two that leaves the way gone within 5 % of that under the smallest one, so
+    that no actuator's strength stands here by hand. Any force takes the lost motion away.
     """
     powers = [2.0**k for k in range(-4, 17)]
-    loads = [0.0, *powers, *(-force for force in powers)]
+    loads = [*powers, *(-force for force in powers)]
     ways = {}
     for force in loads:
         cell = Cell(name, "low", load=force)
@@ -218,6 +227,8 @@ def load(name: str) -> float:
     felt = [
         force
         for force in powers
-        if all(abs(ways[sign * force] / ways[0.0] - 1.0) < 0.05 for sign in (1.0, -1.0))
+        if all(
+            abs(ways[sign * force] / ways[sign * powers[0]] - 1.0) < 0.05 for sign in (1.0, -1.0)
+        )
     ]
     return max(felt)

@@ -1,4 +1,5 @@
-//! Backlash: the backlash operator (T1 eq. 3) and the elastic, damped dead zone between two masses.
+//! Backlash: the backlash operator (T1 eq. 3) and the elastic, damped dead zone between two masses. Rigid flanks under a load
+//! are those of the shaft (`actuator/servo/shaft/flank.rs`).
 
 use crate::scalar::Scalar;
 use crate::{choices, variables};
@@ -12,7 +13,7 @@ variables! {
     BacklashParameter, BACKLASH {
         Total => "total", "2 BLK", "rad", NonNegative, Plant, None, "total backlash, twice the half amplitude BLK of the papers";
         Extra => "extra", "-", "rad", NonNegative, Plant, Some(0.0), "healthy 0; backlash added by wear";
-        Model => "model", "-", "1", Choice(BacklashModel::NAMES), Plant, Some(0.0), "the backlash operator, or two masses with an elastic, damped dead zone",
+        Model => "model", "-", "1", Choice(BacklashModel::NAMES), Plant, Some(0.0), "the backlash operator, rigid flanks where a force or friction acts on the output; or two masses with an elastic, damped dead zone",
             high_only("it keeps the backlash operator: two masses on a contact need the steps of the switching model");
         Stiffness => "stiffness", "K", "N m/rad", Positive, Plant, Some(1e4), "contact stiffness at the output (elastic model)",
             high_only("it keeps the backlash operator: two masses on a contact need the steps of the switching model").when(&[Chosen("backlash.model", &["elastic"])]);
