@@ -107,18 +107,13 @@ impl<S: Scalar> Shaft<S> {
         }
         s.motor_position = position;
         s.motor_speed = end_speed;
+        s.fastest = s.fastest.maximum(new_speed.abs());
         if FULL && d.flanks {
             self.output_at_flank::<EXTRA>(d, x, s, loads, speed);
         }
         if FULL && d.jams {
             self.friction.seize(s.output_position, &mut s.jam_side, &mut s.jammed);
         }
-<<<<<<< HEAD
-        s.motor_position = position;
-        s.motor_speed = end_speed;
-        s.fastest = s.fastest.maximum(new_speed.abs());
-=======
->>>>>>> c809e6d (Backlash under load: rigid flanks that carry, let go and are crossed in time)
     }
 
     /// Speed that moves the position in a step.
