@@ -41,6 +41,35 @@ def test_what_the_logs_determine_is_recovered(one):
     assert np.mean(covered) > 0.75
 
 
+def test_the_model_that_corrects_is_the_one_the_logs_bear(one):
+    """Logs of means lack the ripple of commutations: their runs are of the reduced-order model."""
+    _, logs, result = one
+    assert result.facts["fidelity"] == "low"
+    assert result.facts["ripple_share"] < 0.2
+    with pytest.raises(InputError, match="medium"):
+        calibrate_gear(logs, Actuator.load("pisa-landing-gear"), fidelity="medium")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [FIRST, FIRST + 1])
+def test_logs_that_switch_are_calibrated_by_the_switching_model(seed):
+    """The bench's own default: intervals that hold, and a resistance within them."""
+    values, truth = drawn(seed)
+    logs = make_logs(truth, [load_procedure("gear-cycles")], seed=seed, fidelity="high")
+    result = calibrate_gear(logs, Actuator.load("pisa-landing-gear"))
+    assert result.facts["fidelity"] == "high"
+    assert result.facts["ripple_share"] > 0.8
+    covered = [
+        e.interval[0] <= values[e.path] <= e.interval[1]
+        for e in result.estimates
+        if e.path in values
+    ]
+    assert len(covered) >= 17
+    assert np.mean(covered) >= 0.8
+    path = "motor.winding_resistance"
+    assert abs(result[path].value / values[path] - 1.0) < 0.02
+
+
 def test_what_no_log_shows_is_listed_with_its_reason(one):
     _, _, result = one
     assert "no log of a motion in extension" in result.undetermined["control.gain_extension"]

@@ -55,7 +55,7 @@ class Way:
 
 
 def way_by_parts(
-    paths: Sequence[Path], model: Actuator, column_map: Path | None, fidelity: str = "low"
+    paths: Sequence[Path], model: Actuator, column_map: Path | None, fidelity: str = "auto"
 ) -> Way | None:
     """Return how these logs are calibrated by parts, None where another way must serve.
 

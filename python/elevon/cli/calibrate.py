@@ -60,7 +60,12 @@ PerLogOption = Annotated[
         "--per-log", metavar="PATH", help="Estimated for each log too: backlash.total; repeatable."
     ),
 ]
-FidelityOption = Annotated[str, typer.Option(help="Of the model runs: low or high.")]
+FidelityOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Of the model runs: low or high. Default: low; landing gear: what its logs bear."
+    ),
+]
 TransientOption = Annotated[
     float | None, typer.Option(min=0.0, help="Left out at the beginning of each log [s].")
 ]
@@ -154,7 +159,7 @@ def calibrate(
     column_map: MapOption = None,
     free: FreeOption = None,
     per_log: PerLogOption = None,
-    fidelity: FidelityOption = "low",
+    fidelity: FidelityOption = None,
     transient: TransientOption = None,
     settings: SetOption = None,
     report: ReportOption = None,
@@ -171,9 +176,9 @@ def calibrate(
     if len(logs) == 1 and is_drop_table(logs[0]):
         return _drops(logs[0], model, out, as_json=json, force=force)
     options = _Options(
-        _paths(free), per_log or [], fidelity, transient, out, report, json, force, date
+        _paths(free), per_log or [], fidelity or "low", transient, out, report, json, force, date
     )
-    way = way_by_parts(logs, model, column_map, fidelity)
+    way = way_by_parts(logs, model, column_map, fidelity or "auto")
     if way is not None:
         return _by_parts(way, model, options)
     data = direct_logs(model, logs, loadcell, command, column_map)

@@ -17,6 +17,7 @@ from elevon.calibrate.gear.log import GearLog
 from elevon.calibrate.gear.motor import Motor
 from elevon.calibrate.gear.reading import Reader, Reading
 from elevon.calibrate.gear.rig import RigTest, rig_tests
+from elevon.calibrate.gear.ripple import Ripple, ripple_of
 from elevon.calibrate.gear.runs import corrected, run_again, with_noise
 from elevon.calibrate.gear.tables import (
     friction_knots,
@@ -28,7 +29,7 @@ from elevon.calibrate.gear.tables import (
 )
 from elevon.calibrate.gear.train import Balance
 from elevon.calibrate.level import Level, as_values
-from elevon.errors import InputError
+from elevon.errors import InputError, unknown
 from elevon.parameters.records import record_of
 from elevon.progress import Progress
 from elevon.threads import one_blas_thread
@@ -50,6 +51,7 @@ _NEVER = {
     "gear.efficiency_second": "only the product with the screw's efficiency shows",
     "leg.inertia": "changes the torque as a hundredth of the motor's own inertia would",
 }
+_FIDELITIES = ("auto", "low", "high")
 _ROUNDS = 3  # of runs that correct the balances, at most
 _NOISES = 4  # draws of a run's noise, over which its readings are averaged
 _SETTLED = 0.25  # deviations: a change from which no further round is made
@@ -68,7 +70,7 @@ def calibrate_gear(
     actuator: Actuator,
     *,
     free: Sequence[str] | None = None,
-    fidelity: str | None = "low",
+    fidelity: str | None = "auto",
     progress: Progress | None = None,
 ) -> PartsCalibration:
     """Estimate what logs of an actuator with a control unit determine.
@@ -81,21 +83,25 @@ def calibrate_gear(
         Values before; those that are not estimated stay.
     free : sequence of str, optional
         Paths to estimate; default: all that the logs determine.
-    fidelity : {"low", "high"}, optional
-        Of the runs of the logs' motions that correct the balances; None: none are made.
+    fidelity : {"auto", "low", "high"}, optional
+        Of the runs of the logs' motions that correct the balances; ``auto``: the switching model
+        where the logs have its ripple, else the reduced-order one. None: no runs are made.
     progress : callable, optional
         Told the done fraction; returns False to stop.
 
     Raises
     ------
     InputError
-        No log, nothing determined, or a path requested that the logs do not determine.
+        No log, an unknown fidelity, nothing determined, or a path requested that the logs do not
+        determine.
     Interrupted
         `progress` returned False.
     """
     begin = clock.perf_counter()
     if not logs:
         raise InputError("calibration needs at least one log")
+    if fidelity not in {None, *_FIDELITIES}:
+        raise unknown("fidelity", str(fidelity), _FIDELITIES, "--fidelity")
     for path in free or ():
         record_of(actuator.wiring, path, "--free")
     go(progress, 0.05)
@@ -130,6 +136,8 @@ class _Work(Parts):
         self.motor = Motor({}, {}, believed, 0.0, None, given=True)
         self.balance = Balance({}, {}, float("nan"))
         self.ran = 0
+        self.fidelity: str | None = None
+        self.ripple: Ripple | None = None
 
     def facts(self) -> dict[str, Any]:
         """Return what else is known: kinds of logs, torque of an ampere, residual at the ram."""
@@ -140,6 +148,8 @@ class _Work(Parts):
         return {
             "kinds": kinds,
             "motions_run_again": self.ran,
+            "fidelity": self.fidelity,
+            "ripple_share": None if self.ripple is None else self.ripple.share,
             "torque_per_ampere": self.motor.torque,
             "balance_residual_n": None if np.isnan(residual) else residual,
         }
@@ -198,12 +208,11 @@ class _Work(Parts):
         self, reader: Reader, first: Reading, fidelity: str, progress: Progress | None
     ) -> None:
         """Take off what the balances misread in runs of the same motions."""
+        again = self._chosen(fidelity, progress)
         for _ in range(_ROUNDS):
-            ran, before = self.settled(), as_values(self.levels)
-            again = run_again(self.logs, ran, fidelity, progress)
-            self.ran += len(again)
             if not again:
                 return
+            ran, before = self.settled(), as_values(self.levels)
             noisy = [with_noise(again, self.logs, seed) for seed in range(_NOISES)]
             detents = [reader(logs).levels for logs in noisy]
             self.add(corrected(first.levels, detents, ran), {})
@@ -212,6 +221,24 @@ class _Work(Parts):
             ]
             if max(moved, default=0.0) < _SETTLED:
                 return
+            again = self._run(progress)
+
+    def _chosen(self, fidelity: str, progress: Progress | None) -> list[GearLog]:
+        """Return the first runs, at the fidelity that the logs bear where none is given."""
+        self.fidelity = "high" if fidelity == "auto" else fidelity
+        again = self._run(progress)
+        if fidelity != "auto" or not again:
+            return again
+        self.ripple = ripple_of(self.logs, again)
+        if self.ripple.fidelity == self.fidelity:
+            return again
+        self.fidelity = self.ripple.fidelity
+        return self._run(progress)
+
+    def _run(self, progress: Progress | None) -> list[GearLog]:
+        again = run_again(self.logs, self.settled(), str(self.fidelity), progress)
+        self.ran += len(again)
+        return again
 
     def ends(self) -> None:
         """Evaluate the lock and the brake."""
