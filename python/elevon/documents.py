@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from elevon.errors import FormatError, InputError, did_you_mean
+from elevon.files import read_regular
 
 if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
@@ -73,6 +74,10 @@ class Document:
         return lines
 
 
+_LONGEST = 16 * 2**20
+"""Bytes of a TOML file: a table of a hundred thousand points takes some 4 MB."""
+
+
 def read_toml(path: str | Path) -> Document:
     """Read a TOML file.
 
@@ -81,18 +86,16 @@ def read_toml(path: str | Path) -> Document:
     InputError
         The file cannot be read.
     FormatError
-        It is not TOML; the message holds the line.
+        It is not TOML (the message holds the line), no regular file, or longer than 16 MiB.
     """
     file = Path(path).expanduser()
     try:
-        text = file.read_bytes().decode("utf-8")
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror or error}") from error
+        text = read_regular(file, _LONGEST).decode("utf-8")
     except UnicodeDecodeError as error:
         raise FormatError(f"{file}: is not UTF-8 text: {error}") from error
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, ValueError) as error:
         raise FormatError(f"{file}: not valid TOML: {error}") from error
     except RecursionError as error:
         raise FormatError(f"{file}: {_TOO_DEEP}") from error

@@ -21,8 +21,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from elevon.errors import BusyError, FormatError, OutputError
-from elevon.files import write_text
+from elevon import files as disk
+from elevon.errors import BusyError, FormatError, InputError, OutputError
+from elevon.files import open_owned, owning, read_regular, write_text
 
 __all__ = ["LOCK", "Item", "WorkLog", "digest", "finished", "is_locked", "locked", "sweep"]
 
@@ -30,6 +31,9 @@ LOCK = ".elevon.lock"
 """Name of the lock in a folder. A killed process leaves the file, but holds it no more."""
 
 _LOG = "finished.log"
+
+_LONGEST = 2**30
+"""Bytes of a log: some millions of items."""
 
 _FAR = 2**30
 """Where the byte stands that is locked on Windows."""
@@ -77,11 +81,14 @@ class WorkLog:
         Digits that tell this work from any other.
     items : dict of str to Item
         The finished ones, the last line of a name counting.
+    cut : bool
+        Whether a line is cut or damaged: it goes before the next one is written.
     """
 
     path: Path
     key: str
     items: dict[str, Item] = field(default_factory=dict)
+    cut: bool = False
 
     @classmethod
     def begin(cls, path: Path, key: str) -> WorkLog:
@@ -99,12 +106,12 @@ class WorkLog:
         FormatError
             There is one and its first line, which says whose it is, is damaged.
         """
-        try:
-            text = path.read_bytes()
-        except FileNotFoundError:
+        if not os.path.lexists(path):
             return None
-        except OSError as error:
-            raise FormatError(f"{path}: cannot be read: {error.strerror or error}") from error
+        try:
+            text = read_regular(path, _LONGEST)
+        except InputError as error:
+            raise FormatError(str(error)) from error
         lines = [_open(line) for line in text.splitlines()]
         if not lines or lines[0] is None or not isinstance(lines[0].get("work"), str):
             raise FormatError(f"{path}: damaged: its first line does not say whose work it is")
@@ -112,9 +119,7 @@ class WorkLog:
         for line in lines[1:]:
             if line is not None and line.keys() == {"item", "files", "data"}:
                 log.items[line["item"]] = Item(line["item"], line["files"], line["data"])
-        # A cut or damaged line goes now, lest the next one be written behind half of it.
-        if None in lines or not text.endswith(b"\n"):
-            log.rewrite()
+        log.cut = None in lines or not text.endswith(b"\n")
         return log
 
     def note(self, name: str, files: Iterable[Path], **data: Any) -> Item:
@@ -140,6 +145,8 @@ class WorkLog:
     def add(self, item: Item) -> Item:
         """Write down an item whose digests are known; see `note`."""
         line = _sealed({"item": item.name, "files": item.files, "data": item.data})
+        if self.cut:  # a reader leaves the line alone, which another process may be writing
+            self.rewrite()
         try:
             _append(self.path, line)
         except OSError as error:
@@ -162,6 +169,7 @@ class WorkLog:
             _sealed({"item": i.name, "files": i.files, "data": i.data}) for i in self.items.values()
         ]
         write_text(self.path, "".join(lines), force=True)
+        self.cut = False
 
 
 def digest(path: Path) -> dict[str, Any]:
@@ -209,13 +217,14 @@ def locked(folder: Path) -> Iterator[None]:
     BusyError
         Another process works in the folder; it is named.
     OutputError
-        The folder cannot be made or written.
+        The folder cannot be made or written, or its lock is a link or no file of its own.
     """
     path = folder / LOCK
     handle = _taken(folder, path)
     try:
         _sign(handle)
-        yield
+        with owning(folder):
+            yield
     finally:
         if sys.platform == "win32":  # there an open file has a name that nobody can remove
             os.close(handle)
@@ -230,7 +239,10 @@ def _taken(folder: Path, path: Path) -> int:
     while True:
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+            disk.step("lock", path)
+            handle = open_owned(path, os.O_RDWR | os.O_CREAT)
+        except OutputError:
+            raise
         except OSError as error:
             raise OutputError(f"{folder}: cannot be written: {error.strerror or error}") from error
         if not _take(handle):
@@ -245,7 +257,7 @@ def _taken(folder: Path, path: Path) -> int:
 def is_locked(folder: Path) -> bool:
     """Whether a living process works in a folder."""
     try:
-        handle = os.open(folder / LOCK, os.O_RDWR)
+        handle = open_owned(folder / LOCK, os.O_RDWR)
     except OSError:
         return False
     try:
@@ -346,13 +358,15 @@ def _open(line: bytes) -> dict[str, Any] | None:
 
 def _append(path: Path, line: str) -> None:
     """Append a line and force it to the disk; on failure the file is as before."""
-    handle = os.open(path, os.O_WRONLY | os.O_APPEND)
+    disk.step("append", path)
+    handle = open_owned(path, os.O_WRONLY | os.O_APPEND)
     try:
         before = os.fstat(handle).st_size
         try:
             data = line.encode()
             while data:
                 data = data[os.write(handle, data) :]
+            disk.step("fsync", path)
             os.fsync(handle)
         except OSError:
             with suppress(OSError):

@@ -144,20 +144,18 @@ def _flip(path, place=None):
 
 def _other_split(folder):
     """Put one run of a draw into the other part, with every checksum right."""
-    from elevon.campaign.store import (
-        plan_hash,
-        read_manifest,
-        read_outcome,
-        read_resolved,
-        write_runs,
-    )
+    from elevon.campaign import read_manifest, read_resolved
+    from elevon.campaign.block import write_table
+    from elevon.campaign.resolved_file import plan_hash
+    from elevon.campaign.runs_table import read_outcome, runs_table
     from elevon.worklog import digest
 
     resolved, manifest = read_resolved(folder), read_manifest(folder)
     draw, split = resolved.index.draw.copy(), resolved.index.split.copy()
     draw[1], split[:2] = draw[0], ["train", "test"]
     resolved.index = replace(resolved.index, draw=draw, split=split)
-    write_runs(folder, resolved, read_outcome(folder))
+    table = runs_table(resolved, read_outcome(folder / "runs.parquet"))
+    write_table(table, folder / "runs.parquet")
     manifest.plan_hash = plan_hash(resolved)
     manifest.files["runs.parquet"] = digest(folder / "runs.parquet")
     manifest.write(folder)

@@ -10,9 +10,11 @@ PACKAGE = Path(__file__).resolve().parents[2] / "python" / "elevon"
 # From left to right; packages in one row do not import each other. A new package is added here with
 # thought: what it may know of is everything left of it, and nothing else.
 ROWS = [
-    ["errors", "extras", "arrays", "_core"],
+    ["retired", "arrays", "_core"],
+    ["errors", "extras"],
     ["units", "files", "progress", "memory", "data", "threads"],
     ["documents", "series", "number_text", "report", "worklog", "containers"],
+    ["transaction"],
     ["recording"],
     ["parameters", "loads"],
     ["actuator", "faults", "waveforms"],

@@ -5,7 +5,8 @@ from elevon.campaign.execute import CampaignResult, resume_campaign, run_campaig
 from elevon.campaign.plan import Plan, load_plan
 from elevon.campaign.resolve import resolve_plan
 from elevon.campaign.resolved import Resolved
-from elevon.campaign.store import Manifest, read_manifest, read_resolved
+from elevon.campaign.resolved_file import read_resolved
+from elevon.campaign.store import Manifest, read_manifest
 
 __all__ = [
     "CampaignResult",

@@ -9,11 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elevon.campaign.described import block_description
 from elevon.campaign.ends import ENDS, ends_table
 from elevon.campaign.features import feature_table
 from elevon.campaign.resolved import Resolved
+from elevon.campaign.resolved_file import plan_hash
+from elevon.campaign.store import MANIFEST, SCHEMA
 from elevon.errors import InputError, OutputError
-from elevon.files import atomic_path
+from elevon.files import atomic_path, check_owned
 from elevon.record_plan import ClockPlan
 from elevon.scenario.compile import signal_records
 from elevon.simulate.batch import simulate_prepared
@@ -23,12 +26,9 @@ from elevon.worklog import Item, digest
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["block_name", "finish_block", "run_block", "simulate_block", "write_table"]
+__all__ = ["block_name", "finish_block", "run_block", "simulate_block", "write_rows", "write_table"]
 
 Result = Mapping[str, Any]
-
-#: What tells that a folder is a campaign's still.
-_SIGN = "manifest.json"
 
 #: Rows of a row group: reading one run reads no more than some of these.
 _GROUP = 32_768
@@ -84,7 +84,8 @@ def finish_block(
 ) -> Item:
     """Write what a block's runs gave; arguments and errors as `run_block`."""
     tables = block_tables(resolved, numbers, prepared, results)
-    return write_block(folder, index, numbers, tables, block_outcome(results))
+    mark = resolved.mark or plan_hash(resolved)
+    return write_block(folder, index, numbers, tables, block_outcome(results), mark=mark)
 
 
 def block_tables(
@@ -122,40 +123,56 @@ def write_block(
     numbers: Sequence[int],
     tables: Mapping[str, pa.Table],
     outcome: Mapping[str, Any],
+    *,
+    mark: str,
 ) -> Item:
-    """Write a block's tables, each whole or not at all, and return its item for the log."""
+    """Write a block's tables, each whole or not at all, and return its item for the log.
+
+    The table of ends comes last; it carries the block's own description, with the plan's hash
+    (`mark`).
+    """
     check_there(folder)
-    files = {}
-    for place, table in tables.items():
+    files: dict[str, dict[str, Any]] = {}
+    span = (int(numbers[0]), int(numbers[-1]))
+    for place in sorted(tables, key=lambda name: name == ENDS):
+        table = tables[place]
+        if place == ENDS:
+            about = block_description(mark, block_name(index), span, files)
+            table = table.replace_schema_metadata(about)
         path = folder / place / f"{block_name(index)}.parquet"
+        check_owned(folder, path)
         write_table(table, path)
         files[path.relative_to(folder).as_posix()] = digest(path)
-    about = {"first": int(numbers[0]), "last": int(numbers[-1]), **outcome}
-    return Item(block_name(index), files, about)
+    return Item(block_name(index), files, {"first": span[0], "last": span[1], **outcome})
 
 
 def check_there(folder: Path) -> None:
     """Raise `OutputError` when a campaign's folder has gone: writing would make half a new one."""
-    if not (folder / _SIGN).is_file():
+    if not (folder / MANIFEST).is_file():
         raise OutputError(
             f"{folder}: the folder has gone since the campaign began; nothing more is written"
         )
 
 
 def write_table(table: pa.Table, path: Path) -> None:
-    """Write a Parquet file whose pages carry checksums."""
+    """Write a Parquet file, whole or not at all."""
+    with atomic_path(path, force=True) as temporary:
+        write_rows(table, temporary)
+
+
+def write_rows(table: pa.Table, path: Path) -> None:
+    """Write a Parquet file to a temporary path; its pages carry checksums."""
     import pyarrow.parquet as pq
 
-    with atomic_path(path, force=True) as temporary:
-        pq.write_table(
-            table,
-            temporary,
-            compression="snappy",
-            use_dictionary=False,
-            use_byte_stream_split=False,
-            write_page_checksum=True,
-            row_group_size=_GROUP,
-        )
+    pq.write_table(
+        table,
+        path,
+        compression="snappy",
+        use_dictionary=False,
+        use_byte_stream_split=False,
+        write_page_checksum=True,
+        row_group_size=_GROUP,
+    )
 
 
 def simulate_block(
@@ -241,5 +258,5 @@ def signal_schema(resolved: Resolved, clock: ClockPlan, command_unit: str) -> pa
     for name, unit in resolved.fault_names().items():
         about = {"unit": unit, "text": f"severity of {name} as applied; 0: absent"}
         fields.append(pa.field(name, pa.float64(), metadata=about))
-    head = {"schema": 2, "name": resolved.name, "clock": clock.name, "rate": clock.rate}
+    head = {"schema": SCHEMA, "name": resolved.name, "clock": clock.name, "rate": clock.rate}
     return pa.schema(fields, metadata={"elevon": json.dumps(head)})

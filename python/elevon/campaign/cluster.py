@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 from elevon.campaign.block import check_there, run_block
 from elevon.campaign.resolved import Resolved
-from elevon.campaign.store import core_hash, read_resolved
+from elevon.campaign.resolved_file import read_resolved
+from elevon.campaign.store import core_hash
 from elevon.errors import InputError, Interrupted
 
 if TYPE_CHECKING:

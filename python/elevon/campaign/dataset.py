@@ -10,8 +10,13 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from elevon.campaign.store import RUNS, Manifest, read_manifest, read_resolved, work_log
+from elevon.campaign.resolved_file import read_resolved
+from elevon.campaign.runs_table import RUNS
+from elevon.campaign.store import Manifest, read_manifest, work_log
 from elevon.errors import FormatError, InputError, unknown
+from elevon.recording.old import warn_of_old_names
+from elevon.retired import current
+from elevon.transaction import located
 from elevon.worklog import Item, digest
 
 if TYPE_CHECKING:
@@ -68,11 +73,14 @@ class Table:
         Its files.
     clock : str
         Whose samples these are; empty for tables without time.
+    is_old : bool
+        Whether the files have names that were replaced since; all but `dataset` give the present.
     """
 
     path: str
     parts: Sequence[Part]
     clock: str = ""
+    is_old: bool = False
 
     @property
     def files(self) -> list[Path]:
@@ -101,7 +109,12 @@ class Table:
     @property
     def schema(self) -> pa.Schema:
         """Columns, with ``unit`` and ``text`` in each field's metadata."""
-        return self.dataset().schema
+        import pyarrow as pa
+
+        schema = self.dataset().schema
+        if not self.is_old:
+            return schema
+        return pa.schema([_present(item) for item in schema], metadata=schema.metadata)
 
     @property
     def columns(self) -> list[str]:
@@ -140,17 +153,25 @@ class Table:
         for part in parts:
             part.check()
         data = self.dataset(parts or self.parts[:1])
+        stored = self._stored(data.schema.names)
         for name in columns or ():
-            if name not in data.schema.names:
-                raise unknown("column", name, data.schema.names, self.path)
+            if name not in stored:
+                raise unknown("column", name, stored, self.path)
         wanted = None if numbers is None else ds.field("run").isin(numbers)
+        chosen = list(stored) if columns is None else list(columns)
         try:
-            table: pa.Table = data.to_table(
-                columns=None if columns is None else list(columns), filter=wanted
-            )
+            table: pa.Table = data.to_table([stored[name] for name in chosen], filter=wanted)
         except (OSError, pa.ArrowException) as error:
             raise FormatError(f"{self.path}: cannot be read: {error}") from error
-        return table
+        if not self.is_old:
+            return table
+        return pa.Table.from_arrays(
+            table.columns, schema=pa.schema([_present(item) for item in table.schema])
+        )
+
+    def _stored(self, names: Iterable[str]) -> dict[str, str]:
+        """Return the present name of each column, with the one in the files."""
+        return {current(name) if self.is_old else name: name for name in names}
 
     def to_pandas(
         self, columns: Sequence[str] | None = None, runs: Iterable[int] | None = None
@@ -164,13 +185,19 @@ class Table:
         """Return a lazy polars table over all files."""
         import polars
 
-        return polars.scan_parquet([str(path) for path in self.files])
+        frame = polars.scan_parquet([str(path) for path in self.files])
+        names = {old: new for new, old in self._stored(self.dataset().schema.names).items()}
+        return frame.rename(names) if self.is_old else frame
 
     def to_duckdb(self) -> duckdb.DuckDBPyRelation:
         """Return a lazy DuckDB relation over all files."""
         import duckdb
 
-        return duckdb.read_parquet([str(path) for path in self.files])
+        relation = duckdb.read_parquet([str(path) for path in self.files])
+        if not self.is_old:
+            return relation
+        names = self._stored(relation.columns).items()
+        return relation.project(", ".join(f'"{old}" AS "{new}"' for new, old in names))
 
     def to_xarray(
         self, columns: Sequence[str] | None = None, runs: Iterable[int] | None = None
@@ -226,9 +253,10 @@ class Dataset:
     @property
     def runs(self) -> Table:
         """One row a run: unit, split, seed, status, reason, faults and other drawn values."""
-        path = self.folder / RUNS
         about = None if self.manifest.status == "running" else self.manifest.files.get(RUNS)
-        return Table(str(path), [Part(path, 0, len(self) - 1, about)])
+        path = located(self.folder, RUNS, about)
+        part = Part(path, 0, len(self) - 1, about)
+        return Table(str(path), [part], is_old=self.manifest.is_old)
 
     @property
     def signals(self) -> Table:
@@ -294,7 +322,7 @@ class Dataset:
 
     def resolved(self) -> Resolved:
         """Return the plan with everything decided; errors as `read_resolved`."""
-        return read_resolved(self.folder)
+        return read_resolved(self.folder, self.manifest)
 
     def recording(self, number: int) -> Recording:
         """Return one run as a recording; errors as `elevon.campaign.load_run`."""
@@ -311,7 +339,14 @@ class Dataset:
         ]
         if not parts:
             raise InputError(f"{self.folder}: holds no {place}")
-        return Table(str(self.folder / place / "*.parquet"), parts, clock)
+        return Table(str(self.folder / place / "*.parquet"), parts, clock, self.manifest.is_old)
+
+
+def _present(item: pa.Field) -> pa.Field:
+    """Return a column of an old file with the present name and text."""
+    about = item.metadata or {}
+    text = {b"text": current(about[b"text"].decode()).encode()} if b"text" in about else {}
+    return item.with_name(current(item.name)).with_metadata({**about, **text})
 
 
 def load_campaign(folder: str | os.PathLike[str]) -> Dataset:
@@ -341,7 +376,10 @@ def load_campaign(folder: str | os.PathLike[str]) -> Dataset:
     >>> ds.runs.to_pandas().groupby("split").size()  # doctest: +SKIP
     """
     path = Path(folder).expanduser()
-    return Dataset(path, read_manifest(path))
+    manifest = read_manifest(path)
+    if manifest.is_old:
+        warn_of_old_names(path, [f"form {manifest.schema}"], 2)
+    return Dataset(path, manifest)
 
 
 def load_run(folder: str | os.PathLike[str], number: int) -> Recording:

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from elevon.campaign.resolved import Resolved
-from elevon.campaign.store import RESOLVED, resolved_text
+from elevon.campaign.resolved_file import resolved_text
+from elevon.campaign.store import RESOLVED
 
 __all__ = ["difference"]
 

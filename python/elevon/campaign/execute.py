@@ -15,7 +15,9 @@ from elevon.campaign.check import check
 from elevon.campaign.estimate import Cost, estimate
 from elevon.campaign.folder import CampaignWork, begin, finish, finished, open_folder
 from elevon.campaign.resolved import Resolved
-from elevon.campaign.store import Manifest, read_resolved
+from elevon.campaign.resolved_file import read_resolved
+from elevon.campaign.store import LOG, Manifest, read_manifest
+from elevon.errors import InputError
 from elevon.simulate.batch import checked_threads
 from elevon.worklog import Item, locked, sweep
 
@@ -136,13 +138,29 @@ def resume_campaign(
     """
     start = time.perf_counter()
     folder, count = Path(out).expanduser(), checked_threads(threads)
-    resolved = read_resolved(folder)
+    resolved = _read_or_repaired(folder, announce)
     with locked(folder):
         sweep(folder)
         work = begin(folder, resolved, None, None)
         return _carried_out(
             work, count, cluster=cluster, progress=progress, announce=announce, start=start
         )
+
+
+def _read_or_repaired(folder: Path, announce: Callable[[str], Any] | None) -> Resolved:
+    """Return the resolved plan of a folder; damage that what is whole can prove is repaired."""
+    from elevon.campaign.repair import repair
+
+    try:
+        read_manifest(folder)
+        return read_resolved(folder)
+    except InputError as error:
+        if "repair" not in str(error):  # nothing to start from
+            raise
+    for line in repair(folder):
+        if announce is not None:
+            announce(f"repaired: {line}")
+    return read_resolved(folder)
 
 
 def _carried_out(
@@ -155,6 +173,8 @@ def _carried_out(
     start: float,
 ) -> CampaignResult:
     skipped = work.done_runs
+    if announce is not None and work.recovered:
+        announce(f"{len(work.recovered)} block(s) found whole that {LOG} does not list")
     if (outcome := finished(work)) is not None:
         return CampaignResult(work.manifest, outcome, skipped, time.perf_counter() - start)
     if announce is not None and work.missing:

@@ -2,38 +2,44 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import itertools
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from elevon.campaign.block import block_name
-from elevon.campaign.card import write_cards
+from elevon.campaign.block import block_name, write_rows
+from elevon.campaign.card import card_texts
 from elevon.campaign.dataset import Dataset
-from elevon.campaign.ends import read_ends
+from elevon.campaign.described import described_item, read_description
+from elevon.campaign.ends import ENDS, read_ends
 from elevon.campaign.estimate import Cost, check_disk
 from elevon.campaign.resolved import Resolved
+from elevon.campaign.resolved_file import plan_hash, resolved_text
+from elevon.campaign.runs_table import RUNS, planned, read_outcome, runs_table, with_copy
+from elevon.campaign.split import split_index
 from elevon.campaign.store import (
     LOG,
     MANIFEST,
     PLAN,
     RESOLVED,
-    RUNS,
     Manifest,
     core_hash,
-    plan_hash,
-    planned,
     read_manifest,
-    read_outcome,
-    resolved_text,
+    repair_hint,
     work_log,
-    write_runs,
 )
-from elevon.errors import InputError, OutputError
-from elevon.files import write_text
+from elevon.errors import ElevonWarning, FormatError, InputError, OutputError
+from elevon.files import read_regular, write_text
 from elevon.record_plan import ClockPlan
+from elevon.transaction import Transaction, is_staged, settle
 from elevon.worklog import LOCK, Item, WorkLog, digest
 
 __all__ = ["CampaignWork", "begin", "finish", "finished", "open_folder"]
+
+
+_LONGEST = 2**30
 
 
 @dataclass
@@ -45,6 +51,7 @@ class CampaignWork:
     manifest: Manifest
     log: WorkLog
     missing: list[int]
+    recovered: list[str] = field(default_factory=list)
 
     @property
     def edges(self) -> list[int]:
@@ -78,13 +85,17 @@ def open_folder(folder: Path, resolved: Resolved, text: str) -> bool:
     if not folder.is_dir():
         return False
     if (folder / MANIFEST).is_file():
-        _check_same(folder, read_manifest(folder), resolved)
+        manifest = read_manifest(folder)
+        manifest.check_writable(folder)
+        _check_same(folder, manifest, resolved)
         return True
     names = {path.name for path in folder.iterdir()}
-    if not names <= {LOCK, PLAN, RESOLVED, RUNS, LOG} | {n for n in names if ".part" in n}:
-        raise InputError(f"{folder}: is not a campaign folder (no {MANIFEST}), and not empty")
-    if names and LOCK not in names and not _is_plan(folder / PLAN, text):
-        raise InputError(f"{folder}: is not a campaign folder (no {MANIFEST}), and not empty")
+    known = {LOCK, PLAN, RESOLVED, RUNS, LOG}
+    plain = {name for name in names if ".part" not in name and not is_staged(name)}
+    begun = plain <= known and (LOCK in plain or not plain or _is_plan(folder / PLAN, text))
+    if not begun:
+        hint = repair_hint(folder)
+        raise InputError(f"{folder}: is not a campaign folder (no {MANIFEST}), and not empty{hint}")
     return False
 
 
@@ -107,20 +118,44 @@ def begin(folder: Path, resolved: Resolved, text: str | None, need: Cost | None)
     """
     if (folder / MANIFEST).is_file():
         manifest = read_manifest(folder)
+        manifest.check_writable(folder)
         _check_same(folder, manifest, resolved)
+        settle(folder, manifest.files)
+        resolved.mark = manifest.plan_hash
         if text is not None and PLAN in Item("tables", manifest.files, {}).damaged(folder):
             write_text(folder / PLAN, text, force=True)
             manifest.files[PLAN] = digest(folder / PLAN)
+        _keep_split(folder, resolved, manifest)
         return _there(folder, resolved, manifest)
     if need is None or text is None:
         raise OutputError(f"{folder}: its {MANIFEST} has gone meanwhile")
-    write_text(folder / PLAN, text, force=True)
-    write_text(folder / RESOLVED, resolved_text(resolved), force=True)
-    write_runs(folder, resolved, planned(len(resolved)))
-    manifest = _manifest(resolved, need)
-    manifest.write(folder)
+    settle(folder, {})
+    manifest = new_manifest(resolved, need)
+    resolved.mark = manifest.plan_hash
+    change = Transaction(folder)
+    change.stage_text(PLAN, text)
+    stage_tables(change, resolved, text, planned(len(resolved)))
+    manifest.files = change.files
+    change.commit(lambda: manifest.write(folder))
     log = WorkLog.begin(folder / LOG, manifest.plan_hash)
     return CampaignWork(folder, resolved, manifest, log, list(range(len(need.edges) - 1)))
+
+
+def _keep_split(folder: Path, resolved: Resolved, manifest: Manifest) -> None:
+    """Deal the runs as the folder does: its parts are no part of the plan's hash."""
+    if resolved.split and resolved.split != manifest.split:
+        warnings.warn(
+            f"{folder}: keeps the parts of its runs ({_parts(manifest.split)}), not those of the "
+            f"plan ({_parts(resolved.split)}); elevon dataset split deals them anew",
+            ElevonWarning,
+            stacklevel=4,
+        )
+    split_index(resolved, manifest.split)
+
+
+def _parts(split: Mapping[str, Any]) -> str:
+    shares = split.get("shares", {})
+    return ", ".join(f"{name} = {share:g}" for name, share in shares.items()) or "none"
 
 
 def finished(work: CampaignWork) -> dict[str, list[Any]] | None:
@@ -130,11 +165,16 @@ def finished(work: CampaignWork) -> dict[str, list[Any]] | None:
         return None
     if read_manifest(work.folder) != work.manifest:
         return None
-    return read_outcome(work.folder)
+    return read_outcome(work.folder / RUNS)
 
 
-def finish(work: CampaignWork) -> dict[str, list[Any]]:
+def finish(work: CampaignWork, plan: str | None = None) -> dict[str, list[Any]]:
     """Write the table of the runs, the cards and the manifest; return how every run ended.
+
+    Parameters
+    ----------
+    plan : str, optional
+        The plan's text, where the file is to be written anew.
 
     Raises
     ------
@@ -143,41 +183,88 @@ def finish(work: CampaignWork) -> dict[str, list[Any]]:
     """
     items = [work.log.items.get(block_name(block)) for block in range(len(work.edges) - 1)]
     outcome = _outcome(work, items)
-    runs = write_runs(work.folder, work.resolved, outcome)
     manifest = work.manifest
+    change = Transaction(work.folder)
+    text = _plan_text(work.folder) if plan is None else plan
+    if plan is not None or PLAN not in manifest.files:
+        change.stage_text(PLAN, text)
+    stage_tables(change, work.resolved, text, outcome)
     manifest.blocks = [{"name": i.name, **i.data, "files": i.files} for i in items if i is not None]
     for block in manifest.blocks:
         for key in outcome:
             block.pop(key, None)
     failed = {"diverged", "refused"} & set(outcome["status"])
     manifest.status = "failed" if failed else "ok"
-    whole = write_text(work.folder / RESOLVED, resolved_text(work.resolved), force=True)
-    plan = manifest.files.get(PLAN) or digest(work.folder / PLAN)
-    manifest.files = {PLAN: plan, **{path.name: digest(path) for path in (runs, whole)}}
-    write_cards(Dataset(work.folder, manifest))
-    manifest.write(work.folder)
+    manifest.split = work.resolved.split
+    describe_anew(change, manifest)
     (work.folder / LOG).unlink(missing_ok=True)
     return outcome
 
 
+def stage_tables(
+    change: Transaction, resolved: Resolved, plan: str, outcome: Mapping[str, Sequence[Any]]
+) -> None:
+    """Stage the resolved plan and the table of the runs, which carries a copy of both plans."""
+    text = resolved_text(resolved)
+    change.stage_text(RESOLVED, text)
+    table = with_copy(runs_table(resolved, outcome), plan, text, plan_hash(resolved))
+    with change.stage(RUNS) as temporary:
+        write_rows(table, temporary)
+
+
+def describe_anew(change: Transaction, manifest: Manifest) -> None:
+    """Stage the data card of what has been staged, and switch to all of it."""
+    manifest.files = {**manifest.files, **change.files}
+    for name, text in card_texts(Dataset(change.folder, manifest)).items():
+        change.stage_text(name, text)
+    manifest.files = {**manifest.files, **change.files}
+    change.commit(lambda: manifest.write(change.folder))
+
+
+def _plan_text(folder: Path) -> str:
+    return read_regular(folder / PLAN, _LONGEST).decode("utf-8")
+
+
 def _there(folder: Path, resolved: Resolved, manifest: Manifest) -> CampaignWork:
     """Find which blocks of a campaign are there, each file as it was written."""
-    log = work_log(folder, manifest)
-    before = {} if log is None else dict(log.items)
-    earlier = _finished(folder, manifest)
-    wanted = [block_name(block) for block in range(len(manifest.edges) - 1)]
-    items = {}
-    for name in wanted:
-        item = before.get(name) or earlier.get(name)
-        if item is not None and item.intact(folder):
-            items[name] = item
-    missing = [block for block, name in enumerate(wanted) if name not in items]
+    items, recovered = whole_blocks(folder, manifest)
+    missing = [b for b in range(len(manifest.edges) - 1) if block_name(b) not in items]
     if items and missing:
         _check_build(folder, manifest)
     log = WorkLog(folder / LOG, manifest.plan_hash, items)
     if missing or manifest.status == "running":
         log.rewrite()
-    return CampaignWork(folder, resolved, manifest, log, missing)
+    return CampaignWork(folder, resolved, manifest, log, missing, recovered)
+
+
+def whole_blocks(folder: Path, manifest: Manifest) -> tuple[dict[str, Item], list[str]]:
+    """Return the blocks that are whole, and the names of those that only they themselves prove."""
+    try:
+        log = work_log(folder, manifest)
+    except FormatError:
+        log = None  # each block says itself what it is
+    before = {} if log is None else log.items
+    earlier = _finished(folder, manifest)
+    items, recovered = {}, []
+    for block, (first, stop) in enumerate(itertools.pairwise(manifest.edges)):
+        name = block_name(block)
+        item = before.get(name) or earlier.get(name)
+        if item is None or not item.intact(folder):
+            item = _self_proved(folder, manifest, name, (first, stop - 1))
+            recovered += [] if item is None else [name]
+        if item is not None:
+            items[name] = item
+    return items, recovered
+
+
+def _self_proved(folder: Path, manifest: Manifest, name: str, span: tuple[int, int]) -> Item | None:
+    """Return a block that the log does not know, where its own description proves it."""
+    about = read_description(folder / ENDS / f"{name}.parquet")
+    mine = (manifest.plan_hash, manifest.version, manifest.core, name, *span)
+    keys = ("plan_hash", "version", "core", "name", "first", "last")
+    if about is None or tuple(about[key] for key in keys) != mine:
+        return None
+    return described_item(folder, about)
 
 
 def _finished(folder: Path, manifest: Manifest) -> dict[str, Item]:
@@ -185,7 +272,7 @@ def _finished(folder: Path, manifest: Manifest) -> dict[str, Item]:
     if not manifest.blocks:
         return {}
     damaged = RUNS in Item("tables", manifest.files, {}).damaged(folder)
-    outcome = None if damaged else read_outcome(folder)
+    outcome = None if damaged else read_outcome(folder / RUNS)
     items = {}
     for block in manifest.blocks:
         first, last = block["first"], block["last"]
@@ -247,7 +334,7 @@ def _check_build(folder: Path, manifest: Manifest) -> None:
         )
 
 
-def _manifest(resolved: Resolved, need: Cost) -> Manifest:
+def new_manifest(resolved: Resolved, need: Cost) -> Manifest:
     from elevon import _core
 
     clocks = {} if need.checked is None else need.checked.clocks
@@ -273,6 +360,7 @@ def _manifest(resolved: Resolved, need: Cost) -> Manifest:
         estimate=need.to_dict(),
         design=resolved.design,
         sources=resolved.sources,
+        split=resolved.split,
     )
 
 

@@ -12,7 +12,7 @@ from pydantic import Field, StrictBool, StrictInt, StrictStr, model_validator
 from elevon.campaign.grammar import Axis, Case, Design, Number, Population, Random, Strict
 from elevon.documents import Document, read_toml, validated
 
-__all__ = ["Plan", "load_plan"]
+__all__ = ["Plan", "checked_plan", "load_plan"]
 
 
 class Plan(Strict):
@@ -98,7 +98,12 @@ def load_plan(path: str | os.PathLike[str]) -> tuple[Plan, Document]:
         Every finding with file, line, key and the nearest names.
     """
     document = read_toml(Path(path))
-    return validated(Plan, _plain(document.data), document), document
+    return checked_plan(document), document
+
+
+def checked_plan(document: Document) -> Plan:
+    """Return the plan of a document that has been read; errors as `load_plan`."""
+    return validated(Plan, _plain(document.data), document)
 
 
 def _plain(data: Mapping[str, Any]) -> dict[str, Any]:

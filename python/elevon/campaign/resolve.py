@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from elevon.campaign.grammar import Axis, Target
 from elevon.campaign.plan import Plan
 from elevon.campaign.population import Units, units_of
 from elevon.campaign.resolved import CaseChanges, Index, Resolved
-from elevon.campaign.split import dealt
+from elevon.campaign.split import split_index
 from elevon.documents import Document, read_toml, validated
 from elevon.errors import InputError
 from elevon.faults import Fault
@@ -79,7 +79,7 @@ def resolve_plan(plan: Plan, document: Document) -> Resolved:
     places = [axis.reshape(-1) for axis in np.indices(lengths, dtype=np.int64)]
     quantities = list(_quantities(plan, parts, places, lengths))
     _no_twins([target for target, _, _ in quantities], base, document)
-    return Resolved(
+    resolved = Resolved(
         name=plan.name,
         text=plan.text,
         actuator=actuator,
@@ -89,7 +89,7 @@ def resolve_plan(plan: Plan, document: Document) -> Resolved:
         scenario=base,
         variants=parts.variants,
         columns=[files.column(column_of(*item), document.place()) for item in quantities],
-        index=_index(plan, parts, places, lengths, document),
+        index=_index(plan, parts, places, lengths),
         responses=list(plan.responses),
         allow_not_acting=plan.allow_not_acting,
         runs_per_file=plan.runs_per_file,
@@ -97,6 +97,9 @@ def resolve_plan(plan: Plan, document: Document) -> Resolved:
         sources=files.sources,
         design={} if parts.points is None else parts.points.about,
     )
+    if plan.split:
+        split_index(resolved, _dealing(plan), document.place(("split",)))
+    return resolved
 
 
 def _parts(plan: Plan, actuator: Actuator, document: Document, files: Embedder) -> _Parts:
@@ -145,7 +148,6 @@ def _index(
     parts: _Parts,
     places: Sequence[Any],
     lengths: Sequence[int],
-    document: Document,
 ) -> Index:
     """Return what each run is: unit, age, case, draw, block, replicate, seed, part of the data."""
     ages, drawn, count = places[0], places[-2], len(places[0])
@@ -157,7 +159,7 @@ def _index(
         draw = ages * lengths[-2] + drawn
     else:
         draw = _distinct(places[:-1])
-    index = Index(
+    return Index(
         unit=none - 1 if units is None else units.unit[ages],
         age=np.full(count, np.nan) if units is None else units.age[ages],
         variant=places[1],
@@ -167,7 +169,6 @@ def _index(
         seed=np.array(plan.seeds, dtype=np.int64)[places[-1]],
         split=np.full(count, "", dtype=object),
     )
-    return _split(index, plan, document) if plan.split else index
 
 
 def _texts(record: str | Sequence[str]) -> list[str]:
@@ -232,13 +233,13 @@ def _no_twins(targets: Sequence[Target], base: dict[str, Any], document: Documen
         seen.add(target.name)
 
 
-def _split(labels: Index, plan: Plan, document: Document) -> Index:
-    noun = "draw" if plan.population is None else "unit"
-    groups = labels.draw if plan.population is None else labels.unit
+def _dealing(plan: Plan) -> dict[str, Any]:
+    """Return how the plan deals its runs to parts."""
+    if not plan.split:
+        return {}
     shares = {name: float(share) for name, share in plan.split.items()}
-    return replace(
-        labels, split=dealt(groups, shares, plan.split_seed, document.place(("split",)), noun)
-    )
+    by = "draw" if plan.population is None else "unit"
+    return {"shares": shares, "by": by, "seed": plan.split_seed}
 
 
 def _distinct(axes: Sequence[Any]) -> Any:

@@ -80,6 +80,10 @@ class Resolved:
         What each run is.
     files, sources : dict
         Points of the files among the values; path and SHA-256 of every file read.
+    split : dict
+        How the runs are dealt to parts: ``shares``, ``by`` and ``seed``; empty without parts.
+    mark : str
+        The plan's hash, as the folder that it was read from or written to has it.
     """
 
     name: str
@@ -98,6 +102,8 @@ class Resolved:
     files: dict[str, Any] = field(default_factory=dict)
     sources: dict[str, str] = field(default_factory=dict)
     design: dict[str, Any] = field(default_factory=dict)
+    split: dict[str, Any] = field(default_factory=dict)
+    mark: str = field(default="", init=False, compare=False)
     _known: OrderedDict[Any, Prepared] = field(default_factory=OrderedDict, repr=False)
 
     def __len__(self) -> int:

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
-from elevon.campaign.card import write_cards
-from elevon.campaign.dataset import Dataset
-from elevon.campaign.split import dealt
-from elevon.campaign.store import (
-    RUNS,
-    plan_hash,
-    read_manifest,
-    read_outcome,
-    read_resolved,
-    write_runs,
-)
+from elevon.campaign.folder import describe_anew, stage_tables
+from elevon.campaign.resolved_file import LONGEST, read_resolved
+from elevon.campaign.runs_table import RUNS, read_outcome
+from elevon.campaign.split import split_index
+from elevon.campaign.store import PLAN, read_manifest
 from elevon.errors import InputError
-from elevon.worklog import digest, locked
+from elevon.files import read_regular
+from elevon.transaction import Transaction, settle
+from elevon.worklog import locked, sweep
 
 __all__ = ["resplit"]
 
@@ -52,22 +47,23 @@ def resplit(
     """
     _check(shares)
     with locked(folder):
+        sweep(folder)
         manifest = read_manifest(folder)
+        manifest.check_writable(folder)
+        settle(folder, manifest.files)
         if manifest.status == "running":
             raise InputError(f"{folder}: is not finished; elevon campaign resume {folder}")
-        resolved = read_resolved(folder)
+        resolved = read_resolved(folder, manifest)
         population = bool((resolved.index.unit >= 0).all())
         noun = by or ("unit" if population else "draw")
         _check_noun(noun, population=population)
-        groups = resolved.index.unit if noun == "unit" else resolved.index.draw
-        split = dealt(groups, shares, seed, "--share", noun)
-        resolved.index = replace(resolved.index, split=split)
-        write_runs(folder, resolved, read_outcome(folder))
-        manifest.plan_hash = plan_hash(resolved)
-        manifest.files[RUNS] = digest(folder / RUNS)
-        write_cards(Dataset(folder, manifest))
-        manifest.write(folder)
-    return {name: int((split == name).sum()) for name in shares}
+        split_index(resolved, {"shares": dict(shares), "by": noun, "seed": seed}, "--share")
+        plan = read_regular(folder / PLAN, LONGEST).decode("utf-8")
+        change = Transaction(folder)
+        stage_tables(change, resolved, plan, read_outcome(folder / RUNS))
+        manifest.split = resolved.split
+        describe_anew(change, manifest)
+    return {name: int((resolved.index.split == name).sum()) for name in shares}
 
 
 def _check(shares: Mapping[str, float]) -> None:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import InputError
 
-__all__ = ["dealt", "leaks"]
+if TYPE_CHECKING:
+    from elevon.campaign.resolved import Resolved
+
+__all__ = ["dealt", "leaks", "split_index"]
 
 Groups = npt.NDArray[np.int64]
 
@@ -50,6 +54,32 @@ def dealt(
     of_group = np.empty(len(known), dtype=np.int64)
     of_group[order] = part
     return np.array(names, dtype=object)[of_group[member]]
+
+
+def split_index(resolved: Resolved, about: Mapping[str, Any], place: str = "split") -> None:
+    """Deal the runs of a resolved plan to parts.
+
+    Parameters
+    ----------
+    resolved : Resolved
+        Changed: its index and its `split`.
+    about : mapping
+        ``shares``, ``by`` (``unit`` or ``draw``) and ``seed``; empty: no parts.
+    place : str
+        Where the shares stand; for the error.
+
+    Raises
+    ------
+    InputError
+        So few groups that a part would get none.
+    """
+    index = resolved.index
+    parts: npt.NDArray[Any] = np.full(len(index.seed), "", dtype=object)
+    if about:
+        groups = index.unit if about["by"] == "unit" else index.draw
+        parts = dealt(groups, about["shares"], about["seed"], place, about["by"])
+    resolved.index = replace(index, split=parts)
+    resolved.split = dict(about)
 
 
 def leaks(groups: Sequence[Any], split: Sequence[str]) -> list[Any]:

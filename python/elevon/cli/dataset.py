@@ -118,6 +118,19 @@ def split(
     return 0
 
 
+@app.command()
+def repair(folder: FolderArgument, *, json: JsonOption = False) -> int:
+    """Rebuild damaged manifest, plans, table and log from what is whole; simulates nothing."""
+    from elevon.campaign.repair import repair as repaired
+
+    done = repaired(folder.expanduser())
+    if json:
+        print_json({"status": "ok", "done": done, "out": folder})
+    else:
+        typer.echo("\n".join(done) if done else "nothing is damaged")
+    return 0
+
+
 def _shares(texts: list[str]) -> dict[str, float]:
     from elevon.errors import InputError
 

@@ -56,7 +56,7 @@ def find_set(reference: str | os.PathLike[str], folder: Path | None = None) -> P
     if text in known:
         return known[text]
     near = [place / f"{text}.toml" for place in (folder or Path(), Path())]
-    found = next((path for path in near if path.is_file()), None)
+    found = next((path for path in near if _is_file(path)), None)
     if found is None:
         error = unknown("actuator", text, known)
         where = near[0]
@@ -66,11 +66,18 @@ def find_set(reference: str | os.PathLike[str], folder: Path | None = None) -> P
 
 def _file(text: str, folder: Path | None) -> Path:
     path = Path(text).expanduser()
-    if folder is not None and not path.is_absolute() and (folder / path).is_file():
+    if folder is not None and not path.is_absolute() and _is_file(folder / path):
         path = folder / path
-    if not path.is_file():
+    if not _is_file(path):
         raise InputError(f"{path}: no such actuator file")
     return path
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # longer than a name may be
+        return False
 
 
 def _user_folders() -> list[Path]:

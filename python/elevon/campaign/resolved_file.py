@@ -1,0 +1,208 @@
+"""The resolved plan in a campaign's folder: ``resolved.json``, with the table of the runs."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from elevon.actuator import Actuator
+from elevon.campaign.draw import Column
+from elevon.campaign.resolved import CaseChanges, Index, Resolved
+from elevon.campaign.runs_table import RUNS, read_table
+from elevon.campaign.store import (
+    READ,
+    RESOLVED,
+    SCHEMA,
+    Manifest,
+    read_manifest,
+    repair_hint,
+)
+from elevon.errors import FormatError, InputError
+from elevon.files import read_regular
+from elevon.parameters import ParameterSet
+from elevon.parameters.parameter import Parameter
+from elevon.retired import current, mapped
+from elevon.transaction import located
+from elevon.worklog import Item
+
+__all__ = ["LONGEST", "plan_hash", "read_resolved", "rebuilt", "resolved_text"]
+
+LONGEST = 2**30
+"""Bytes of a resolved plan."""
+SPLIT_IS_NO_PART = 3
+"""First version whose hash leaves the split out: runs can be dealt anew."""
+
+
+def resolved_text(resolved: Resolved) -> str:
+    """Return the resolved plan as JSON: everything but the table of the runs."""
+    actuator = resolved.actuator
+    content = {
+        "schema": SCHEMA,
+        "name": resolved.name,
+        "text": resolved.text,
+        "fidelity": resolved.fidelity,
+        "record": resolved.record,
+        "features": resolved.features,
+        "actuator": {
+            "name": actuator.name,
+            "title": actuator.title,
+            "wiring": actuator.wiring,
+            "references": dict(actuator.references),
+            "parameters": [asdict(item) for item in actuator.parameters.values()],
+        },
+        "scenario": resolved.scenario,
+        "variants": [asdict(variant) for variant in resolved.variants],
+        "columns": [_about(column) for column in resolved.columns],
+        "responses": resolved.responses,
+        "allow_not_acting": resolved.allow_not_acting,
+        "runs_per_file": resolved.runs_per_file,
+        "files": resolved.files,
+        "sources": resolved.sources,
+        "design": resolved.design,
+        "split": resolved.split,
+    }
+    return json.dumps(content, indent=1) + "\n"
+
+
+def plan_hash(resolved: Resolved) -> str:
+    """Return the SHA-256 of everything that decides a campaign's results."""
+    return _hash(json.loads(resolved_text(resolved)), resolved)
+
+
+def _hash(content: Mapping[str, Any], resolved: Resolved) -> str:
+    # Where a file stood, and what only readers read, decides nothing: its points do.
+    reading = {"sources", "text", "responses", "runs_per_file", "split"}
+    deciding = {key: value for key, value in content.items() if key not in reading}
+    mark = hashlib.sha256(json.dumps(deciding, sort_keys=True).encode())
+    index = dict(vars(resolved.index))
+    if content["schema"] >= SPLIT_IS_NO_PART:
+        del index["split"]
+    for values in (*(column.values for column in resolved.columns), *index.values()):
+        mark.update(_bytes(values))
+    return mark.hexdigest()
+
+
+def _bytes(values: Any) -> bytes:
+    if values.dtype == object:
+        return json.dumps(values.tolist()).encode()
+    raw: bytes = np.ascontiguousarray(values).tobytes()
+    return raw
+
+
+def _about(column: Column) -> dict[str, Any]:
+    return {
+        "name": column.name,
+        "kind": column.kind,
+        "unit": column.unit,
+        "role": column.role,
+        "attributes": column.attributes,
+        "profile": column.profile,
+    }
+
+
+def read_resolved(folder: Path, manifest: Manifest | None = None) -> Resolved:
+    """Read the resolved plan of a campaign's folder.
+
+    Raises
+    ------
+    FormatError
+        It is damaged: its content is not the one that the manifest's hash stands for.
+    """
+    import pyarrow as pa
+
+    manifest = manifest or read_manifest(folder)
+    try:
+        path = located(folder, RESOLVED, manifest.files.get(RESOLVED))
+        content = json.loads(read_regular(path, LONGEST))
+        table = read_table(located(folder, RUNS, manifest.files.get(RUNS)))
+        resolved, mark = _checked(content, table)
+    except (OSError, ValueError, KeyError, TypeError, RecursionError, pa.ArrowException) as error:
+        raise FormatError(
+            f"{folder}: {RESOLVED} or {RUNS} is damaged ({error!r}){repair_hint(folder)}"
+        ) from error
+    tables = {n: a for n, a in manifest.files.items() if n in {RESOLVED, RUNS}}
+    waiting = {n for n, a in tables.items() if located(folder, n, a) != folder / n}
+    damaged = set(Item("tables", tables, {}).damaged(folder)) - waiting
+    if mark != manifest.plan_hash or damaged:
+        raise FormatError(
+            f"{folder}: {RESOLVED} or {RUNS} is not as it was written{repair_hint(folder)}"
+        )
+    resolved.mark = mark
+    return resolved
+
+
+def _checked(content: Mapping[str, Any], table: Any) -> tuple[Resolved, str]:
+    """Return the resolved plan and the hash of its content, of an old one before it is mapped."""
+    if content["schema"] == SCHEMA:
+        resolved = rebuilt(content, table)
+        return resolved, plan_hash(resolved)
+    if content["schema"] not in READ:
+        raise InputError(f"its form is number {content['schema']!r}")
+    present = table.rename_columns([current(name) for name in table.column_names])
+    resolved = rebuilt(mapped(content), present)
+    return resolved, _hash(content, resolved)  # the values are the same under either name
+
+
+_COPIED = ("name", "text", "fidelity", "record", "features", "scenario", "responses")
+
+
+def rebuilt(content: Mapping[str, Any], table: Any) -> Resolved:
+    """Return the resolved plan of its JSON content and of the table of the runs."""
+    data = content["actuator"]
+    entries = {item["path"]: _parameter(item) for item in data["parameters"]}
+    actuator = Actuator(
+        data["name"],
+        data["wiring"],
+        ParameterSet(data["wiring"], entries),
+        title=data["title"],
+        references=data["references"],
+    )
+    copied = {c: content[c] for c in _COPIED}
+    keys = ("allow_not_acting", "runs_per_file", "files", "sources", "design")
+    variants = [CaseChanges(**item) for item in content["variants"]]
+    return Resolved(
+        **copied,
+        **{key: content[key] for key in keys},
+        split=content.get("split", {}),
+        actuator=actuator,
+        variants=variants,
+        columns=[
+            Column(**item, values=_values(table, item["name"])) for item in content["columns"]
+        ],
+        index=_index(table, variants),
+    )
+
+
+def _parameter(item: Mapping[str, Any]) -> Parameter:
+    interval = item["interval"]
+    return Parameter(**{**item, "interval": None if interval is None else tuple(interval)})
+
+
+def _values(table: Any, name: str) -> Any:
+    column = table[name]
+    if (table.schema.field(name).metadata or {}).get(b"form") == b"json":
+        read = np.empty(len(column), dtype=object)
+        read[:] = [json.loads(text) for text in column.to_pylist()]
+        return read
+    return column.to_numpy()
+
+
+def _index(table: Any, variants: Sequence[CaseChanges]) -> Index:
+    names = {variant.name: number for number, variant in enumerate(variants)}
+    count = table.num_rows
+    population = "age" in table.column_names
+    cases = table["case"].to_pylist() if "case" in table.column_names else [""] * count
+    whole = ("draw", "block", "replicate", "seed")
+    return Index(
+        unit=table["unit"].to_numpy() if population else np.full(count, -1, dtype=np.int64),
+        age=table["age"].to_numpy() if population else np.full(count, np.nan),
+        variant=np.array([names[case] for case in cases], dtype=np.int64),
+        split=np.array(table["split"].to_pylist(), dtype=object),
+        **{name: table[name].to_numpy() for name in whole},
+    )
