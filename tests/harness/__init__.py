@@ -1,0 +1,1 @@
+"""Kills, full disks and second processes at every command that writes; see `test_writes.py`."""
