@@ -183,8 +183,6 @@ class Trial:
         names = state.keys() | wanted.keys()
         other = (n for n in names if state.get(n) != wanted.get(n) and n not in self.changing)
         return sorted(other)[:6]
-            :6
-        ]
 
     def _torn(self, state):
         """Files that are neither the old nor the new ones, nor whole ones on the way there."""
@@ -194,12 +192,10 @@ class Trial:
             and not readable(self.driver.root / name)
         ]  # fmt: skip
         gone = [name for name in self.before if name not in state and name in self.after]
-        foreign = [path for path in [self.driver.outside, *self.driver.root.rglob("foreign.txt")]
-                   if path.is_file() and path.read_text() != FOREIGN]  # fmt: skip
-        if (self.driver.outside / "foreign.txt").read_text() != FOREIGN:
-            foreign.append("outside")
-        return [f"{text}: {names}" for text, names in
-                (("torn", torn), ("gone", gone), ("foreign files changed", foreign)) if names]  # fmt: skip
+        places = [self.driver.outside / "foreign.txt", *self.driver.root.rglob("foreign.txt")]
+        foreign = [path.name for path in places if path.read_text() != FOREIGN]
+        findings = {"torn": torn, "gone": gone, "foreign files changed": foreign}
+        return [f"{text}: {names}" for text, names in findings.items() if names]
 
     def _unrepaired(self):
         ((code, error, _),) = self.driver.run(self.repair)
