@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import logging
 import re
+import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import lru_cache
 from importlib import import_module
 from itertools import islice
@@ -20,7 +21,8 @@ from elevon.campaign.block import check_there, run_block
 from elevon.campaign.resolved import Resolved
 from elevon.campaign.resolved_file import read_resolved
 from elevon.campaign.store import core_hash
-from elevon.errors import InputError, Interrupted
+from elevon.campaign.scheduler import LIMIT, check_scheduler
+from elevon.errors import ElevonError, InputError, Interrupted, OutputError
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -35,9 +37,16 @@ _LOCAL = re.compile(r"local:(\d+)")
 _MOST_WORKERS = 1024
 #: Tasks given out at once for each worker: enough that none waits, few enough to stop soon.
 _AHEAD = 3
+#: Seconds between two looks at the scheduler while no block is done.
+_MOMENT = 1.0
 
 
-def in_cluster(work: CampaignWork, address: str, progress: Callable[[float], Any] | None) -> None:
+def in_cluster(
+    work: CampaignWork,
+    address: str,
+    progress: Callable[[float], Any] | None,
+    announce: Callable[[str], Any] | None = None,
+) -> None:
     """Have the missing blocks of a campaign done by a cluster.
 
     Parameters
@@ -48,11 +57,15 @@ def in_cluster(work: CampaignWork, address: str, progress: Callable[[float], Any
         Of a scheduler (``tcp://host:8786``), or ``local:N`` for N workers on this machine.
     progress : callable, optional
         Called with the done fraction after each block; returning False interrupts.
+    announce : callable, optional
+        Called with a line when there are no workers.
 
     Raises
     ------
     InputError
         No such scheduler, or ``distributed`` is not installed.
+    OutputError
+        The scheduler no longer answers; what is done is kept.
     Interrupted
         `progress` returned False.
     """
@@ -60,15 +73,71 @@ def in_cluster(work: CampaignWork, address: str, progress: Callable[[float], Any
         return
     waiting = iter(work.missing)
     with _client(address) as client:
-        slots = _AHEAD * max(len(client.scheduler_info()["workers"]), 1)
-        futures = [_submitted(client, work, block) for block in islice(waiting, slots)]
-        queue = import_module("distributed").as_completed(futures, loop=client.loop)
-        for future in queue:
+        workers = _Workers(client, address, announce)
+        slots = _AHEAD * max(workers.count(), 1)
+        pending = {_submitted(client, work, block) for block in islice(waiting, slots)}
+        while pending:
+            finished = _finished(client, pending)
+            workers.look(idle=not finished)
             check_there(work.folder)
-            work.log.add(future.result())
-            queue.update([_submitted(client, work, block) for block in islice(waiting, 1)])
+            for future in finished:
+                work.log.add(_result(future, address))
+                pending.discard(future)
+                pending |= {_submitted(client, work, block) for block in islice(waiting, 1)}
             if progress is not None and progress(_fraction(work)) is False:
                 raise Interrupted("interrupted between two blocks")
+
+
+class _Workers:
+    """Watches the scheduler: whether it answers, and whether anybody works for it."""
+
+    def __init__(self, client: Client, address: str, announce: Callable[[str], Any] | None) -> None:
+        self._client, self._address, self._announce = client, address, announce
+        self._seen = time.monotonic()
+        self._waits = False
+
+    def count(self) -> int:
+        return len(self._client.scheduler_info()["workers"])
+
+    def look(self, *, idle: bool) -> None:
+        """Raise where the scheduler has gone; say so where nobody works."""
+        if self._client.status == "running":
+            self._seen = time.monotonic()
+        elif self._client.status == "closed" or time.monotonic() - self._seen > LIMIT / 2.0:
+            raise _lost(self._address)
+        waits = idle and self.count() == 0
+        if waits and not self._waits and self._announce is not None:
+            self._announce("waiting for workers (0)")
+        self._waits = waits
+
+
+def _finished(client: Client, pending: set[Any]) -> set[Any]:
+    """Wait a moment for a block; none may come of it."""
+    wait = import_module("distributed").wait
+    with suppress(TimeoutError):
+        return set(wait(pending, timeout=_MOMENT, return_when="FIRST_COMPLETED").done)
+    return set()
+
+
+def _result(future: Any, address: str) -> Item:
+    """Return what a worker has made of a block, or its error."""
+    try:
+        item: Item = future.result(timeout=LIMIT)
+    except (ElevonError, KeyboardInterrupt):
+        raise
+    except MemoryError as error:
+        raise OutputError(f"--scheduler {address}: a worker has not enough memory") from error
+    # The library has a dozen errors for a scheduler or a worker that is gone.
+    except Exception as error:
+        raise _lost(address, f": {type(error).__name__}: {error}") from error
+    return item
+
+
+def _lost(address: str, why: str = "") -> OutputError:
+    return OutputError(
+        f"--scheduler {address}: no longer answers{why}; what is done is kept: give the command "
+        "again, or elevon campaign resume"
+    )
 
 
 def worker_block(folder: str, core: str, index: int, first: int, last: int) -> Item:
@@ -107,25 +176,62 @@ def _client(address: str) -> Iterator[Client]:
     except ImportError as error:
         raise InputError("a cluster needs the extra 'cluster' (distributed)") from error
     local = _LOCAL.fullmatch(address)
-    if local is None:
-        try:
-            client = distributed.Client(address, timeout="10 s", set_as_default=False)
-        except (OSError, ValueError) as error:
-            raise InputError(f"--scheduler {address}: no scheduler answers: {error}") from error
-        with client:
+    with _quiet():
+        if local is None:
+            check_scheduler(address)
+            with _connected(distributed, address) as client:
+                yield client
+            return
+        with (
+            distributed.LocalCluster(n_workers=_checked(address, int(local[1])), **_OPTIONS) as own,
+            distributed.Client(own, set_as_default=False) as client,
+        ):
             yield client
-        return
-    count = int(local[1])
+
+
+_OPTIONS = {
+    "threads_per_worker": 1,
+    "dashboard_address": None,
+    "processes": True,
+    "silence_logs": logging.ERROR,
+}
+
+
+def _checked(address: str, count: int) -> int:
     if not 1 <= count <= _MOST_WORKERS:
         raise InputError(f"--cluster {address}: {count} workers is outside 1 to {_MOST_WORKERS}")
-    options: dict[str, Any] = {
-        "threads_per_worker": 1,
-        "dashboard_address": None,
-        "processes": True,
-        "silence_logs": logging.ERROR,
-    }
-    with (
-        distributed.LocalCluster(n_workers=count, **options) as cluster,
-        distributed.Client(cluster, set_as_default=False) as client,
-    ):
+    return count
+
+
+@contextmanager
+def _connected(distributed: Any, address: str) -> Iterator[Client]:
+    """Connect to a scheduler that has answered already; leave it without waiting for it."""
+    try:
+        client = distributed.Client(address, timeout=LIMIT / 2.0, set_as_default=False)
+    # Whatever the library makes of a peer that is no scheduler of its version.
+    except Exception as error:
+        why = f"{type(error).__name__}: {error}".splitlines()[0]
+        raise InputError(f"--scheduler {address}: no scheduler answers: {why}") from error
+    try:
         yield client
+    finally:
+        with suppress(Exception):  # a scheduler that has gone cannot be told
+            client.close(timeout=_MOMENT)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the library's own log, with its tracebacks, off standard error."""
+    log = logging.getLogger("distributed")
+    before, log.level = log.level, logging.CRITICAL + 1
+    others = {name: logging.getLogger(name) for name in logging.root.manager.loggerDict
+              if name.startswith(("distributed.", "tornado"))}  # fmt: skip
+    levels = {name: item.level for name, item in others.items()}
+    for item in others.values():
+        item.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        log.setLevel(before)
+        for name, item in others.items():
+            item.setLevel(levels[name])

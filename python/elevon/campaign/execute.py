@@ -152,8 +152,10 @@ def _read_or_repaired(folder: Path, announce: Callable[[str], Any] | None) -> Re
     from elevon.campaign.repair import repair
 
     try:
-        read_manifest(folder)
-        return read_resolved(folder)
+        manifest = read_manifest(folder)
+        resolved = read_resolved(folder, manifest)
+        if manifest.is_old or not Item("tables", manifest.files, {}).damaged(folder):
+            return resolved
     except InputError as error:
         if "repair" not in str(error):  # nothing to start from
             raise
@@ -185,7 +187,7 @@ def _carried_out(
     else:
         from elevon.campaign.cluster import in_cluster
 
-        in_cluster(work, cluster, progress)
+        in_cluster(work, cluster, progress, announce)
     outcome = finish(work)
     return CampaignResult(work.manifest, outcome, skipped, time.perf_counter() - start)
 

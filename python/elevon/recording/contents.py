@@ -13,6 +13,7 @@ from elevon.errors import DamageError, FormatError, InputError
 from elevon.recording.channel import Channel
 from elevon.recording.clock import Clock
 from elevon.recording.header import SCHEMA, Header
+from elevon.recording.old import with_present_names
 
 __all__ = ["Contents", "check_size", "header_bytes", "rebuild"]
 
@@ -67,8 +68,6 @@ def rebuild(
     FormatError
         A column is missing, of another length, or breaks a rule of `Clock` or `Channel`.
     """
-    from elevon.recording.old import with_present_names
-
     clocks: list[Clock] = []
     channels: list[Channel] = []
     try:

@@ -6,10 +6,13 @@ import os
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from elevon.errors import RetiredNamesWarning
-from elevon.recording.contents import Contents
 from elevon.retired import current, mapped
+
+if TYPE_CHECKING:
+    from elevon.recording.contents import Contents
 
 __all__ = ["warn_of_old_names", "with_present_names"]
 
@@ -27,7 +30,7 @@ def with_present_names(contents: Contents) -> Contents:
     changed = sorted(renamed)
     if not changed and (meta, labels) != (contents.meta, contents.labels):
         changed = ["its description"]
-    return Contents(channels, contents.clocks, meta, labels, final, changed)
+    return replace(contents, channels=channels, meta=meta, labels=labels, final=final, old=changed)
 
 
 def warn_of_old_names(path: str | os.PathLike[str], names: Sequence[str], stacklevel: int) -> None:
