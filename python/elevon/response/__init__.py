@@ -1,7 +1,19 @@
-"""Frequency response of an actuator at work, and linear models of the low-fidelity one."""
+"""Frequency response of an actuator at work, its open loops, and linear models of it."""
 
 from elevon.response.estimate import FrequencyResponse
 from elevon.response.linear import LinearModel, linearise
+from elevon.response.loop import LoopResponse, loop_response
+from elevon.response.margins import Margin, Margins, margins
 from elevon.response.measure import frequency_response
 
-__all__ = ["FrequencyResponse", "LinearModel", "frequency_response", "linearise"]
+__all__ = [
+    "FrequencyResponse",
+    "LinearModel",
+    "LoopResponse",
+    "Margin",
+    "Margins",
+    "frequency_response",
+    "linearise",
+    "loop_response",
+    "margins",
+]

@@ -110,21 +110,12 @@ class FrequencyResponse:
 
     def plot(self) -> Figure:
         """Return a Bode plot: gain, phase, coherence over frequency."""
-        from elevon.report.figures import new_figure
+        from elevon.response.bode import bode_plot
 
-        with new_figure(3, 1, height=7.0, sharex=True, height_ratios=[2, 2, 1]) as (figure, axes):
-            gain = 20.0 * np.log10(self.gain)
-            spread = 20.0 / np.log(10.0) * 1.645 * np.nan_to_num(self.std)
-            phase, turned = np.rad2deg(self.phase), np.rad2deg(1.645 * np.nan_to_num(self.std))
-            for axis, line, width in ((axes[0], gain, spread), (axes[1], phase, turned)):
-                axis.fill_between(self.frequency, line - width, line + width, alpha=0.25, lw=0)
-                axis.semilogx(self.frequency, line, marker=".", ms=4)
-            axes[2].semilogx(self.frequency, self.coherence, marker=".", ms=4)
-            axes[0].set_title(f"{self.input} to {self.output}, {self.method}")
-            axes[0].set_ylabel(f"gain [dB of 1 {self.unit}]" if self.unit != "1" else "gain [dB]")
-            axes[1].set_ylabel("phase [deg]")
-            axes[2].set(ylabel="coherence", xlabel="frequency [Hz]", ylim=(0.0, 1.05))
-        return figure
+        return bode_plot(
+            self.frequency, self.response, self.std, self.coherence,
+            title=f"{self.input} to {self.output}, {self.method}", unit=self.unit,
+        )  # fmt: skip
 
 
 def estimate(inputs: Complex, outputs: Complex) -> tuple[Complex, Floats, Floats]:

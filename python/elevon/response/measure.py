@@ -17,7 +17,14 @@ from elevon.simulate import Run, check_fidelity, simulate_batch, solver_step
 from elevon.simulate.arguments import ActuatorLike, as_actuator
 from elevon.units import parse_quantity, shown_unit
 
-__all__ = ["METHODS", "frequency_response"]
+__all__ = [
+    "METHODS",
+    "Multisine",
+    "frequencies",
+    "frequency_response",
+    "require_finished",
+    "scenario_of",
+]
 
 METHODS = ("multisine", "sweep")
 _MOST = 24  # lines of a multisine: about ten in a decade are read well from a plot
@@ -94,13 +101,13 @@ def frequency_response(
     if output not in units:
         raise unknown("signal", output, units, "output")
     unit = unit_of_command[mode] or units["output_position"]
-    first, last = _range(low, high)
+    first, last = frequencies(low, high)
     size = parse_quantity(amplitude, unit, "amplitude", shown_unit(unit))
     if not size > 0.0:
         raise InputError(f"amplitude = {amplitude} must be positive")
     if realisations < 1:
         raise InputError(f"realisations = {realisations} must be at least 1")
-    design = (_Multisine if method == "multisine" else _Sweep)(
+    design = (Multisine if method == "multisine" else _Sweep)(
         first, last, solver_step(loaded, fidelity)
     )
     mean = parse_quantity(bias, unit, "bias", shown_unit(unit))
@@ -108,10 +115,12 @@ def frequency_response(
     runs = []
     for number in range(realisations):
         terms = [*design.terms(size, generator), {"kind": "constant", "value": mean}]
-        runs.append(Run(loaded, _scenario(design.duration, mode, terms, load), seed, number=number))
+        runs.append(
+            Run(loaded, scenario_of(design.duration, mode, terms, load), seed, number=number)
+        )
     record = f"command,{output}@{design.rate!r} Hz"
     recordings = simulate_batch(runs, fidelity=fidelity, record=record, progress=progress)
-    _check(recordings)
+    require_finished(recordings)
     spectra = [design.spectra(item, output, mean) for item in recordings]
     response, coherence, std = estimate(
         np.concatenate([item[0] for item in spectra]), np.concatenate([item[1] for item in spectra])
@@ -130,14 +139,16 @@ def frequency_response(
     )
 
 
-def _range(low: float | str, high: float | str) -> tuple[float, float]:
+def frequencies(low: float | str, high: float | str) -> tuple[float, float]:
+    """Return a range in Hz; `InputError` where it is none."""
     first, last = parse_quantity(low, "Hz", "low"), parse_quantity(high, "Hz", "high")
     if not 0.0 < first < last:
         raise InputError(f"frequencies: {first:g} to {last:g} Hz is no range; 0 < low < high")
     return first, last
 
 
-def _check(recordings: list[Recording]) -> None:
+def require_finished(recordings: list[Recording]) -> None:
+    """Raise `InputError` for a run that tripped or diverged."""
     for item in recordings:
         if item.status != "ok":
             raise InputError(
@@ -145,11 +156,26 @@ def _check(recordings: list[Recording]) -> None:
             )
 
 
-class _Multisine:
-    """Lines at whole multiples of the lowest frequency, with equal amplitudes and random phases."""
+class Multisine:
+    """Lines at whole multiples of the lowest frequency, with random phases.
 
-    def __init__(self, low: float, high: float, step: float) -> None:
-        multiples = np.unique(np.round(np.geomspace(1.0, high / low, _MOST))).astype(int)
+    Parameters
+    ----------
+    low, high : float
+        Hz.
+    step : float
+        Of the solver, s.
+    lines : int
+        At most, equally spaced over the logarithm.
+    falling : bool
+        Amplitudes fall as 1/f, so that a controller's derivative asks as much of each line; else
+        they are equal.
+    """
+
+    def __init__(
+        self, low: float, high: float, step: float, *, lines: int = _MOST, falling: bool = False
+    ) -> None:
+        multiples = np.unique(np.round(np.geomspace(1.0, high / low, lines))).astype(int)
         sample = _sample(high, step)
         self._count = round(1.0 / (low * sample))
         self.period = self._count * sample
@@ -157,26 +183,36 @@ class _Multisine:
         self.duration = (1 + _PERIODS) * self.period
         self.rate = 1.0 / sample
         self._multiples = multiples
+        self._shape = 1.0 / multiples if falling else np.ones(len(multiples))
 
     def terms(self, amplitude: float, generator: np.random.Generator) -> list[dict[str, Any]]:
+        """Return the waveforms of one realisation."""
         phases = generator.uniform(0.0, 2.0 * np.pi, self.frequency.size)
         time = np.linspace(0.0, self.period, 64 * int(self._multiples[-1]), endpoint=False)
-        sines = np.sin(2.0 * np.pi * self.frequency[:, None] * time + phases[:, None])
-        scale = amplitude / np.abs(sines.sum(axis=0)).max()
+        total = np.zeros_like(time)
+        for frequency, phase, size in zip(self.frequency, phases, self._shape, strict=True):
+            total += size * np.sin(2.0 * np.pi * frequency * time + phase)
+        scale = amplitude / np.abs(total).max()
         return [
-            {"kind": "sine", "amplitude": scale, "frequency": float(f), "phase": float(phase)}
-            for f, phase in zip(self.frequency, phases, strict=True)
+            {
+                "kind": "sine",
+                "amplitude": float(scale * a),
+                "frequency": float(f),
+                "phase": float(p),
+            }
+            for f, p, a in zip(self.frequency, phases, self._shape, strict=True)
         ]
 
-    def spectra(self, recording: Recording, output: str, bias: float) -> tuple[Any, Any]:
-        """Return input and output at the lines, averaged over the measured periods, one row."""
+    def spectrum(self, recording: Recording, name: str, mean: float = 0.0) -> Any:
+        """Return a signal at the lines, averaged over the measured periods, one row."""
         count = self._count
-        rows = []
-        for name, mean in (("command", bias), (output, 0.0)):
-            values = recording[name].values[count : count * (1 + _PERIODS)] - mean
-            spectrum = np.fft.rfft(values.reshape(_PERIODS, count), axis=1)
-            rows.append(spectrum[:, self._multiples].mean(axis=0, keepdims=True))
-        return rows[0], rows[1]
+        values = recording[name].values[count : count * (1 + _PERIODS)] - mean
+        found = np.fft.rfft(values.reshape(_PERIODS, count), axis=1)
+        return found[:, self._multiples].mean(axis=0, keepdims=True)
+
+    def spectra(self, recording: Recording, output: str, bias: float) -> tuple[Any, Any]:
+        """Return input and output at the lines."""
+        return self.spectrum(recording, "command", bias), self.spectrum(recording, output)
 
 
 class _Sweep:
@@ -220,9 +256,10 @@ def _sample(high: float, step: float) -> float:
     return steps * step
 
 
-def _scenario(
+def scenario_of(
     duration: float, mode: str, terms: list[dict[str, Any]], load: float | str
 ) -> Scenario:
+    """Return the run of one realisation."""
     loads = {"load": {"output": {"terms": [{"kind": "constant", "value": load}]}}} if load else {}
     command = {"mode": mode, "terms": terms}
     return Scenario.from_dict({"duration": duration, "command": command, **loads})

@@ -1,0 +1,268 @@
+"""An open loop measured in closed loop: a command is injected where the loop compares.
+
+With ``y`` the feedback, ``r`` the command and ``e = r - y``, all spectra of one run, the loop
+broken at the error is ``L = Y / E``. Both are read against the command, so that noise and what is
+not linear bias neither (instrumental variable: T. Soderstrom, P. Stoica, System Identification,
+1989).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.arrays import Floats
+from elevon.errors import InputError, unknown
+from elevon.progress import Progress
+from elevon.response.margins import Margins, margins
+from elevon.response.measure import Multisine, frequencies, require_finished, scenario_of
+from elevon.simulate import Run, check_fidelity, simulate_batch, solver_step
+from elevon.simulate.arguments import ActuatorLike, as_actuator
+from elevon.units import parse_quantity, shown_unit
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from elevon.actuator import Actuator
+    from elevon.recording import Recording
+
+__all__ = ["LOOPS", "LoopResponse", "loop_response"]
+
+Complex = npt.NDArray[np.complex128]
+LOOPS = ("position", "speed", "current")
+_LINES = 60  # some twenty in a decade: the phase turns little between two
+_COHERENT = 0.95  # below it a loop's margins are those of something else than its linear part
+_RANGE = {"position": (0.5, 2000.0), "speed": (0.5, 2000.0), "current": (20.0, 2000.0)}
+_SIZE = {"position": ("1 deg", "1 mm"), "speed": ("200 rpm",) * 2, "current": ("2 N m",) * 2}
+_SAMPLES = 20
+
+
+@dataclass(frozen=True)
+class LoopResponse:
+    """The open loop at each line.
+
+    Attributes
+    ----------
+    loop : str
+        ``position``, ``speed`` or ``current``.
+    frequency : ndarray, shape (n,)
+        Hz.
+    response : ndarray of complex, shape (n,)
+        Feedback over error.
+    coherence : ndarray, shape (n,)
+        Share of the feedback's power that is linear in the command, 0 to 1.
+    std : ndarray, shape (n,)
+        Relative standard deviation of the gain, and of the phase in rad; NaN of one realisation.
+    command, feedback : str
+        Signals compared.
+    amplitude : float
+        Greatest value of the command about its mean, SI.
+    realisations : int
+        Independent inputs the figures stand on.
+    """
+
+    loop: str
+    frequency: Floats
+    response: Complex
+    coherence: Floats
+    std: Floats
+    command: str
+    feedback: str
+    amplitude: float
+    realisations: int
+
+    @cached_property
+    def margins(self) -> Margins:
+        """Gain, phase and disk margin with their intervals."""
+        return margins(self.frequency, self.response, self.std)
+
+    @property
+    def hint(self) -> str:
+        """What lowers the coherence and how to raise it; empty where it is high up to crossover."""
+        crossover = self.margins.crossover.value
+        inside = self.frequency <= 2.0 * (crossover or self.frequency[-1])
+        if not inside.any() or float(self.coherence[inside].min()) >= _COHERENT:
+            return ""
+        at = int(np.argmin(np.where(inside, self.coherence, 2.0)))
+        remedy = {
+            "position": "a larger amplitude",
+            "speed": "a bias that keeps the shaft turning, or a larger amplitude",
+            "current": "another amplitude",
+        }[self.loop]
+        return (
+            f"coherence falls to {self.coherence[at]:.2f} at {self.frequency[at]:.3g} Hz: "
+            "friction, backlash, relays or limits shape what was measured, and the margins are "
+            f"not those of a linear loop; {remedy} may help"
+        )
+
+    def plot(self) -> Figure:
+        """Return a Bode plot: gain, phase, coherence over frequency."""
+        from elevon.response.bode import bode_plot
+
+        return bode_plot(
+            self.frequency, self.response, self.std, self.coherence, title=f"{self.loop} loop"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form."""
+        return {
+            "loop": self.loop,
+            "command": self.command,
+            "feedback": self.feedback,
+            "amplitude": self.amplitude,
+            "realisations": self.realisations,
+            "frequency_hz": self.frequency,
+            "gain_db": 20.0 * np.log10(np.abs(self.response)),
+            "phase_deg": np.rad2deg(np.unwrap(np.angle(self.response))),
+            "coherence": self.coherence,
+            "gain_relative_std": self.std,
+            "margins": self.margins.to_dict(),
+            "hint": self.hint,
+        }
+
+
+def loop_response(
+    actuator: ActuatorLike,
+    loop: str,
+    low: float | str | None = None,
+    high: float | str | None = None,
+    amplitude: float | str | None = None,
+    *,
+    bias: float | str = 0.0,
+    load: float | str = 0.0,
+    realisations: int = 6,
+    fidelity: str = "high",
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> LoopResponse:
+    """Measure an open loop of a servo with its loops closed.
+
+    Parameters
+    ----------
+    actuator : Actuator, str or path
+        What is measured.
+    loop : str
+        ``position`` (speed and current loops closed inside), ``speed`` (no position loop) or
+        ``current`` (neither; carrier drives only, relays have no linear loop).
+    low, high : float or str, optional
+        Frequency range, Hz; default 0.5, for the current 20, to 2000, or to what
+        the solver's step resolves.
+    amplitude : float or str, optional
+        Greatest value of the injected command: output position, motor speed, torque of the motor.
+    bias, load, realisations, fidelity, seed, progress
+        As for `frequency_response`.
+
+    Raises
+    ------
+    InputError
+        No such loop in this actuator or drive, an empty range, a run that tripped or diverged.
+    """
+    loaded = _checked(as_actuator(actuator), loop, fidelity)
+    if realisations < 1:
+        raise InputError(f"realisations = {realisations} must be at least 1")
+    step = solver_step(loaded, fidelity)
+    first, last = frequencies(
+        _RANGE[loop][0] if low is None else low,
+        min(_RANGE[loop][1], 0.999 / (_SAMPLES * step)) if high is None else high,
+    )
+    mode = "torque" if loop == "current" else loop
+    command, feedback, factor = _signals(loaded, loop)
+    unit, size = _amplitude(loaded, loop, amplitude)
+    mean = parse_quantity(bias, unit, "bias", shown_unit(unit))
+    design = Multisine(first, last, step, lines=_LINES, falling=loop != "current")
+    generator = np.random.default_rng(seed)
+    runs = []
+    for number in range(realisations):
+        terms = [*design.terms(size, generator), {"kind": "constant", "value": mean}]
+        runs.append(
+            Run(loaded, scenario_of(design.duration, mode, terms, load), seed, number=number)
+        )
+    recordings = simulate_batch(
+        runs,
+        fidelity=fidelity,
+        record=f"{command},{feedback}@{design.rate!r} Hz",
+        progress=progress,
+    )
+    require_finished(recordings)
+    response, coherence, std = _ratio(design, recordings, (command, feedback, factor))
+    return LoopResponse(
+        loop, design.frequency, response, coherence, std, command, feedback, size, realisations
+    )
+
+
+def _checked(actuator: Actuator, loop: str, fidelity: str) -> Actuator:
+    """Return the actuator whose loop is measured; refuse what has none."""
+    from elevon.parameters.records import wirings
+
+    check_fidelity(actuator.wiring, fidelity)
+    if loop not in LOOPS:
+        raise unknown("loop", loop, LOOPS, "--loop")
+    if "position" not in wirings()[actuator.wiring]["modes"]:
+        raise InputError(
+            f"--loop: {actuator.name} has a control unit of its own; its loops take no command"
+        )
+    if loop == "current" and fidelity == "low":
+        raise InputError("--loop current: the reduced-order model has a lag in its place; use high")
+    if loop == "current" and actuator.parameters["drive.kind"].value != "pwm":
+        raise InputError(
+            f"--loop current: drive.kind = {actuator.parameters['drive.kind'].value} of "
+            f"{actuator.name} has no linear current loop; set drive.kind=pwm"
+        )
+    if loop != "position" or actuator.parameters.value("control.speed_feedforward") == 0.0:
+        return actuator
+    # The feed-forward is outside the loop, but would reach the feedback past the error.
+    return actuator.with_values({"control.speed_feedforward": 0.0}, source="loop measurement")
+
+
+def _signals(actuator: Actuator, loop: str) -> tuple[str, str, float]:
+    """Return what is compared: command, feedback and the feedback's factor."""
+    if loop == "speed":
+        return "speed_ref", "resolver_speed", 1.0
+    if loop == "current":
+        return "current_ref", "current_q", 1.0
+    chosen = str(actuator.parameters["control.position_feedback"].value)
+    if chosen != "resolver":
+        return "command", f"{chosen}_position", 1.0
+    value = actuator.parameters.value
+    lead = value("screw.lead") if actuator.wiring == "ballscrew" else 1.0
+    return "command", "resolver_position", lead / value("gear.ratio")
+
+
+def _amplitude(actuator: Actuator, loop: str, amplitude: float | str | None) -> tuple[str, float]:
+    from elevon.scenario.compile import signal_units
+
+    place = signal_units(actuator.wiring, "high")["output_position"]
+    unit = {"position": place, "speed": "rad/s", "current": "N m"}[loop]
+    given = _SIZE[loop][place == "m"] if amplitude is None else amplitude
+    size = parse_quantity(given, unit, "amplitude", shown_unit(unit))
+    if not size > 0.0:
+        raise InputError(f"amplitude = {amplitude} must be positive")
+    return unit, size
+
+
+def _ratio(
+    design: Multisine, recordings: list[Recording], signals: tuple[str, str, float]
+) -> tuple[Complex, Floats, Floats]:
+    """Return the loop, its coherence and its deviation over realisations."""
+    command, feedback, factor = signals
+    injected, back = (
+        np.concatenate([design.spectrum(item, name) for item in recordings])
+        for name in (command, feedback)
+    )
+    back = factor * back
+    error = injected - back
+    through = np.sum(error * injected.conj(), axis=0)
+    loop = np.sum(back * injected.conj(), axis=0) / through
+    power = np.sum(np.abs(injected) ** 2, axis=0)
+    cross = np.abs(np.sum(back * injected.conj(), axis=0)) ** 2
+    coherence = np.minimum(cross / (power * np.sum(np.abs(back) ** 2, axis=0)), 1.0)
+    count = len(injected)
+    if count == 1:
+        return loop, coherence, np.full(len(loop), np.nan)
+    unexplained = np.sum(np.abs(back - loop * error) ** 2, axis=0) / (count - 1)
+    std = np.sqrt(0.5 * unexplained * power) / np.abs(through) / np.abs(loop)
+    return loop, coherence, np.asarray(std, dtype=np.float64)
