@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 import os
 from collections.abc import Iterable, Sequence
@@ -11,12 +12,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from elevon.errors import FormatError, InputError
+from elevon.files import read_regular
 
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-__all__ = ["check_series", "read_series"]
+__all__ = ["LONGEST", "check_series", "read_series"]
+
+LONGEST = 256 * 2**20
+"""Bytes of a table of points: some ten million rows."""
 
 Points = tuple[tuple[float, ...], tuple[float, ...]]
 
@@ -73,8 +78,13 @@ def read_series(path: str | os.PathLike[str], place: str) -> Points:
 
 @lru_cache(maxsize=16)
 def _read(file: Path, stamp: int, place: str) -> Points:  # noqa: ARG001 - a changed file is read anew
-    with file.open(newline="", encoding="utf-8-sig") as stream:
-        return _points(csv.reader(stream), file, place)
+    try:
+        text = read_regular(file, LONGEST).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise FormatError(f"{place}: {file}: is not UTF-8 text") from error
+    except InputError as error:
+        raise type(error)(f"{place}: {error}") from error
+    return _points(csv.reader(io.StringIO(text, newline="")), file, place)
 
 
 def _points(rows: Iterable[Sequence[str]], file: Path, place: str) -> Points:

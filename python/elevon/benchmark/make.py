@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from elevon.errors import InputError, unknown
-from elevon.files import write_text
+from elevon.files import read_regular, write_text
+from elevon.worklog import locked
 
 __all__ = ["ACTUATORS", "BENCHMARK", "BENCHMARK_VERSION", "SIZES", "Made", "make_benchmark"]
 
@@ -50,6 +51,9 @@ class Made:
     folder: Path
     about: dict[str, Any]
     failed: int
+
+
+_LONGEST = 2**24
 
 
 def make_benchmark(
@@ -112,8 +116,9 @@ def make_benchmark(
         failed += len(result.failed)
         campaigns.append(_campaign(name, result.manifest))
     about = {**settings, "elevon": result.manifest.version, "campaigns": campaigns}
-    write_text(folder / BENCHMARK, json.dumps(about, indent=1) + "\n", force=True)
-    write_text(folder / "README.md", _card(about), force=True)
+    with locked(folder):
+        write_text(folder / "README.md", _card(about), force=True)
+        write_text(folder / BENCHMARK, json.dumps(about, indent=1) + "\n", force=True)
     return Made(folder, about, failed)
 
 
@@ -187,7 +192,7 @@ def _check_same(folder: Path, settings: Mapping[str, Any]) -> None:
     path = folder / BENCHMARK
     if not path.is_file():
         return
-    known = json.loads(path.read_text("utf-8"))
+    known = json.loads(read_regular(path, _LONGEST))
     other = [key for key in settings if known.get(key) != settings[key]]
     if other:
         key = other[0]

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 from elevon.benchmark.make import ACTUATORS, BENCHMARK
 from elevon.errors import InputError
-from elevon.files import write_text
+from elevon.files import read_regular, write_text
 
 __all__ = ["SCORES", "Score", "score_benchmark"]
 
@@ -109,7 +109,7 @@ def score_benchmark(
         if progress is not None:
             progress((place + 1) / len(ACTUATORS))
     rows = [vars(score) for score in scores]
-    about = json.loads((root / BENCHMARK).read_text("utf-8"))
+    about = json.loads(read_regular(root / BENCHMARK, 2**24))
     content = {"version": about["version"], "seed": seed, "trees": _TREES, "scores": rows}
     write_text(root / SCORES, json.dumps(content, indent=1) + "\n", force=True)
     return scores

@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any
 from elevon.campaign.block import check_there, run_block
 from elevon.campaign.resolved import Resolved
 from elevon.campaign.resolved_file import read_resolved
-from elevon.campaign.store import core_hash
 from elevon.campaign.scheduler import LIMIT, check_scheduler
+from elevon.campaign.store import core_hash
 from elevon.errors import ElevonError, InputError, Interrupted, OutputError
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def in_cluster(
         slots = _AHEAD * max(workers.count(), 1)
         pending = {_submitted(client, work, block) for block in islice(waiting, slots)}
         while pending:
-            finished = _finished(client, pending)
+            finished = _finished(pending)
             workers.look(idle=not finished)
             check_there(work.folder)
             for future in finished:
@@ -97,7 +97,12 @@ class _Workers:
         self._waits = False
 
     def count(self) -> int:
-        return len(self._client.scheduler_info()["workers"])
+        try:
+            about = self._client.scheduler_info()
+        # The library has a dozen errors for a scheduler that has gone.
+        except Exception as error:
+            raise _lost(self._address, f": {type(error).__name__}") from error
+        return int(about.get("n_workers", len(about["workers"])))
 
     def look(self, *, idle: bool) -> None:
         """Raise where the scheduler has gone; say so where nobody works."""
@@ -111,7 +116,7 @@ class _Workers:
         self._waits = waits
 
 
-def _finished(client: Client, pending: set[Any]) -> set[Any]:
+def _finished(pending: set[Any]) -> set[Any]:
     """Wait a moment for a block; none may come of it."""
     wait = import_module("distributed").wait
     with suppress(TimeoutError):
@@ -176,7 +181,8 @@ def _client(address: str) -> Iterator[Client]:
     except ImportError as error:
         raise InputError("a cluster needs the extra 'cluster' (distributed)") from error
     local = _LOCAL.fullmatch(address)
-    with _quiet():
+    wait = {"distributed.comm.timeouts.connect": LIMIT / 2.0, "distributed.comm.retry.count": 0}
+    with _quiet(), import_module("dask").config.set(wait):
         if local is None:
             check_scheduler(address)
             with _connected(distributed, address) as client:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,6 +28,8 @@ from elevon.campaign.twolevel import (
     spelled,
 )
 from elevon.errors import InputError
+from elevon.files import read_regular
+from elevon.series import LONGEST
 
 __all__ = ["Points", "design_points"]
 
@@ -206,10 +209,13 @@ def _of_table(
     path = Path(str(design.file)).expanduser()
     path = path if path.is_absolute() or folder is None else folder / path
     try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            rows = [row for row in csv.reader(stream) if any(cell.strip() for cell in row)]
-    except (OSError, ValueError) as error:
-        raise InputError(f"{place}: {path} cannot be read: {error}") from error
+        text = read_regular(path, LONGEST).decode("utf-8-sig")
+        reader = csv.reader(io.StringIO(text, newline=""))
+        rows = [row for row in reader if any(cell.strip() for cell in row)]
+    except UnicodeDecodeError as error:
+        raise InputError(f"{place}: {path} cannot be read: is not UTF-8 text") from error
+    except (csv.Error, ValueError) as error:
+        raise InputError(f"{place}: {error}") from error
     if len(rows) < 2:
         raise InputError(f"{place}: {path}: the design is empty: it holds no point")
     titles = [cell.strip() for cell in rows[0]]

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from elevon.campaign.resolved import Resolved
-from elevon.campaign.resolved_file import resolved_text
+from elevon.campaign.resolved_file import LONGEST, resolved_text
 from elevon.campaign.store import RESOLVED
+from elevon.files import read_regular
 
 __all__ = ["difference"]
 
@@ -19,7 +20,7 @@ _MOST = 3
 def difference(folder: Path, resolved: Resolved) -> str:
     """Return the first differences between a plan and the one a folder holds."""
     try:
-        old = json.loads((folder / RESOLVED).read_text("utf-8"))
+        old = json.loads(read_regular(folder / RESOLVED, LONGEST))
     except (OSError, ValueError):
         return "its resolved plan cannot be read"
     new = json.loads(resolved_text(resolved))

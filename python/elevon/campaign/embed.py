@@ -12,7 +12,8 @@ from typing import Any
 from elevon.campaign.draw import Column
 from elevon.errors import InputError
 from elevon.faults import Fault
-from elevon.series import read_series
+from elevon.files import read_regular
+from elevon.series import LONGEST, read_series
 
 __all__ = ["Embedder", "filled"]
 
@@ -27,6 +28,8 @@ class Embedder:
     ----------
     folder : Path or None
         Of the plan.
+    root : Path or None
+        The files must lie in it or below; None: anywhere.
     points : dict
         File as written in the values of an axis to its ``{"times": ..., "values": ...}``.
     sources : dict
@@ -34,19 +37,32 @@ class Embedder:
     """
 
     folder: Path | None
+    root: Path | None = None
     points: dict[str, dict[str, list[float]]] = field(default_factory=dict)
     sources: dict[str, str] = field(default_factory=dict)
 
     def located(self, name: str) -> Path:
-        """Return a file's path, relative ones from the plan's folder."""
+        """Return a file's path, relative ones from the plan's folder.
+
+        Raises
+        ------
+        InputError
+            It lies outside the folder that the plan may read from, or leads there by a link.
+        """
         path = Path(name).expanduser()
-        return path if path.is_absolute() or self.folder is None else self.folder / path
+        path = path if path.is_absolute() or self.folder is None else self.folder / path
+        if self.root is not None and not path.resolve().is_relative_to(self.root.resolve()):
+            raise InputError(
+                f"{name}: lies outside the plan's folder {self.root}; --allow-outside "
+                "(allow_outside=True) lets a plan read other files"
+            )
+        return path
 
     def series(self, name: str, place: str) -> dict[str, list[float]]:
         """Return the points of a CSV file; errors as `read_series`."""
         path = self.located(name)
         times, values = read_series(path, place)
-        self.sources[str(path)] = hashlib.sha256(path.read_bytes()).hexdigest()
+        self.sources[str(path)] = hashlib.sha256(read_regular(path, LONGEST)).hexdigest()
         return {"times": list(times), "values": list(values)}
 
     def scenario(self, data: Mapping[str, Any], place: str) -> dict[str, Any]:
@@ -94,7 +110,7 @@ class Embedder:
         """Note a file as a source, and return its path."""
         path = self.located(name)
         if path.is_file():
-            self.sources[str(path)] = hashlib.sha256(path.read_bytes()).hexdigest()
+            self.sources[str(path)] = hashlib.sha256(read_regular(path, LONGEST)).hexdigest()
         return path
 
     def _within(self, value: Any, place: str) -> Any:

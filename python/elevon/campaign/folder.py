@@ -305,8 +305,8 @@ def _outcome(work: CampaignWork, items: list[Item | None]) -> dict[str, list[Any
 
 def _is_plan(path: Path, text: str) -> bool:
     try:
-        return path.read_text("utf-8") == text
-    except (OSError, ValueError):
+        return read_regular(path, _LONGEST).decode("utf-8") == text
+    except ValueError:
         return False
 
 

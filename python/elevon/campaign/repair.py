@@ -170,7 +170,7 @@ def _resolved_anew(folder: Path, text: str) -> Resolved:
     from elevon.documents import Document
 
     document = Document(str(folder / PLAN), text, tomllib.loads(text), folder)
-    return resolve_plan(checked_plan(document), document)
+    return resolve_plan(checked_plan(document), document)  # its folder holds no other files
 
 
 def _manifest(found: _Found, resolved: Resolved) -> Manifest:

@@ -14,6 +14,7 @@ from elevon.campaign.design import Points, design_points
 from elevon.campaign.draw import axis_values, column_of, random_values
 from elevon.campaign.embed import Embedder
 from elevon.campaign.grammar import Axis, Target
+from elevon.campaign.limits import check_counts
 from elevon.campaign.plan import Plan
 from elevon.campaign.population import Units, units_of
 from elevon.campaign.resolved import CaseChanges, Index, Resolved
@@ -49,7 +50,7 @@ class _Parts:
         return [ages, len(self.variants), *grid, drawn, len(plan.seeds)]
 
 
-def resolve_plan(plan: Plan, document: Document) -> Resolved:
+def resolve_plan(plan: Plan, document: Document, *, allow_outside: bool = False) -> Resolved:
     """Return every run of a plan: units x ages x cases x axes x draws x seeds, the last fastest.
 
     Parameters
@@ -58,6 +59,8 @@ def resolve_plan(plan: Plan, document: Document) -> Resolved:
         As read.
     document : Document
         Where it came from: names places in errors, and is where relative files are looked for.
+    allow_outside : bool
+        Whether the plan may name files that are not in its own folder or below.
 
     Returns
     -------
@@ -67,10 +70,11 @@ def resolve_plan(plan: Plan, document: Document) -> Resolved:
     Raises
     ------
     InputError
-        The plan is empty, or anything in it cannot be; the place is named.
+        The plan is empty, asks for too many runs, or anything in it cannot be; the place is named.
     """
-    files = Embedder(document.folder)
-    actuator = _actuator(plan, document)
+    check_counts(plan, document.place())
+    files = Embedder(document.folder, None if allow_outside else document.folder)
+    actuator = _actuator(plan, document, files)
     base = _base_scenario(plan, actuator, document, files)
     parts = _parts(plan, actuator, document, files)
     lengths = parts.lengths(plan)
@@ -119,9 +123,9 @@ def _parts(plan: Plan, actuator: Actuator, document: Document, files: Embedder) 
     points = None
     if plan.design is not None:
         place = document.place(("design",))
-        points = design_points(plan.design, wiring, document.folder, place)
         if plan.design.file is not None:
             files.note(plan.design.file)
+        points = design_points(plan.design, wiring, document.folder, place)
     return _Parts(units, _variants(plan, document, files), axes, draws, points)
 
 
@@ -175,10 +179,10 @@ def _texts(record: str | Sequence[str]) -> list[str]:
     return [record] if isinstance(record, str) else list(record)
 
 
-def _actuator(plan: Plan, document: Document) -> Actuator:
+def _actuator(plan: Plan, document: Document, files: Embedder) -> Actuator:
     reference = plan.actuator
     if reference.endswith(".toml") and document.folder is not None:
-        near = document.folder / reference
+        near = files.located(reference)
         reference = str(near) if near.is_file() else reference
     actuator = Actuator.load(reference)
     values = with_texts(plan.parameters) if document.text else plan.parameters
@@ -192,7 +196,7 @@ def _base_scenario(
         path = files.located(plan.scenario)
         document = read_toml(path)
         check_units(document)
-        inner = Embedder(document.folder)
+        inner = Embedder(document.folder, files.root)
         scenario = validated(Scenario, inner.scenario(document.data, document.place()), document)
         files.sources[str(path)] = hashlib.sha256(document.text.encode()).hexdigest()
         files.sources.update(inner.sources)

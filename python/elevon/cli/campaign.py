@@ -18,6 +18,10 @@ campaign_analysis.add_to(app)
 
 PlanArgument = Annotated[Path, typer.Argument(metavar="PLAN", help="The plan file (TOML).")]
 FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="The campaign's folder.")]
+OutsideOption = Annotated[
+    bool,
+    typer.Option("--allow-outside", help="Let the plan read files outside its folder."),
+]
 ThreadsOption = Annotated[int | None, typer.Option(min=1, help="Threads; default one a core.")]
 SchedulerOption = Annotated[
     str | None, typer.Option("--scheduler", metavar="ADDRESS", help="Of a Dask scheduler.")
@@ -32,6 +36,7 @@ def plan(
     plan: PlanArgument,
     *,
     threads: ThreadsOption = None,
+    allow_outside: OutsideOption = False,
     json: JsonOption = False,
 ) -> int:
     """Check a plan and say what it will take; nothing is written."""
@@ -41,7 +46,7 @@ def plan(
     from elevon.simulate.batch import checked_threads
 
     read, document = load_plan(plan)
-    resolved = resolve_plan(read, document)
+    resolved = resolve_plan(read, document, allow_outside=allow_outside)
     checked = check(resolved)
     need = estimate(resolved, checked, Path(), checked_threads(threads))
     if json:
@@ -104,13 +109,14 @@ def run(
     scheduler: SchedulerOption = None,
     cluster: ClusterOption = None,
     strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
+    allow_outside: OutsideOption = False,
     json: JsonOption = False,
 ) -> int:
     """Run a plan into a folder; an interrupted one goes on where it was."""
     from elevon.campaign import load_plan, resolve_plan, run_campaign
 
     read, document = load_plan(plan)
-    resolved = resolve_plan(read, document)
+    resolved = resolve_plan(read, document, allow_outside=allow_outside)
     with interrupt.telling(lambda: _how_far(out)), progress_bar(f"running {read.name}") as advance:
         result = run_campaign(
             resolved,
@@ -191,7 +197,10 @@ def _cluster(scheduler: str | None, cluster: str | None) -> str | None:
 
     if scheduler is not None and cluster is not None:
         raise InputError("give either --scheduler or --cluster")
-    return scheduler or cluster
+    for name, address in (("--scheduler", scheduler), ("--cluster", cluster)):
+        if address is not None and not address.strip():
+            raise InputError(f"{name} {address!r}: is no address")
+    return cluster if scheduler is None else scheduler
 
 
 def _how_far(out: Path) -> str:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from elevon.errors import DamageError, FormatError, InputError
-from elevon.files import journal, write_text
+from elevon.files import journal, read_regular, write_text
 from elevon.recording.header import Header
 
 __all__ = [
@@ -142,10 +142,9 @@ def _document(table: Path) -> dict[str, Any]:
 
 
 def _parsed(path: Path) -> dict[str, Any]:
-    if path.stat().st_size > _LARGEST:
-        raise FormatError(f"{path}: is longer than {_LARGEST} bytes")
+    text = read_regular(path, _LARGEST)
     try:
-        content = json.loads(path.read_text("utf-8"))
+        content = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise FormatError(f"{path}: damaged: {error!r}") from error
     if not isinstance(content, dict) or content.get("what") != _WHAT:
