@@ -71,7 +71,7 @@ class Comparison:
     cutoff: float
 
     def rms_error(self, signal: str) -> float:
-        """Return the RMS of low less high, in the signal's own unit."""
+        """Return the RMS of the two models' difference, in the signal's own unit."""
         return _rms(self.low[signal] - self.high[signal])
 
     @property
@@ -93,7 +93,7 @@ class Comparison:
 
     @property
     def speed_up(self) -> float:
-        """Wall time of the switching model over that of the low one, integration alone."""
+        """Wall time of the switching model over the reduced-order one's, integration alone."""
         high, low = (float(recording.meta["wall_s"]) for recording in self.recordings)
         return high / low if low > 0.0 else float("inf")
 
@@ -177,7 +177,7 @@ def compare(
     cutoff: float = CUTOFF_HZ,
     progress: Progress | None = None,
 ) -> Comparison:
-    """Run one scenario at high and at low fidelity and compare what came out.
+    """Run one scenario with both models and compare what came out.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ def compared_signals(wiring: str) -> dict[str, str]:
 def run_pair(
     actuator: Actuator, scenario: Scenario, *, seed: int = 0, progress: Progress | None = None
 ) -> tuple[Recording, Recording]:
-    """Return the recordings of one scenario at high and at low fidelity; errors as `compare`."""
+    """Return the recordings of one scenario with both models; errors as `compare`."""
     from elevon.progress import part
     from elevon.simulate import simulate
     from elevon.simulate.acting import together

@@ -35,8 +35,8 @@ def compare_loads(
 ) -> dict[str, Comparison]:
     """Compare both fidelities on a scenario as it is, and with a load against and along its motion.
 
-    The load acts on the output. Its direction is that of the motion without it (low fidelity); it
-    fades out below 5 % of the greatest speed.
+    The load acts on the output. Its direction is that of the motion without it (reduced-order
+    model); it fades out below 5 % of the greatest speed.
 
     Parameters
     ----------

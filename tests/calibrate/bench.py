@@ -1,4 +1,4 @@
-"""Logs of a bench with a known truth, in the drive's format: high fidelity, PWM drive, noise."""
+"""Logs of a bench with a known truth, in the drive's format: switching model, PWM drive, noise."""
 
 import json
 import math

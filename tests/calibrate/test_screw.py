@@ -28,7 +28,7 @@ TWO = Procedure.model_validate(
 
 @pytest.fixture(scope="module")
 def one():
-    """Truth, logs and calibration of one draw: high fidelity, two short logs."""
+    """Truth, logs and calibration of one draw: switching model, two short logs."""
     values, model = drawn(5)
     logs = make_logs(model, [TWO], seed=5, fidelity="high")
     return values, logs, calibrate_screw(logs, Actuator.load("nasa-ballscrew"))
@@ -112,7 +112,7 @@ def test_slopes_are_smoothed_as_the_values_are():
 @pytest.mark.long
 @pytest.mark.parametrize(("name", "draws"), [("nasa-ballscrew", 20), ("nasa-dema", 5)])
 def test_truth_recovery_over_draws(name, draws):
-    """Profiles at high fidelity, 70 minutes of heating at low."""
+    """Profiles by the switching model, 70 minutes of heating by the reduced-order one."""
     before = Actuator.load(name)
     errors, covered = {}, []
     for seed in range(FIRST, FIRST + draws):

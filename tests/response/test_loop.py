@@ -134,12 +134,12 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     frequency, truth = np.abs(s) / (2.0 * np.pi), 20.0 / (s * (0.02 * s + 1.0))
     std = np.full(40, 0.03)
     true = margins(frequency, truth, np.full(40, np.nan))
-    generator, held = np.random.default_rng(4), []
+    generator, covered = np.random.default_rng(4), []
     for number in range(100):
         noise = generator.normal(size=40) + 1j * generator.normal(size=40)
         found = margins(frequency, truth * np.exp(std * noise), std, seed=number)
-        held.append(found.phase.interval[0] <= true.phase.value <= found.phase.interval[1])
-    assert 0.83 <= np.mean(held) <= 0.97
+        covered.append(found.phase.interval[0] <= true.phase.value <= found.phase.interval[1])
+    assert 0.83 <= np.mean(covered) <= 0.97
 
 
 def test_friction_lowers_the_coherence_and_says_so():

@@ -115,6 +115,6 @@ def shortened(actuator: Actuator, estimates: Sequence[Estimate]) -> list[str]:
     if "control.derivative_time" not in within_inertia(actuator, values):
         return []
     return [
-        "control.derivative_time is shortened in the set: as estimated, speed gain times it "
+        "control.derivative_time is shortened in the file: as estimated, speed gain times it "
         "exceeds the inertia, which this controller without its filter cannot hold"
     ]

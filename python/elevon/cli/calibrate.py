@@ -60,10 +60,12 @@ PerLogOption = Annotated[
         "--per-log", metavar="PATH", help="Estimated for each log too: backlash.total; repeatable."
     ),
 ]
-FidelityOption = Annotated[
+FidelityOption = Annotated[str, typer.Option(help="Of the model runs: low or high.")]
+RunsFidelityOption = Annotated[
     str | None,
     typer.Option(
-        help="Of the model runs: low or high. Default: low; landing gear: what its logs bear."
+        "--fidelity",
+        help="Of the model runs: low or high. Default: low; landing gear: what its logs bear.",
     ),
 ]
 TransientOption = Annotated[
@@ -159,7 +161,7 @@ def calibrate(
     column_map: MapOption = None,
     free: FreeOption = None,
     per_log: PerLogOption = None,
-    fidelity: FidelityOption = None,
+    fidelity: RunsFidelityOption = None,
     transient: TransientOption = None,
     settings: SetOption = None,
     report: ReportOption = None,

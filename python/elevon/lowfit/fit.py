@@ -36,7 +36,7 @@ SEEN = 1e-4
 
 @dataclass(frozen=True)
 class LowFit:
-    """What was fitted, and how far the reduced-order model was and is from the high one.
+    """What was fitted, and how far the reduced-order model was and is from the switching one.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class LowFit:
     unchanged : mapping of str to str
         Numbers left as they were, and why.
     errors_before, errors_after : tuple of mapping of str to float
-        For each case, RMS of low less high over the size of high, by signal: RMS, of the
+        For each case, RMS of the difference over the switching one's size, by signal: RMS, of the
         position about its mean.
     """
 
@@ -166,7 +166,7 @@ class _Problem:
     def errors(
         self, values: Mapping[str, float], rows: Sequence[int] | None = None
     ) -> tuple[Mapping[str, float], ...]:
-        """Return RMS of low less high over the size of high, by case and signal."""
+        """Return RMS of the difference over the size of the switching one, by case and signal."""
         chosen = range(len(self.cases)) if rows is None else rows
         pairs = zip(self.low(values, chosen), (self.high[row] for row in chosen), strict=True)
         return tuple({n: _rms(low[n] - high[n]) / _size(n, high[n]) for n in SIGNALS}

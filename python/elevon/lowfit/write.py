@@ -38,7 +38,7 @@ def write_fit(path: str | os.PathLike[str], fit: LowFit, *, force: bool = False)
         name=_name(target.stem),
         changes=fitted_parameters(fit),
         base=_base(fit, target),
-        title=f"{fit.before.title or fit.before.name}, low model fitted",
+        title=f"{fit.before.title or fit.before.name}, reduced-order model fitted",
         force=force,
     )
 

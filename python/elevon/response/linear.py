@@ -1,4 +1,4 @@
-"""Linear models of the low-fidelity actuator about an operating point."""
+"""Linear models of the reduced-order model about an operating point."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def linearise(
     pulse: float = 1e-6,
     order: int | None = None,
 ) -> LinearModel:
-    """Linearise the low-fidelity model about an operating point.
+    """Linearise the reduced-order model about an operating point.
 
     The session is brought to the point and its state saved; from there each input gives a pulse of
     one period, up and down. Half the difference of the answers is the impulse response, and its

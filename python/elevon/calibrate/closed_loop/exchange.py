@@ -79,6 +79,6 @@ def _reasons(taken: dict[str, float], other: dict[str, float]) -> dict[str, str]
     text = (
         "cannot be separated from {}: with control.speed_feedforward = 1 the logs are followed "
         f"alike with {GAIN} = {taken[GAIN]:.4g} and {TIME} = {taken[TIME]:.4g} s, and with "
-        f"{other[GAIN]:.4g} and {other[TIME]:.4g} s; the pair nearer to the set is written"
+        f"{other[GAIN]:.4g} and {other[TIME]:.4g} s; the pair nearer to the file is written"
     )
     return {GAIN: text.format(TIME), TIME: text.format(GAIN)}

@@ -2,7 +2,7 @@
 
 While the motor drives, the demand follows from current and speed through the link
 (``V = 2 k w + (2 (R + R_on) + c p |w| L) i + 2 L di/dt + (1 - d) V_f``), and the set point from
-what commands it: a ramp to the high speed, and one to the low speed from the switch near the end.
+what commands it: a ramp to the higher speed, and one to the lower from the switch near the end.
 When each begins is fitted along.
 
 Only the product of gain and zero shows throughout: it is the gain for the zero as given. The gain

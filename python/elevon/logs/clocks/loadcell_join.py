@@ -177,7 +177,7 @@ def _shared(
 
 
 def _braked(recording: Recording) -> list[FloatArray]:
-    """Return the sets of signals that tell a brake's torque on the motor shaft.
+    """Return the sets of signals that show a brake's torque on the motor shaft.
 
     What is left of the motor's torque when friction and inertia took their share: torque current,
     direction of motion, speed and acceleration. Without the last two a brake that turns its sign

@@ -173,6 +173,8 @@ def _is_full(given: Any) -> bool:
 def _command(given: Mapping[str, Any], place: str, folder: Path | None) -> Command:
     """Read the full form; tables in files must lie beside the note."""
     terms = given.get("terms", ())
+    if not isinstance(terms, (list, tuple)):
+        raise InputError(f"{place}: command: terms = {quoted(str(terms))} is no list of tables")
     terms = [dict(t) if isinstance(t, Mapping) else t for t in terms if t is not None]
     if len(terms) > _MOST_TERMS:
         raise InputError(f"{place}: command: {len(terms)} terms, at most {_MOST_TERMS}")
