@@ -85,7 +85,7 @@ def test_no_workers_are_reported_and_a_killed_scheduler_ends_the_wait(plan, tmp_
     words = ["-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(port)]
     scheduler = subprocess.Popen([sys.executable, *words, "--no-dashboard"],
                                  stderr=subprocess.DEVNULL)  # fmt: skip
-    address = f"tcp://127.0.0.1:{port}"
+    address, run = f"tcp://127.0.0.1:{port}", None
     try:
         _answering(address)
         command = ["campaign", "run", plan(), "--out", tmp_path / "out", "--scheduler", address]
@@ -101,8 +101,9 @@ def test_no_workers_are_reported_and_a_killed_scheduler_ends_the_wait(plan, tmp_
         assert "no longer answers" in text
         assert "Traceback" not in text
     finally:
-        scheduler.kill()
-        scheduler.wait()
+        for process in filter(None, (scheduler, run)):
+            process.kill()
+            process.wait()
 
 
 def _answering(address):

@@ -39,6 +39,8 @@ _MOST_WORKERS = 1024
 _AHEAD = 3
 #: Seconds between two looks at the scheduler while no block is done.
 _MOMENT = 1.0
+#: Seconds between two looks at the blocks given out.
+_PAUSE = 0.02
 
 
 def in_cluster(
@@ -117,10 +119,12 @@ class _Workers:
 
 
 def _finished(pending: set[Any]) -> set[Any]:
-    """Wait a moment for a block; none may come of it."""
-    wait = import_module("distributed").wait
-    with suppress(TimeoutError):
-        return set(wait(pending, timeout=_MOMENT, return_when="FIRST_COMPLETED").done)
+    """Wait a moment for blocks that are done, or have failed; there may be none."""
+    end = time.monotonic() + _MOMENT
+    while time.monotonic() < end:
+        if done := {future for future in pending if future.done()}:
+            return done
+        time.sleep(_PAUSE)
     return set()
 
 
