@@ -78,7 +78,7 @@ def state(folder):
     return "new" if found == NEW else "old"
 
 
-@pytest.mark.parametrize("every", [4, pytest.param(1, marks=pytest.mark.long)])
+@pytest.mark.parametrize("every", [6, pytest.param(1, marks=pytest.mark.long)])
 def test_a_split_killed_at_each_step_leaves_the_old_or_the_new(made, tmp_path, capsys, every):
     source, plan = made
     out = tmp_path / "set"
