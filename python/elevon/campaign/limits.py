@@ -13,6 +13,8 @@ __all__ = ["MOST_RUNS", "check_counts"]
 #: Runs of a plan. ASSUMED: the table of ten million runs takes some 2 GB while a plan is resolved;
 #: a larger experiment is split into several plans.
 MOST_RUNS = 10_000_000
+#: Axes of the product of all that varies: NumPy's arrays have 64 dimensions at most.
+_MOST_AXES = 60
 #: Kinds of a design whose points are all combinations of the factors' levels.
 _ALL_LEVELS = {"full_factorial"}
 
@@ -23,8 +25,10 @@ def check_counts(plan: Plan, place: str) -> int:
     Raises
     ------
     InputError
-        More than `MOST_RUNS`, or one number alone is; it is named.
+        More than `MOST_RUNS`, or one number alone is; it is named. More axes than arrays have.
     """
+    if len(plan.vary) > _MOST_AXES:
+        raise InputError(f"{place}: {len(plan.vary)} axes in 'vary'; the limit is {_MOST_AXES}")
     counts = dict(_counts(plan))
     total = math.prod(counts.values())
     if total > MOST_RUNS:

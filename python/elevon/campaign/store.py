@@ -10,6 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from elevon.campaign.manifest_shape import shape_error
 from elevon.campaign.seal import seal
 from elevon.errors import FormatError, InputError
 from elevon.files import read_regular, write_text
@@ -133,9 +134,12 @@ def read_manifest(folder: str | os.PathLike[str]) -> Manifest:
     if not whole:
         raise FormatError(f"{path}: damaged: its content does not match its checksum{hint}")
     try:
-        return Manifest(**(data if data["schema"] == SCHEMA else mapped(data)))
+        manifest = Manifest(**(data if data["schema"] == SCHEMA else mapped(data)))
     except TypeError as error:
         raise FormatError(f"{path}: damaged: {error}{hint}") from error
+    if wrong := shape_error(Manifest, vars(manifest)):
+        raise FormatError(f"{path}: damaged: {wrong}{hint}")
+    return manifest
 
 
 def repair_hint(folder: Path) -> str:

@@ -189,7 +189,7 @@ def _entry(path: Path) -> tuple[HistoryEntry, str] | None:
         data = json.loads(path.read_text("utf-8"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise FormatError(f"{path}: is not JSON: {error}") from error
     if not isinstance(data, dict) or "usage" not in data:
         return None

@@ -139,7 +139,7 @@ def read_result(path: str | Path) -> dict[str, Any]:
     try:
         data = json.loads(Path(path).read_text("utf-8"))
         Answered.of(data)
-    except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
+    except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
         why = f"no {error}" if isinstance(error, KeyError) else str(error)
         raise FormatError(
             f"{path}: not a result of elevon diagnose --json of a rotary actuator: {why}"
