@@ -1,5 +1,6 @@
 """Retired names: refused when given, mapped when an old file is read."""
 
+import tarfile
 import warnings
 from pathlib import Path
 
@@ -161,3 +162,12 @@ def test_only_names_are_replaced():
     assert mapped([fault])[0]["kind"] == "backlash"
     entry = {"path": "control.position_feedback", "value": "user", "note": "user"}
     assert mapped(entry) == {**entry, "value": "output"}
+
+
+def test_an_old_data_set_takes_no_old_name(tmp_path):
+    with tarfile.open(OLD.parents[1] / "campaign" / "old" / "campaign.tar.gz") as archive:
+        archive.extractall(tmp_path, filter="data")
+    with pytest.warns(RetiredNamesWarning):
+        ds = elevon.load_campaign(tmp_path / "campaign")
+    with pytest.raises(UnknownNameError, match="did you mean 'output_position'"):
+        ds.signals.to_arrow(["user_position"])

@@ -55,7 +55,7 @@ def test_many_seeds_times_many_values(plan, cli):
 
 
 @pytest.fixture
-def beside(tmp_path):
+def plans(tmp_path):
     """Return a folder of plans, and a table and an actuator file that lie outside it."""
     folder = tmp_path / "plans"
     folder.mkdir()
@@ -88,16 +88,16 @@ def _plan(folder, actuator="torino-rotary", fault="friction@transmission=0.2", s
     ],
     ids=["table", "link", "actuator", "scenario"],
 )
-def test_a_plan_reads_below_its_folder_only(beside, capsys, options):
-    (beside.parent / "scenario.toml").write_text('duration = "10 ms"\n')
-    (beside / "link.csv").symlink_to(beside.parent / "secret.csv")
-    path = _plan(beside, **options)
-    for command in (["plan", str(path)], ["run", str(path), "--out", str(beside / "out")]):
+def test_a_plan_reads_below_its_folder_only(plans, capsys, options):
+    (plans.parent / "scenario.toml").write_text('duration = "10 ms"\n')
+    (plans / "link.csv").symlink_to(plans.parent / "secret.csv")
+    path = _plan(plans, **options)
+    for command in (["plan", str(path)], ["run", str(path), "--out", str(plans / "out")]):
         assert main(["campaign", *command]) == 2
         err = capsys.readouterr().err
         assert "lies outside the plan's folder" in err
         assert "--allow-outside" in err
-    assert not (beside / "out").exists()
+    assert not (plans / "out").exists()
     assert main(["campaign", "plan", str(path), "--allow-outside"]) == 0
     assert len(resolve_plan(*load_plan(path), allow_outside=True)) == 1
     capsys.readouterr()

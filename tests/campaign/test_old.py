@@ -41,8 +41,6 @@ def test_every_table_has_the_present_names(ds):
     assert "backlash@transmission" in ds.runs.to_pandas()
     assert ds.manifest.faults[0]["name"] == "backlash@transmission"
     assert "output_speed" in ds.ends.columns
-    with pytest.raises(LookupError, match="output_position"):
-        ds.signals.to_arrow(["user_position"])
 
 
 def test_every_run_is_what_the_present_core_records(ds):

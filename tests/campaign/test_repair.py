@@ -11,7 +11,7 @@ from elevon.campaign import execute as execute_module
 from elevon.campaign import read_manifest
 from elevon.cli import main
 
-SAID = ("manifest.json", "resolved.json", "plan.toml", "runs.parquet")
+NAMES = ("manifest.json", "resolved.json", "plan.toml", "runs.parquet")
 
 
 @pytest.fixture(scope="module")
@@ -68,15 +68,15 @@ def never_simulated(monkeypatch):
 
 def contents(folder):
     """Return what a folder says, but for the pilot's time, which a repair does not take."""
-    said = {name: (folder / name).read_bytes() for name in SAID if name != "manifest.json"}
+    files = {name: (folder / name).read_bytes() for name in NAMES if name != "manifest.json"}
     manifest = json.loads((folder / "manifest.json").read_text("utf-8"))
     manifest["estimate"].pop("seconds")
     manifest.pop("check")
-    return said, manifest
+    return files, manifest
 
 
 @pytest.mark.parametrize("harm", HARM)
-@pytest.mark.parametrize("name", SAID)
+@pytest.mark.parametrize("name", NAMES)
 def test_a_damaged_file_of_a_finished_campaign(made, tmp_path, capsys, never_simulated, name, harm):
     out = tmp_path / "set"
     shutil.copytree(made / "whole", out)
@@ -99,7 +99,7 @@ def test_a_damaged_file_of_a_finished_campaign(made, tmp_path, capsys, never_sim
 
 
 @pytest.mark.parametrize("harm", HARM)
-@pytest.mark.parametrize("name", [*SAID, "progress.log"])
+@pytest.mark.parametrize("name", [*NAMES, "progress.log"])
 def test_a_damaged_file_of_a_begun_campaign(made, tmp_path, capsys, monkeypatch, name, harm):
     out = tmp_path / "set"
     shutil.copytree(made / "begun", out)
@@ -116,7 +116,7 @@ def test_a_damaged_file_of_a_begun_campaign(made, tmp_path, capsys, monkeypatch,
     capsys.readouterr()
 
 
-@pytest.mark.parametrize("name", [*SAID, "progress.log"])
+@pytest.mark.parametrize("name", [*NAMES, "progress.log"])
 def test_resume_repairs_what_it_can_prove(made, tmp_path, capsys, name):
     out = tmp_path / "set"
     shutil.copytree(made / "begun", out)
@@ -171,7 +171,7 @@ def test_a_split_outlives_a_repair(made, tmp_path, capsys):
     shares = ["--share", "fit=0.5", "--share", "hold=0.5"]
     assert main(["dataset", "split", str(out), *shares, "--seed", "5"]) == 0
     parts = elevon.load_campaign(out).runs.to_pandas()["split"].tolist()
-    for name in SAID:
+    for name in NAMES:
         (out / name).unlink()
         assert main(["dataset", "repair", str(out)]) == 0, name
         assert elevon.load_campaign(out).runs.to_pandas()["split"].tolist() == parts

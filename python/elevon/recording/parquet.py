@@ -1,6 +1,6 @@
 """Recordings in Parquet: one file, whatever the number of clocks.
 
-Layout, version 2. The schema metadata entry ``elevon`` holds the description (`Header`); each
+Layout, version 3. The schema metadata entry ``elevon`` holds the description (`Header`); each
 field has its ``unit`` and ``text``. With one clock the columns are ``time`` and the channels. With
 several clocks a first column ``clock`` names the clock of the row; the rows of the clocks follow
 each other, every clock starting a row group, and a channel is null in the rows of the others. So
