@@ -51,7 +51,7 @@ def test_every_run_keeps_every_bit(ds, old):
     ends = pq.read_table(old / "ends" / "block_00000.parquet").to_pandas()
     for number in range(len(ds)):
         recording, mine = ds.recording(number), raw[raw["run"] == number]
-        assert [c.name for c in recording.channels][0] == "output_position"
+        assert next(c.name for c in recording.channels) == "output_position"
         assert recording.clock().time.tolist() == mine["time"].tolist()
         for place, channel in enumerate(recording.channels, start=2):
             assert channel.values.tolist() == mine.iloc[:, place].tolist(), channel.name
