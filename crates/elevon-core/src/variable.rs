@@ -48,6 +48,8 @@ pub enum Range {
     Flag,
     Between(f64, f64),
     AtLeast(f64),
+    /// A whole number in between, both included.
+    Count(f64, f64),
     /// The index of one of these names.
     Choice(&'static [&'static str]),
 }
@@ -62,7 +64,7 @@ impl Range {
             Self::NonNegative => (0.0, inf, false),
             Self::Fraction => (0.0, 1.0, true),
             Self::Unit | Self::Flag => (0.0, 1.0, false),
-            Self::Between(low, high) => (low, high, false),
+            Self::Between(low, high) | Self::Count(low, high) => (low, high, false),
             Self::AtLeast(low) => (low, inf, false),
             Self::Choice(names) => (0.0, names.len() as f64 - 1.0, false),
         }
@@ -70,8 +72,13 @@ impl Range {
 
     pub fn contains(self, value: f64) -> bool {
         let (low, high, open) = self.bounds();
-        let integral = !matches!(self, Self::Choice(_)) || value.fract() == 0.0;
+        let integral = !self.whole() || value.fract() == 0.0;
         value.is_finite() && integral && value <= high && if open { value > low } else { value >= low }
+    }
+
+    /// Are its values whole numbers?
+    pub fn whole(self) -> bool {
+        matches!(self, Self::Choice(_) | Self::Count(..))
     }
 
     /// Do two values act differently?
@@ -164,6 +171,11 @@ impl<'a, P: Parameter> View<'a, P> {
     /// Is the parameter away from its neutral value, that of its record, now or later?
     pub fn away(&self, parameter: P) -> bool {
         self.apart(parameter.index())
+    }
+
+    /// Is the parameter other than zero, now or later?
+    pub fn used(&self, parameter: P) -> bool {
+        self.value(parameter) != 0.0 || self.touched[parameter.index()]
     }
 
     pub fn any_away(&self, parameters: impl IntoIterator<Item = P>) -> bool {

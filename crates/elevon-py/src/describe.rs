@@ -98,6 +98,7 @@ pub fn parameters<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
             d.set_item("maximum_open", false)?;
             d.set_item("text", v.text)?;
             d.set_item("register", v.register.name())?;
+            d.set_item("whole", matches!(v.range, Range::Count(..)))?;
             d.set_item("default", v.default)?;
             let choices = if let Range::Choice(names) = v.range { Some(names.to_vec()) } else { None };
             d.set_item("choices", choices)?;

@@ -224,6 +224,7 @@ pub fn sensitivities<'py>(
         if let Some(missing) = faults.iter().find(|&&f| f >= spec.faults.len()) {
             return Err(bad(format!("fault {missing} of {}", spec.faults.len())));
         }
+        resolver.differentiable(&spec, run, &wanted, &faults)?;
         let model = resolver.model;
         let dt = model.step(&spec.parameters);
         let chosen = wanted.len() + faults.len();

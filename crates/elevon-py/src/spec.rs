@@ -7,7 +7,8 @@ use elevon_core::actuator::Severity;
 use elevon_core::command::{catalogue, SourcePlan, Term, Wave};
 use elevon_core::fault::{whole, FaultKind, FaultSpec, Op, Profile, Write};
 use elevon_core::registry::Model;
-use elevon_core::solver::{Clock, RunSpec};
+use elevon_core::solver::{fault_refusal, parameter_refusal, Clock, RunSpec};
+use elevon_core::variable::{acts::records, Range};
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -42,6 +43,10 @@ fn in_range(model: Model, raw: &[f64], start: &str) -> PyResult<()> {
         let range = group.variables[i].range;
         if !range.contains(x) {
             let (low, high, _) = range.bounds();
+            if matches!(range, Range::Count(..)) && x >= low && x <= high {
+                let path = group.path(i);
+                return Err(bad(format!("{start}{path}: {x} is not a whole number; {} or {}", x.floor(), x.ceil())));
+            }
             return Err(bad(format!("{start}{}: {x} is outside {low} to {high}", group.path(i))));
         }
     }
@@ -252,6 +257,24 @@ impl Resolver {
         let digits = 10f64.powf(3.0 - most.abs().log10().floor());
         let hint = if low > 0.0 { format!("; or a severity of at most {}", (most * digits).trunc() / digits) } else { String::new() };
         Some(format!("{} at its whole severity: {}{hint}", names[alone], finding.message))
+    }
+
+    /// Refuses parameters and faults by which a run has no derivative.
+    pub fn differentiable(&self, run: &RunSpec, given: &Bound<'_, PyDict>, parameters: &[usize], faults: &[usize]) -> PyResult<()> {
+        let all: Vec<_> = records(self.model.groups()).collect();
+        for &index in parameters {
+            let (path, record) = &all[index];
+            if let Some(reason) = parameter_refusal(path, record, run.parameters[index]) {
+                return Err(bad(format!("sensitivities: {path} = {}: {reason}", run.parameters[index])));
+            }
+        }
+        let names = names_of(&need(given, "faults")?.cast_into::<PyList>()?)?;
+        for &fault in faults {
+            if let Some(reason) = fault_refusal(&run.faults[fault], &run.parameters, &all) {
+                return Err(bad(format!("sensitivities: {} = {}: {reason}", names[fault], run.faults[fault].severity)));
+            }
+        }
+        Ok(())
     }
 
     /// Signals by their names.

@@ -34,6 +34,7 @@ class Record:
     register: str
     default: float | None
     choices: tuple[str, ...] | None
+    whole: bool = False
     fidelities: tuple[str, ...] = ()
     not_modelled: Mapping[str, str] = field(default_factory=dict)
     when: tuple[str, ...] = ()
@@ -52,7 +53,8 @@ class Record:
             return "|".join(self.choices)
         low = "(" if self.minimum_open or math.isinf(self.minimum) else "["
         high = ")" if self.maximum_open or math.isinf(self.maximum) else "]"
-        return f"{low}{self.minimum:g}, {self.maximum:g}{high}"
+        whole = " whole" if self.whole else ""
+        return f"{low}{self.minimum:g}, {self.maximum:g}{high}{whole}"
 
     def read(
         self, given: str | float, place: str | None = None, display_unit: str | None = None
@@ -83,6 +85,11 @@ class Record:
         above = value > self.minimum or (value == self.minimum and not self.minimum_open)
         below = value < self.maximum or (value == self.maximum and not self.maximum_open)
         if math.isfinite(value) and above and below:
+            if self.whole and not float(value).is_integer():
+                raise RangeError(
+                    f"{place or self.path} = {value:.9g} is not a whole number; "
+                    f"{math.floor(value)} or {math.ceil(value)} ({self.text})"
+                )
             return
         text = format_quantity(value, self.unit, 9) if math.isfinite(value) else str(value)
         raise RangeError(
@@ -174,6 +181,7 @@ def _record(item: Mapping[str, Any]) -> Record:
         register=item["register"],
         default=None if item["default"] is None else float(item["default"]),
         choices=None if not choices else tuple(choices),
+        whole=bool(item["whole"]),
         fidelities=tuple(item["fidelities"]),
         not_modelled=item["not_modelled"],
         when=tuple(item["when"]),

@@ -125,6 +125,12 @@ impl SourceLanes {
 }
 
 impl<S: Scalar> Source<S> {
+    /// One value for good.
+    pub fn constant(value: S) -> Self {
+        let zero = S::zero();
+        Self { at: zero, value, slope: zero, curve: zero, flat: true, oscillators: Vec::new() }
+    }
+
     /// The value does not change before the next breakpoint.
     #[inline(always)]
     pub fn flat(&self) -> bool {

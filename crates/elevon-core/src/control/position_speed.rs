@@ -4,7 +4,7 @@
 
 use crate::scalar::Scalar;
 use crate::variable::acts::When;
-use crate::variable::Switch;
+use crate::variable::{Switch, View};
 use crate::{choices, variables};
 
 choices! {
@@ -98,9 +98,9 @@ impl ControlStructure {
         mode == Mode::Position && Structure::read(raw[ControlParameter::Structure as usize]) == Structure::Pid
     }
 
-    pub fn read(raw: &[f64]) -> Self {
+    pub fn read(view: &View<ControlParameter>) -> Self {
         use ControlParameter as P;
-        let on = |p: P| raw[p as usize] != 0.0;
+        let (raw, on) = (view.raw, |p: P| view.used(p));
         let switched = |p: P| Switch::read(raw[p as usize]) == Switch::On;
         let pid = Self::single(raw);
         Self {
@@ -163,7 +163,7 @@ impl<S: Scalar> PositionSpeed<S> {
         let dt = S::splat(ts);
         // The filter decays exactly over a tick, and a ramp gives K_p T_d times its slope at any tick: the gain N of the
         // continuous form is its limit for short ticks, the difference of two samples that for long ones.
-        let decay = S::one() - (-(filter * dt / guarded(td))).exp();
+        let decay = S::one() - present(td) * (-(filter * dt / guarded(td))).exp();
         Self {
             position_gain: g(P::PositionGain) * g(P::PositionGainScale),
             speed_gain: gain,
@@ -288,7 +288,7 @@ mod tests {
         ] {
             raw[at as usize] = value;
         }
-        (PositionSpeed::derive(&raw, TICK, 1.0), ControlStructure::read(&raw))
+        (PositionSpeed::derive(&raw, TICK, 1.0), ControlStructure::read(&View::new(&raw, &[false; CONTROL.len()])))
     }
 
     /// Torque references for position errors of one tick after the other.

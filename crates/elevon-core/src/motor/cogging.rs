@@ -11,7 +11,7 @@ variables! {
     /// Cogging of the motor.
     CoggingParameter, COGGING {
         CoggingTorque => "cogging_torque", "A", "N m", NonNegative, Plant, Some(0.0), "amplitude of the cogging torque; 0: none";
-        CoggingCycles => "cogging_cycles", "N", "1", AtLeast(1.0), Plant, Some(24.0), "cycles of the cogging torque in a turn, the least common multiple of slots and poles; ASSUMED: 12 slots, 8 poles",
+        CoggingCycles => "cogging_cycles", "N", "1", Count(1.0, f64::INFINITY), Plant, Some(24.0), "cycles of the cogging torque in a turn, the least common multiple of slots and poles; ASSUMED: 12 slots, 8 poles",
             when(&[Away("motor.cogging_torque", 0.0)]);
         CoggingSecond => "cogging_second", "r", "1", Between(-1.0, 1.0), Plant, Some(0.0), "second harmonic of the cogging torque over the first",
             when(&[Away("motor.cogging_torque", 0.0)]);

@@ -24,7 +24,7 @@ const WARM: When = When::Either(&[
 variables! {
     /// The motor.
     MotorParameter, MOTOR {
-        PolePairs => "pole_pairs", "p", "1", AtLeast(1.0), Plant, None, "pole pairs";
+        PolePairs => "pole_pairs", "p", "1", Count(1.0, f64::INFINITY), Plant, None, "pole pairs";
         Inertia => "inertia", "J_m", "kg m2", Positive, Plant, None, "rotor inertia";
         WindingResistance => "winding_resistance", "R", "ohm", Positive, Plant, None, "phase resistance at the reference temperature";
         WindingInductance => "winding_inductance", "L", "H", Positive, Plant, None, "phase inductance, mutual part included";

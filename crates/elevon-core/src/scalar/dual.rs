@@ -102,6 +102,10 @@ impl<V: Scalar> Scalar for Dual<V> {
         }
     }
     #[inline(always)]
+    fn anchor(neutral: bool, plain: Self, detailed: Self) -> Self {
+        Self { value: if neutral { plain.value } else { detailed.value }, slope: detailed.slope }
+    }
+    #[inline(always)]
     fn any(mask: bool) -> bool {
         mask
     }

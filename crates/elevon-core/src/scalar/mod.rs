@@ -62,6 +62,11 @@ pub trait Scalar:
     fn le(self, other: Self) -> Self::Mask;
     fn equals(self, other: Self) -> Self::Mask;
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// `plain` where a detail is `neutral`, to the bit; slopes are those of `detailed` in any case.
+    #[inline(always)]
+    fn anchor(neutral: Self::Mask, plain: Self, detailed: Self) -> Self {
+        Self::select(neutral, plain, detailed)
+    }
     fn any(mask: Self::Mask) -> bool;
     fn mask(value: bool) -> Self::Mask;
 

@@ -33,7 +33,7 @@ variables! {
             high_only("the noise of single phase currents is none of its one");
         NoiseSampleTime => "current.noise_sample_time", "-", "s", Positive, Sensor, Some(5e-5), "the noise is held over this time, which sets its band",
             high_only("the noise of single phase currents is none of its one").when(&[Away("sensor.current.noise_deviation", 0.0)]);
-        Bits => "current.bits", "-", "1", Between(0.0, 32.0), Sensor, Some(0.0), "resolution over twice the range; 0: not quantised",
+        Bits => "current.bits", "-", "1", Count(0.0, 32.0), Sensor, Some(0.0), "resolution over twice the range; 0: not quantised",
             high_only("single phase currents are quantised, not its one");
         FullScale => "current.full_scale", "-", "A", Positive, Sensor, Some(40.0), "largest current the quantised sensor reports",
             high_only("single phase currents are quantised, not its one").when(&[Away("sensor.current.bits", 0.0)]);

@@ -201,7 +201,7 @@ impl<S: Scalar> Resolver<S> {
         let alike = self.gain_less.equals(S::zero());
         let tracked = self.sine * self.cosine / (self.cosine * self.cosine * cc + self.sine * self.sine * ss);
         let reading = theta + error + self.offset;
-        let rate = S::select(alike, S::one(), tracked);
+        let rate = S::anchor(alike, S::one(), tracked);
         let turning = S::select(off, S::zero(), (omega * rate).clamp_abs(self.tracking_limit));
         memory.angle = S::select(off | stuck, memory.angle, reading);
         memory.speed = S::select(stuck, memory.speed, turning);

@@ -5,7 +5,7 @@ use super::kernels::{Advance, Lift, Observe, Record, Ticking};
 use super::rows::Rows;
 use super::spec::{Clock, RunOutput, RunSpec, Status};
 use crate::actuator::{Inputs, Setup, Signals, Tick, Wiring};
-use crate::command::SourceLanes;
+use crate::command::{Source, SourceLanes};
 use crate::fault::{FaultLanes, FaultSpec};
 use crate::noise::Key;
 use crate::scalar::Scalar;
@@ -23,6 +23,16 @@ pub fn structure<W: Wiring>(run: &RunSpec, recorded: &[usize]) -> W::Structure {
         touched[index] = true;
     }
     W::structure(&Setup { raw: &run.parameters, touched: &touched, driven: &run.driven, recorded })
+}
+
+/// Ports that no waveform drives and a parameter does, each with the parameter's place.
+fn constants<W: Wiring>(run: &RunSpec) -> Vec<(usize, usize)> {
+    let paths: Vec<String> = W::groups().iter().flat_map(|g| (0..g.variables.len()).map(|i| g.path(i))).collect();
+    let place = |(port, &driven): (usize, &bool)| {
+        let found = paths.iter().position(|path| path == W::PORTS[port].parameter);
+        found.filter(|_| !driven).map(|index| (port, index))
+    };
+    run.driven.iter().enumerate().filter_map(place).collect()
 }
 
 /// A block of lanes in progress.
@@ -49,6 +59,8 @@ pub struct Block<'a, W: Wiring, S: Scalar, L: Lift<S>> {
     pub(super) models: Vec<W::Model<S>>,
     pub(super) states: Vec<W::State<S>>,
     inputs: Vec<Inputs<S>>,
+    /// Where numbers carry slopes: ports whose value is a parameter's, and which.
+    constants: Vec<(usize, usize)>,
     pub(super) sources: Vec<SourceLanes>,
     pub(super) faults: FaultLanes,
     ticks: Vec<Tick>,
@@ -95,6 +107,7 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             models: Vec::new(),
             states: Vec::new(),
             inputs: vec![Vec::new(); chunks],
+            constants: if L::SLOPES { constants::<W>(first) } else { Vec::new() },
             status: vec![Status::Ok; runs.len()],
             stopped: vec![None; runs.len()],
             last: vec![Vec::new(); runs.len()],
@@ -227,6 +240,9 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         if renewed {
             for chunk in 0..self.inputs.len() {
                 self.inputs[chunk] = self.sources.iter().map(|s| s.pack(chunk * S::LANES)).collect();
+                for &(port, index) in &self.constants {
+                    self.inputs[chunk][port] = Source::constant(self.healthy[chunk][index]);
+                }
             }
         }
         if self.stale || k > 0 && self.faults.next() <= k {

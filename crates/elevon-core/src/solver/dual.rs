@@ -23,6 +23,7 @@ struct Seeds {
 }
 
 impl<V: Scalar> Lift<Dual<V>> for Seeds {
+    const SLOPES: bool = true;
     fn parameter(&self, runs: &[&RunSpec], first: usize, index: usize) -> Dual<V> {
         let value = runs[first].parameters[index];
         match self.parameters.iter().position(|&p| p == index) {
@@ -71,6 +72,16 @@ pub fn sensitivities<W: Wiring>(
     passes::<W, Slopes>(run, parameters, faults, clocks, monitor)
 }
 
+/// The run with everything in its structure whose derivative is wanted: what is neutral may have one, and all passes share
+/// their equations.
+fn differentiated(run: &RunSpec, parameters: &[usize], faults: &[usize]) -> RunSpec {
+    let mut all = run.clone();
+    all.tunable.extend_from_slice(parameters);
+    let writes = faults.iter().filter_map(|&fault| run.faults.get(fault)).flat_map(|fault| &fault.writes);
+    all.tunable.extend(writes.map(|write| write.index));
+    all
+}
+
 fn passes<W: Wiring, V: Scalar>(
     run: &RunSpec,
     parameters: &[usize],
@@ -79,6 +90,7 @@ fn passes<W: Wiring, V: Scalar>(
     monitor: &Monitor,
 ) -> Vec<RunOutput> {
     let recorded = recorded(clocks);
+    let run = &differentiated(run, parameters, faults);
     let mut chosen: Vec<(bool, usize)> = parameters.iter().map(|&p| (true, p)).collect();
     chosen.extend(faults.iter().map(|&f| (false, f)));
     let pass = |pass: &[(bool, usize)]| {

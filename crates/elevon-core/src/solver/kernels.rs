@@ -9,6 +9,8 @@ use crate::time::Steps;
 
 /// Turns the plain numbers of a run into scalars: lanes by default, dual numbers with their seeds otherwise.
 pub trait Lift<S> {
+    /// Numbers carry slopes: parameters must reach the equations as scalars wherever they act.
+    const SLOPES: bool = false;
     /// A parameter of the lanes from `first` on.
     fn parameter(&self, runs: &[&RunSpec], first: usize, index: usize) -> S;
     fn severity(&self, faults: &FaultLanes, lane: usize, fault: usize) -> S;

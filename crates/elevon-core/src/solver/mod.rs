@@ -2,6 +2,7 @@
 
 mod batch;
 mod block;
+mod differentiable;
 mod dual;
 mod ending;
 mod kernels;
@@ -12,6 +13,7 @@ mod summing;
 mod width;
 
 pub use batch::{run_all, Monitor};
+pub use differentiable::{fault_refusal, parameter_refusal};
 pub use dual::{derivatives, sensitivities};
 pub use live::{live, Change, Live, Refusal};
 pub use spec::{Clock, RunOutput, RunSpec, Status};

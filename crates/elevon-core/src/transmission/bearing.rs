@@ -14,7 +14,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 variables! {
     /// The motor's bearing.
     BearingParameter, BEARING {
-        Balls => "balls", "Z", "1", Between(3.0, 100.0), Plant, Some(8.0), "balls of the motor's bearing; ASSUMED: a deep-groove bearing of 15 mm bore",
+        Balls => "balls", "Z", "1", Count(3.0, 100.0), Plant, Some(8.0), "balls of the motor's bearing; ASSUMED: a deep-groove bearing of 15 mm bore",
             when(&[Either(&[Away("bearing.outer_defect", 0.0), Away("bearing.inner_defect", 0.0), Away("bearing.ball_defect", 0.0)])]);
         BallDiameter => "ball_diameter", "d", "m", Between(1e-4, 0.1), Plant, Some(5.95e-3), "diameter of a ball; ASSUMED as bearing.balls",
             when(&[Either(&[Away("bearing.outer_defect", 0.0), Away("bearing.inner_defect", 0.0), Away("bearing.ball_defect", 0.0), Away("bearing.cage_drag", 0.0)])]);

@@ -34,13 +34,13 @@ impl<S: Scalar> Lubricant<S> {
         let viscous = (g(P::ViscosityExponent) * g(P::ViscosityRate) * colder).exp();
         // Far above the reference a loss stays a loss.
         let loss = g(P::LossRate).fma(colder, S::one()).maximum(S::splat(0.1));
-        Self { viscous: S::select(same, S::one(), viscous), loss: S::select(same, S::one(), loss) }
+        Self { viscous: S::anchor(same, S::one(), viscous), loss: S::anchor(same, S::one(), loss) }
     }
 
     /// An efficiency with its loss scaled.
     pub fn efficiency(&self, eta: S) -> S {
         let scaled = S::one() / (S::one() + self.loss * (S::one() / eta - S::one()));
-        S::select(self.loss.equals(S::one()), eta, scaled)
+        S::anchor(self.loss.equals(S::one()), eta, scaled)
     }
 
     /// A table of friction over rising speeds: what it has grown above its least value so far is viscous.
@@ -49,7 +49,7 @@ impl<S: Scalar> Lubricant<S> {
         table.map(|force| {
             least = least.minimum(force);
             let scaled = self.viscous.fma(force - least, least);
-            S::select(self.viscous.equals(S::one()), force, scaled)
+            S::anchor(self.viscous.equals(S::one()), force, scaled)
         })
     }
 }

@@ -23,9 +23,9 @@ variables! {
             when(&[Either(&[Away("screw.spall_groove", 0.0), Away("screw.spall_nut", 0.0), Away("screw.spall_ball", 0.0)])]);
         ContactAngle => "contact_angle", "alpha", "rad", Between(0.1, 1.5), Plant, Some(std::f64::consts::FRAC_PI_4), "contact angle of the balls",
             when(&[Either(&[Away("screw.spall_groove", 0.0), Away("screw.spall_nut", 0.0), Away("screw.spall_ball", 0.0)])]);
-        BallsPerTurn => "balls_per_turn", "Z", "1", AtLeast(1.0), Plant, Some(15.0), "balls in one turn",
+        BallsPerTurn => "balls_per_turn", "Z", "1", Count(1.0, f64::INFINITY), Plant, Some(15.0), "balls in one turn",
             when(&[Either(&[Away("screw.spall_groove", 0.0), Away("screw.spall_nut", 0.0), Away("screw.spall_ball", 0.0)])]);
-        Circuits => "circuits", "n", "1", AtLeast(1.0), Plant, Some(4.0), "return channels, each with one turn of balls",
+        Circuits => "circuits", "n", "1", Count(1.0, f64::INFINITY), Plant, Some(4.0), "return channels, each with one turn of balls",
             when(&[Either(&[
                 Away("screw.blocked_circuits", 0.0),
                 Away("screw.spall_groove", 0.0), Away("screw.spall_nut", 0.0), Away("screw.spall_ball", 0.0),
@@ -43,7 +43,7 @@ variables! {
             ])]);
         FrictionDry => "friction_dry", "mu_dry", "1", Unit, Plant, Some(0.05), "friction coefficient without lubricant",
             when(&[Away("screw.lubricant_lost", 0.0)]);
-        BlockedCircuits => "blocked_circuits", "b", "1", NonNegative, Plant, Some(0.0), "healthy 0; return channels that are jammed";
+        BlockedCircuits => "blocked_circuits", "b", "1", Count(0.0, f64::INFINITY), Plant, Some(0.0), "healthy 0; return channels that are jammed";
         LubricantLost => "lubricant_lost", "s", "1", Unit, Plant, Some(0.0), "healthy 0; fraction of the lubricant lost";
         Debris => "debris", "c", "1", Between(0.0, 0.05), Plant, Some(0.0), "healthy 0; mass of debris over mass of grease";
         SpallGroove => "spall_groove", "w", "m", Between(0.0, 5e-3), Plant, Some(0.0), "healthy 0; length of a spall in the screw's groove";
@@ -192,8 +192,8 @@ impl<S: Scalar> Screw<S> {
         let worn = mu.map(|mu| sliding * (g(P::FrictionSliding) - mu) + asperities * (g(P::FrictionDry) - mu) + debris);
         let healthy = sliding.equals(zero) & asperities.equals(zero) & debris.equals(zero);
         let (drive, back) = (mu[0] + worn[0], mu[1] + worn[1]);
-        let efficiency = S::select(healthy, g(P::Efficiency), (one - drive * slope) / (one + drive / slope));
-        let aiding = S::select(healthy, g(P::EfficiencyAiding), (one - back / slope) / (one + back * slope));
+        let efficiency = S::anchor(healthy, g(P::Efficiency), (one - drive * slope) / (one + drive / slope));
+        let aiding = S::anchor(healthy, g(P::EfficiencyAiding), (one - back / slope) / (one + back * slope));
         Self {
             efficiency,
             efficiency_aiding: aiding,

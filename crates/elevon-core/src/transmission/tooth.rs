@@ -14,7 +14,7 @@ use std::f64::consts::{PI, TAU};
 variables! {
     /// Teeth of the gear.
     ToothParameter, TOOTH {
-        Teeth => "teeth", "N", "1", Between(5.0, 1000.0), Plant, Some(20.0), "teeth of the wheel whose teeth are worn or chipped; ASSUMED: a pinion on the motor's shaft",
+        Teeth => "teeth", "N", "1", Count(5.0, 1000.0), Plant, Some(20.0), "teeth of the wheel whose teeth are worn or chipped; ASSUMED: a pinion on the motor's shaft",
             when(&[Either(&[Away("gear.tooth_wear", 0.0), Away("gear.tooth_chip", 0.0)])]);
         TeethRatio => "teeth_ratio", "-", "1", AtLeast(1.0), Plant, Some(1.0), "turns of the motor per turn of that wheel; 1: it stands on the motor's shaft",
             when(&[Either(&[Away("gear.tooth_wear", 0.0), Away("gear.tooth_chip", 0.0)])]);

@@ -18,7 +18,7 @@ variables! {
         Frequency => "frequency", "f_n", "Hz", Positive, Sensor, Some(1200.0), "natural frequency of the mode", high_only("it has no accelerometer").when(&[Chosen("vibration.model", &["resonance"])]);
         Damping => "damping", "zeta", "1", Unit, Sensor, Some(0.05), "damping ratio of the mode", high_only("it has no accelerometer").when(&[Chosen("vibration.model", &["resonance"])]);
         Approach => "approach", "delta_H", "m", Positive, Sensor, Some(1e-5), "elastic approach of a loaded ball: a spall that is deeper unloads the ball altogether", high_only("it has no accelerometer").when(&[Chosen("vibration.model", &["resonance"]), Either(&[Away("screw.spall_groove", 0.0), Away("screw.spall_nut", 0.0), Away("screw.spall_ball", 0.0)])]);
-        GearTeeth => "gear_teeth", "z", "1", NonNegative, Sensor, Some(0.0), "teeth on the motor's shaft: order of the mesh; 0: no gear", high_only("it has no accelerometer").when(&[Chosen("vibration.model", &["resonance"]), Away("vibration.gear_ripple", 0.0)]);
+        GearTeeth => "gear_teeth", "z", "1", Count(0.0, f64::INFINITY), Sensor, Some(0.0), "teeth on the motor's shaft: order of the mesh; 0: no gear", high_only("it has no accelerometer").when(&[Chosen("vibration.model", &["resonance"]), Away("vibration.gear_ripple", 0.0)]);
         GearRipple => "gear_ripple", "-", "1/m", NonNegative, Sensor, Some(0.0), "force of the mesh per motor torque", high_only("it has no accelerometer").when(&[Chosen("vibration.model", &["resonance"]), Away("vibration.gear_teeth", 0.0)]);
     }
 }

@@ -198,22 +198,11 @@ pub fn check(raw: &[f64]) -> Vec<Finding> {
     out
 }
 
-/// Circuits and balls are whole, and no more circuits are blocked than there are.
+/// No more circuits are blocked than there are.
 fn counts(out: &mut Vec<Finding>, raw: &[f64]) {
     let g = |p: ScrewParameter| raw[p.at()];
-    let (circuits, balls) = (g(ScrewParameter::Circuits), g(ScrewParameter::BallsPerTurn));
-    for (path, value) in [("screw.circuits", circuits), ("screw.balls_per_turn", balls)] {
-        if value.fract() != 0.0 {
-            let message = format!("{path}: {value} is not a whole number; {} or {}", value.floor(), value.ceil());
-            out.push(finding(path, value, value.floor(), message));
-        }
-    }
-    let blocked = g(ScrewParameter::BlockedCircuits);
-    if blocked.fract() != 0.0 {
-        let message =
-            format!("screw.blocked_circuits: a circuit is blocked or not, {blocked} is neither; {} or {}", blocked.floor(), blocked.ceil());
-        out.push(finding("screw.blocked_circuits", blocked, blocked.floor(), message));
-    } else if blocked > circuits {
+    let (circuits, blocked) = (g(ScrewParameter::Circuits), g(ScrewParameter::BlockedCircuits));
+    if blocked > circuits {
         let message = format!("screw.blocked_circuits: {blocked} of the {circuits} in screw.circuits");
         out.push(finding("screw.blocked_circuits", blocked, circuits, message));
     }

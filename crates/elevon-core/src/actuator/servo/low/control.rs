@@ -41,7 +41,8 @@ impl<S: Scalar> Control<S> {
         let by_inertia = structure.control.mode != Mode::Torque && !pid;
         let td = at(ControlParameter::PidDerivativeTime);
         let derives = zero.lt(td);
-        let decay = one - (-(at(ControlParameter::PidDerivativeFilter) * dt / S::select(derives, td, one))).exp();
+        let passing = (-(at(ControlParameter::PidDerivativeFilter) * dt / S::select(derives, td, one))).exp();
+        let decay = S::select(derives, one - passing, one);
         Self {
             per_dt: one / dt,
             position_gain: at(ControlParameter::PositionGain) * at(ControlParameter::PositionGainScale),

@@ -14,6 +14,8 @@ use crate::scalar::Scalar;
 const SMOOTH: f64 = 0.1;
 /// A remainder of a jump that demands less than this part of the torque limit is none.
 const GONE: f64 = 1e-6;
+/// Time of a filter that passes at once, s.
+const INSTANT: f64 = 1e-12;
 
 /// Constants of the derivative's filter.
 #[derive(Clone, Copy, Debug)]
@@ -51,8 +53,9 @@ impl<S: Scalar> Jumps<S> {
         let at = |p: ControlParameter| raw[p.at()];
         let (zero, one) = (S::zero(), S::one());
         let td = at(ControlParameter::DerivativeTime);
-        let there = S::mask(active) & zero.lt(td);
-        let time = S::select(there, td, one) / at(ControlParameter::DerivativeFilter);
+        let there = S::mask(active);
+        // With T_d = 0 the filter passes at once: a time that no step sees, with the slope of T_d.
+        let time = S::select(zero.lt(td), td, td + S::splat(INSTANT)) / at(ControlParameter::DerivativeFilter);
         let speed_gain = at(ControlParameter::SpeedGain) * at(ControlParameter::SpeedGainScale);
         let gain = S::select(there, speed_gain * at(ControlParameter::DerivativeFilter), zero);
         let limit = at(ControlParameter::TorqueConstant) * at(ControlParameter::CurrentLimit);

@@ -74,7 +74,7 @@ impl<F: Form> Wiring for Low<F> {
         if structure.shaft.debris {
             ticks.push(Tick::every(period(raw[ControlParameter::SampleTime.at()]), TICK_DEBRIS));
         }
-        if raw[ControlParameter::NoiseDeviation.at()] != 0.0 {
+        if structure.noisy_command {
             ticks.push(Tick::every(period(raw[ControlParameter::NoiseSampleTime.at()]), TICK_COMMAND_NOISE));
         }
         ticks

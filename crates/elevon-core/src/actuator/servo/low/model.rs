@@ -33,8 +33,10 @@ details! {
         bridge: BridgeStructure = BridgeStructure::gateless(&parts.inverter());
         /// The references are blocks, not sines.
         six_step: bool = Commutation::read(parts.drive().value(DriveParameter::Commutation)) == Commutation::SixStep;
-        control: ControlStructure = ControlStructure::read(parts.control().raw);
-        integral: bool = parts.control().value(if control.pid { ControlParameter::PidIntegralTime } else { ControlParameter::IntegralTime }) > 0.0;
+        control: ControlStructure = ControlStructure::read(&parts.control());
+        integral: bool = parts.control().used(if control.pid { ControlParameter::PidIntegralTime } else { ControlParameter::IntegralTime });
+        /// The command carries noise.
+        noisy_command: bool = parts.control().used(ControlParameter::NoiseDeviation);
         shaft: ShaftDetails = ShaftDetails::read::<F>(&ShaftNeeds::low(parts));
         sensing: SensingDetails = SensingDetails::read::<F>(parts);
         motor: MotorStructure = MotorStructure::read(&parts.motor()).with_unbalance(shaft.unbalance).with_weak_pole(WeakPole::<f64>::needed(&parts.pole()));
