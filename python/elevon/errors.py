@@ -256,7 +256,7 @@ def unknown(
     UnknownNameError
         To be raised by the caller.
     """
-    name = name if isinstance(name, str) else repr(name)
+    name = str(name)
     names = list(candidates)
     start = f"{place}: " if place else ""
     about = remark(what, name)

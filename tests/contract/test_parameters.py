@@ -58,7 +58,9 @@ def false(name: str, fidelity: str, count: int | None) -> list[str]:
 
 
 @pytest.mark.parametrize("name", shipped.names())
-def test_what_is_reported_without_effect_changes_no_bit_of_the_reduced_order_model(name: str) -> None:
+def test_what_is_reported_without_effect_changes_no_bit_of_the_reduced_order_model(
+    name: str,
+) -> None:
     """One other value of each."""
     assert false(name, "low", 1) == []
 
@@ -88,7 +90,9 @@ def test_a_switch_is_as_it_was_below_one_half_by_value_and_by_fault(
 
 @pytest.mark.long
 @EVERY
-def test_what_is_reported_without_effect_changes_no_bit_at_any_value(name: str, fidelity: str) -> None:
+def test_what_is_reported_without_effect_changes_no_bit_at_any_value(
+    name: str, fidelity: str
+) -> None:
     """From near to extreme."""
     assert false(name, fidelity, None) == []
 
