@@ -23,6 +23,7 @@ __all__ = [
     "journal",
     "open_owned",
     "owning",
+    "publish",
     "read_regular",
     "step",
     "sync_folder",
@@ -140,10 +141,11 @@ def read_regular(path: str | os.PathLike[str], limit: int) -> bytes:
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         raise InputError(f"{name}: cannot be read: {why}") from error
+    about = os.fstat(handle)
+    if not stat.S_ISREG(about.st_mode):
+        os.close(handle)
+        raise FormatError(f"{name}: cannot be read: is no regular file")
     with os.fdopen(handle, "rb") as stream:
-        about = os.fstat(handle)
-        if not stat.S_ISREG(about.st_mode):
-            raise FormatError(f"{name}: cannot be read: is no regular file")
         if about.st_size > limit:
             raise FormatError(f"{name}: has {about.st_size} bytes; the limit is {limit}")
         try:
@@ -255,6 +257,23 @@ def atomic_path(path: str | os.PathLike[str], *, force: bool = False) -> Iterato
         with suppress(OSError):  # what is left is swept by the next writer
             step("unlink", temporary)
             temporary.unlink()
+    sync_folder(target.parent)
+
+
+def publish(waiting: Path, target: Path, *, force: bool) -> None:
+    """Give a file that waits beside, written before, its name; errors as `atomic_path`."""
+    try:
+        check_output(target, force=force)
+        _publish(waiting, target, force=force)
+        if (written := _journal.get()) is not None:
+            written.append(target)
+    except OutputError:
+        raise
+    except OSError as error:
+        why = os.strerror(error.errno) if error.errno else str(error)
+        raise OutputError(f"{target}: cannot be written: {why}") from error
+    with suppress(FileNotFoundError):
+        waiting.unlink()
     sync_folder(target.parent)
 
 

@@ -1,12 +1,14 @@
 """Recordings in CSV: plain tables with a description beside them."""
 
 import json
+import multiprocessing
+import os
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from elevon import Recording
+from elevon import Recording, files
 from elevon.errors import (
     DamageError,
     FormatError,
@@ -111,6 +113,53 @@ def test_a_replacement_cut_short_leaves_one_whole_recording(tmp_path, monkeypatc
                 later.save(path, force=True)
         assert Recording.load(path).equals(expected)
         one_clock().save(path, force=True)
+
+
+def _killed_at(save, at):
+    """Save in a process that ends, as if killed, before its step number `at`."""
+
+    def child():
+        count = iter(range(at + 1))
+
+        def die(_operation, _path):
+            if next(count) == at:
+                os._exit(9)
+
+        files.step = die
+        save()
+        os._exit(0)
+
+    process = multiprocessing.get_context("fork").Process(target=child)
+    process.start()
+    process.join(60)
+    return process.exitcode
+
+
+@pytest.mark.parametrize("first", [True, False], ids=["new", "replaced"])
+def test_tables_of_several_clocks_cut_short_are_the_old_or_the_new(tmp_path, first):
+    path, new = tmp_path / "a.csv", ordinary().with_meta(seed=9)
+    states, at, code = [], 0, 9
+    while code == 9:
+        for item in tmp_path.iterdir():
+            item.unlink()
+        if not first:
+            ordinary().save(path)
+        code = _killed_at(lambda: new.save(path, force=True), at)
+        if first and not list(tmp_path.glob("a.*.csv")):
+            states.append("old")
+        else:
+            loaded = Recording.load(path)
+            states.append("new" if loaded.equals(new) else "old")
+            assert loaded.equals(new) or (not first and loaded.equals(ordinary()))
+        assert new.save(path, force=True) == path
+        assert Recording.load(path).equals(new)
+        assert not list(tmp_path.glob(".a.*.next*"))
+        assert len(list(tmp_path.glob("a.*"))) == 4
+        at += 1
+    assert code == 0
+    assert at > 20
+    assert states == sorted(states, reverse=True)
+    assert set(states) == {"old", "new"}
 
 
 def test_a_description_without_its_table_stands_in_nobodys_way(tmp_path):

@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import DamageError, FormatError, InputError, UncheckedWarning
-from elevon.files import atomic_path, check_output
+from elevon.files import atomic_path, check_output, journal, publish
 from elevon.recording.channel import in_si
 from elevon.recording.clock import Clock
 from elevon.recording.contents import Contents, check_size, header_bytes, rebuild
@@ -80,15 +80,66 @@ def check(path: Path, clocks: Iterable[str], *, force: bool) -> None:
 def save(recording: Recording, path: Path, *, force: bool) -> None:
     """Write the tables and the file beside each."""
     check(path, recording.clocks, force=force)
-    whole = Header.sealed(recording).sha256
     paths = tables(path, recording.clocks)
-    files = [table.name for table in paths]
-    for table, clock in zip(paths, recording.clocks, strict=True):
-        part = recording if len(paths) == 1 else recording.select(clock=clock)
-        _save_one(part, table, whole, files, force=force)
-    if len(paths) > 1:  # replaced with leave: the tables of the clocks stand for it now
-        for old in (path, description_path(path)):
-            old.unlink(missing_ok=True)
+    if len(paths) == 1:
+        whole = Header.sealed(recording).sha256
+        _save_one(recording, path, whole, [path.name], force=force)
+        return
+    _save_several(recording, paths, force=force)
+    for old in (path, description_path(path)):  # the tables of the clocks replace it
+        old.unlink(missing_ok=True)
+
+
+def _save_several(recording: Recording, paths: list[Path], *, force: bool) -> None:
+    """Write the tables of several clocks: all wait beside before the first one gets its name.
+
+    So whatever cuts this short, either no table is new, or the new ones are all there.
+    """
+    whole, files = Header.sealed(recording).sha256, [table.name for table in paths]
+    switched = False
+    _drop_waiting(paths)
+    try:
+        for table, clock in zip(paths, recording.clocks, strict=True):
+            part, place = recording.select(clock=clock), _waiting(table, whole)
+            with journal(), atomic_path(place, force=True) as temporary:
+                _write(part, temporary)
+                about = TableDescription(sha256_of(temporary), Header.sealed(part), whole, files)
+            write_description(place, about, keep_old=False)
+        for table in paths:
+            _switch(table, whole, force=force)
+            switched = True
+    except BaseException:
+        if not switched:
+            _drop_waiting(paths)
+        raise
+
+
+def _switch(table: Path, whole: str, *, force: bool) -> None:
+    """Give a table that waits beside, and its description, their names."""
+    place = _waiting(table, whole)
+    about, replaced = read_description(place), table.exists()
+    assert about is not None
+    try:
+        write_description(table, about, keep_old=replaced)
+        publish(place, table, force=force)
+    except BaseException:
+        if not table.exists():
+            description_path(table).unlink(missing_ok=True)
+        raise
+    if replaced:
+        write_description(table, about, keep_old=False)
+    description_path(place).unlink(missing_ok=True)
+
+
+def _waiting(table: Path, whole: str) -> Path:
+    """Return where a table of a recording of that SHA-256 waits for its name."""
+    return table.with_name(f".{table.name}.{whole}.next")
+
+
+def _drop_waiting(paths: Iterable[Path]) -> None:
+    for table in paths:
+        for left in table.parent.glob(f".{escape(table.name)}.*.next*"):
+            left.unlink(missing_ok=True)
 
 
 def _save_one(
@@ -156,7 +207,7 @@ def joined_tables(path: Path) -> list[Path]:
         if present != tables(path, clocks):
             continue
         for table in present:
-            if not table.is_file():
+            if not table.is_file() and not _waiting(table, about.of).is_file():
                 raise DamageError(
                     f"{path}: {table.name} is missing, the table of one of its clocks"
                 )
@@ -169,9 +220,7 @@ def load(path: Path, max_bytes: int) -> Contents:
     parts = joined_tables(path)
     if not parts:
         return _read(path, max_bytes)[0]
-    read = [_read(part, max_bytes) for part in parts]
-    if len({whole for _, whole in read}) != 1:
-        raise DamageError(f"{path}: its tables are not of one recording: a save was cut short")
+    read = _of_one_recording(path, parts, max_bytes)
     first = read[0][0]
     return replace(
         first,
@@ -179,6 +228,22 @@ def load(path: Path, max_bytes: int) -> Contents:
         clocks=[clock for contents, _ in read for clock in contents.clocks],
         old=sorted({name for contents, _ in read for name in contents.old}),
     )
+
+
+def _of_one_recording(path: Path, parts: list[Path], max_bytes: int) -> list[tuple[Contents, str]]:
+    """Return the tables of all clocks; where a save was cut short, those that it had written."""
+    read = [_read(part, max_bytes) if part.is_file() else None for part in parts]
+    for whole in dict.fromkeys(item[1] for item in read if item is not None):
+        places = [_waiting(part, whole) for part in parts]
+        if all(
+            (item is not None and item[1] == whole) or place.is_file()
+            for item, place in zip(read, places, strict=True)
+        ):
+            return [
+                item if item is not None and item[1] == whole else _read(place, max_bytes)
+                for item, place in zip(read, places, strict=True)
+            ]
+    raise DamageError(f"{path}: its tables are not of one recording: a save was cut short")
 
 
 def _read(path: Path, max_bytes: int) -> tuple[Contents, str]:
