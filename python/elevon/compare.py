@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.errors import InputError, SimulationError
+from elevon.errors import InputError, RangeError, SimulationError
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -208,6 +209,8 @@ def compare(
     default = scenario is None
     scenario = default_scenario(actuator) if scenario is None else scenario
     start = default_start(actuator, scenario, default=default) if start is None else start
+    if not (math.isfinite(cutoff) and cutoff > 0.0):
+        raise RangeError(f"cutoff = {cutoff:g} Hz: must be above 0 and finite")
     if scenario.seconds <= start + 1.0 / cutoff:
         raise InputError(
             f"compare: the scenario lasts {scenario.seconds:g} s; what is compared begins at "

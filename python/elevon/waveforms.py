@@ -182,6 +182,8 @@ def _check_acceleration(record: WaveRecord, values: Mapping[str, float], place: 
     if record.kind == "trapezoid" and not (values["rise"] > 0.0 and values["fall"] > 0.0):
         raise InputError(f"{place}: acceleration needs rise and fall above 0 s")
     corners = _corners(record, values)
+    if any(b[0] <= a[0] for a, b in pairwise(corners)):
+        raise InputError(f"{place}: a part of it is shorter than the rounding of its time")
     slopes = [0.0, *((b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(corners))]
     bends = [abs(b - a) for a, b in pairwise(slopes)]
     spans = [b[0] - a[0] for a, b in pairwise(corners)]

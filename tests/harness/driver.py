@@ -169,9 +169,9 @@ class Trial:
         return wrong
 
     def _kind(self, state):
-        if self._same(state, self.after):
-            return "new"
-        return "old" if state == self.before else "between"
+        if state == self.before:
+            return "new" if self.before == self.after else "old"
+        return "new" if self._same(state, self.after) else "between"
 
     def _same(self, state, wanted):
         return state.keys() == wanted.keys() and all(

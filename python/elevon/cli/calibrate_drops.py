@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from elevon.errors import FormatError, InputError
+from elevon.files import read_regular
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -25,13 +26,11 @@ GUIDE_RADIUS = 0.08
 def is_drop_table(path: Path) -> bool:
     """Whether a file's header names the columns of a table of drops."""
     try:
-        with path.open(encoding="utf-8-sig") as stream:
-            for line in stream:
-                if not line.startswith("#"):
-                    return line.strip().replace(" ", "").split(",")[:4] == list(COLUMNS)
-    except (OSError, UnicodeDecodeError):
+        lines = read_regular(path, _MOST_BYTES).decode("utf-8-sig").splitlines()
+    except (InputError, UnicodeDecodeError):
         return False
-    return False
+    header = next((line for line in lines if not line.startswith("#")), "")
+    return header.strip().replace(" ", "").split(",")[:4] == list(COLUMNS)
 
 
 def run_drops(path: Path, actuator: Actuator) -> tuple[ComplianceCalibration, dict[str, Any]]:
@@ -72,9 +71,8 @@ def run_drops(path: Path, actuator: Actuator) -> tuple[ComplianceCalibration, di
 def _read(path: Path) -> list[WeightDrop]:
     from elevon.reproduce.compliance.slips import WeightDrop
 
-    if path.stat().st_size > _MOST_BYTES:
-        raise InputError(f"{path}: larger than {_MOST_BYTES} bytes; no table of drops")
-    lines = [x for x in path.read_text("utf-8-sig").splitlines() if x and not x.startswith("#")]
+    text = read_regular(path, _MOST_BYTES).decode("utf-8-sig")
+    lines = [x for x in text.splitlines() if x and not x.startswith("#")]
     drops = []
     for number, line in enumerate(csv.DictReader(lines), 1):
         try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
 import os
 import sys
@@ -122,7 +123,8 @@ def _code(arguments: list[str]) -> int:
         return _fail(needed, USAGE)
     except OSError as error:
         interrupt.check()
-        return _fail(str(error), FAILED)
+        # A name that no file system takes is a wrong argument; all else has gone wrong on the way.
+        return _fail(str(error), USAGE if error.errno == errno.ENAMETOOLONG else FAILED)
     return outcome if isinstance(outcome, int) else 0
 
 

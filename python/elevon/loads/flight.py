@@ -1,6 +1,7 @@
 """Flight data: what is needed of a recorded flight, and its CSV file."""
 
 import csv
+import io
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import FormatError, InputError, Interrupted, RangeError, unknown
+from elevon.files import read_regular
 from elevon.loads.airspeed import AIRSPEED_KINDS, AirspeedKind
 from elevon.progress import Progress
 from elevon.units import check_kind, to_si
@@ -18,6 +20,9 @@ from elevon.units import check_kind, to_si
 __all__ = ["FlightData", "read_flight"]
 
 Array = npt.NDArray[np.float64]
+
+_LONGEST = 2**28
+"""Bytes of a flight: a day of ten columns at 20 Hz has some 160 MB."""
 
 _AIRSPEEDS = {
     "true_airspeed": "true",
@@ -168,16 +173,14 @@ def read_flight(path: str | os.PathLike[str], *, progress: Progress | None = Non
 
 
 def _read_lines(source: Path) -> list[tuple[int, list[str]]]:
+    raw = read_regular(source, _LONGEST)
     try:
-        with source.open(encoding="utf-8-sig", newline="") as stream:
-            reader = csv.reader(stream, skipinitialspace=True)
-            return [
-                (reader.line_num, row)
-                for row in reader
-                if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#")
-            ]
-    except OSError as error:
-        raise InputError(f"{source}: cannot be read: {error.strerror}") from error
+        reader = csv.reader(io.StringIO(raw.decode("utf-8-sig"), newline=""), skipinitialspace=True)
+        return [
+            (reader.line_num, row)
+            for row in reader
+            if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#")
+        ]
     except (UnicodeDecodeError, csv.Error) as error:
         raise FormatError(f"{source}: is not a UTF-8 CSV file: {error}") from error
 
@@ -188,7 +191,9 @@ def _header(source: Path, cells: Sequence[str]) -> list[tuple[str, str]]:
         name, bracket, unit_text = cell.strip().partition("[")
         name, unit = name.strip(), unit_text.strip().removesuffix("]").strip()
         if name not in _UNITS:
-            raise unknown("column", name, _UNITS, str(source))
+            # Not every file given is a flight: what is no name is not printed.
+            given = name if name.isidentifier() and len(name) < 32 else f"number {len(columns) + 1}"
+            raise unknown("column", given, _UNITS, str(source))
         if name in dict(columns):
             raise FormatError(f"{source}: column {name!r} is given twice")
         if not bracket or not unit_text.strip().endswith("]"):

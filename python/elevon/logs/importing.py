@@ -52,6 +52,8 @@ class ImportedLog:
 def find_sidecars(path: str | Path) -> tuple[Path | None, Path | None]:
     """Return ``NAME_loadcell.csv`` and ``NAME_command.json`` (or ``.toml``) beside ``NAME.csv``."""
     file = Path(path).expanduser()
+    if not file.name:
+        raise InputError(f"{str(path)!r}: is no file name")
     stem = file.name[: -len(file.suffix)] if file.suffix else file.name
     cell = file.with_name(f"{stem}_loadcell.csv")
     notes = [file.with_name(f"{stem}_command{ending}") for ending in (".json", ".toml")]
@@ -192,6 +194,11 @@ def _scenario(recording: Recording, source: str) -> Scenario | None:
 
 
 def _is_saved(file: Path) -> bool:
+    # A pipe or a device would be waited for; the reader says what it is.
+    return file.is_file() and _begins_saved(file)
+
+
+def _begins_saved(file: Path) -> bool:
     try:
         if file.suffix.lower() == ".csv" and (
             describes(description_path(file)) or joined_tables(file)

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from elevon.errors import FormatError, InputError, Interrupted, unknown
+from elevon.files import read_regular
 from elevon.prognose.laws import LAWS
 from elevon.prognose.measured import read_measured
 from elevon.prognose.mission import UNITS_OF_USE
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
     from elevon.recording import Recording
 
 __all__ = ["History", "HistoryEntry", "diagnosed", "read_history", "write_stamp"]
+
+_LONGEST = 2**24
+"""Bytes of an inspection's file; it has some ten thousand."""
 
 _KEYS = frozenset({"usage", "unit", "date", "serial", "reset", "logs", "healthy", "measured"})
 _OF_DIAGNOSIS = frozenset(
@@ -186,9 +190,9 @@ def _one(place: Path, what: str, names: Mapping[str, str], why: str) -> None:
 
 def _entry(path: Path) -> tuple[HistoryEntry, str] | None:
     try:
-        data = json.loads(path.read_text("utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+        data = json.loads(read_regular(path, _LONGEST))
+    except InputError:
+        raise
     except (ValueError, RecursionError) as error:
         raise FormatError(f"{path}: is not JSON: {error}") from error
     if not isinstance(data, dict) or "usage" not in data:

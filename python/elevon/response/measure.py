@@ -29,6 +29,7 @@ __all__ = [
 METHODS = ("multisine", "sweep")
 _MOST = 24  # lines of a multisine: about ten in a decade are read well from a plot
 _PERIODS = 2  # measured, after one in which the transient dies
+_WIDEST = 1e4  # highest frequency over lowest: a period of the one is sampled for the other
 _SAMPLES = 20  # a period of the highest frequency at least
 
 
@@ -175,8 +176,8 @@ class Multisine:
     def __init__(
         self, low: float, high: float, step: float, *, lines: int = _MOST, falling: bool = False
     ) -> None:
+        sample = _sample(low, high, step)
         multiples = np.unique(np.round(np.geomspace(1.0, high / low, lines))).astype(int)
-        sample = _sample(high, step)
         self._count = round(1.0 / (low * sample))
         self.period = self._count * sample
         self.frequency: Floats = multiples / self.period
@@ -219,7 +220,7 @@ class _Sweep:
     """A sine whose frequency rises in time, read by averaged spectra of overlapping stretches."""
 
     def __init__(self, low: float, high: float, step: float) -> None:
-        self.rate = 1.0 / _sample(high, step)
+        self.rate = 1.0 / _sample(low, high, step)
         self._stretch = int(2 ** np.ceil(np.log2(2.0 * self.rate / low)))
         self.duration = 8.0 * self._stretch / self.rate
         grid = np.fft.rfftfreq(self._stretch, 1.0 / self.rate)
@@ -245,8 +246,13 @@ class _Sweep:
         return rows[0], rows[1]
 
 
-def _sample(high: float, step: float) -> float:
+def _sample(low: float, high: float, step: float) -> float:
     """Return the time between samples: whole solver steps, enough of them for the highest line."""
+    if high > _WIDEST * low:
+        raise InputError(
+            f"low = {low:g} Hz: is more than {_WIDEST:g} times below high = {high:g} Hz; measure "
+            "the range in parts"
+        )
     steps = int(1.0 / (_SAMPLES * high * step) * (1.0 + 1e-9))
     if steps < 1:
         raise InputError(

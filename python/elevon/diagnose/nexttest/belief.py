@@ -16,9 +16,11 @@ from elevon.arrays import Floats
 from elevon.diagnose.bymodel.candidates import CANDIDATES, CandidateFault
 from elevon.diagnose.bymodel.posterior import PRIOR_FAULTY, SECOND
 from elevon.errors import FormatError, InputError
+from elevon.files import read_regular
 
 __all__ = ["Belief", "Possible", "read_result"]
 
+_LONGEST = 2**24  # bytes of a result; it has some ten thousand
 _LEAST = 1e-4  # weight that all sets have together that a result does not list
 _SMALL = 0.1  # root of the least severity over the greatest, where nothing is known of it
 _NINETY = 3.29  # deviations in a Gaussian's interval of 90 %
@@ -137,7 +139,7 @@ def read_result(path: str | Path) -> dict[str, Any]:
         No such file, no JSON, or no diagnosis of a rotary actuator.
     """
     try:
-        data = json.loads(Path(path).read_text("utf-8"))
+        data = json.loads(read_regular(path, _LONGEST))
         Answered.of(data)
     except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
         why = f"no {error}" if isinstance(error, KeyError) else str(error)

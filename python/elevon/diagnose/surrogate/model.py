@@ -247,6 +247,8 @@ class Surrogate:
             The file is absent, damaged, of another version or something else.
         """
         try:
+            if not Path(path).is_file():
+                raise ValueError("is no regular file")
             with zipfile.ZipFile(path) as archive:
                 if sum(item.file_size for item in archive.infolist()) > _MOST_BYTES:
                     raise ValueError(f"more than {_MOST_BYTES} bytes")

@@ -19,6 +19,7 @@ from typing import Any
 
 from elevon.documents import Document, check_depth, validated
 from elevon.errors import FormatError, InputError, did_you_mean, quoted
+from elevon.files import read_regular
 from elevon.logs.command.guess import FREE
 from elevon.logs.formats.limits import Limits, existing_file
 from elevon.scenario.bare import check_units
@@ -190,9 +191,7 @@ def _command(given: Mapping[str, Any], place: str, folder: Path | None) -> Comma
 
 
 def _document(file: Path) -> Mapping[str, Any]:
-    raw = file.read_bytes()[: _MOST_BYTES + 1]
-    if len(raw) > _MOST_BYTES:
-        raise FormatError(f"{file}: longer than {_MOST_BYTES} bytes; not a command note")
+    raw = read_regular(file, _MOST_BYTES)
     try:
         text = raw.decode("utf-8-sig")
         is_json = file.suffix.lower() == ".json" or text.lstrip().startswith("{")

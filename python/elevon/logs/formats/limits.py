@@ -77,6 +77,8 @@ def existing_file(path: str | Path, limits: Limits = DEFAULT_LIMITS) -> Path:
         size = file.stat().st_size
         with file.open("rb"):
             pass
+    except InputError:
+        raise
     except (OSError, ValueError) as error:
         raise InputError(f"{quoted(str(file))}: cannot be read: {error}") from error
     if size == 0:
