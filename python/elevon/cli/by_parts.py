@@ -193,6 +193,10 @@ def _print(result: PartsCalibration) -> None:
         ("parameter", "before", "after", "low", "high", "unit", "holds for"),
         [estimate_row(item, result.actuator) for item in result.estimates],
     )
+    if fidelity := result.facts.get("fidelity"):
+        share = result.facts.get("ripple_share")
+        why = "" if share is None else f" (the logs have {share:.2g} of the switching ripple)"
+        say(f"balances corrected by runs at --fidelity {fidelity}{why}")
     for reason in dict.fromkeys(result.undetermined.values()):
         names = [path for path, why in result.undetermined.items() if why == reason]
         text = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
