@@ -60,12 +60,12 @@ def read_description(path: Path) -> dict[str, Any] | None:
 
 def described_blocks(folder: Path) -> dict[str, dict[str, Any]]:
     """Return the descriptions of all blocks of a folder that have one, by name."""
-    found = {}
+    abouts = {}
     for path in sorted((folder / ENDS).glob("*.parquet")):
         about = read_description(path)
         if about is not None and about["name"] == path.stem:
-            found[path.stem] = about
-    return found
+            abouts[path.stem] = about
+    return abouts
 
 
 def described_item(folder: Path, about: Mapping[str, Any]) -> Item | None:

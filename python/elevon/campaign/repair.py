@@ -65,7 +65,7 @@ def repair(folder: Path) -> list[str]:
 
 
 @dataclass
-class _Found:
+class _Survey:
     """What a folder still holds, each part None where it is damaged or has gone."""
 
     folder: Path
@@ -94,15 +94,15 @@ class _Found:
 
 def repair_locked(folder: Path) -> list[str]:
     """Repair a folder that this process holds; see `repair`."""
-    found = _survey(folder)
-    if found.manifest is not None:
-        found.manifest.check_writable(folder)
-        moved = settle(folder, found.manifest.files)
-        found.done += [f"{name}: a change that was cut short is complete" for name in moved]
+    survey = _survey(folder)
+    if survey.manifest is not None:
+        survey.manifest.check_writable(folder)
+        moved = settle(folder, survey.manifest.files)
+        survey.done += [f"{name}: a change that was cut short is complete" for name in moved]
         if moved:
-            found = _survey(folder, found.done)
-    resolved = _resolved(found)
-    manifest = found.manifest or _manifest(found, resolved)
+            survey = _survey(folder, survey.done)
+    resolved = _resolved(survey)
+    manifest = survey.manifest or _manifest(survey, resolved)
     split_index(resolved, manifest.split)
     resolved.mark = manifest.plan_hash
     items, recovered = whole_blocks(folder, manifest)
@@ -110,11 +110,11 @@ def repair_locked(folder: Path) -> list[str]:
     missing = [block for block, name in enumerate(names) if name not in items]
     log = WorkLog(folder / LOG, manifest.plan_hash, items)
     work = CampaignWork(folder, resolved, manifest, log, missing, recovered)
-    _write(found, work)
-    return [*found.done, *(_lost(folder, names[block]) for block in missing if manifest.blocks)]
+    _write(survey, work)
+    return [*survey.done, *(_lost(folder, names[block]) for block in missing if manifest.blocks)]
 
 
-def _survey(folder: Path, done: list[str] | None = None) -> _Found:
+def _survey(folder: Path, done: list[str] | None = None) -> _Survey:
     """Read everything that can be read; nothing is believed yet."""
     manifest = None
     try:
@@ -132,34 +132,34 @@ def _survey(folder: Path, done: list[str] | None = None) -> _Found:
         contents.append(json.loads(read_regular(folder / RESOLVED, LONGEST)))
     if copy is not None:
         contents.append(json.loads(copy["resolved"]))
-    return _Found(folder, manifest, contents, copy, table, described_blocks(folder), done or [])
+    return _Survey(folder, manifest, contents, copy, table, described_blocks(folder), done or [])
 
 
-def _resolved(found: _Found) -> Resolved:
+def _resolved(survey: _Survey) -> Resolved:
     """Return the resolved plan that the plan's hash stands for."""
-    for resolved in _candidates(found):
-        if plan_hash(resolved) == found.mark:
+    for resolved in _candidates(survey):
+        if plan_hash(resolved) == survey.mark:
             return resolved
     raise FormatError(
-        f"{found.folder}: cannot be repaired: neither {RESOLVED} nor {PLAN} is that of the hash "
-        f"{found.mark[:12]}; elevon campaign run PLAN --out {found.folder} with the plan as it "
+        f"{survey.folder}: cannot be repaired: neither {RESOLVED} nor {PLAN} is that of the hash "
+        f"{survey.mark[:12]}; elevon campaign run PLAN --out {survey.folder} with the plan as it "
         "was makes both again, and simulates nothing that is whole"
     )
 
 
-def _candidates(found: _Found) -> Iterator[Resolved]:
+def _candidates(survey: _Survey) -> Iterator[Resolved]:
     """Yield what may be the resolved plan: its file, its copy, and the plan resolved anew."""
-    for content in found.contents if found.table is not None else []:
+    for content in survey.contents if survey.table is not None else []:
         try:
-            yield rebuilt(content, found.table)
+            yield rebuilt(content, survey.table)
         except (ElevonError, KeyError, TypeError, ValueError, AttributeError):
             continue
-    texts = [] if found.copy is None else [found.copy["plan"]]
+    texts = [] if survey.copy is None else [survey.copy["plan"]]
     with contextlib.suppress(InputError, ValueError):
-        texts.append(read_regular(found.folder / PLAN, LONGEST).decode("utf-8"))
+        texts.append(read_regular(survey.folder / PLAN, LONGEST).decode("utf-8"))
     for text in texts:
         try:
-            yield _resolved_anew(found.folder, text)
+            yield _resolved_anew(survey.folder, text)
         except (ElevonError, ValueError):
             continue
 
@@ -173,11 +173,11 @@ def _resolved_anew(folder: Path, text: str) -> Resolved:
     return resolve_plan(checked_plan(document), document)  # its folder holds no other files
 
 
-def _manifest(found: _Found, resolved: Resolved) -> Manifest:
+def _manifest(survey: _Survey, resolved: Resolved) -> Manifest:
     """Return the manifest that a folder must have had."""
     checked = check(resolved)
     edges = borders(checked.sizes, resolved.runs_per_file)
-    spans = sorted((about["first"], about["last"] + 1) for about in found.blocks.values())
+    spans = sorted((about["first"], about["last"] + 1) for about in survey.blocks.values())
     ends = [0, *(stop for _, stop in spans)]
     if [first for first, _ in spans] == ends[:-1] and ends[-1] == len(resolved):
         edges = ends
@@ -185,34 +185,34 @@ def _manifest(found: _Found, resolved: Resolved) -> Manifest:
     memory = max(int(checked.sizes[a:b].sum()) for a, b in itertools.pairwise(edges))
     cost = Cost(len(resolved), len(edges) - 1, edges, disk, memory, 0.0, checked)
     manifest = new_manifest(resolved, cost)
-    builds = {(about["version"], about["core"]) for about in found.blocks.values()}
+    builds = {(about["version"], about["core"]) for about in survey.blocks.values()}
     if len(builds) > 1:
-        raise FormatError(f"{found.folder}: cannot be repaired: its blocks are of several builds")
+        raise FormatError(f"{survey.folder}: cannot be repaired: its blocks are of several builds")
     for version, core in builds:
         manifest.version, manifest.core = version, core
-    found.done.append(
-        f"{MANIFEST}: rebuilt from {RESOLVED}, {RUNS} and {len(found.blocks)} block(s)"
+    survey.done.append(
+        f"{MANIFEST}: rebuilt from {RESOLVED}, {RUNS} and {len(survey.blocks)} block(s)"
     )
     return manifest
 
 
-def _write(found: _Found, work: CampaignWork) -> None:
+def _write(survey: _Survey, work: CampaignWork) -> None:
     """Write what is damaged; all that changes together, by one switch."""
     folder, manifest = work.folder, work.manifest
     damaged = Item("tables", manifest.files, {}).damaged(folder)
-    anew = found.manifest is None or bool(damaged)
-    found.done += [f"{name}: rebuilt" for name in damaged]
+    anew = survey.manifest is None or bool(damaged)
+    survey.done += [f"{name}: rebuilt" for name in damaged]
     running = manifest.status == "running"
     if anew:
-        plan = _plan_text(found, work, damaged)
+        plan = _plan_text(survey, work, damaged)
         if running and not work.missing:
             finish(work, plan)
-            found.done.append("all blocks are whole: the campaign is finished")
+            survey.done.append("all blocks are whole: the campaign is finished")
             return
         _write_tables(work, plan, damaged)
     if running and work.missing and _log_differs(work):
         work.log.rewrite()
-        found.done.append(f"{LOG}: rebuilt, {len(work.log.items)} block(s) are whole")
+        survey.done.append(f"{LOG}: rebuilt, {len(work.log.items)} block(s) are whole")
 
 
 def _write_tables(work: CampaignWork, plan: str, damaged: list[str]) -> None:
@@ -227,14 +227,14 @@ def _write_tables(work: CampaignWork, plan: str, damaged: list[str]) -> None:
         describe_anew(change, work.manifest)
 
 
-def _plan_text(found: _Found, work: CampaignWork, damaged: list[str]) -> str:
+def _plan_text(survey: _Survey, work: CampaignWork, damaged: list[str]) -> str:
     """Return the plan's text: the file where it is whole, else its copy."""
-    if found.manifest is not None and PLAN not in damaged:
+    if survey.manifest is not None and PLAN not in damaged:
         return read_regular(work.folder / PLAN, LONGEST).decode("utf-8")
-    if found.copy is not None:
-        return str(found.copy["plan"])
+    if survey.copy is not None:
+        return str(survey.copy["plan"])
     text = read_regular(work.folder / PLAN, LONGEST).decode("utf-8")
-    if plan_hash(_resolved_anew(work.folder, text)) != found.mark:
+    if plan_hash(_resolved_anew(work.folder, text)) != survey.mark:
         raise FormatError(f"{work.folder}: cannot be repaired: {PLAN} is not as it was written")
     return text
 

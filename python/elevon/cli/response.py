@@ -143,13 +143,13 @@ def _finish(
 
 def _print_loop(measured: LoopResponse) -> None:
     """Print the margins with their intervals, and what to think of them."""
-    found = measured.margins
+    margins = measured.margins
     rows = []
     for name, unit, margin in (
-        ("crossover", "Hz", found.crossover),
-        ("phase margin", "deg", found.phase),
-        ("gain margin", "dB", found.gain),
-        ("disk margin", "1", found.disk),
+        ("crossover", "Hz", margins.crossover),
+        ("phase margin", "deg", margins.phase),
+        ("gain margin", "dB", margins.gain),
+        ("disk margin", "1", margins.disk),
     ):
         ends = ["", ""] if margin.interval is None else [f"{x:.4g}" for x in margin.interval]
         value = "not reached" if margin.value is None else f"{margin.value:.4g}"

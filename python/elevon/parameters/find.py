@@ -56,12 +56,12 @@ def find_set(reference: str | os.PathLike[str], folder: Path | None = None) -> P
     if text in known:
         return known[text]
     near = [place / f"{text}.toml" for place in (folder or Path(), Path())]
-    found = next((path for path in near if _is_file(path)), None)
-    if found is None:
+    path = next((place for place in near if _is_file(place)), None)
+    if path is None:
         error = unknown("actuator", text, known)
         where = near[0]
         raise UnknownNameError(f"{error}; or write {where}", error.name, error.nearest)
-    return found
+    return path
 
 
 def _file(text: str, folder: Path | None) -> Path:

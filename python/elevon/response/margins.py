@@ -104,27 +104,27 @@ def margins(frequency: Floats, loop: Complex, std: Floats, seed: int = 0) -> Mar
     return Margins(crossover, phase, gain, disk)
 
 
-_Found = tuple[float, float] | None
+_Point = tuple[float, float] | None
 
 
 def _with_interval(
-    reader: Callable[[Floats, Complex], _Found],
+    reader: Callable[[Floats, Complex], _Point],
     frequency: Floats,
     loop: Complex,
     draws: list[Complex],
 ) -> Margin:
     """Return a margin; an interval only where nearly all draws reach it, too."""
-    found = reader(frequency, loop)
-    if found is None:
+    point = reader(frequency, loop)
+    if point is None:
         return Margin(None, None, None)
     values = [item[0] for draw in draws if (item := reader(frequency, draw)) is not None]
     if len(values) < LEVEL * _DRAWS:
-        return Margin(found[0], None, found[1])
+        return Margin(point[0], None, point[1])
     low, high = np.quantile(values, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0])
-    return Margin(found[0], (float(low), float(high)), found[1])
+    return Margin(point[0], (float(low), float(high)), point[1])
 
 
-def _crossover(frequency: Floats, loop: Complex) -> _Found:
+def _crossover(frequency: Floats, loop: Complex) -> _Point:
     level = np.log(np.abs(loop))
     above = np.flatnonzero(level >= 0.0)
     if not above.size or above[-1] == len(level) - 1:
@@ -133,15 +133,15 @@ def _crossover(frequency: Floats, loop: Complex) -> _Found:
     return at, at
 
 
-def _phase(frequency: Floats, loop: Complex) -> _Found:
-    found = _crossover(frequency, loop)
-    if found is None:
+def _phase(frequency: Floats, loop: Complex) -> _Point:
+    point = _crossover(frequency, loop)
+    if point is None:
         return None
-    phase = np.interp(np.log(found[0]), np.log(frequency), _turned(loop))
-    return float(180.0 + np.rad2deg(phase)), found[0]
+    phase = np.interp(np.log(point[0]), np.log(frequency), _turned(loop))
+    return float(180.0 + np.rad2deg(phase)), point[0]
 
 
-def _gain(frequency: Floats, loop: Complex) -> _Found:
+def _gain(frequency: Floats, loop: Complex) -> _Point:
     """Where the phase passes -180 degrees with the largest gain below one."""
     beyond = _turned(loop) + np.pi
     gain = np.log(np.abs(loop))
@@ -154,7 +154,7 @@ def _gain(frequency: Floats, loop: Complex) -> _Found:
     return min(rows) if rows else None
 
 
-def _disk(frequency: Floats, loop: Complex) -> _Found:
+def _disk(frequency: Floats, loop: Complex) -> _Point:
     grid = np.log(frequency)
     share = np.arange(_FINE) / _FINE
     fine = np.append((grid[:-1, None] + np.diff(grid)[:, None] * share).ravel(), grid[-1])

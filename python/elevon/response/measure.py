@@ -208,8 +208,8 @@ class Multisine:
         """Return a signal at the lines, averaged over the measured periods, one row."""
         count = self._count
         values = recording[name].values[count : count * (1 + _PERIODS)] - mean
-        found = np.fft.rfft(values.reshape(_PERIODS, count), axis=1)
-        return found[:, self._multiples].mean(axis=0, keepdims=True)
+        spectrum = np.fft.rfft(values.reshape(_PERIODS, count), axis=1)
+        return spectrum[:, self._multiples].mean(axis=0, keepdims=True)
 
     def spectra(self, recording: Recording, output: str, bias: float) -> tuple[Any, Any]:
         """Return input and output at the lines."""

@@ -65,6 +65,6 @@ class Reader:
         if self.gains:
             values: dict[str, str | float] = {**as_values(motor.levels)}
             ready = self.settled.with_values(values, source="calibration")
-            found, missing = gains_by_current(logs, ready, motor)
-            levels, reasons = levels | found, reasons | missing
+            gains, missing = gains_by_current(logs, ready, motor)
+            levels, reasons = levels | gains, reasons | missing
         return Reading(levels, reasons, motor, balance)
