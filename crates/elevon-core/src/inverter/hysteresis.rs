@@ -50,6 +50,20 @@ pub fn crossing<S: Scalar>(half_band: S, legs: [S; 3], start: [S; 3], end: [S; 3
     Some((first, three!(|j| crossed[j] & shares[j].le(first))))
 }
 
+/// Squares of the three phases' ripple under relays, summed, over the square of the band that the currents fill: of the limit
+/// cycle of three relays with a floating neutral, hardly dependent on voltage and speed (docs/theory/low-fidelity.md).
+const RIPPLE: f64 = 1.2;
+/// Overshoot behind a filter of the measured currents, over its time constant and V/L.
+const OVERSHOOT: f64 = 0.37;
+
+/// Sum of the squares of the ripple that relays leave beside the phases' mean currents, A^2. `delay` is the time constant of a
+/// filter of the measured currents, `slope` the link's voltage over a winding's inductance.
+#[inline(always)]
+pub fn ripple_square<S: Scalar>(half_band: S, delay: S, slope: S) -> S {
+    let filled = S::splat(OVERSHOOT) * delay * slope + half_band;
+    S::splat(RIPPLE) * filled * filled
+}
+
 /// References of a six-step drive per ampere: 1 on [30, 150), -1 on [210, 330) degrees of each phase angle, else 0,
 /// from the sines of the three angles.
 #[inline(always)]
@@ -92,5 +106,53 @@ mod tests {
         let (share, _) = crossing(0.5, legs, [-0.6, 0.0, 0.0], [-0.8, 0.0, 0.0]).unwrap_or((1.0, [false; 3]));
         assert_eq!(share, 0.0);
         assert!(crossing(0.5, [0.0; 3], [-0.4; 3], [-0.8; 3]).is_none());
+    }
+
+    /// Own integration of three relays on L de/dt = V (leg - mean leg) - v sin(theta - j 2 pi/3), errors in half bands and
+    /// times in h L/V, seen through a filter: sum of the squares beside the mean in the rotating frame.
+    fn integrated(voltage: f64, turning: f64, filter: f64) -> f64 {
+        let (dt, steps) = (0.02, 1_000_000);
+        let share = if filter > 0.0 { 1.0 - (-dt / filter).exp() } else { 1.0 };
+        let (mut e, mut seen, mut legs) = ([0.0; 3], [0.0; 3], [-1.0; 3]);
+        let (mut square, mut q, mut d, mut n) = (0.0, 0.0, 0.0, 0.0);
+        for k in 0..steps {
+            let angle = turning * dt * f64::from(k);
+            let phases: [f64; 3] = std::array::from_fn(|j| angle - std::f64::consts::TAU / 3.0 * j as f64);
+            for j in 0..3 {
+                seen[j] += share * (e[j] - seen[j]);
+            }
+            legs = relays(1.0, legs, seen.map(|x: f64| -x));
+            if k > steps / 10 {
+                for j in 0..3 {
+                    square += e[j] * e[j];
+                    q += 2.0 / 3.0 * e[j] * phases[j].sin();
+                    d -= 2.0 / 3.0 * e[j] * phases[j].cos();
+                }
+                n += 1.0;
+            }
+            let mean = (legs[0] + legs[1] + legs[2]) / 3.0;
+            for j in 0..3 {
+                e[j] += dt * (0.5 * (legs[j] - mean) - voltage * phases[j].sin());
+            }
+        }
+        square / n - 1.5 * (q * q + d * d) / (n * n)
+    }
+
+    #[test]
+    fn the_ripple_of_three_relays_hardly_depends_on_voltage_and_speed() {
+        for voltage in [0.03, 0.1, 0.25] {
+            for turning in [0.0016, 0.0064] {
+                let found = integrated(voltage, turning, 0.0);
+                assert!((found / ripple_square(1.0, 0.0, 1.0) - 1.0).abs() < 0.1, "{voltage} {turning}: {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_filter_of_the_measured_currents_lets_them_overshoot() {
+        for filter in [0.3, 1.0, 2.0, 4.0, 6.4] {
+            let found = integrated(0.1, 0.003, filter);
+            assert!((found / ripple_square(1.0, filter, 1.0) - 1.0).abs() < 0.1, "{filter}: {found}");
+        }
     }
 }

@@ -131,6 +131,8 @@ pub struct Drive<S> {
     pub trip_current: S,
     /// Largest excess of a phase current over its reference.
     pub half_band: S,
+    /// Time constant of the filter of the currents that relays see.
+    pub filter_time: S,
     /// One over the gain of each current sensor; none of an interrupted phase.
     pub weight: [S; 3],
     pub gain: [S; 3],
@@ -203,11 +205,18 @@ impl<S: Scalar> Drive<S> {
                 DriveKind::Hysteresis => at(InverterParameter::HysteresisBand.at()),
                 DriveKind::Pwm | DriveKind::Off => zero,
             },
+            filter_time: time_constant(at(CurrentSensorParameter::Bandwidth.at())),
             weight: three!(|j| S::select(half.le(star.open[j]), zero, followed[j])),
             gain,
             link: DcLink::derive(Raw(raw).link(), dt),
         }
     }
+}
+
+/// Of a first-order filter; none where there is no filter.
+fn time_constant<S: Scalar>(bandwidth: S) -> S {
+    let there = S::zero().lt(bandwidth);
+    S::select(there, S::one() / (S::splat(std::f64::consts::TAU) * S::select(there, bandwidth, S::one())), S::zero())
 }
 
 /// Largest phase voltage of a min-max modulated carrier drive over its link: 1 / sqrt 3, less the fundamental of the

@@ -9,6 +9,7 @@ use super::phase::{phase, Phase};
 use super::relays::{mean_error, within_band, TorqueDemand};
 use crate::actuator::servo::advance::{Instant, Stepper};
 use crate::actuator::servo::layout::DriveKind;
+use crate::inverter::hysteresis::ripple_square;
 use crate::scalar::Scalar;
 use crate::sensor::filter::low_pass;
 use crate::three;
@@ -39,9 +40,10 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
     }
     let current_ref = s.torque_ref * m.control.per_torque_constant;
     let circuit = &p.circuit;
+    let coasting = circuit.current(s.current, -emf);
     let target = match structure.drive {
         // The relays act only at the edges of their band; inside it the EMF drives the current.
-        DriveKind::Hysteresis => circuit.current(s.current, -emf).clamp(current_ref - band, current_ref + band),
+        DriveKind::Hysteresis => coasting.clamp(current_ref - band, current_ref + band),
         DriveKind::Pwm => s.current + m.drive.tracking * (current_ref - s.current),
         DriveKind::Off => S::zero(),
     };
@@ -84,6 +86,13 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
         (s.motor_torque, s.voltage) = (x.torque, x.voltage);
         (loss, power) = (x.copper, x.drawn);
     }
+    if EXTRA && structure.heat && structure.drive == DriveKind::Hysteresis {
+        // Relays that switch leave a ripple, which heats and makes no mean torque.
+        let idle = if structure.driven { resting(&s.driven.legs) } else { target.equals(coasting) | limited };
+        let ripple = ripple_square(m.drive.half_band, m.drive.filter_time, supply / m.cold[2]) * p.circuit.resistance;
+        let heat = S::select(idle, S::zero(), ripple);
+        (loss, power) = (loss + heat, power + heat);
+    }
     if EXTRA && structure.passive {
         (loss, power) = without_gates(m, structure, supply, s, p, phases, [loss, power]);
     }
@@ -102,6 +111,13 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
         s.network.collected[0] = s.network.collected[0] + heat;
         s.copper = s.copper + heat;
     }
+}
+
+/// Do all legs rest, by their mean voltages?
+#[inline(always)]
+fn resting<S: Scalar>(legs: &[S; 3]) -> S::Mask {
+    let zero = S::zero();
+    legs[0].equals(zero) & legs[1].equals(zero) & legs[2].equals(zero)
 }
 
 /// Trips the drive, and where the bridge has no gates lets the EMFs drive the windings. Copper loss of the step and power drawn from
