@@ -252,7 +252,7 @@ def test_it_serves_the_rotary_actuator_too() -> None:
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        ({"thermal.convection": 0.0, "thermal.emissivity": 0.0}, ["thermal.convection", "path out"]),
+        ({"thermal.convection": 0.0, "thermal.emissivity": 0.0}, ["thermal.convection", "no path"]),
         ({"thermal.trip": "400 K"}, ["thermal.trip", "400", "403.15"]),
         ({"thermal.warning": "290 K"}, ["thermal.warning", "290", "293.15"]),
         ({"thermal.emissivity": 1.2}, ["thermal.emissivity", "1"]),

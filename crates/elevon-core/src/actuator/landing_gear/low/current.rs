@@ -121,10 +121,18 @@ pub(super) fn third_current<S: Scalar>(m: &Model<S>, p: &Pair<S>, s: &Body<S>, d
     Third { shared: conducts * (half * peak * off + falls * (last - half * fall * falls)), alone: conducts * half * (peak + last) * lasts }
 }
 
-/// Line current that gives the mean torque of the windings shorted by the low switches: 3/2 k_1^2 w R/(R^2 + (p w L)^2)
-/// with the fundamental k_1 of the EMF, up to the current cut-off.
+/// Windings shorted by the low switches.
+pub(super) struct Shorted<S: Scalar> {
+    /// Line current that gives their mean torque.
+    pub(super) line: S,
+    /// The cut-off opens the switches again and again.
+    pub(super) chopped: S::Mask,
+}
+
+/// Mean torque of the windings shorted by the low switches: 3/2 k_1^2 w R/(R^2 + (p w L)^2) with the fundamental k_1 of the
+/// EMF, up to the current cut-off.
 #[inline(always)]
-pub(super) fn shorted_current<S: Scalar>(m: &Model<S>, p: &Pair<S>, s: &Body<S>) -> S {
+pub(super) fn shorted_current<S: Scalar>(m: &Model<S>, p: &Pair<S>, s: &Body<S>) -> Shorted<S> {
     let (half, one) = (S::splat(0.5), S::one());
     let constant = S::select(p.constant.equals(S::zero()), one, p.constant);
     let fundamental = S::splat(FUNDAMENTAL * 0.5) * constant;
@@ -135,5 +143,29 @@ pub(super) fn shorted_current<S: Scalar>(m: &Model<S>, p: &Pair<S>, s: &Body<S>)
     let torque = S::splat(1.5) * fundamental * fundamental * speed * resistance / impedance;
     // No cut-off opens a short across the terminals.
     let limit = S::select(half.lt(m.terminals), S::splat(1e9), m.c.cutoff);
-    -(torque / constant).clamp_abs(limit)
+    let line = torque / constant;
+    // The cut-off looks at the phase currents, whose amplitude is more than what brakes of them.
+    let amplitude = (fundamental * speed).abs() / impedance.sqrt();
+    Shorted { line: -line.clamp_abs(limit), chopped: limit.lt(amplitude) }
+}
+
+/// Where the power that shorted windings brake goes: their copper, switches and diodes, and the link.
+pub(super) struct Braked<S> {
+    pub(super) copper: S,
+    pub(super) drops: S,
+    pub(super) drawn: S,
+}
+
+/// Below the cut-off all of it becomes heat in the windings' own circuit. Beyond, the windings are a boost converter: a current
+/// held at the cut-off heats its circuit by 2 R i^2, and the rest flows through two diodes to the link while all switches are off.
+#[inline(always)]
+pub(super) fn braked_power<S: Scalar>(m: &Model<S>, p: &Pair<S>, s: &State<S>, chopped: S::Mask) -> Braked<S> {
+    let (zero, one) = (S::zero(), S::one());
+    let power = -(p.constant * s.body.motion.motor_speed * s.current);
+    let heat = S::select(chopped, (p.resistance * s.current * s.current).minimum(power), power);
+    let diodes = m.diode_drop + m.diode_drop;
+    let returned = power - heat;
+    let lost = returned * diodes / (s.body.link + diodes).maximum(one);
+    let share = p.winding / S::select(zero.lt(p.resistance), p.resistance, one);
+    Braked { copper: heat * share, drops: heat * (one - share) + lost, drawn: lost - returned }
 }

@@ -5,7 +5,7 @@ mod current;
 mod handover;
 mod pair;
 
-use self::current::{mean_current, shorted_current, third_current, Lag};
+use self::current::{braked_power, mean_current, shorted_current, third_current, Lag};
 use self::handover::{hand_over, handed_over, Handover};
 use self::pair::pair;
 use super::body::{Body, Constants, Structure, E_COPPER, E_INVERTER};
@@ -62,10 +62,13 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
     let mut current = mean_current(m, structure.chopping, &p, s, duty * (one - s.tripped));
     let shorted = m.terminals.maximum(s.body.short * (one - s.tripped));
     let short = half.lt(shorted) & half.lt(p.closed);
+    let mut chopped = S::mask(false);
     if S::any(short) {
         let inductance = S::select(zero.lt(p.inductance), p.inductance, one);
         let lag = Lag { share: (dt * p.resistance / inductance).minimum(one), from: s.current };
-        current = S::select(short, lag.to(shorted_current(m, &p, &s.body)), current);
+        let windings = shorted_current(m, &p, &s.body);
+        chopped = windings.chopped;
+        current = S::select(short, lag.to(windings.line), current);
     }
     if structure.shorted {
         // Driving into shorted terminals is a short of the link.
@@ -96,12 +99,10 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
     let mut drops = i.abs() * (one - duty) * drop + (p.resistance - p.winding) * square + third_torque * speed;
     let mut drawn = (driving - third_torque) * speed + winding + drops;
     if S::any(short) {
-        // All that a shorted winding brakes becomes heat in its own circuit.
-        let heat = -(p.constant * speed * i);
-        let share = p.winding / S::select(zero.lt(p.resistance), p.resistance, one);
-        winding = S::select(short, heat * share, winding);
-        drops = S::select(short, heat * (one - share), drops);
-        drawn = S::select(short, zero, drawn);
+        let braked = braked_power(m, &p, s, chopped);
+        winding = S::select(short, braked.copper, winding);
+        drops = S::select(short, braked.drops, drops);
+        drawn = S::select(short, braked.drawn, drawn);
     }
     let bus = drawn / s.body.link.maximum(one);
     if structure.accounts {
