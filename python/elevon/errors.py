@@ -152,7 +152,7 @@ class DivergedError(SimulationError):
 
 
 class Interrupted(ElevonError):  # noqa: N818 - an interruption is wanted, it is no error
-    """The work was stopped by the user before its end."""
+    """The work was stopped by the caller before its end."""
 
     exit_code: ClassVar[int] = 130
 

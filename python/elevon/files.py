@@ -2,7 +2,7 @@
 
 The content goes to a temporary file in the same folder, is forced to the disk, and takes its name
 in one step. A process killed at any moment leaves the old file, the new one, or none; never a
-half one. An existing file is replaced only when asked for (`force`).
+half one. An existing file is replaced only with `force`.
 """
 
 import errno

@@ -140,7 +140,7 @@ def record_plan(
         A signal the model does not have.
     InputError
         The rate is no whole number of steps (the nearest possible rates are named), or a signal
-        is asked for at two rates.
+        is given at two rates.
     """
     if record is None:
         record = DEFAULT_GEAR_RECORD if "fault_code" in units else DEFAULT_RECORD

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -10,6 +11,7 @@ from elevon.campaign.describe import describe, typical_runs
 from elevon.errors import ElevonError
 from elevon.memory import format_bytes
 from elevon.report import Report, ReportTable, Section
+from elevon.report.cells import markdown_text
 
 __all__ = ["card_texts"]
 
@@ -81,8 +83,9 @@ def _shape(item: dict[str, Any]) -> list[object]:
 
 
 def _markdown(about: dict[str, Any], ds: Dataset) -> str:
-    lines = [f"# {about['name']}", "", about["text"] or "Simulated runs of one actuator.", ""]
-    lines += [f"* {fact}" for fact in _facts(about)]
+    text = markdown_text(about["text"] or "Simulated runs of one actuator.")
+    lines = [f"# {markdown_text(about['name'])}", "", text, ""]
+    lines += [f"* {markdown_text(fact)}" for fact in _facts(about)]
     lines += [
         "* `plan.toml` is the plan as given, `resolved.json` all that it means,",
         "  `manifest.json` every file with its SHA-256; `elevon dataset verify` checks them.",
@@ -105,7 +108,7 @@ def _markdown(about: dict[str, Any], ds: Dataset) -> str:
 def _code(ds: Dataset) -> str:
     return (
         "import elevon\n\n"
-        f'ds = elevon.load_campaign("{ds.folder.name}")\n'
+        f"ds = elevon.load_campaign({json.dumps(ds.folder.name)})\n"
         "runs = ds.runs.to_pandas()       # one row a run: faults in SI, 0 when absent\n"
         + (
             "signals = ds.signals.to_pandas(runs=[0])"
@@ -120,20 +123,22 @@ def _md_table(title: str, titles: Sequence[str], rows: Sequence[Sequence[object]
         yield from ("", f"## {title}", "", f"| {' | '.join(titles)} |", "|---" * len(titles) + "|")
         for row in rows:
             cells = [f"{cell:.5g}" if isinstance(cell, float) else str(cell) for cell in row]
-            yield f"| {' | '.join(cell.replace('|', '/') for cell in cells)} |"
+            yield f"| {' | '.join(map(markdown_text, cells))} |"
 
 
 def _not_acting(about: dict[str, Any]) -> Iterator[str]:
     if about["not_acting"]:
         yield from ("", "## Set, but without effect", "")
-        yield from (f"* {text}" for text in about["not_acting"])
+        yield from (f"* {markdown_text(text)}" for text in about["not_acting"])
 
 
 def _failed(about: dict[str, Any]) -> Iterator[str]:
     if about["failed"]:
         yield from ("", "## Runs that failed", "")
         listed = about["failed"][:_FAILED_LISTED]
-        yield from (f"* run {f['run']}: {f['status']}: {f['reason']}" for f in listed)
+        yield from (
+            f"* run {f['run']}: {f['status']}: {markdown_text(f['reason'])}" for f in listed
+        )
         if len(about["failed"]) > len(listed):
             yield "* and more: see `status` and `reason` in `runs.parquet`"
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from elevon.campaign.part import Part
 from elevon.campaign.resolved_file import read_resolved
 from elevon.campaign.runs_table import RUNS
 from elevon.campaign.store import Manifest, read_manifest, work_log
@@ -17,7 +17,7 @@ from elevon.errors import FormatError, InputError, unknown
 from elevon.recording.old import warn_of_old_names
 from elevon.retired import current
 from elevon.transaction import located
-from elevon.worklog import Item, digest
+from elevon.worklog import Item
 
 if TYPE_CHECKING:
     import duckdb
@@ -31,30 +31,6 @@ if TYPE_CHECKING:
     from elevon.recording import Recording
 
 __all__ = ["Dataset", "Table", "load_campaign", "load_run"]
-
-
-@dataclass(frozen=True)
-class Part:
-    """One file of a table: the runs it holds, and what it must be (size, SHA-256) if known."""
-
-    path: Path
-    first: int
-    last: int
-    about: Mapping[str, Any] | None
-
-    def check(self) -> None:
-        """Raise `FormatError` unless the file is as it was written."""
-        try:
-            stat = self.path.stat()
-        except OSError as error:
-            raise FormatError(f"{self.path}: cannot be read: {error.strerror}") from error
-        if self.about is not None and _mark(self.path, stat.st_mtime_ns) != self.about["sha256"]:
-            raise FormatError(f"{self.path}: is not as it was written (SHA-256)")
-
-
-@lru_cache(maxsize=4096)
-def _mark(path: Path, stamp: int) -> str:  # noqa: ARG001 - a changed file is read anew
-    return str(digest(path)["sha256"])
 
 
 @dataclass(frozen=True)

@@ -98,7 +98,7 @@ def random_values(plan: Random, repeats: int, wiring: str, place: str) -> list[t
     Raises
     ------
     InputError
-        As `axis_values`; also when a Sobol sequence is asked for a count that is no power of two.
+        As `axis_values`; also when a Sobol sequence is given a count that is no power of two.
     """
     points = sample(plan.method, (plan.count, 2 * len(plan.draw)), plan.seed, repeats, place)
     columns = []

@@ -15,6 +15,7 @@ from elevon.files import atomic_path, check_output
 from elevon.recording import Channel, Recording
 from elevon.recording.formats import check_ending, files_of
 from elevon.recording.names import LONGEST_NAME
+from elevon.report.cells import quoted_columns
 
 __all__ = ["export", "identifiers", "run_numbers"]
 
@@ -145,7 +146,7 @@ def _write_table(ds: Dataset, path: Path, numbers: Sequence[int], *, force: bool
 
             units = ds.runs.units
             heads = [f"{c} [{units[c]}]" if units.get(c) else c for c in table.column_names]
-            write_csv(table.rename_columns(heads), temporary)
+            write_csv(quoted_columns(table.rename_columns(heads)), temporary)
         elif path.suffix == ".nc":
             ds.runs.to_xarray(runs=numbers).to_netcdf(temporary, engine="h5netcdf")
         else:

@@ -162,7 +162,7 @@ class Power(Strict):
     alpha : float
         Probability of calling an effect where there is none.
     terms : tuple of str
-        Effects asked about, such as ``A`` or ``A:B``; default every factor.
+        Effects of interest, such as ``A`` or ``A:B``; default every factor.
     """
 
     response: StrictStr = ""
@@ -202,7 +202,7 @@ class Design(Strict):
     centre : int
         Centre points of a two-level design, per replicate.
     file : str
-        CSV of a user's table: a line of letters or names, a row a point.
+        CSV of your own table: a line of letters or names, a row a point.
     """
 
     kind: Literal[

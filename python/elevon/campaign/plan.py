@@ -19,7 +19,7 @@ class Plan(Strict):
     """A campaign plan.
 
     The runs are all combinations of units, ages, cases, axes, draws (or the points of the design)
-    and seeds. What a run sets where it cannot act is an error, unless `allow_not_acting`.
+    and seeds. What a run sets where it has no effect is an error, unless `allow_not_acting`.
 
     Attributes
     ----------

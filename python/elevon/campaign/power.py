@@ -22,16 +22,16 @@ def power_rows(
     names: Sequence[str],
     place: str,
 ) -> list[dict[str, Any]]:
-    """Return the power of each effect asked about.
+    """Return the power of each effect of interest.
 
-    The model has a mean, the blocks, every factor and the interactions asked about; the effect is
+    The model has a mean, the blocks, every factor and the interactions of interest; the effect is
     tested by Student's t, two-sided. Under the alternative t is noncentral with
     effect / (2 sd sqrt(v)), v the effect's diagonal entry of (X' X)^-1 (Montgomery, Design and
     Analysis of Experiments, ch. 3 and 10).
 
     Parameters
     ----------
-    asked : Power
+    request : Power
         Size of the effect, spread, level, terms.
     coded : ndarray, shape (runs, factors)
         The design, -1 to +1.

@@ -94,13 +94,13 @@ class _Survey:
 
 def repair_locked(folder: Path) -> list[str]:
     """Repair a folder that this process holds; see `repair`."""
-    survey = _survey(folder)
+    survey = _surveyed(folder)
     if survey.manifest is not None:
         survey.manifest.check_writable(folder)
         moved = settle(folder, survey.manifest.files)
         survey.done += [f"{name}: a change that was cut short is complete" for name in moved]
         if moved:
-            survey = _survey(folder, survey.done)
+            survey = _surveyed(folder, survey.done)
     resolved = _resolved(survey)
     manifest = survey.manifest or _manifest(survey, resolved)
     split_index(resolved, manifest.split)
@@ -114,7 +114,7 @@ def repair_locked(folder: Path) -> list[str]:
     return [*survey.done, *(_lost(folder, names[block]) for block in missing if manifest.blocks)]
 
 
-def _survey(folder: Path, done: list[str] | None = None) -> _Survey:
+def _surveyed(folder: Path, done: list[str] | None = None) -> _Survey:
     """Read everything that can be read; nothing is believed yet."""
     manifest = None
     try:

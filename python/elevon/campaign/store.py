@@ -48,7 +48,7 @@ class Manifest:
     faults, columns : list of dict
         Label columns; varied quantities with kind, unit and role.
     not_acting : list of str
-        What is set where it cannot act, allowed by the plan.
+        What is set where it has no effect, allowed by the plan.
     sources : dict
         Files that the plan named, with the SHA-256 of their content.
     files : dict

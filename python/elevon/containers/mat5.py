@@ -76,7 +76,7 @@ class _Source:
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """A variable or field: its heading, and its content, decoded only when asked for.
+    """A variable or field: its heading, and its content, decoded on demand.
 
     Attributes
     ----------

@@ -119,7 +119,7 @@ def feature_plans(
     UnknownNameError
         No such feature or family.
     InputError
-        A feature needs a signal that the model does not have, or a higher rate; or is asked for at
+        A feature needs a signal that the model does not have, or a higher rate; or is wanted at
         two rates; or the rate is no whole number of steps.
     """
     texts = (features,) if isinstance(features, str) else tuple(features or ())

@@ -88,7 +88,7 @@ def wanted_records(
     Returns
     -------
     list of FeatureRecord, list of str
-        In the order asked for, each once; and the names of those asked for that cannot be. A
+        In the order given, each once; and the names of those given that cannot be. A
         feature of a family, or of ``all``, that lacks a column or the rate is left out.
 
     Raises

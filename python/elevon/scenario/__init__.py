@@ -1,4 +1,4 @@
-"""Scenarios: what is asked of an actuator, what acts on it, and what breaks."""
+"""Scenarios: what an actuator is commanded, what acts on it, and what breaks."""
 
 from elevon.scenario.compile import CompiledScenario, compile_scenario
 from elevon.scenario.scenario import Action, Command, Load, Scenario, Term, Terms

@@ -203,14 +203,14 @@ Values = Annotated[dict[str, Quantity], BeforeValidator(_flat)]
 
 
 class Scenario(_Frozen):
-    """What is asked of an actuator, what acts on it, what breaks, and for how long.
+    """What an actuator is commanded, what acts on it, what breaks, and for how long.
 
     Attributes
     ----------
     duration : float or str
         Simulated time; a bare number is in s.
     command : Command
-        Mode and sum of waveforms; nothing asked means a constant zero.
+        Mode and sum of waveforms; no command means a constant zero.
     loads : Load
         Key ``load`` of the file: loads on the motor shaft and the output side.
     supply : Terms

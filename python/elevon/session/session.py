@@ -42,7 +42,7 @@ class Session:
         wiring: every reading then is an array of shape (runs,), every value set may be one.
     scenario : Scenario, mapping or path, optional
         What acts at the start, such as waveforms of loads; its duration does not count. Without it
-        nothing is asked: a constant zero command.
+        the command is a constant zero.
     fidelity : str
         ``high`` or ``low``.
     mode : str, optional

@@ -46,7 +46,7 @@ def simulate(
     actuator : Actuator, str or path
         What moves; a name or a path is loaded.
     scenario : Scenario, mapping, path or None
-        What it is asked, what acts on it, what breaks, for how long: a `Scenario`, a mapping of the
+        Command, loads, faults and duration: a `Scenario`, a mapping of the
         same form as the file, or a file. None: the actuator's own default scenario.
     fidelity : str
         ``high`` or ``low``.
@@ -213,7 +213,7 @@ _MOST_THREADS = 1024
 
 
 def checked_threads(threads: int | None) -> int:
-    """Return how many threads are started: as many as asked for, at most one a core.
+    """Return how many threads are started: as many as given, at most one a core.
 
     Raises
     ------

@@ -62,7 +62,7 @@ def shown_drives(actuator: Actuator) -> tuple[str, ...]:
 
 
 def resting(actuator: Actuator, record: FaultRecord) -> list[Resting]:
-    """Return where a fault cannot act in an actuator: fidelities and drives, each with its reason.
+    """Return where a fault has no effect: fidelities and drives, each with its reason.
 
     Parameters
     ----------

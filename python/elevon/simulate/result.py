@@ -127,7 +127,7 @@ def _meta(run: Run, prepared: Prepared, fidelity: str, result: Mapping[str, Any]
 
 
 def _features(prepared: Prepared, result: Mapping[str, Any]) -> dict[str, Any]:
-    """Features of the run, None where there is none; nothing where none were asked for."""
+    """Features of the run, None where there is none; nothing where none were requested."""
     if not prepared.features:
         return {}
     values = {
