@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from elevon.report.checks import Check, all_passed
+from elevon.report.policy import policy
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -243,10 +244,15 @@ class Report:
         environment = jinja2.Environment(
             autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
         )
-        template = environment.from_string((folder / "report.html.j2").read_text("utf-8"))
+        source = (folder / "report.html.j2").read_text("utf-8")
         style = (folder / "style.css").read_text("utf-8")
-        return template.render(
-            report=self, style=style, entries=self._provenance, assets=self._assets()
+        assets = self._assets()
+        return environment.from_string(source).render(
+            report=self,
+            style=style,
+            entries=self._provenance,
+            assets=assets,
+            policy=policy(assets, source),
         )
 
     def _assets(self) -> str:

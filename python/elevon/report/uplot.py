@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
+from elevon.report.policy import policy
 
 __all__ = ["assets", "chart", "page", "thinned"]
 
@@ -188,7 +189,6 @@ def page(title: str, body: str) -> str:
     body : str
         HTML, such as charts one after the other; taken as it is.
     """
-    policy = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
     look = (
         ":root { color-scheme: light dark; } body { margin: 1.5rem auto; max-width: 75rem; "
         "padding: 0 1rem; background: Canvas; color: CanvasText; } "
@@ -196,7 +196,7 @@ def page(title: str, body: str) -> str:
     )
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-        f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy(assets())}">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{escape(title)}</title><style>{look}</style>\n{assets()}</head>\n"
         f"<body><h1>{escape(title)}</h1>\n{body}\n</body></html>\n"

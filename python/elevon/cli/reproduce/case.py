@@ -131,11 +131,12 @@ def _write(out: Path, report: Report, rows: list[Values], force: bool) -> None:
     import io
 
     from elevon.files import write_text
+    from elevon.report.cells import csv_cell
 
     stream = io.StringIO()
     writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
     writer.writeheader()
-    writer.writerows(rows)
+    writer.writerows({name: csv_cell(cell) for name, cell in row.items()} for row in rows)
     write_text(out / "rows.csv", stream.getvalue(), force=force)
     say(f"report: {report.save(out / 'report.html', force=force)}")
 
