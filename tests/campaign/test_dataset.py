@@ -217,7 +217,7 @@ def test_cards_tell_what_is_in_it(made):
             assert word in content
     assert "elevon-chart" in page
     assert "backlash@transmission: output_position" in page
-    assert "http" not in page.replace("http://www.w3.org", "").split("<style>")[0]
+    assert "http:" not in page.replace("http://www.w3.org", "").split("<style>")[0]
 
 
 def test_cards_list_what_does_not_act_and_what_failed(plan, cli, tmp_path):

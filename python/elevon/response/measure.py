@@ -248,16 +248,16 @@ class _Sweep:
 
 def _sample(low: float, high: float, step: float) -> float:
     """Return the time between samples: whole solver steps, enough of them for the highest line."""
-    if high > _WIDEST * low:
-        raise InputError(
-            f"low = {low:g} Hz: is more than {_WIDEST:g} times below high = {high:g} Hz; measure "
-            "the range in parts"
-        )
     steps = int(1.0 / (_SAMPLES * high * step) * (1.0 + 1e-9))
     if steps < 1:
         raise InputError(
             f"high = {high:g} Hz: the solver's step of {step:g} s resolves up to "
             f"{1.0 / (_SAMPLES * step):g} Hz here ({_SAMPLES} steps a period)"
+        )
+    if high > _WIDEST * low:
+        raise InputError(
+            f"low = {low:g} Hz: is more than {_WIDEST:g} times below high = {high:g} Hz; measure "
+            "the range in parts"
         )
     return steps * step
 
