@@ -23,7 +23,7 @@ FLIGHT = {
             {"kind": "sine", "amplitude": "60 N m", "frequency": "0.2 Hz"}]}},
     },
     "requirement": [
-        {"name": "error", "measure": "tracking_error", "limit": "1 deg", "after": 5},
+        {"name": "error", "measure": "tracking_error", "limit": "1.8 deg", "after": 5},
     ],
     "growth": [{"law": "gear_wear", "dormant": 0}],
 }  # fmt: skip
@@ -68,7 +68,7 @@ def test_the_answer_is_where_the_model_meets_its_requirement(unit, tables):
     result = predict(inspections(), unit, mission(), response=tables)
     backlash = np.linspace(0.0, LAWS["gear_wear"].highest, 400)
     errors = tables.measured(backlash[:, None])[0]
-    end = np.interp(np.radians(1.0), errors, backlash) / 4e-6
+    end = np.interp(np.radians(1.8), errors, backlash) / 4e-6
     low, high = result.interval
     assert low < end - 2000.0 < high
     assert result.median == pytest.approx(end - 2000.0, rel=0.25)
@@ -99,8 +99,8 @@ def test_a_last_diagnosis_beyond_the_requirement_is_said_even_where_it_is_taken_
     result = predict([*inspections(), last], unit, mission(), response=tables)
     (finding,) = [text for text in result.findings if "last.json" in text]
     assert "if what it says of backlash@transmission is true, the unit has failed" in finding
-    assert "requirement error: 1" in finding
-    assert "deg, limit 1 deg" in finding
+    assert "requirement error: 2" in finding
+    assert "deg, limit 1.8 deg" in finding
     near = Inspection(2100.0, {KEY: Seen(4e-6 * 2100.0, 3e-4, 3e-4)}, name="last.json")
     assert predict([*inspections(), near], unit, mission(), response=tables).findings == ()
 
@@ -123,13 +123,13 @@ def test_a_law_of_ones_own(unit):
         return c["pace"] * drivers["shaft_travel"] * (1.0 + damage / 0.01)
 
     base = LAWS["gear_wear"]
-    creep = Law(
+    law = Law(
         name="creep", text="", source="a user's", kind="backlash", place="transmission", unit="rad",
         rate=creep, drivers=("shaft_travel",), highest=base.highest,
         coefficients={"pace": base.coefficients["wear"]},
     )  # fmt: skip
     flight = mission(growth=[{"law": "creep"}])
-    laws = flight.laws({"creep": creep})
+    laws = flight.laws({"creep": law})
     result = predict(inspections(), unit, flight, response=respond(unit, flight, laws=laws))
     assert result.known[0].law == "creep"
     assert np.isfinite(result.median)
