@@ -42,7 +42,7 @@ __all__ = ["calibrate_gear"]
 _NEVER = {
     "motor.bearing_torque": "the rig shows it only within the whole train's friction (FFM)",
     "friction.breakaway_ratio": "the rig imposes the motion: nothing breaks away",
-    "lock.stiffness": "the seat gives by less than the position's noise",
+    "lock.stiffness": "the seat deflects by less than the position's noise",
     "lock.strength": "nothing broke",
     "lock.spring_force": "the sleeve's spring and the screw's efficiency slow the nut alike",
     "lock.travel": "the nut stops before it",
