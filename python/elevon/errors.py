@@ -8,8 +8,6 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import ClassVar
 
-from elevon.retired import remark, successors
-
 __all__ = [
     "ArgumentTypeError",
     "BusyError",
@@ -207,6 +205,8 @@ def nearest(name: str, candidates: Iterable[str], count: int = 3) -> list[str]:
     names = list(dict.fromkeys(candidates))
     # Some callers pass on what they were given, whatever it is.
     given = str(name)
+    from elevon.retired import successors  # only where a name is wrong
+
     first = successors(given, names)
     wanted = _plain(given)
     plain: dict[str, list[str]] = {}
@@ -259,6 +259,8 @@ def unknown(
     name = str(name)
     names = list(candidates)
     start = f"{place}: " if place else ""
+    from elevon.retired import remark  # only where a name is wrong
+
     about = remark(what, name)
     more = f"; {about}" if about else did_you_mean(name, names)
     message = f"{start}unknown {what} {name!r}{more}"
