@@ -106,7 +106,7 @@ def amplitude_findings(commands: Sequence[CommandFit], estimates: Sequence[Estim
             "the output is not carried through the backlash by friction but moves within it "
             "on its own (its inertia "
             "is not small against its friction): backlash.total comes from the span of the two "
-            "positions' difference and holds the give of the contacts; encoder gain and delay "
+            "positions' difference and holds the compliance of the contacts; encoder gain and delay "
             "cannot be determined; a model whose output has no inertia will miss the output's "
             "position by "
             "up to half the backlash"
