@@ -103,13 +103,11 @@ def amplitude_findings(commands: Sequence[CommandFit], estimates: Sequence[Estim
     backlash = next((item for item in estimates if item.path == "backlash.total"), None)
     if backlash is not None and "floats" in backlash.note:
         says.append(
-            "the output is not carried through the backlash by friction but moves within it "
-            "on its own (its inertia "
-            "is not small against its friction): backlash.total comes from the span of the two "
-            "positions' difference and holds the compliance of the contacts; encoder gain and delay "
-            "cannot be determined; a model whose output has no inertia will miss the output's "
-            "position by "
-            "up to half the backlash"
+            "the output is not carried through the backlash by friction but moves within it on its "
+            "own (its inertia is not small against its friction): backlash.total comes from the "
+            "span of the two positions' difference and holds the compliance of the contacts; "
+            "encoder gain and delay cannot be determined; a model whose output has no inertia will "
+            "miss the output's position by up to half the backlash"
         )
     gain = next((item for item in estimates if item.path == "sensor.encoder.gain"), None)
     if gain is not None and abs(gain.value - 1.0) > max(_FACTOR, 3.0 * gain.std):
