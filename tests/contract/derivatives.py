@@ -44,6 +44,7 @@ class Motion:
     values: tuple[tuple[str, Any], ...] = ()
     speed: float = 40.0
     load: float = 0.05
+    output: float = 0.0
 
     @property
     def actuator(self) -> elevon.Actuator:
@@ -51,6 +52,12 @@ class Motion:
         return elevon.Actuator.load(self.name).with_values(chosen)
 
     def scenario(self, fault: dict[str, Any] | None = None) -> Scenario:
+        acting = {"shaft": self.load, "output": self.output}
+        loads = {
+            port: {"terms": [{"kind": "constant", "value": value}]}
+            for port, value in acting.items()
+            if value
+        }
         return Scenario.from_dict(
             {
                 "duration": "0.15 s",
@@ -58,7 +65,7 @@ class Motion:
                     "mode": "speed",
                     "terms": [{"kind": "constant", "value": self.speed}],
                 },
-                "load": {"shaft": {"terms": [{"kind": "constant", "value": self.load}]}},
+                "load": loads,
                 "initial": {"motor_speed": 0.95 * self.speed},
                 "fault": [] if fault is None else [fault],
             }

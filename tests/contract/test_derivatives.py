@@ -82,6 +82,18 @@ def test_every_parameter_and_fault(name: str, drive: str, neutral: bool) -> None
     assert compared + severities > 150
 
 
+def test_forces_on_the_output() -> None:
+    """Exact where the output bears a force; the first one chooses a flank, and is refused."""
+    loaded = Motion("torino-rotary", "pwm", output=5.0)
+    places = [p for p in parameter_places(loaded, neutral=True) if p.label.startswith("load.")]
+    wrong, compared = disagreements(places)
+    assert not wrong
+    assert compared >= 6
+    free = Motion("torino-rotary", "pwm")
+    with pytest.raises(InputError, match=r"load.constant = 0: .* flank of the backlash"):
+        sensitivities(free.actuator, free.scenario(), ["load.constant"], record=RECORD)
+
+
 @pytest.mark.parametrize("drive", ["hysteresis", "pwm"])
 def test_supply_voltage_at_its_limit(drive: str) -> None:
     """The speed that the voltage allows: dw/dV = w/V where only the EMF takes it up."""

@@ -7,7 +7,7 @@ use elevon_core::actuator::Severity;
 use elevon_core::command::{catalogue, SourcePlan, Term, Wave};
 use elevon_core::fault::{whole, FaultKind, FaultSpec, Op, Profile, Write};
 use elevon_core::registry::Model;
-use elevon_core::solver::{fault_refusal, parameter_refusal, Clock, RunSpec};
+use elevon_core::solver::{fault_refusal, force_refusal, parameter_refusal, Clock, RunSpec};
 use elevon_core::variable::{acts::records, Range};
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
@@ -262,9 +262,12 @@ impl Resolver {
     /// Refuses parameters and faults by which a run has no derivative.
     pub fn differentiable(&self, run: &RunSpec, given: &Bound<'_, PyDict>, parameters: &[usize], faults: &[usize]) -> PyResult<()> {
         let all: Vec<_> = records(self.model.groups()).collect();
+        let at = |path: &str| self.places.get(path).map_or(0.0, |&index| run.parameters[index]);
+        let loaded = self.model.ports().iter().zip(&run.driven).any(|(port, &driven)| port.name == "output" && driven);
         for &index in parameters {
             let (path, record) = &all[index];
-            if let Some(reason) = parameter_refusal(path, record, run.parameters[index]) {
+            let refused = parameter_refusal(path, record, run.parameters[index]).or_else(|| force_refusal(path, at, loaded));
+            if let Some(reason) = refused {
                 return Err(bad(format!("sensitivities: {path} = {}: {reason}", run.parameters[index])));
             }
         }

@@ -14,7 +14,7 @@ variables! {
         Gain => "encoder.gain", "-", "1", Any, Sensor, Some(1.0), "gain of the reported output position";
         MissingCounts => "encoder.missing_counts", "-", "1", Unit, Sensor, Some(0.0), "fraction of the counts that are lost, spread evenly over the disc";
         DarkShare => "encoder.dark_share", "-", "1", Unit, Sensor, Some(0.0), "share of the disc in whose sectors no counts come";
-        DarkSectors => "encoder.dark_sectors", "-", "1", Count(1.0, 1000.0), Sensor, Some(1.0), "number of dark sectors, equal and evenly spread; its whole part counts",
+        DarkSectors => "encoder.dark_sectors", "-", "1", Count(1.0, 1000.0), Sensor, Some(1.0), "number of dark sectors, equal and evenly spread",
             when(&[Away("sensor.encoder.dark_share", 0.0)]);
         DarkPosition => "encoder.dark_position", "-", "rad", Any, Sensor, Some(0.0), "angle of the disc at the middle of a dark sector",
             when(&[Away("sensor.encoder.dark_share", 0.0)]);

@@ -39,3 +39,13 @@ pub fn fault_refusal(fault: &FaultSpec, raw: &[f64], records: &[(String, &Variab
         }
     })
 }
+
+/// Parameters that put a force on the output.
+const FORCES: &[&str] = &["load.constant", "load.stiffness", "load.friction"];
+
+/// Why a run whose output bears no force (`loaded`: a waveform puts one on it) has no derivative by one. `at` gives the values
+/// of parameters.
+pub fn force_refusal(path: &str, at: impl Fn(&str) -> f64, loaded: bool) -> Option<&'static str> {
+    let first = FORCES.contains(&path) && !loaded && FORCES.iter().all(|force| at(force) == 0.0);
+    (first && at("backlash.total") != 0.0).then_some("the first force on the output chooses a flank of the backlash: no derivative at 0")
+}

@@ -13,7 +13,7 @@ mod summing;
 mod width;
 
 pub use batch::{run_all, Monitor};
-pub use differentiable::{fault_refusal, parameter_refusal};
+pub use differentiable::{fault_refusal, force_refusal, parameter_refusal};
 pub use dual::{derivatives, sensitivities};
 pub use live::{live, Change, Live, Refusal};
 pub use spec::{Clock, RunOutput, RunSpec, Status};
