@@ -10,7 +10,7 @@ import typer
 from elevon.cli import dataset_make
 from elevon.cli.common import ForceOption, JsonOption
 from elevon.cli.groups import NamingGroup
-from elevon.cli.output import print_json, print_table, progress_bar
+from elevon.cli.output import print_json, print_table, progress_bar, say
 
 app = typer.Typer(rich_markup_mode=None, no_args_is_help=True, cls=NamingGroup)
 dataset_make.add_to(app)
@@ -56,6 +56,11 @@ def verify(folder: FolderArgument, *, json: JsonOption = False) -> int:
     else:
         rows = [["pass" if c.passed else "FAIL", f"{c.value:.0f}", c.name] for c in checks]
         print_table(["", "count", "what is wrong"], rows)
+    if not passed:
+        say(
+            f"elevon dataset repair {folder} rebuilds what it can prove; elevon campaign resume "
+            f"{folder} simulates lost blocks again"
+        )
     return 0 if passed else 1
 
 
