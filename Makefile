@@ -24,7 +24,7 @@ RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name 
 DEMO := $(BIN)/elevon demo --out out/demo --force
 
 .DELETE_ON_ERROR:
-.PHONY: help setup demo check test test-rust test-python test-long lint stubs wheel bench format lock clean
+.PHONY: help setup demo check test test-rust test-python test-long lint stubs wheel bench format lock audit licences clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -37,7 +37,7 @@ $(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
 
 $(STAMPS)/packages: requirements.lock | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	@mkdir -p $(STAMPS) && touch $@
 
 $(STAMPS)/extension: $(STAMPS)/packages pyproject.toml $(RUST_SOURCES)
@@ -90,8 +90,18 @@ format: setup ## rewrite the sources in the project's format
 
 lock: $(BIN)/python ## choose the newest packages again, for Python 3.11 and up
 	$(BIN)/uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 \
-		--no-emit-index-url --no-emit-find-links --upgrade --quiet \
+		--no-emit-index-url --no-emit-find-links --upgrade --quiet --generate-hashes \
 		--custom-compile-command "make lock" --output-file requirements.lock
+
+audit: $(STAMPS)/packages ## known flaws of the dependencies of both languages; needs a network and cargo-deny, pip-audit
+	@command -v cargo-deny >/dev/null || { echo "make audit needs cargo-deny: cargo install --locked cargo-deny" >&2; exit 1; }
+	@command -v pip-audit >/dev/null || { echo "make audit needs pip-audit: pipx install pip-audit" >&2; exit 1; }
+	cargo deny --locked check
+	pip-audit --require-hashes --disable-pip --requirement requirements.lock
+	$(BIN)/python tools/licences.py
+
+licences: $(STAMPS)/packages ## the licence of every dependency; refused where none of the allowed ones
+	$(BIN)/python tools/licences.py
 
 clean: ## remove what was built; .venv stays
 	rm -rf $(STAMPS) out target .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
