@@ -54,7 +54,7 @@ def test_backlash_of_a_screw_is_named_and_a_healthy_day_is_healthy(screw):
     assert worn.status == "faulty"
     assert worn.best == ("backlash@transmission",)
     assert worn.faults[0].interval[0] < 4e-4 < worn.faults[0].interval[1]
-    assert worn.unobservable == ()  # both are seen, others were not asked for
+    assert worn.unobservable == ()  # both are seen, others were not requested
 
 
 def test_two_faults_of_a_screw_are_named_together(screw):

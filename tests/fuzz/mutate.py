@@ -27,9 +27,10 @@ class Raw:
 #: Values nobody would give; each may take the place of any other.
 VALUES: tuple[Any, ...] = (
     "", " ", "\0", "a\0b", "\x1b[31m", "é€😀", "x" * 20_000, "../../etc/passwd", "/dev/zero",
+    "~nobody/x", "a\0.csv",
     "/dev/full", "nul", "%s{}", "=1+1", "NaN", "1e400 deg", "-inf", "12 parsec", "1 deg deg",
     "0x10", "1_000", "-0 s", "1e-320 s", True, False, 0, 1, -1, 2**31, 2**63, -(2**64), 10**30,
-    Raw("9" * 5000), Raw("-" + "9" * 4301), 0.0, -0.0, 1e-320, 1e-30, 1e30, 1e308, -1e308,
+    Raw("9" * 5000), Raw("-" + "9" * 4301), 10**400, 0.0, -0.0, 1e-320, 1e-30, 1e30, 1e308, -1e308,
     math.inf, -math.inf, math.nan, [], {}, [[]], [{}], {"": ""}, {"kind": "none"}, [0] * 3000,
     ["a", 1, None, {}], [math.nan], {"a": {"b": {"c": {}}}}, Raw("[" * 60 + "]" * 60),
     Raw("[" * 20_000 + "]" * 20_000),

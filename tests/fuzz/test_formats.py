@@ -13,6 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from elevon.campaign.manifest_shape import shape_error
+from elevon.campaign.store import Manifest
+from elevon.errors import FormatError, InputError
 from tests.fuzz.formats import FORMATS
 from tests.fuzz.mutate import Raw, changed, to_json, to_toml
 
@@ -56,3 +59,54 @@ def test_what_no_writer_writes_stands_in_the_file() -> None:
     digits = "9" * 5000
     assert to_json({"a": [Raw(digits), None]}) == f'{{"a":[{digits},null]}}'
     assert to_toml({"a": [Raw(digits), True, "x"]}) == f'"a" = [{digits}, true, "x"]\n'
+
+
+DEEP, LONG = "[" * 20_000 + "]" * 20_000, "9" * 5000
+
+
+@pytest.mark.parametrize(
+    ("name", "file", "text"),
+    [
+        ("scenario", "a.toml", 'command.terms = [{kind = "table", file = "\\u0000"}]'),
+        ("scenario", "a.toml", f"duration = {DEEP}\n"),
+        ("scenario", "a.toml", f"duration = {LONG}\n"),
+        ("note", "a.json", f'{{"waveform": "sine", "amplitude": {LONG[:400]}}}'),
+        ("note", "a.json", '{"command": {"mode": "position", "terms": 5}}'),
+        ("calibration", "a.toml", f'base = "{LONG}"\n'),
+        ("result", "a.json", f'{{"hypotheses": {DEEP}}}'),
+        ("result", "a.json", f'{{"hypotheses": {LONG}}}'),
+    ],
+)
+def test_what_once_ended_in_a_traceback_is_refused(
+    tmp_path: Path, name: str, file: str, text: str
+) -> None:
+    path = tmp_path / file
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError):
+        FORMATS[name].read(path)
+
+
+def test_a_history_with_a_number_too_long_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.json").write_text(f'{{"usage": {LONG}}}', encoding="utf-8")
+    with pytest.raises(FormatError):
+        FORMATS["history"].read(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "place"),
+    [
+        ("total", -1, "total"),
+        ("files", {"../../x": {"bytes": 1, "sha256": "0" * 64}}, "files"),
+        ("files", {"runs.parquet": {"bytes": 1, "sha256": 5}}, "files.runs.parquet.sha256"),
+        ("blocks", [{"name": "block", "first": 0, "last": "a", "files": {}}], "blocks.0.last"),
+        ("clocks", [5], "clocks.0"),
+    ],
+)
+def test_a_manifest_whose_fields_are_of_another_form_is_refused_by_name(
+    field: str, value: object, place: str
+) -> None:
+    whole = Manifest("n", "0" * 64, 1, [0, 1], "0", "0")
+    assert shape_error(Manifest, vars(whole)) is None
+    found = shape_error(Manifest, {**vars(whole), field: value})
+    assert found is not None
+    assert found.startswith((f"{place}:", f"{place}."))

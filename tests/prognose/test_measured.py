@@ -80,7 +80,7 @@ def test_what_the_model_is_off_by_is_learned_and_moves_the_end():
 
 
 def test_without_a_measured_value_nothing_is_drawn_anew():
-    """Units carry what the model is off by from the first value on, of each requirement."""
+    """Units carry the model's error from the first value on, of each requirement."""
     unit = process(law(1e-3))
     flt = flown(unit, 0.0, measured=False)
     assert flt.units.off.shape == (2000, 1, 0)

@@ -186,8 +186,7 @@ def _with_gain(log: BenchLog, fit: WaveformFit, gain: float, limit: float) -> Co
     misfit = np.asarray(best.fun)
     if float(misfit.std()) > _SMALL * float(np.std(output)):
         return None
-    covariance = robust_covariance(np.asarray(best.jac), misfit)
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    std = np.sqrt(np.maximum(np.diag(robust_covariance(np.asarray(best.jac), misfit)), 0.0))
     inverse, inverse_std = float(best.x[-1]), float(std[-1])
     if not inverse > 0.0:
         return None

@@ -47,11 +47,16 @@ class Embedder:
         Raises
         ------
         InputError
-            It lies outside the folder that the plan may read from, or leads there by a link.
+            It names no file, lies outside the folder that the plan may read from, or leads there
+            by a link.
         """
-        path = Path(name).expanduser()
-        path = path if path.is_absolute() or self.folder is None else self.folder / path
-        if self.root is not None and not path.resolve().is_relative_to(self.root.resolve()):
+        try:
+            path = Path(name).expanduser()
+            path = path if path.is_absolute() or self.folder is None else self.folder / path
+            place = path.resolve()
+        except (OSError, ValueError, RuntimeError) as error:  # a zero byte, ~nobody, a ring
+            raise InputError(f"{name!a}: names no file: {error}") from error
+        if self.root is not None and not place.is_relative_to(self.root.resolve()):
             raise InputError(
                 f"{name}: lies outside the plan's folder {self.root}; --allow-outside "
                 "(allow_outside=True) lets a plan read other files"

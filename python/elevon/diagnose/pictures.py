@@ -105,7 +105,7 @@ def features_figure(moved: Sequence[Moved]) -> Figure:
         explained = np.array([m.explained / m.deviation for m in ranked])
         if np.isfinite(explained).any() and np.any(explained != 0.0):
             axis.plot(explained, at, "D", ms=5, color=COLOURS["orange"], label="what is named")
-        axis.set(yticks=at, yticklabels=names, xlabel="off the healthy unit [its deviations]")
+        axis.set(yticks=at, yticklabels=names, xlabel="deviation from the healthy unit [sigma]")
         axis.grid(visible=False, axis="y")
         axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
     return figure

@@ -80,7 +80,7 @@ class Prognosis:
     reserve : tuple of dict
         Each requirement's ``name``, ``value``, ``threshold``, ``unit`` at the median severities.
     findings : tuple of str
-        What the user should know.
+        What the caller should know.
     serial : str
         Of the unit.
     seconds : dict of str to float

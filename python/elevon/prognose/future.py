@@ -122,7 +122,7 @@ def look_ahead(
 def _model_errors(
     process: Process, units: UnitPopulation, deviation: float, rng: np.random.Generator
 ) -> Floats:
-    """Return what each unit's requirements are off by, shape (m, n), in thresholds.
+    """Return the model's error of each unit's requirements, shape (m, n), in thresholds.
 
     Drawn, or what the units carry where requirements have been measured.
     """

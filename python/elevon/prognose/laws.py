@@ -1,6 +1,6 @@
 """The degradation laws that come with the package.
 
-Forms are those of the literature; where the numbers of a law come from is said beside each of
+Forms are those of the literature; where the numbers of a law come from is stated beside each of
 them. Most are ASSUMED, since no published set of an actuator's growth rates exists: they set the
 scale of a life, the diagnoses of the unit then say its own.
 """

@@ -58,7 +58,7 @@ class ParticleFilter:
         self._counts = [0] * len(process.laws)
 
     def update(self, item: Inspection) -> UnitPopulation:
-        """Grow to an inspection, weigh by what it saw, make new what was replaced after it."""
+        """Grow to an inspection, weight by what it saw, make new what was replaced after it."""
         units = self.process.to(self.units, item.usage, self.rng)
         for k, law in enumerate(self.process.laws):
             seen = item.seen.get(law.key)
@@ -89,9 +89,9 @@ class ParticleFilter:
     def _measured(self, units: UnitPopulation, name: str, value: Measured) -> UnitPopulation:
         """Weigh by a requirement's own value: the model's at the units' severities, and off it.
 
-        What the model is off by is a share of its value; `LASTING` of its square stays as faults
+        The model's error is a share of its value; `LASTING` of its square stays as faults
         grow, the rest is the value's own scatter.
-        The numbers of the law that moves it most are reweighted, and what the model is off by
+        The numbers of the law that moves it most are reweighted, and the model's error
         stands beside them; of the other laws' faults their units' spread is in the value.
         """
         response = self.process.response

@@ -62,7 +62,7 @@ class UnitPopulation:
         Logarithms of the unit's factors on the coefficients that differ from unit to unit, in the
         order of `Law.spreading`; the rest of c is unused.
     off : ndarray, shape (n, k, m)
-        What the model says of m requirements is off by, in deviations of that, beside the law that
+        The model's error of m requirements, in deviations of it, beside the law that
         moves each most; m = 0 until one of them has been measured.
     usage : float
         Use so far, in the mission's unit.
@@ -114,7 +114,7 @@ class UnitPopulation:
         return replace(self, **{name: getattr(self, name)[rows, columns] for name in _OF_LAWS})
 
     def with_off(self, requirements: int, rng: np.random.Generator) -> UnitPopulation:
-        """Return the units with what the model is off by, drawn where they carry none yet."""
+        """Return the units with the model's error, drawn where they carry none yet."""
         if self.off.shape[2]:
             return self
         return replace(self, off=rng.standard_normal((*self.damage.shape, requirements)))

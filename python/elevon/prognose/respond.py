@@ -43,7 +43,7 @@ def respond(
     fidelity : str
         Of the runs.
     snapshots : bool
-        Correct the low fidelity's tables by runs of the switching model, see `correction`.
+        Correct the reduced-order tables by runs of the switching model, see `correction`.
 
     Raises
     ------

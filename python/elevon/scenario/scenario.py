@@ -319,8 +319,15 @@ def located(data: Any, folder: Path | None) -> Any:
     if not isinstance(data, dict):
         return data
     return {
-        key: str((folder / item).resolve())
+        key: _resolved(folder / item)
         if key == "file" and isinstance(item, str) and folder is not None
         else located(item, folder)
         for key, item in data.items()
     }
+
+
+def _resolved(path: Path) -> str:
+    try:
+        return str(path.resolve())
+    except (ValueError, RuntimeError):  # a zero byte, links in a ring: reading it states so
+        return str(path)

@@ -25,7 +25,7 @@ class Cause:
         Median.
     interval : (float, float)
         Of 90 %.
-    equivalents : tuple of (str, str)
+    ambiguous_with : tuple of (str, str)
         Kinds and places that the logs do not separate from it.
     """
 
@@ -130,7 +130,7 @@ class Moved:
 
     @property
     def score(self) -> float:
-        """Deviations off the healthy unit."""
+        """Deviations from the healthy unit."""
         return (self.value - self.expected) / self.deviation
 
     def to_dict(self) -> dict[str, Any]:

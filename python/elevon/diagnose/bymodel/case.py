@@ -40,7 +40,7 @@ class LogCase:
     ----------
     name : str
         The log.
-    shown : FeatureVector
+    features : FeatureVector
         Of the log.
     unit : Healthy
         What a healthy unit would show.

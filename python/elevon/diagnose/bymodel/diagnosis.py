@@ -181,7 +181,7 @@ def _left(
     *,
     faulty: bool,
 ) -> tuple[str, ...]:
-    """Return what is to be said of what the named faults leave."""
+    """Return the findings on what the named faults leave."""
     if faulty and not named:
         return (f"{NO_CANDIDATE} (probability {result.other:.2g})",)
     return unexplained(cases, named)

@@ -25,7 +25,7 @@ __all__ = [
 
 LISTED = 0.02  # probability below which a cause is not listed
 POSSIBLE = 1e-3  # probability below which a set of faults is not listed
-UNLIKELY = 1e-3  # chance of what the named faults leave below which that is said
+UNLIKELY = 1e-3  # chance of what the named faults leave below which that is a finding
 ALIKE = 1.0  # deviations between two faults' shifts below which no log separates them
 
 

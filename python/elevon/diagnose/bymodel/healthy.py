@@ -123,9 +123,9 @@ def healthy(
 
     The offset of a unit from the model is Gaussian with `MISMATCH`; the mean of the baselines of
     the same test narrows it, those of other tests narrow what is `POOLED`. The spread's scale is
-    that stated, worth `DEGREES` runs, and the baselines' scatter. Where baselines stand further
-    off the model than was assumed, the assumption yields. In a test that is a brake of unknown
-    torque loads (`brake_unknown`), the model says nothing of friction.
+    that stated, worth `DEGREES` runs, and the baselines' scatter. Where baselines deviate
+    further from the model than was assumed, the assumption yields. Under a brake of unknown torque
+    (`brake_unknown`) the model gives nothing of friction.
     """
     at = [model.healthy.names.index(name) for name in names]
     draws = model.draws[:, at]

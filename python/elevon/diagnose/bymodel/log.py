@@ -167,7 +167,7 @@ def _check_motion(log: BenchLog, good: npt.NDArray[np.bool_], actuator: Actuator
     if top < 1.0 or float(np.ptp(log.motor[good])) < count:
         raise InputError(
             f"{log.name}: nothing moves (motor up to {top:.3g} rad/s); a jam, an open phase or a "
-            "supply that is gone would do that, and more cannot be told without motion"
+            "supply that is gone would do that, and more cannot be found without motion"
         )
     for way, text in ((1.0, "forwards"), (-1.0, "backwards")):
         if (good & (way * log.speed > _MOVING * top)).sum() < 100:

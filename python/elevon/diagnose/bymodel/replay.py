@@ -121,7 +121,7 @@ def replay(
 
     The healthy run is always the log's own. Shifts and spread are those of the first baseline that
     is of the same test by its note, run once for all logs that stand against it; without one they
-    are the log's own. So they depend on what the caller gives, not on what was asked before.
+    are the log's own. So they depend on what the caller gives, not on earlier calls.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def _about(made: Replay, healthy: FeatureVector) -> Replay:
 
 
 _REMEMBERED = 32  # logs
-_RECENT: dict[Any, Replay] = {}  # by all that the runs depend on; the latest asked for is the last
+_RECENT: dict[Any, Replay] = {}  # by all that the runs depend on; the latest is the last
 
 
 def _remembered(item: TestLog, actuator: Actuator, candidates: Sequence[CandidateFault]) -> Replay:

@@ -50,7 +50,7 @@ class RoleLog:
     test : RoleTest
         What was commanded and what loaded it, for the model.
     findings : tuple of str
-        What the user should know.
+        What the caller should know.
     """
 
     name: str

@@ -313,7 +313,7 @@ def _loops(out: Numbers, channels: Mapping[str, Floats], slow: _Slow) -> None:
 
 
 def _ratios(out: Numbers, slow: _Slow) -> None:
-    """Speed shown over the change of the position shown: gains of sensors."""
+    """Measured speed over the change of the measured position: gains of sensors."""
     channels = slow.channels
     pairs = (("motor_speed", "motor_position"), ("motor_position", "output_position"))
     moving = slow.forward | slow.backward

@@ -72,7 +72,7 @@ class Discriminant:
         labels : sequence of str
             Class of each recording.
         groups : array, (recordings,)
-            What is left out together: the load, where another load will be asked for, or the run.
+            What is left out together: the load, where another load will be predicted, or the run.
         shrinkage : float, optional
             0 to 1; chosen from `SHRINKAGES` by default.
 

@@ -272,7 +272,7 @@ def _spectrum(values: Floats, period: float) -> tuple[Floats, Floats]:
 
 
 def _joined(sides: list[dict[str, float]], hold: dict[str, float]) -> dict[str, float]:
-    """What is not asked of each stroke apart."""
+    """What is not computed of each stroke apart."""
     mean = {name: float(np.mean([side[name] for side in sides])) for name in sides[0]}
     return {
         "tracking_noise": mean["noise_ratio"] + hold["hold_noise"],

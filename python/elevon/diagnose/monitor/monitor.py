@@ -133,7 +133,7 @@ class Monitor:
     false_alarm_time : float
         Mean time between false alarms [s].
     faults : sequence of str, optional
-        ``KIND@PLACE``; default: all that diagnosis by the model weighs.
+        ``KIND@PLACE``; default: all candidates of diagnosis by the model.
     days : int
         Logs to come, or days on which the unit is watched without a stop.
     longest : float, optional

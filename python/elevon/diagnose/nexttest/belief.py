@@ -77,7 +77,7 @@ class Belief:
 
     @classmethod
     def prior(cls, candidates: Sequence[CandidateFault] = CANDIDATES) -> Belief:
-        """Return what is believed before any test: as diagnosis by the model weighs it."""
+        """Return what is believed before any test: the prior of diagnosis by the model."""
         total = sum(c.rate for c in candidates)
         out = [Possible((), 1.0 - PRIOR_FAULTY)]
         for c in candidates:
@@ -95,7 +95,7 @@ class Belief:
         """Return what is believed after diagnoses (`elevon diagnose --json`) of different logs.
 
         Each result counts by how far it moved the weights from its own prior; a fault that it did
-        not weigh counts as absent, as it would on a log that cannot show it.
+        not score counts as absent, as it would on a log that cannot show it.
         """
         prior = cls.prior().possible
         answered = [Answered.of(result) for result in results]

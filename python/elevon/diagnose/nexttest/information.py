@@ -86,7 +86,7 @@ def _seen(
 
 
 def _likelihoods(case: LogCase, belief: Belief, outcomes: Floats) -> Floats:
-    """Log likelihood of outcomes off the healthy unit, shape (n, k), per set, shape (n, sets)."""
+    """Log likelihood of outcomes less the healthy unit, shape (n, k), per set, shape (n, sets)."""
     columns = []
     for number, possible in enumerate(belief.possible):
         count = _SAMPLES if possible.keys else 1

@@ -175,7 +175,7 @@ def diagnose_by_both(
     """Let the surrogate propose causes and the model score those; as `diagnose_by_surrogate`.
 
     Where the surrogate cannot speak, or says that the logs lie outside its training set, the
-    model weighs all causes.
+    model scores all causes.
     """
     from elevon.diagnose.bymodel import diagnose
 

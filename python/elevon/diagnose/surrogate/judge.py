@@ -76,7 +76,7 @@ def _opinion(head: Head, rows_of: Rows, rows: Index, most: int | None) -> Opinio
 
 
 def _outside(head: Head, rows_of: Rows, rows: Index) -> int:
-    """How many runs are said to lie outside the training set."""
+    """How many runs are reported outside the training set."""
     rng = np.random.default_rng(0)
     healthy = rows_of.references(rows, rng)[0] if head.view.relative else None
     change = head.view.change(rows_of.values(rows, rng), healthy)

@@ -49,7 +49,7 @@ class LogOpinion:
     size, reach : ndarray, shape (f,)
         Scaled size of each fault were it there, and half its 90 % interval.
     change : ndarray, shape (k,)
-        Features off the healthy unit, in its spread.
+        Deviations of features from the healthy unit, in its spread.
     outside : tuple of str
         What lies outside the training set; empty when nothing does.
     """
@@ -200,7 +200,7 @@ class Surrogate:
     tests : mapping of str to TestModel
         By the bench's procedure.
     report : mapping
-        How it was trained and what held-out units said of it.
+        How it was trained and what held-out units proved of it.
     """
 
     tests: Mapping[str, TestModel]

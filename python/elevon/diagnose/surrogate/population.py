@@ -1,8 +1,8 @@
 """Units the surrogate learns from: how they differ, from day to day, and what is broken in them.
 
-Nothing here is measured: the ranges are ASSUMED wide, so that a unit whose set is calibrated lies
-among them whatever its drive, friction and sensors are. What changes from day to day is the stated
-spread of diagnosis by the model (`elevon.diagnose.bymodel.replay.SPREAD`).
+Nothing here is measured: the ranges are ASSUMED wide, so that a unit whose actuator file is
+calibrated lies among them whatever its drive, friction and sensors are. What changes from day to
+day is the stated spread of diagnosis by the model (`elevon.diagnose.bymodel.replay.SPREAD`).
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ class Proposal:
     moved : tuple of Moved
         The features.
     outside, findings : tuple of str
-        What lies outside the training set; what the user should know.
+        What lies outside the training set; what the caller should know.
     """
 
     logs: tuple[str, ...]

@@ -50,7 +50,7 @@ def _deviation(values: Floats) -> Floats:
 class Rows:
     """A table with, for every row, the other healthy days of its unit.
 
-    What runs of a simulation lack from day to day (`FLOOR`) is drawn anew whenever they are asked
+    What runs of a simulation lack from day to day (`FLOOR`) is drawn anew whenever they are read
     for.
 
     Attributes

@@ -30,6 +30,7 @@ from elevon.waveforms import wave_records
 __all__ = ["CommandNote", "read_command_note"]
 
 _MOST_BYTES = 1_000_000
+_LARGEST = 1e300  # greater whole numbers are no floats; reading the value refuses them
 _MOST_TERMS = 1000
 _MOST_TABLE = 50_000_000  # bytes of a table's file
 _KINDS: dict[str, str] = {
@@ -230,7 +231,7 @@ def _check_units(flat: Mapping[str, Any], place: str) -> None:
         plain = isinstance(value, (int, float)) and not isinstance(value, bool)
         if kind is None or not plain or _SUFFIX.search(_spelt(key)):
             continue
-        if is_ambiguous(float(value), si_unit(kind), kind):
+        if abs(value) < _LARGEST and is_ambiguous(float(value), si_unit(kind), kind):
             raise ambiguous(str(value), si_unit(kind), kind, f"{place}: {key}")
 
 
