@@ -114,7 +114,7 @@ BAD = {
     "too many turns": ((*RUN, "--set", "motor.turns_a=1.1"), "outside (0, 1]"),
     "zero step": ((*RUN, "--set", "solver.step=0"), "outside [1e-12, 1] s"),
     "step and electrical pole": ((*RUN, "--set", "solver.step=20 ms"), "electrical pole"),
-    "step and filter": ((*RUN, "--set", "solver.step=20 us"), "derivative filter"),
+    "step and relays": ((*RUN, "--set", "solver.step=100 us"), "relays: the current"),
     "step and contact": (
         (*RUN, "--set", "backlash.model=elastic", "--set", "backlash.stiffness=1e12"),
         "backlash.stiffness",

@@ -108,34 +108,6 @@ def locked_pwm(command: float, rate: str = "40 kHz", **extra: object) -> object:
     )
 
 
-def test_pwm_mean_voltage_is_resistance_times_current() -> None:
-    """Locked, settled: the mean phase voltage is R i, and the set point v_q too but for the edges,
-    which fall on solver steps: dt f V.
-    """
-    rec = locked_pwm(4.0, rate="1 MHz")
-    late = rec["current_q"].time > 0.05 - 1e-7
-    current, volts, phase = (
-        np.mean(x[late][:-1]) for x in values(rec, "current_q", "voltage_q_ref", "voltage_a")
-    )
-    assert current == pytest.approx(4.0 / (1.5 * K), rel=0.01)
-    assert volts == pytest.approx(R * current, abs=SUPPLY * 1e-6 * 4000.0)
-    assert phase == pytest.approx(R * current, rel=0.01)
-
-
-def test_dead_time_costs_its_share_of_the_link_each_period() -> None:
-    """Every leg loses t_d f V against its current; on a star with (+, -, -) that is 4/3 t_d f V on
-    phase a.
-    """
-    dead, frequency = 4e-6, 4000.0
-    lost = 4 / 3 * dead * frequency * SUPPLY
-    ideal, real = locked_pwm(4.0), locked_pwm(4.0, **{"inverter.dead_time": dead})
-    late = ideal["current_q"].time > 0.05
-    drop = np.mean(real["voltage_q_ref"].values[late]) - np.mean(
-        ideal["voltage_q_ref"].values[late]
-    )
-    assert drop == pytest.approx(lost, rel=0.1)
-
-
 def test_current_loop_has_its_bandwidth() -> None:
     """A small step of current reaches 63 % one time constant after it, give or take two carrier
     periods.

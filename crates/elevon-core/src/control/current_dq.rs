@@ -33,7 +33,6 @@ pub struct CurrentControl<S> {
     inductance: S,
     emf_constant: S,
     pole_pairs: S,
-    frequency: S,
     lead: S,
 }
 
@@ -45,6 +44,8 @@ pub struct CurrentControlState<S> {
     pub voltage_q: S,
     /// Phase voltage references over half the supply, to be compared with the carrier.
     pub modulation: [S; 3],
+    /// When the next edge of a leg can be, in carrier periods.
+    pub next_edge: S,
     /// Those of the last sample, which act after the computation delay.
     computed: [S; 3],
 }
@@ -80,7 +81,6 @@ impl<S: Scalar> CurrentControl<S> {
             inductance: g(P::Inductance),
             emf_constant: g(P::EmfConstant),
             pole_pairs,
-            frequency: g(P::Frequency),
             // The voltage acts over a tick after the delay: turn it by what the rotor moves until the middle of that tick.
             lead: (S::splat(0.5) + g(P::ComputationDelay)) * g(P::SampleTime) * pole_pairs,
         }
@@ -116,27 +116,33 @@ impl<S: Scalar> CurrentControl<S> {
         let shift = S::splat(0.5) * (high + low);
         s.computed = three!(|j| phase[j] - shift);
     }
-
-    /// Gate signals: +1 while the reference stands above the triangular carrier, else -1.
-    #[inline(always)]
-    pub fn compare(&self, s: &CurrentControlState<S>, t: S) -> [S; 3] {
-        let x = t * self.frequency;
-        let cycle = x - x.floor();
-        let carrier = S::splat(4.0) * (cycle - S::splat(0.5)).abs() - S::one();
-        three!(|j| S::select(carrier.le(s.modulation[j]), S::one(), -S::one()))
-    }
 }
 
 impl<S: Scalar> CurrentControlState<S> {
     pub fn initial() -> Self {
         let zero = S::zero();
-        Self { integral_d: zero, integral_q: zero, voltage_d: zero, voltage_q: zero, modulation: [zero; 3], computed: [zero; 3] }
+        Self {
+            integral_d: zero,
+            integral_q: zero,
+            voltage_d: zero,
+            voltage_q: zero,
+            modulation: [zero; 3],
+            next_edge: -S::splat(f64::INFINITY),
+            computed: [zero; 3],
+        }
+    }
+
+    /// What is known of the next edge does not hold any more.
+    #[inline(always)]
+    pub fn look_for_edges(&mut self) {
+        self.next_edge = S::splat(f64::NEG_INFINITY);
     }
 
     /// The duties computed from the last sample act from now on.
     #[inline(always)]
     pub fn update(&mut self) {
         self.modulation = self.computed;
+        self.look_for_edges();
     }
 }
 

@@ -1,6 +1,7 @@
 //! Power electronics: relays, six-step modulation, the six-switch bridge, the supply.
 
 pub mod bridge;
+pub mod carrier;
 pub mod hysteresis;
 pub mod link;
 pub mod losses;

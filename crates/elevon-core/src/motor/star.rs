@@ -127,7 +127,8 @@ pub struct Star<S> {
     pub emf_constant: [S; 3],
     pub resistance: [S; 3],
     pub per_inductance: [S; 3],
-    /// Weight of each phase in the neutral voltage, all connected.
+    /// Weight of each phase in the neutral voltage, and its share with all connected.
+    pub weight: [S; 3],
     neutral_weight: [S; 3],
     torque_limit: S,
     eccentric_cos: S,
@@ -174,6 +175,7 @@ impl<S: Scalar> Star<S> {
             emf_constant: three!(|j| turns[j] * k),
             resistance: three!(|j| turns[j] * g(P::WindingResistance)),
             per_inductance,
+            weight: per_inductance,
             dt_per_inductance: three!(|j| dt * per_inductance[j]),
             neutral_weight: three!(|j| per_inductance[j] / total),
             torque_limit: g(P::TorqueLimit),
@@ -184,6 +186,20 @@ impl<S: Scalar> Star<S> {
             flat_slope: pi / (pi - g(P::EmfFlatWidth)),
             open: phases(raw, P::OpenA),
         }
+    }
+
+    /// The same winding with the resistance's voltage taken at the middle of a step: of second order in it.
+    ///
+    /// (i' - i) L / dt = u - R (i' - i) / 2 with u the drop at the start, so that each phase's gain dt / L becomes
+    /// (dt / L) / (1 + R dt / 2 L), and so does its weight in the neutral. What warm copper has above the cold one's
+    /// resistance is left out of this gain, not of u: the current settles where it should.
+    pub fn at_the_middle(&self) -> Self {
+        let gain: [S; 3] = three!(|j| {
+            let per = self.dt_per_inductance[j];
+            per / (S::splat(0.5) * per).fma(self.resistance[j], S::one())
+        });
+        let total = gain[0] + gain[1] + gain[2];
+        Self { dt_per_inductance: gain, weight: gain, neutral_weight: three!(|j| gain[j] / total), ..*self }
     }
 
     /// The same winding over a share of a step.

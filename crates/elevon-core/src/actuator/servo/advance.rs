@@ -102,31 +102,57 @@ fn advance<T: Stepper<S>, S: Scalar>(x: Stretch<'_, T::Model, T::Structure, T::S
         instant.load(inputs, S::splat(from as f64) * T::dt(model));
         *steady = inputs[COMMAND + 1..].iter().all(|source| source.flat());
     }
+    if let (true, [model], [inputs], [state]) = (T::IN_REGISTERS, models, inputs, &mut *states) {
+        // The state is large: copied once a stretch, which may be as short as a tick of a controller.
+        let mut s = *state;
+        alone::<T, S>(model, structure, inputs, &mut s, (instants[0], steady[0]), [from, from + count]);
+        *state = s;
+        return;
+    }
     let mut k = from;
     while k < from + count {
         let some = (from + count - k).min(AHEAD as Steps) as usize;
         for ((model, inputs), commands) in models.iter().zip(inputs).zip(commands.iter_mut()) {
-            for (i, command) in commands[..some].iter_mut().enumerate() {
-                *command = inputs[COMMAND].at(S::splat((k + i as Steps) as f64) * T::dt(model));
+            ahead::<T, S>(model, inputs, k, &mut commands[..some]);
+        }
+        // Several chunks side by side hide each other's latencies.
+        for i in 0..some {
+            let number = S::splat((k + i as Steps) as f64);
+            for (c, ((model, inputs), state)) in models.iter().zip(inputs).zip(states.iter_mut()).enumerate().take(MAX_CHUNKS) {
+                instants[c].move_to(inputs, steady[c], number * T::dt(model), commands[c][i]);
+                T::step(model, structure, &instants[c], state);
             }
         }
-        if let (true, [model], [inputs], [state]) = (T::IN_REGISTERS, models, inputs, &mut *states) {
-            let (mut s, mut instant, steady) = (*state, instants[0], steady[0]);
-            for (i, &command) in commands[0][..some].iter().enumerate() {
-                let t = S::splat((k + i as Steps) as f64) * T::dt(model);
-                instant.move_to(inputs, steady, t, command);
-                T::step(model, structure, &instant, &mut s);
-            }
-            *state = s;
-        } else {
-            // Several chunks side by side hide each other's latencies.
-            for i in 0..some {
-                let number = S::splat((k + i as Steps) as f64);
-                for (c, ((model, inputs), state)) in models.iter().zip(inputs).zip(states.iter_mut()).enumerate().take(MAX_CHUNKS) {
-                    instants[c].move_to(inputs, steady[c], number * T::dt(model), commands[c][i]);
-                    T::step(model, structure, &instants[c], state);
-                }
-            }
+        k += some as Steps;
+    }
+}
+
+/// Commands of the steps from `k` on.
+#[inline(always)]
+fn ahead<T: Stepper<S>, S: Scalar>(model: &T::Model, inputs: &Inputs<S>, k: Steps, commands: &mut [S]) {
+    for (i, command) in commands.iter_mut().enumerate() {
+        *command = inputs[COMMAND].at(S::splat((k + i as Steps) as f64) * T::dt(model));
+    }
+}
+
+/// A single chunk.
+#[inline(always)]
+fn alone<T: Stepper<S>, S: Scalar>(
+    model: &T::Model,
+    structure: &T::Structure,
+    inputs: &Inputs<S>,
+    s: &mut T::State,
+    (mut instant, steady): (Instant<S>, bool),
+    [mut k, end]: [Steps; 2],
+) {
+    let mut commands = [S::zero(); AHEAD];
+    while k < end {
+        let some = (end - k).min(AHEAD as Steps) as usize;
+        ahead::<T, S>(model, inputs, k, &mut commands[..some]);
+        for (i, &command) in commands[..some].iter().enumerate() {
+            let t = S::splat((k + i as Steps) as f64) * T::dt(model);
+            instant.move_to(inputs, steady, t, command);
+            T::step(model, structure, &instant, s);
         }
         k += some as Steps;
     }

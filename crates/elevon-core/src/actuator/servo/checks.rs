@@ -254,14 +254,9 @@ fn steps<F: Form>(out: &mut Vec<Finding>, raw: &[f64]) {
     let dt = raw[SolverParameter::Step.at()];
     windings(out, raw, dt);
     let (rotor, inertia) = inertia::<F>(raw);
-    let td = raw[Control::DerivativeTime.at()];
-    if td > 0.0 && raw[Control::SampleTime.at()] == 0.0 {
-        step_limit(
-            out,
-            dt,
-            td / raw[Control::DerivativeFilter.at()],
-            "derivative filter's pole N / T_d of control.derivative_filter and control.derivative_time",
-        );
+    if drive(raw) == DriveKind::Pwm {
+        // A step with more than two edges of a leg is none of this carrier.
+        step_limit(out, dt, 0.5 / raw[PwmParameter::Frequency.at()], "carrier: half its period at pwm.frequency");
     }
     let viscous = raw[FrictionParameter::Viscous.at()] * raw[FrictionParameter::ViscousScale.at()];
     if viscous > 0.0 {

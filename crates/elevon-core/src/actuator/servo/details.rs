@@ -36,6 +36,8 @@ details! {
         /// Steps from the sampling of the currents to the update of the duties.
         duty_delay: Steps = duty_delay(x.parts.0.raw, drive);
         control_every_step: bool = sample_steps(x.parts.0.raw, ControlParameter::SampleTime.at()) <= 1;
+        /// Relays act at the instant of their crossing.
+        located: bool = drive == DriveKind::Hysteresis && RelayCrossing::located(&x.parts.relays());
         /// Filtered quantities are recorded.
         acquisition: bool = x.parts.0.recorded.iter().any(|s| (Q::CurrentQMeas as usize..=Q::VoltageQMeas as usize).contains(s));
     }
@@ -59,8 +61,6 @@ details! {
         six_step = Commutation::read(x.parts.drive().value(DriveParameter::Commutation)) == Commutation::SixStep;
         /// A lost resolver opens the bridge.
         stops = x.stops();
-        /// Relays act at the instant of their crossing.
-        located = drive == DriveKind::Hysteresis && RelayCrossing::located(&x.parts.relays());
         extra_shaft = shaft.extra;
         extra_sensing = sensing.extra;
     }

@@ -8,6 +8,10 @@
 //! over the step. The volt-seconds are exact for a current that keeps its sign within the step; a leg without current
 //! has no diode to follow and is given to its switch at once.
 
+mod pulses;
+
+pub use self::pulses::Pulses;
+
 use crate::scalar::Scalar;
 use crate::three;
 use crate::variable::acts::{Fidelity, When};

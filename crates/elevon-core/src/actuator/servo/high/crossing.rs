@@ -1,122 +1,202 @@
-//! Relays that act at the instant of their crossing: the electrical step in two parts.
+//! Relays that act at the instant of their crossing: the electrical step in parts.
 //!
 //! The step is taken whole; where a relay's error is then beyond its threshold, the step is taken again up to the crossing
 //! (on the straight line between the errors at both ends, exact to the order of the step), the relay turns, and the rest
-//! follows. A second crossing within the same step is found at the begin of the next.
+//! follows, in which another relay may cross in turn.
 
-use super::electric::{Coupling, Detailed};
+use super::electric::{electric_step, Coupling, Detailed, Gates};
 use super::model::{Model, State};
 use super::shorted::discrete;
 use super::step::{lose_switching, measured_current};
 use crate::actuator::servo::details::Structure;
 use crate::inverter::hysteresis::{count_transitions, crossing, six_step};
-use crate::scalar::{apart, Kernel, Scalar};
+use crate::scalar::{apart, Scalar};
 use crate::sensor::filter::low_pass;
 use crate::three;
+
+/// Crossings that a step may have; further ones act at the begin of the next.
+const CROSSINGS: usize = 3;
 
 /// What the relays see at the begin of a step.
 pub(crate) struct Seen<S> {
     pub error: [S; 3],
-    /// Of the phase angles, and the rate of the rotor that they turn with.
-    pub sines: [S; 3],
-    pub cosines: [S; 3],
-    pub rate: S,
+    /// References per ampere at the end of the step.
+    pub shape: [S; 3],
 }
 
-/// Errors of the relays at the end of a step after which the currents are `current`: the reference goes on as it went.
+/// What a step makes of the windings: currents at its end, their means and those of the voltages over it.
+#[derive(Clone, Copy)]
+pub(crate) struct Wound<S> {
+    pub current: [S; 3],
+    pub mean: [S; 3],
+    pub voltage: [S; 3],
+}
+
+/// References per ampere after the rotor has turned on at `rate` for a step.
 #[inline(always)]
-fn error_after<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, current: [S; 3], x: &Seen<S>) -> [S; 3] {
-    let mut after = *s;
-    after.star.current = current;
-    let mut measured = measured_current::<S, true, true>(m, structure, &after);
-    if structure.current_filter {
-        measured = three!(|j| low_pass(m.extra.closing, s.extra.sensed[j], measured[j]));
+pub(crate) fn turned<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, [sines, cosines]: [[S; 3]; 2], rate: S) -> [S; 3] {
+    if FULL && structure.six_step {
+        return six_step(sines);
     }
-    let turned = m.dt * m.star.pole_pairs * x.rate;
-    let shape = if structure.six_step { six_step(x.sines) } else { three!(|j| turned.fma(x.cosines[j], x.sines[j])) };
-    let mut reference = s.current_ref;
-    if structure.control_every_step {
-        reference = reference + (reference - s.extra.last_reference);
-    }
-    three!(|j| reference * shape[j] - measured[j])
-}
-
-/// As `electric_step`, in two parts where a relay crosses its threshold within the step. A function of its own: few runs need
-/// it, and its copies of the state would slow the compilation of every step.
-pub(crate) struct Located<'a, S: Scalar> {
-    pub model: &'a Model<S>,
-    pub structure: &'a Structure,
-    pub state: &'a mut State<S>,
-    pub coupling: &'a Coupling<S>,
-    pub half_supply: S,
-    pub old_legs: [S; 3],
-    pub seen: Seen<S>,
-}
-
-impl<S: Scalar> Kernel for Located<'_, S> {
-    type Output = ([S; 3], [S; 3]);
-    #[inline(always)]
-    fn run(self) -> Self::Output {
-        let Self { model: m, structure, state: s, coupling, half_supply, old_legs, seen } = self;
-        let circuit = Switched { structure, coupling, half_supply };
-        let before = *s;
-        let whole = circuit.step(m, s, old_legs);
-        let end = error_after(m, structure, s, whole.0, &seen);
-        s.extra.last_reference = s.current_ref;
-        let Some((share, which)) = crossing(m.half_band, s.legs, seen.error, end) else {
-            return whole;
-        };
-        let kept = *s;
-        *s = before;
-        let parts = circuit.step_in_two(m, s, old_legs, share, which);
-        s.star.current = before.star.current;
-        s.extra.last_reference = kept.extra.last_reference;
-        s.extra.contacts = kept.extra.contacts;
-        let split = which[0] | which[1] | which[2];
-        choose(s, split, &kept);
-        (three!(|j| S::select(split, parts.0[j], whole.0[j])), three!(|j| S::select(split, parts.1[j], whole.1[j])))
-    }
+    let angle = m.dt * m.star.pole_pairs * rate;
+    let along = S::splat(-0.5).fma(angle * angle, S::one());
+    three!(|j| angle.fma(cosines[j], along * sines[j]))
 }
 
 /// Windings and bridge, and what feeds them during a step.
-struct Switched<'a, S: Scalar> {
-    structure: &'a Structure,
-    coupling: &'a Coupling<S>,
-    half_supply: S,
+pub(crate) struct Switched<'a, S: Scalar> {
+    pub model: &'a Model<S>,
+    pub structure: &'a Structure,
+    pub coupling: &'a Coupling<S>,
+    pub half_supply: S,
+}
+
+/// The part of a step behind the last crossing, and the sums over what lies before it.
+struct Open<S> {
+    start: [S; 3],
+    legs: [S; 3],
+    errors: [S; 3],
+    length: S,
+    mean: [S; 3],
+    voltage: [S; 3],
+}
+
+impl<S: Scalar> Open<S> {
+    /// In the lanes that were split; the others go on as they were.
+    #[inline(always)]
+    fn only(&self, split: S::Mask, other: &Self) -> Self {
+        let pick = |mine: &[S; 3], other: &[S; 3]| three!(|j| S::select(split, mine[j], other[j]));
+        Self {
+            start: pick(&self.start, &other.start),
+            legs: pick(&self.legs, &other.legs),
+            errors: pick(&self.errors, &other.errors),
+            length: S::select(split, self.length, other.length),
+            mean: pick(&self.mean, &other.mean),
+            voltage: pick(&self.voltage, &other.voltage),
+        }
+    }
+
+    /// With this part, whose currents end at `end`.
+    #[inline(always)]
+    fn closed(&self, end: [S; 3], voltage: [S; 3], length: S) -> [[S; 3]; 2] {
+        let half = S::splat(0.5) * length;
+        [three!(|j| half.fma(self.start[j] + end[j], self.mean[j])), three!(|j| length.fma(voltage[j], self.voltage[j]))]
+    }
 }
 
 impl<S: Scalar> Switched<'_, S> {
+    /// A step under relays whose errors were `seen`.
     #[inline(always)]
-    fn step(&self, model: &Model<S>, state: &mut State<S>, old_legs: [S; 3]) -> ([S; 3], [S; 3]) {
-        let Self { structure, coupling, half_supply } = *self;
-        apart::<S, _>(Detailed { model, structure, state, coupling, half_supply, old_legs })
+    pub fn step<const FULL: bool>(&self, s: &mut State<S>, old_legs: [S; 3], seen: &Seen<S>) -> Wound<S> {
+        let begin = three!(|j| s.star.current[j]);
+        let before = FULL.then_some(*s);
+        let (end, voltage) = self.part::<FULL>(s, begin, old_legs, S::one());
+        let reference = self.reference_after(s);
+        let ends = self.errors_after::<FULL>(s, end, reference, seen);
+        let zero = [S::zero(); 3];
+        let open = Open { start: begin, legs: old_legs, errors: seen.error, length: S::one(), mean: zero, voltage: zero };
+        let [mean, _] = open.closed(end, voltage, S::one());
+        let mut wound = Wound { current: end, mean, voltage };
+        if crossing(self.model.half_band, s.legs, seen.error, ends).is_some() {
+            wound = self.in_parts::<FULL>(s, open, before, (end, voltage, ends), reference, seen);
+        }
+        s.extra.last_reference = s.current_ref;
+        s.star.current = begin;
+        wound
     }
 
-    /// Over a share of the step.
+    /// The same again in parts, from crossing to crossing; the state at the begin of the open part is needed in full only.
     #[inline(always)]
-    fn part(&self, m: &Model<S>, s: &mut State<S>, old_legs: [S; 3], share: S) -> ([S; 3], [S; 3]) {
-        let model = m.over(share);
+    fn in_parts<const FULL: bool>(
+        &self,
+        s: &mut State<S>,
+        mut open: Open<S>,
+        mut from: Option<State<S>>,
+        (mut end, mut voltage, mut ends): ([S; 3], [S; 3], [S; 3]),
+        reference: S,
+        seen: &Seen<S>,
+    ) -> Wound<S> {
+        for _ in 0..CROSSINGS {
+            let Some((share, which)) = crossing(self.model.half_band, s.legs, open.errors, ends) else {
+                break;
+            };
+            let split = which[0] | which[1] | which[2];
+            let (kept, legs, count) = (FULL.then_some(*s), s.legs, s.transitions);
+            if let Some(from) = &from {
+                *s = *from;
+                (s.legs, s.transitions) = (legs, count);
+            }
+            let length = open.length * share;
+            let (at, v) = self.part::<FULL>(s, open.start, open.legs, length);
+            let [mean, volts] = open.closed(at, v, length);
+            s.star.current = at;
+            let new_legs = three!(|j| S::select(which[j], -legs[j], legs[j]));
+            if FULL && self.structure.switching {
+                lose_switching(self.model, s, self.half_supply + self.half_supply, legs, new_legs);
+            }
+            s.transitions = count_transitions(count, legs, new_legs);
+            s.legs = new_legs;
+            from = FULL.then_some(*s);
+            let rest = open.length * (S::one() - share);
+            let (e, v) = self.part::<FULL>(s, at, legs, rest);
+            if let Some(kept) = &kept {
+                choose(s, split, kept);
+            }
+            let pick = |new: S, old: S| S::select(split, new, old);
+            s.transitions = pick(s.transitions, count);
+            s.legs = three!(|j| pick(new_legs[j], legs[j]));
+            let errors = three!(|j| share.fma(ends[j] - open.errors[j], open.errors[j]));
+            open = Open { start: at, legs, errors, length: rest, mean, voltage: volts }.only(split, &open);
+            end = three!(|j| pick(e[j], end[j]));
+            voltage = three!(|j| pick(v[j], voltage[j]));
+            ends = self.errors_after::<FULL>(s, end, reference, seen);
+        }
+        let [mean, voltage] = open.closed(end, voltage, open.length);
+        if FULL && self.structure.shorted {
+            s.extra.contacts = discrete(self.model, &s.star);
+        }
+        Wound { current: end, mean, voltage }
+    }
+
+    /// Windings and bridge over a share of the step: currents at its end and mean voltages.
+    #[inline(always)]
+    fn part<const FULL: bool>(&self, s: &mut State<S>, start: [S; 3], old_legs: [S; 3], share: S) -> ([S; 3], [S; 3]) {
+        let model = self.model.over(share);
+        s.star.current = start;
+        if !FULL {
+            return electric_step::<S, false, false>(&model, self.structure, s, self.coupling, self.half_supply, Gates::At(old_legs));
+        }
         if self.structure.shorted {
             s.extra.contacts = discrete(&model, &s.star);
         }
-        self.step(&model, s, old_legs)
+        let Self { structure, coupling, half_supply, .. } = *self;
+        // Contacts and bridge are the largest code of a step, and are wanted in three places.
+        apart::<S, _>(Detailed { model: &model, structure, state: s, coupling, half_supply, old_legs })
     }
 
-    /// Up to the crossing, where the relays of `which` turn, and from there on: currents at the end, mean voltages.
+    /// Current reference at the end of the step, which goes on as it went.
     #[inline(always)]
-    fn step_in_two(&self, m: &Model<S>, s: &mut State<S>, old_legs: [S; 3], share: S, which: [S::Mask; 3]) -> ([S; 3], [S; 3]) {
-        let first = self.part(m, s, old_legs, share);
-        s.star.current = first.0;
-        let turned = three!(|j| S::select(which[j], -s.legs[j], s.legs[j]));
-        s.transitions = count_transitions(s.transitions, s.legs, turned);
-        if self.structure.switching {
-            lose_switching(m, s, self.half_supply + self.half_supply, s.legs, turned);
+    fn reference_after(&self, s: &State<S>) -> S {
+        if self.structure.control_every_step {
+            s.current_ref + (s.current_ref - s.extra.last_reference)
+        } else {
+            s.current_ref
         }
-        let legs = s.legs;
-        s.legs = turned;
-        let remainder = S::one() - share;
-        let second = self.part(m, s, legs, remainder);
-        (second.0, three!(|j| share * first.1[j] + remainder * second.1[j]))
+    }
+
+    /// Errors of the relays at the end of a step after which the currents are `current`.
+    #[inline(always)]
+    fn errors_after<const FULL: bool>(&self, s: &State<S>, current: [S; 3], reference: S, seen: &Seen<S>) -> [S; 3] {
+        let mut measured = current;
+        if FULL {
+            let mut after = *s;
+            after.star.current = current;
+            measured = measured_current::<S, true, true>(self.model, self.structure, &after);
+            if self.structure.current_filter {
+                measured = three!(|j| low_pass(self.model.extra.closing, s.extra.sensed[j], measured[j]));
+            }
+        }
+        three!(|j| reference * seen.shape[j] - measured[j])
     }
 }
 
@@ -124,8 +204,6 @@ impl<S: Scalar> Switched<'_, S> {
 #[inline(always)]
 fn choose<S: Scalar>(s: &mut State<S>, split: S::Mask, kept: &State<S>) {
     let pick = |mine: S, other: S| S::select(split, mine, other);
-    s.transitions = pick(s.transitions, kept.transitions);
-    s.legs = three!(|j| pick(s.legs[j], kept.legs[j]));
     s.voltage = three!(|j| pick(s.voltage[j], kept.voltage[j]));
     for (mine, other) in s.star.contact.iter_mut().flatten().zip(kept.star.contact.iter().flatten()) {
         *mine = pick(*mine, *other);

@@ -3,7 +3,7 @@
 use super::model::*;
 use super::shorted::shorted_step;
 use crate::actuator::servo::details::Structure;
-use crate::inverter::bridge::{extinguish, Windings};
+use crate::inverter::bridge::{extinguish, BridgeState, Circuit, Connection, Pulses, Windings};
 use crate::scalar::{three_phase, Kernel, Scalar};
 use crate::three;
 
@@ -16,6 +16,18 @@ pub(crate) struct Coupling<S> {
 
 #[inline(always)]
 pub(crate) fn coupling<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &State<S>, sin: S, cos: S) -> Coupling<S> {
+    coupling_at::<S, FULL>(m, structure, s, s.shaft.motor_position, [sin, cos])
+}
+
+/// At a motor position other than the state's.
+#[inline(always)]
+pub(crate) fn coupling_at<S: Scalar, const FULL: bool>(
+    m: &Model<S>,
+    structure: &Structure,
+    s: &State<S>,
+    position: S,
+    [sin, cos]: [S; 2],
+) -> Coupling<S> {
     let (mut shape, _) = three_phase(sin, cos);
     let eccentric = structure.motor.static_eccentricity;
     if !FULL && !eccentric {
@@ -27,14 +39,14 @@ pub(crate) fn coupling<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &St
     }
     if FULL {
         if structure.motor.trapezoidal {
-            shape = m.star.trapezoid(m.star.electrical_angle(s.shaft.motor_position));
+            shape = m.star.trapezoid(m.star.electrical_angle(position));
         }
         if structure.motor.dynamic_eccentricity {
-            let turning = m.star.dynamic_gap(s.shaft.motor_position);
+            let turning = m.star.dynamic_gap(position);
             gap = three!(|j| gap[j] * turning[j]);
         }
         if structure.motor.weak_pole {
-            let passing = m.extra.pole.gap(s.shaft.motor_position);
+            let passing = m.extra.pole.gap(position);
             gap = three!(|j| gap[j] * passing[j]);
         }
         if structure.thermal {
@@ -49,12 +61,39 @@ pub(crate) fn motor_torque<S: Scalar>(m: &Model<S>, s: &State<S>, c: &Coupling<S
     m.star.saturate(m.star.torque(c.k, s.star.current))
 }
 
+/// What switches the legs during a step.
+#[derive(Clone, Copy)]
+pub(crate) enum Gates<'a, S: Scalar> {
+    /// Commands before it; those of the state act from its begin on.
+    At([S; 3]),
+    /// Edges within it.
+    Within(Pulses<'a, S>),
+}
+
 /// What feeds the windings during a step.
-pub(crate) struct Fed<S> {
+pub(crate) struct Fed<'a, S: Scalar> {
     pub half_supply: S,
-    pub old_legs: [S; 3],
+    pub gates: Gates<'a, S>,
     /// Of the windings, warm.
     pub resistance: [S; 3],
+}
+
+/// The legs of a step.
+#[inline(always)]
+pub(crate) fn connect<S: Scalar>(
+    m: &Model<S>,
+    structure: &Structure,
+    bridge: &mut BridgeState<S>,
+    legs: [S; 3],
+    gates: Gates<'_, S>,
+    half_supply: S,
+    circuit: &impl Circuit<S>,
+) -> Connection<S> {
+    let parts = &structure.bridge_structure;
+    match gates {
+        Gates::At(before) => m.bridge.connect(bridge, parts, before, legs, half_supply, circuit, m.dt),
+        Gates::Within(pulses) => m.bridge.connect_pulses(bridge, parts, &pulses, half_supply, circuit, m.dt),
+    }
 }
 
 /// New phase currents and the phase-to-neutral voltages of this step.
@@ -65,14 +104,14 @@ pub(crate) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
     s: &mut State<S>,
     c: &Coupling<S>,
     half_supply: S,
-    old_legs: [S; 3],
+    gates: Gates<'_, S>,
 ) -> ([S; 3], [S; 3]) {
     let mut resistance = m.star.resistance;
     if FULL && structure.thermal {
         resistance = three!(|j| resistance[j] * s.star.resistance_factor);
     }
     if EXTRA && structure.shorted {
-        let (turns, voltage) = shorted_step(m, structure, s, c, &Fed { half_supply, old_legs, resistance });
+        let (turns, voltage) = shorted_step(m, structure, s, c, &Fed { half_supply, gates, resistance });
         return (three!(|j| turns[j]), three!(|j| voltage[j]));
     }
     let speed = s.shaft.motor_speed;
@@ -84,8 +123,8 @@ pub(crate) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
     let drops = |terminal: &[S; 3]| three!(|j| (-resistance[j]).fma(i[j], terminal[j] - emf[j]));
     let neutral;
     if FULL && structure.bridge {
-        let windings = Windings { current: i, emf, per_inductance: m.star.per_inductance, resistance, open: m.star.open };
-        let connection = m.bridge.connect(&mut s.bridge, &structure.bridge_structure, old_legs, s.legs, half_supply, &windings, m.dt);
+        let windings = Windings { current: i, emf, per_inductance: m.star.weight, resistance, open: m.star.open };
+        let connection = connect(m, structure, &mut s.bridge, s.legs, gates, half_supply, &windings);
         terminal = connection.legs.voltage;
         rail = connection.legs.rail;
         let plain = m.star.neutral(drops(&terminal));
@@ -134,7 +173,7 @@ impl<S: Scalar> Kernel for Detailed<'_, S> {
     #[inline(always)]
     fn run(self) -> Self::Output {
         let Self { model, structure, state, coupling, half_supply, old_legs } = self;
-        electric_step::<S, true, true>(model, structure, state, coupling, half_supply, old_legs)
+        electric_step::<S, true, true>(model, structure, state, coupling, half_supply, Gates::At(old_legs))
     }
 }
 

@@ -1,7 +1,9 @@
 //! Switching model: three phases, switching inverter, fixed step (reference sheet 1.2 to 1.7).
 
+mod carrier;
 mod crossing;
 mod electric;
+mod located;
 pub(crate) mod model;
 pub(crate) mod observe;
 mod shorted;
@@ -9,6 +11,8 @@ mod start;
 mod step;
 mod tick;
 
+use self::carrier::CarrierStep;
+use self::located::LocatedStep;
 use self::model::{Model, State};
 use self::observe::Observation;
 use self::step::HighStep;
@@ -94,14 +98,17 @@ impl<F: Form> Wiring for High<F> {
         count: Steps,
     ) {
         let x = Stretch { structure, models, inputs, states, from, count };
-        if !S::FORMS {
-            return x.run::<HighStep<true, true, false>>();
+        let (full, extra) = (structure.full || !S::FORMS, structure.extra || !S::FORMS);
+        if structure.drive == DriveKind::Pwm {
+            return if full { x.run::<CarrierStep<true>>() } else { x.run::<CarrierStep<false>>() };
         }
-        match (structure.full, structure.extra, structure.drive == DriveKind::Pwm) {
-            (false, _, false) => x.run::<HighStep<false, false, false>>(),
-            (false, _, true) => x.run::<HighStep<false, false, true>>(),
-            (true, false, _) => x.run::<HighStep<true, false, false>>(),
-            (true, true, _) => x.run::<HighStep<true, true, false>>(),
+        if structure.located {
+            return if full { x.run::<LocatedStep<true>>() } else { x.run::<LocatedStep<false>>() };
+        }
+        match (full, extra) {
+            (false, _) => x.run::<HighStep<false, false>>(),
+            (true, false) => x.run::<HighStep<true, false>>(),
+            (true, true) => x.run::<HighStep<true, true>>(),
         }
     }
 

@@ -5,9 +5,10 @@ use crate::actuator::servo::form::Form;
 use crate::actuator::servo::layout::*;
 use crate::actuator::servo::sensing::{Sensed, Sensing};
 use crate::actuator::servo::shaft::{Shaft, ShaftState};
-use crate::control::current_dq::{CurrentControl, CurrentControlState};
+use crate::control::current_dq::{CurrentControl, CurrentControlState, PwmParameter};
 use crate::control::position_speed::{ControlParameter, PositionSpeed, PositionSpeedState};
 use crate::inverter::bridge::{Bridge, BridgeState, InverterParameter};
+use crate::inverter::carrier::Carrier;
 use crate::inverter::link::{DcLink, DcLinkState};
 use crate::inverter::losses::{DriveHeat, DriveHeatState, SwitchingParameter};
 use crate::motor::pole::WeakPole;
@@ -28,6 +29,7 @@ pub struct Model<S> {
     pub(crate) supply_scale: S,
     pub(crate) control: PositionSpeed<S>,
     pub(crate) current_control: CurrentControl<S>,
+    pub(crate) carrier: Carrier<S>,
     pub(crate) shaft: Shaft<S>,
     pub(crate) sensing: Sensing<S>,
     pub(crate) sensor: CurrentSensor<S>,
@@ -54,7 +56,12 @@ pub(crate) struct Extra<S> {
 #[derive(Clone, Copy, Debug)]
 pub struct State<S> {
     pub(crate) star: StarState<S>,
+    /// Rotor position expected at the middle of the next step, where steps are of second order.
+    pub(crate) middle: S,
+    /// Commands of the legs (+1 high, -1 low, 0 off); behind a carrier their means over the last step.
     pub(crate) legs: [S; 3],
+    /// Those at its end.
+    pub(crate) commands: [S; 3],
     pub(crate) bridge: BridgeState<S>,
     pub(crate) control: PositionSpeedState<S>,
     pub(crate) current_ref: S,
@@ -115,6 +122,9 @@ impl<S: Scalar> Model<S> {
         if structure.shaft.unbalance {
             star.add_eccentricity(shaft.unbalance.eccentricity(shaft.whole_inertia));
         }
+        if structure.drive == DriveKind::Pwm || structure.located {
+            star = star.at_the_middle();
+        }
         Self {
             dt,
             star,
@@ -123,6 +133,7 @@ impl<S: Scalar> Model<S> {
             supply_scale: at(InverterParameter::SupplyScale.at()),
             control: PositionSpeed::derive(view.control(), ts, shaft.gear.ratio),
             current_control: CurrentControl::derive(view.pwm(), at(MotorParameter::PolePairs.at())),
+            carrier: Carrier::derive(at(PwmParameter::Frequency.at()), dt),
             shaft,
             sensing: Sensing::derive(raw, &structure.sensing),
             sensor: CurrentSensor::derive(view.current_sensor()),

@@ -1,6 +1,6 @@
 //! The electrical part of a step with contacts in or at the windings.
 
-use super::electric::{Coupling, Fed};
+use super::electric::{connect, Coupling, Fed};
 use super::model::*;
 use crate::actuator::servo::details::Structure;
 use crate::inverter::bridge::{BridgeState, Circuit as _, Legs};
@@ -29,7 +29,7 @@ pub(crate) fn shorted_step<S: Scalar>(
     structure: &Structure,
     s: &mut State<S>,
     c: &Coupling<S>,
-    fed: &Fed<S>,
+    fed: &Fed<'_, S>,
 ) -> ([S; 3], [S; 3]) {
     let old = three!(|j| s.star.current[j]);
     let drop = three!(|j| (-fed.resistance[j]).fma(old[j], -(c.k[j] * s.shaft.motor_speed)));
@@ -59,13 +59,13 @@ fn solve<S: Scalar>(
     bridge: &mut BridgeState<S>,
     new_legs: [S; 3],
     net: &Network<'_, S>,
-    fed: &Fed<S>,
+    fed: &Fed<'_, S>,
 ) -> Solved<S> {
     if !structure.bridge {
         let terminal = three!(|j| new_legs[j] * fed.half_supply);
         return Solved { terminal, neutral: net.neutral(terminal), rail: terminal };
     }
-    let connection = m.bridge.connect(bridge, &structure.bridge_structure, fed.old_legs, new_legs, fed.half_supply, net, m.dt);
+    let connection = connect(m, structure, bridge, new_legs, fed.gates, fed.half_supply, net);
     let legs = connection.legs;
     // A switch's resistance acts on the step's end: explicit, it would not stand a contact of less than its own.
     let old = net.currents();

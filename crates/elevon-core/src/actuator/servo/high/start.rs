@@ -36,7 +36,9 @@ pub(crate) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> St
     heat(raw, &mut star, &warm);
     State {
         star,
+        middle: (S::splat(0.5) * model.dt).fma(shaft.motor_speed, shaft.motor_position),
         legs: [-S::one(); 3],
+        commands: [-S::one(); 3],
         bridge: BridgeState::initial(),
         control: PositionSpeedState::initial(),
         current_ref: zero,
@@ -63,6 +65,7 @@ pub(crate) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> St
 
 pub(crate) fn refresh<S: Scalar>(model: &Model<S>, structure: &Structure, raw: &[S], state: &mut State<S>) {
     heat(raw, &mut state.star, &state.extra.network);
+    state.current_control.look_for_edges();
     if structure.shorted {
         state.extra.contacts = discrete(model, &state.star);
     }

@@ -2,15 +2,14 @@
 //! motor, transmission, acquisition. With `FULL` false the optional details compile to nothing, with `EXTRA` false those
 //! that only some servos have; a detail at its healthy value changes no bit, so the forms agree exactly where both apply.
 
-use super::crossing::{Located, Seen};
-use super::electric::{coupling, electric_step, motor_torque};
+use super::electric::{coupling, electric_step, motor_torque, Gates};
 use super::model::{Model, State, E_INVERTER, E_SUPPLY};
 use crate::actuator::servo::advance::{Instant, Stepper};
 use crate::actuator::servo::details::Structure;
 use crate::actuator::servo::layout::DriveKind;
 use crate::inverter::hysteresis::{count_transitions, relays, six_step, transition};
 use crate::inverter::losses::switching_loss;
-use crate::scalar::{apart, three_phase, Scalar};
+use crate::scalar::{three_phase, Scalar};
 use crate::sensor::filter::low_pass;
 use crate::sensor::resolver::Reading;
 use crate::three;
@@ -99,14 +98,14 @@ pub(crate) fn lose_switching<S: Scalar>(m: &Model<S>, s: &mut State<S>, supply: 
     s.energy[E_INVERTER] = s.energy[E_INVERTER] + lost;
 }
 
+/// What the controller is shown, and what it makes of it where it has no tick of its own.
 #[inline(always)]
-fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
+pub(crate) fn sense<S: Scalar, const FULL: bool, const EXTRA: bool>(
     m: &Model<S>,
     structure: &Structure,
     x: &Instant<S>,
     s: &mut State<S>,
-) {
-    // Sensors and control electronics.
+) -> Reading<S> {
     let reading = if EXTRA && structure.sensing.unread && !structure.control_every_step {
         // Nobody looks between the ticks of the controller.
         Reading { angle: s.shaft.motor_position, position: s.shaft.motor_position, speed: s.shaft.motor_speed }
@@ -119,15 +118,37 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     if structure.control_every_step {
         control_step::<S, FULL>(m, structure, x.command, s, &reading);
     }
-    let (sin, cos) = m.star.electrical_angle(s.shaft.motor_position).sin_cos();
-    let mut measured = measured_current::<S, FULL, EXTRA>(m, structure, s);
+    reading
+}
+
+/// Phase currents that the drive is shown in this step.
+#[inline(always)]
+pub(crate) fn measure<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure: &Structure, s: &mut State<S>) -> [S; 3] {
+    let measured = measured_current::<S, FULL, EXTRA>(m, structure, s);
     if FULL && structure.measured_current {
         s.current_reading = measured;
     }
     if EXTRA && structure.current_filter {
         s.extra.sensed = three!(|j| low_pass(m.extra.closing, s.extra.sensed[j], measured[j]));
-        measured = s.extra.sensed;
+        return s.extra.sensed;
     }
+    measured
+}
+
+/// The filters of the acquisition: currents (q, d) and the quadrature voltage.
+#[inline(always)]
+pub(crate) fn acquire<S: Scalar>(m: &Model<S>, s: &mut State<S>, (q, d): (S, S), v_q: S) {
+    s.filtered[0] = low_pass(m.filter, s.filtered[0], q);
+    s.filtered[1] = low_pass(m.filter, s.filtered[1], d);
+    s.filtered[2] = low_pass(m.filter, s.filtered[2], v_q);
+}
+
+#[inline(always)]
+fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure: &Structure, x: &Instant<S>, s: &mut State<S>) {
+    // Sensors and control electronics.
+    let reading = sense::<S, FULL, EXTRA>(m, structure, x, s);
+    let (sin, cos) = m.star.electrical_angle(s.shaft.motor_position).sin_cos();
+    let measured = measure::<S, FULL, EXTRA>(m, structure, s);
     let (sin_c, cos_c) = if FULL && structure.sensing.distorts() && (!EXTRA || structure.sensing.commutated) {
         m.star.electrical_angle(reading.angle).sin_cos()
     } else {
@@ -140,15 +161,12 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     let supply = if EXTRA { link_voltage(m, structure, s, source) } else { source };
     let half_supply = S::splat(0.5) * supply;
     let old_legs = three!(|j| s.legs[j]);
-    let mut error = [S::zero(); 3];
     let mut legs;
-    if PWM || (FULL && structure.drive == DriveKind::Pwm) {
-        legs = m.current_control.compare(&s.current_control, x.t);
-    } else if FULL && structure.drive == DriveKind::Off {
+    if FULL && structure.drive == DriveKind::Off {
         legs = [S::zero(); 3];
     } else {
         let shape = if EXTRA && structure.six_step { six_step(sin_phases) } else { sin_phases };
-        error = three!(|j| s.current_ref * shape[j] - measured[j]);
+        let error = three!(|j| s.current_ref * shape[j] - measured[j]);
         legs = relays(m.half_band, old_legs, error);
     }
     if EXTRA && structure.stops {
@@ -168,25 +186,14 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     // Motor electromagnetics.
     let c = coupling::<S, FULL>(m, structure, s, sin, cos);
     let torque = motor_torque(m, s, &c);
-    let (current, voltage): ([S; 3], [S; 3]);
-    if EXTRA && structure.located {
-        let rate = if structure.sensing.distorts() && structure.sensing.commutated { reading.speed } else { s.shaft.motor_speed };
-        let seen = Seen { error, sines: sin_phases, cosines: cos_phases, rate };
-        let (i, v) = apart::<S, _>(Located { model: m, structure, state: &mut *s, coupling: &c, half_supply, old_legs, seen });
-        (current, voltage) = (three!(|j| i[j]), three!(|j| v[j]));
-    } else {
-        let (i, v) = electric_step::<S, FULL, EXTRA>(m, structure, s, &c, half_supply, old_legs);
-        (current, voltage) = (three!(|j| i[j]), three!(|j| v[j]));
-    }
+    let (i, v) = electric_step::<S, FULL, EXTRA>(m, structure, s, &c, half_supply, Gates::At(old_legs));
+    let (current, voltage) = (three!(|j| i[j]), three!(|j| v[j]));
     if EXTRA && structure.link {
         m.extra.link.step(&mut s.extra.link, source, s.energy[E_SUPPLY] - drawn_before);
     }
     if structure.acquisition {
-        let (q, d) = park(measured, sin_phases, cos_phases);
         let (v_q, _) = park(voltage, sin_phases, cos_phases);
-        s.filtered[0] = low_pass(m.filter, s.filtered[0], q);
-        s.filtered[1] = low_pass(m.filter, s.filtered[1], d);
-        s.filtered[2] = low_pass(m.filter, s.filtered[2], v_q);
+        acquire(m, s, park(measured, sin_phases, cos_phases), v_q);
     }
 
     // Motor and transmission dynamics.
@@ -198,11 +205,10 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool>(
     s.star.current = current;
 }
 
-/// The step of the inner loop with and without details, behind relays or a carrier. With details the drive is looked up in
-/// the structure, which spares the compiler two copies of the largest code.
-pub(crate) struct HighStep<const FULL: bool, const EXTRA: bool, const PWM: bool>;
+/// The step of the inner loop behind relays, or without a drive.
+pub(crate) struct HighStep<const FULL: bool, const EXTRA: bool>;
 
-impl<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool> Stepper<S> for HighStep<FULL, EXTRA, PWM> {
+impl<S: Scalar, const FULL: bool, const EXTRA: bool> Stepper<S> for HighStep<FULL, EXTRA> {
     type Model = Model<S>;
     type Structure = Structure;
     type State = State<S>;
@@ -214,6 +220,6 @@ impl<S: Scalar, const FULL: bool, const EXTRA: bool, const PWM: bool> Stepper<S>
     }
     #[inline(always)]
     fn step(model: &Model<S>, structure: &Structure, instant: &Instant<S>, state: &mut State<S>) {
-        step::<S, FULL, EXTRA, PWM>(model, structure, instant, state);
+        step::<S, FULL, EXTRA>(model, structure, instant, state);
     }
 }
