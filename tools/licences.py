@@ -67,8 +67,8 @@ def finding(name: str, licence: str, *, default: bool) -> str:
 def allowed(licence: str) -> bool:
     """Whether an SPDX expression is met by allowed licences alone."""
     words = re.findall(r"\(|\)|[^\s()/]+|/", licence.replace(" WITH ", "\0"))
-    value, rest = _either([word.replace("\0", " WITH ") for word in words])
-    return value and not rest
+    value, left = _either([word.replace("\0", " WITH ") for word in words])
+    return value and not left
 
 
 def _either(words: list[str]) -> tuple[bool, list[str]]:

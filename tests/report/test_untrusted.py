@@ -43,7 +43,7 @@ def test_a_page_without_charts_needs_no_library():
 
 
 @pytest.mark.parametrize(
-    ("text", "shown"),
+    ("text", "displayed"),
     [
         (EVIL, None),
         ("# a\n\n* b", r"\# a \* b"),
@@ -53,11 +53,11 @@ def test_a_page_without_charts_needs_no_library():
         ("motor.inertia of friction_dynamic, 3 %", "motor.inertia of friction_dynamic, 3 %"),
     ],
 )
-def test_markdown_shows_the_text(text, shown):
+def test_markdown_shows_the_text(text, displayed):
     given = markdown_text(text)
     assert "<" not in given
     assert "\n" not in given
-    assert shown is None or given == shown
+    assert displayed is None or given == displayed
 
 
 @pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r"])

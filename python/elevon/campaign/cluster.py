@@ -193,8 +193,10 @@ def _client(address: str) -> Iterator[Client]:
                 yield client
             return
         with (
-            distributed.LocalCluster(n_workers=_checked(address, int(local[1])), **_OPTIONS) as own,
-            distributed.Client(own, set_as_default=False) as client,
+            distributed.LocalCluster(
+                n_workers=_checked(address, int(local[1])), **_OPTIONS
+            ) as cluster,
+            distributed.Client(cluster, set_as_default=False) as client,
         ):
             yield client
 
