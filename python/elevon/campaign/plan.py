@@ -57,7 +57,8 @@ class Plan(Strict):
     @model_validator(mode="after")
     def _split_adds_up(self) -> Self:
         shares = self.split.values()
-        if self.split and (min(shares) < 0.0 or abs(sum(shares) - 1.0) > 1e-9):
+        # Whole numbers beyond floats are compared before they are added to floats.
+        if self.split and (min(shares) < 0.0 or max(shares) > 2.0 or abs(sum(shares) - 1.0) > 1e-9):
             raise ValueError(f"split: the shares are {list(shares)}; they must add up to 1")
         self._split_keeps_together()
         if self.random is not None and self.design is not None:

@@ -39,7 +39,7 @@ def check_units(document: Document) -> None:
         pairs = [
             (unit, other)
             for unit, other in zip(units, display_units, strict=True)
-            if is_ambiguous(float(number), unit, other)
+            if abs(number) < 1e300 and is_ambiguous(float(number), unit, other)
         ]
         if pairs:
             text = str(ambiguous(str(number), *pairs[0], document.place(location)))

@@ -141,7 +141,7 @@ def read_result(path: str | Path) -> dict[str, Any]:
     try:
         data = json.loads(read_regular(path, _LONGEST))
         Answered.of(data)
-    except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
+    except (OSError, ValueError, LookupError, TypeError, RecursionError, OverflowError) as error:
         why = f"no {error}" if isinstance(error, KeyError) else str(error)
         raise FormatError(
             f"{path}: not a result of elevon diagnose --json of a rotary actuator: {why}"
