@@ -43,7 +43,10 @@ def check_series(
         raise InputError(f"{place}: {len(times)} times but {len(values)} values")
     if not len(times):
         raise InputError(f"{place}: the table has no points")
-    t, v = np.asarray(times, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    try:
+        t, v = np.asarray(times, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    except OverflowError as error:
+        raise InputError(f"{place}: a whole number is too large for a float") from error
     for name, array in (("times", t), ("values", v)):
         if not np.isfinite(array).all():
             row = int(np.flatnonzero(~np.isfinite(array))[0])
