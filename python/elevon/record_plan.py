@@ -153,7 +153,7 @@ def record_plan(
         names, period = _read(text, units, step)
         for name in names:
             if owner.setdefault(name, text) != text:
-                raise InputError(f"record: {name!r} is asked for twice: {owner[name]!r}, {text!r}")
+                raise InputError(f"record: {name!r} is requested twice: {owner[name]!r}, {text!r}")
         chosen_names = chosen.setdefault(period, [])
         chosen_names.extend(name for name in names if name not in chosen_names)
     return [

@@ -70,7 +70,7 @@ def write_description(table: Path, about: TableDescription, *, keep_old: bool) -
     """Write a description; `keep_old`: with the one it replaces, until the table is replaced."""
     content = _content(about)
     if keep_old:
-        with suppress(FormatError, OSError):
+        with suppress(InputError, OSError):
             old = _document(table)
             old.pop("replaces", None)
             content["replaces"] = _matching(table) or old
