@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import elevon
 from tests.physics.rig import (
     FREE_SHAFT,
     HYSTERESIS,
@@ -18,7 +19,9 @@ from tests.physics.rig import (
     SUPPLY,
     L,
     R,
+    actuator,
     constant,
+    make_scenario,
     run,
     term,
 )
@@ -182,3 +185,117 @@ def test_a_stiff_link_and_ideal_switches_are_the_drive_without_them() -> None:
         for values in ({}, {"inverter.link_capacitance": 0.0, "inverter.switching_time": 0.0})
     )
     assert plain.final == neutral.final
+
+
+#: A shaft that a load drives at 300 W, held by the motor: what the copper leaves comes back.
+BLOCKED = (
+    FREE_SHAFT
+    | SPEED
+    | LINK
+    | {
+        "motor.inertia": 0.02,
+        "inverter.source_regeneration": "block",
+        "inverter.link_capacitance": 2e-4,
+    }
+)
+
+
+def held_back(fidelity: str, drive: str, values: dict[str, Any]) -> Any:
+    """A link whose source takes nothing back, at 100 rad/s under -3 N m; tripped or not."""
+    extra = {"initial": {"motor_speed": 100.0}, "load": {"shaft": {"terms": [constant(-3.0)]}}}
+    scenario = make_scenario(duration=0.3, mode="speed", command=[constant(100.0)], extra=extra)
+    return elevon.simulate(
+        actuator(BLOCKED | DRIVES[drive] | values),
+        scenario,
+        fidelity=fidelity,
+        record="supply_voltage,motor_speed,tripped@2 kHz",
+    )
+
+
+@pytest.mark.parametrize("fidelity", ["high", "low"])
+@pytest.mark.parametrize("drive", DRIVES)
+def test_a_blocked_link_without_limits_rises(fidelity: str, drive: str) -> None:
+    """Some 75 J go into 0.2 mF: almost a thousand volts, and nothing trips."""
+    rec = held_back(fidelity, drive, {})
+    assert rec.meta["status"] == "ok"
+    assert rec["supply_voltage"].values.max() > 800.0
+
+
+@pytest.mark.parametrize("fidelity", ["high", "low"])
+@pytest.mark.parametrize("drive", DRIVES)
+def test_over_voltage_trips_the_drive(fidelity: str, drive: str) -> None:
+    """At 450 V the bridge opens: the link keeps that voltage, and the load drives the shaft on."""
+    rec = held_back(fidelity, drive, {"inverter.over_voltage_trip": 450.0})
+    assert rec.meta["status"] == "tripped"
+    assert "inverter.over_voltage_trip = 450 V" in rec.meta["message"]
+    voltage = rec["supply_voltage"].values
+    # Above: what the windings hold, and a step of 0.5 ms at 300 W.
+    assert 450.0 < voltage.max() < 460.0
+    assert voltage[-1] == pytest.approx(voltage.max(), rel=1e-6)
+    assert rec["motor_speed"].values[-1] > 110.0
+    assert rec["tripped"].values[-1] == 1.0
+
+
+@pytest.mark.parametrize("fidelity", ["high", "low"])
+@pytest.mark.parametrize("drive", DRIVES)
+def test_a_brake_chopper_holds_the_link(fidelity: str, drive: str) -> None:
+    """200 ohm take 1 kW at 450 V, more than the load gives: the link stays at 430 to 450 V."""
+    rec = held_back(fidelity, drive, {"inverter.chopper_resistance": 200.0})
+    assert rec.meta["status"] == "ok"
+    voltage = rec["supply_voltage"].values
+    reached = voltage[int(np.argmax(voltage > 449.0)) :]
+    # The reduced-order model switches the chopper at its steps: 0.7 kW of 0.5 ms are 4 V.
+    assert len(reached) > 300
+    assert 426.0 < reached.min() < 435.0
+    assert 445.0 < reached.max() < 454.0
+
+
+def test_the_chopper_decays_the_link_exponentially_and_its_heat_is_counted() -> None:
+    """A link at rest above the chopper's voltage: exp(-t/(R C)) down to where it goes off."""
+    values = (
+        FREE_SHAFT
+        | LINK
+        | {
+            "inverter.source_regeneration": "block",
+            "inverter.chopper_resistance": 20.0,
+            "inverter.chopper_voltage": 350.0,
+            "inverter.chopper_band": 100.0,
+            "inverter.supply_voltage": SUPPLY,
+        }
+    )
+    rec = run(
+        values,
+        duration=0.02,
+        scenario={"fault": opened()},
+        record="supply_voltage,energy_source,energy_link@10 kHz",
+    )
+    voltage, time = rec["supply_voltage"].values, rec["supply_voltage"].time
+    exact = np.maximum(SUPPLY * np.exp(-time / (20.0 * CAPACITANCE)), 250.0)
+    assert voltage == pytest.approx(exact, rel=1e-3)
+    lost = rec.final["energy_source"]
+    assert lost == pytest.approx(-rec.final["energy_link"], rel=1e-9)
+
+
+@pytest.mark.parametrize("fidelity", ["high", "low"])
+def test_under_voltage_trips_the_drive(fidelity: str) -> None:
+    """Behind an open connector the bridge empties the link: at 200 V it stops."""
+    values = (
+        FREE_SHAFT
+        | SPEED
+        | HYSTERESIS
+        | LINK
+        | {
+            "inverter.link_capacitance": 2e-4,
+            "inverter.under_voltage_trip": 200.0,
+            "motor.inertia": 0.02,
+        }
+    )
+    scenario = make_scenario(
+        duration=0.3, mode="speed", command=[constant(100.0)], extra={"fault": opened()}
+    )
+    rec = elevon.simulate(
+        actuator(values), scenario, fidelity=fidelity, record="supply_voltage@2 kHz"
+    )
+    assert rec.meta["status"] == "tripped"
+    assert "below inverter.under_voltage_trip = 200 V" in rec.meta["message"]
+    assert rec["supply_voltage"].values[-1] > 150.0

@@ -1,8 +1,9 @@
 //! The DC link of a servo's drive: a capacitor that a source feeds through its resistance and a connector.
 //!
 //! Over a step the bridge takes an energy E from the capacitor. With the connector open, C v^2 / 2 falls by just that:
-//! v'^2 = v^2 - 2 E / C, the discharge at constant power, upwards when the motor brakes (there is no brake chopper). With
-//! the source on, E is a current i over the step and v goes exponentially to V_s - R_s i.
+//! v'^2 = v^2 - 2 E / C, the discharge at constant power, upwards when the motor brakes. With the source on, E is a current i
+//! over the step and v goes exponentially to V_s - R_s i. A brake chopper, where there is one, takes
+//! C v^2 / 2 (1 - exp(-2 dt / (R C))) of a step while it is on; the drive trips beyond the limits of the link's voltage.
 
 use crate::scalar::Scalar;
 use crate::variable::View;
@@ -18,10 +19,20 @@ variables! {
         LinkCapacitance => "link_capacitance", "C", "F", NonNegative, Plant, Some(0.0), "capacitor of the DC link, fed through inverter.source_resistance; 0: a stiff link, the source itself";
         SourceResistance => "source_resistance", "R_s", "ohm", Positive, Plant, Some(0.5), "source, harness and connector in front of the link's capacitor",
             when(&[Away("inverter.link_capacitance", 0.0)]);
-        SourceRegeneration => "source_regeneration", "-", "1", Choice(SourceRegeneration::NAMES), Plant, Some(0.0), "does the source take current back, or (a rectifier) does a braking motor charge the link; there is no brake chopper",
+        SourceRegeneration => "source_regeneration", "-", "1", Choice(SourceRegeneration::NAMES), Plant, Some(0.0), "does the source take current back, or (a rectifier) does a braking motor charge the link",
             when(&[Away("inverter.link_capacitance", 0.0)]);
         ConnectorOpen => "connector_open", "-", "1", Flag, Plant, Some(0.0), "1: the power connector is open, the link's capacitor alone feeds the bridge",
             when(&[Away("inverter.link_capacitance", 0.0)]);
+        OverVoltageTrip => "over_voltage_trip", "V_max", "V", NonNegative, Controller, Some(0.0), "the drive trips when the link's voltage exceeds it; 0: no over-voltage trip",
+            when(&[Away("inverter.link_capacitance", 0.0)]);
+        UnderVoltageTrip => "under_voltage_trip", "V_min", "V", NonNegative, Controller, Some(0.0), "the drive trips when the link's voltage falls below it; 0: no under-voltage trip",
+            when(&[Away("inverter.link_capacitance", 0.0)]);
+        ChopperResistance => "chopper_resistance", "R_ch", "ohm", NonNegative, Plant, Some(0.0), "brake resistor that a chopper puts across the link; 0: there is no brake chopper",
+            when(&[Away("inverter.link_capacitance", 0.0)]);
+        ChopperVoltage => "chopper_voltage", "V_ch", "V", Positive, Controller, Some(450.0), "link voltage above which the chopper is on; ASSUMED: 1.2 times a link of 380 V",
+            when(&[Away("inverter.link_capacitance", 0.0), Away("inverter.chopper_resistance", 0.0)]);
+        ChopperBand => "chopper_band", "-", "V", NonNegative, Controller, Some(20.0), "the chopper is off again this much below chopper_voltage; ASSUMED: some 5 % of it",
+            when(&[Away("inverter.link_capacitance", 0.0), Away("inverter.chopper_resistance", 0.0)]);
     }
 }
 
@@ -39,6 +50,11 @@ pub struct DcLink<S> {
     blocks: S,
     /// 1: the connector is open.
     open: S,
+    /// Least and largest voltage that trip the drive; 0: none does.
+    limits: [S; 2],
+    /// Link voltages at which the chopper goes off and on, and the share of the link's energy that it takes in a step.
+    chopper: [S; 2],
+    chopper_share: S,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -46,9 +62,13 @@ pub struct DcLinkState<S> {
     /// NaN before the first step: the capacitor begins at the source's voltage.
     voltage: S,
     begin: S,
-    /// J, since the start: given by the source, lost in its resistance.
+    /// J, since the start: given by the source, lost in its resistance and in the chopper's.
     pub given: S,
     pub lost: S,
+    /// 1: the chopper is on.
+    chopping: S,
+    /// Voltage that tripped the drive; 0: none has.
+    trip: S,
 }
 
 impl<S: Scalar> DcLink<S> {
@@ -68,7 +88,32 @@ impl<S: Scalar> DcLink<S> {
             decay: (-(dt / (resistance * guarded))).exp(),
             blocks: g(LinkParameter::SourceRegeneration),
             open: g(LinkParameter::ConnectorOpen),
+            limits: [g(LinkParameter::UnderVoltageTrip), g(LinkParameter::OverVoltageTrip)],
+            chopper: [g(LinkParameter::ChopperVoltage) - g(LinkParameter::ChopperBand), g(LinkParameter::ChopperVoltage)],
+            chopper_share: chopper_share(g(LinkParameter::ChopperResistance), guarded, dt),
         }
+    }
+
+    /// May the link's voltage trip the drive?
+    pub fn trips(view: &View<LinkParameter>) -> bool {
+        Self::needed(view) && view.any_away([LinkParameter::OverVoltageTrip, LinkParameter::UnderVoltageTrip])
+    }
+
+    /// 1 once the link's voltage has tripped the drive.
+    #[inline(always)]
+    pub fn tripped(&self, s: &DcLinkState<S>) -> S {
+        S::indicator(S::zero().lt(s.trip))
+    }
+
+    /// Why it has.
+    pub fn trip_reason(&self, s: &DcLinkState<S>, lane: usize) -> Option<String> {
+        let (voltage, [least, most]) = (s.trip.lane(lane), self.limits.map(|limit| limit.lane(lane)));
+        let (side, path, limit) = if most > 0.0 && voltage > most {
+            ("above", "inverter.over_voltage_trip", most)
+        } else {
+            ("below", "inverter.under_voltage_trip", least)
+        };
+        (voltage > 0.0).then(|| format!("the drive tripped: the link has {voltage:.1} V, {side} {path} = {limit} V"))
     }
 
     /// Voltage of the link.
@@ -83,13 +128,20 @@ impl<S: Scalar> DcLink<S> {
         let (half, two) = (S::splat(0.5), S::splat(2.0));
         let before = self.voltage(s, source);
         s.begin = S::select(s.begin.equals(s.begin), s.begin, before);
+        s.chopping = S::select(self.chopper[1].lt(before), S::one(), S::select(before.lt(self.chopper[0]), S::zero(), s.chopping));
+        let chopped = s.chopping * self.chopper_share * (half * self.capacitance * before * before);
+        let drawn = drawn + chopped;
+        s.lost = s.lost + chopped;
         let alone = (before * before - two * drawn / self.capacitance).maximum(S::zero()).sqrt().maximum(S::splat(EMPTY));
         let bus = drawn / (self.dt * half * (before + alone));
         let settled = source - self.resistance * bus;
         let fed = self.decay.fma(before - settled, settled);
-        let refused = half.lt(self.blocks) & source.le(before.minimum(fed));
+        let refused = half.lt(self.blocks) & source.le(before.minimum(alone));
         let off = half.le(self.open) | refused;
         s.voltage = S::select(off, alone, fed.maximum(S::splat(EMPTY)));
+        let [least, most] = self.limits;
+        let beyond = (S::zero().lt(most) & most.lt(s.voltage)) | s.voltage.lt(least);
+        s.trip = S::select(beyond & s.trip.equals(S::zero()), s.voltage, s.trip);
         // i(t) = bus + first exp(-t / (R C)), integrated.
         let first = (settled - before) / self.resistance;
         let time = self.resistance * self.capacitance;
@@ -108,10 +160,17 @@ impl<S: Scalar> DcLink<S> {
     }
 }
 
+/// Share of the link's energy that a resistor takes in a step; none where there is no resistor.
+fn chopper_share<S: Scalar>(resistance: S, capacitance: S, dt: S) -> S {
+    let there = S::zero().lt(resistance);
+    let taken = S::one() - (S::splat(-2.0) * dt / (S::select(there, resistance, S::one()) * capacitance)).exp();
+    S::select(there, taken, S::zero())
+}
+
 impl<S: Scalar> DcLinkState<S> {
     pub fn initial() -> Self {
         let nan = S::splat(f64::NAN);
-        Self { voltage: nan, begin: nan, given: S::zero(), lost: S::zero() }
+        Self { voltage: nan, begin: nan, given: S::zero(), lost: S::zero(), chopping: S::zero(), trip: S::zero() }
     }
 }
 
@@ -124,7 +183,7 @@ mod tests {
     const SOURCE: f64 = 380.0;
 
     fn link(dt: f64, open: f64, blocks: f64) -> DcLink<f64> {
-        DcLink::derive(&[CAPACITANCE, RESISTANCE, blocks, open], dt)
+        DcLink::derive(&[CAPACITANCE, RESISTANCE, blocks, open, 0.0, 0.0, 0.0, 450.0, 20.0], dt)
     }
 
     /// Voltage after `steps` steps at a power, which may depend on the voltage.

@@ -32,7 +32,7 @@ details! {
         motor: MotorStructure = MotorStructure::read(&x.parts.motor()).with_unbalance(shaft.unbalance).with_weak_pole(WeakPole::<f64>::needed(&x.parts.pole()));
         /// Which kinds of contacts in or at the windings.
         shorts: ShortStructure = short::kinds(&x.parts.motor(), &x.parts.tap(), &x.parts.short());
-        bridge_structure: BridgeStructure = BridgeStructure::read(&x.parts.inverter(), interrupted(&x.parts.motor()));
+        bridge_structure: BridgeStructure = BridgeStructure::read(&x.parts.inverter(), interrupted(&x.parts.motor())).with_trips(DcLink::<f64>::trips(&x.parts.link()));
         /// Steps from the sampling of the currents to the update of the duties.
         duty_delay: Steps = duty_delay(x.parts.0.raw, drive);
         control_every_step: bool = sample_steps(x.parts.0.raw, ControlParameter::SampleTime.at()) <= 1;
@@ -43,7 +43,7 @@ details! {
     }
     full {
         /// More than ideal switches.
-        bridge = bridge_structure.open_phases || bridge::detailed(&x.parts.inverter()) || drive == DriveKind::Off || x.stops();
+        bridge = bridge_structure.open_phases || bridge::detailed(&x.parts.inverter()) || bridge_structure.trips || drive == DriveKind::Off || x.stops();
         measured_current = CurrentSensor::<f64>::needed(&x.parts.current_sensor());
         /// Electrical energies are accounted: recorded, or needed by the link or the drive's heat.
         accounts = shaft.accounts || x.link() || x.switches() || (bridge && Network::<f64>::needed(&x.parts.thermal()));

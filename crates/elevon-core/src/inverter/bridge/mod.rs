@@ -121,6 +121,11 @@ impl BridgeStructure {
         Self { switch_faults, open_phases, trips: switch_faults || view.away(P::TripCurrent) }
     }
 
+    /// The same where something else may trip the drive, too.
+    pub fn with_trips(self, more: bool) -> Self {
+        Self { trips: self.trips || more, ..self }
+    }
+
     /// Of a bridge that is looked at without gates only: switches that never close are then like any other.
     pub fn gateless(view: &View<InverterParameter>) -> Self {
         use InverterParameter as P;

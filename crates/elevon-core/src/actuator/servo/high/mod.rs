@@ -143,6 +143,9 @@ impl<F: Form> Wiring for High<F> {
     fn tripped<S: Scalar>(s: &State<S>) -> S {
         s.bridge.tripped.maximum(s.extra.network.over)
     }
+    fn trip_reason<S: Scalar>(m: &Model<S>, s: &State<S>, lane: usize) -> Option<String> {
+        m.extra.link.trip_reason(&s.extra.link, lane)
+    }
     fn overheated<S: Scalar>(s: &State<S>) -> Option<Overheat<S>> {
         let network = &s.extra.network;
         Some(Overheat { over: network.over, temperature: network.winding })

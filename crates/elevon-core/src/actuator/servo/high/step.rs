@@ -190,6 +190,7 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
     let (current, voltage) = (three!(|j| i[j]), three!(|j| v[j]));
     if EXTRA && structure.link {
         m.extra.link.step(&mut s.extra.link, source, s.energy[E_SUPPLY] - drawn_before);
+        s.bridge.tripped = s.bridge.tripped.maximum(m.extra.link.tripped(&s.extra.link));
     }
     if structure.acquisition {
         let (v_q, _) = park(voltage, sin_phases, cos_phases);

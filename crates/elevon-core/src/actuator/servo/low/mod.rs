@@ -165,6 +165,9 @@ impl<F: Form> Wiring for Low<F> {
     fn tripped<S: Scalar>(s: &State<S>) -> S {
         s.tripped.maximum(s.network.over)
     }
+    fn trip_reason<S: Scalar>(m: &Model<S>, s: &State<S>, lane: usize) -> Option<String> {
+        m.drive.link.trip_reason(&s.link, lane)
+    }
     fn overheated<S: Scalar>(s: &State<S>) -> Option<Overheat<S>> {
         Some(Overheat { over: s.network.over, temperature: s.network.winding })
     }

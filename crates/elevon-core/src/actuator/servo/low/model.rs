@@ -30,7 +30,7 @@ details! {
     Structure, read<F>(parts: Parts)
     always {
         drive: DriveKind = DriveKind::read(parts.drive().value(DriveParameter::Kind));
-        bridge: BridgeStructure = BridgeStructure::gateless(&parts.inverter());
+        bridge: BridgeStructure = BridgeStructure::gateless(&parts.inverter()).with_trips(DcLink::<f64>::trips(&parts.link()));
         /// The references are blocks, not sines.
         six_step: bool = Commutation::read(parts.drive().value(DriveParameter::Commutation)) == Commutation::SixStep;
         control: ControlStructure = ControlStructure::read(&parts.control());

@@ -98,6 +98,7 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
     }
     if EXTRA && structure.link {
         m.drive.link.step(&mut s.link, source, power * m.dt);
+        s.tripped = s.tripped.maximum(m.drive.link.tripped(&s.link));
     }
     if EXTRA && structure.loops {
         let added = m.circuits.step(s, p, phases, s.phases);
