@@ -68,6 +68,7 @@ fn step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &In
     let torque = m.star.saturate(m.star.torque(coupling.k, wound.mean));
     if FULL && structure.link {
         m.extra.link.step(&mut s.extra.link, source, s.energy[E_SUPPLY] - drawn_before);
+        s.bridge.tripped = s.bridge.tripped.maximum(m.extra.link.tripped(&s.extra.link));
     }
     if structure.acquisition {
         let (v_q, _) = park(wound.voltage, sines, cosines);
@@ -75,6 +76,9 @@ fn step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &In
     }
 
     // Motor and transmission dynamics.
+    if FULL && structure.shaft.flanks {
+        m.shaft.hold_flank::<FULL>(&structure.shaft, x, &mut s.shaft, torque);
+    }
     let loads = m.shaft.loads::<FULL, FULL>(&structure.shaft, x, &s.shaft, torque);
     m.shaft.step::<FULL, FULL>(&structure.shaft, x, &mut s.shaft, &loads, torque);
     s.star.current = wound.current;
