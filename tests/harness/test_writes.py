@@ -70,5 +70,5 @@ def test_every_fault(driver, name, record_property, capsys):
     counts = tried(driver, name, RECIPES[name].points)
     record_property("counts", str(counts))
     with capsys.disabled():
-        sys.stdout.write(f"\n{name}: {counts}\n")
+        sys.stdout.write("\n".join(["", f"{name}: {counts}", *counts.faults, ""]))
     assert counts.faults == []
