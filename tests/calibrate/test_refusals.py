@@ -120,7 +120,8 @@ def test_the_ranking_drops_what_cannot_be_told_and_names_the_rival(logs, before)
     ]
     problem = Problem(pwm, logs[:1])
     x = np.array([item.inner(pwm.parameters.value(item.path)) for item in free])
-    jac = problem.jacobian(free, x, np.full(2, 0.01))
+    # Steps that the instants of sticking, which differ from run to run, do not blur.
+    jac = problem.jacobian(free, x, np.full(2, 0.05))
     residual = problem.residual(problem.simulate([{}])[0])
     blocks = [np.floor(logs[0].time).astype(np.int64)]
     kept, ranking = choose(free, jac, residual, blocks, [])

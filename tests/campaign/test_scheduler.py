@@ -4,6 +4,7 @@ import socket
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from threading import Thread
 
 import pytest
@@ -28,8 +29,9 @@ def listener():
                 return
             sockets.append(peer)
             if data is not None:
-                peer.sendall(data)
-                peer.shutdown(socket.SHUT_WR)
+                with suppress(OSError):  # the caller may have hung up already
+                    peer.sendall(data)
+                    peer.shutdown(socket.SHUT_WR)
 
         Thread(target=serve, daemon=True).start()
         return f"tcp://127.0.0.1:{server.getsockname()[1]}"

@@ -174,7 +174,7 @@ def test_overrides_keep_the_old_value_and_leave_the_original_alone():
 @pytest.mark.parametrize(
     ("path", "value", "named"),
     [
-        ("solver.step", 1e-4, "derivative_filter"),
+        ("solver.step", 1e-4, "hysteresis_band"),
         ("solver.step", 0.1, "electrical pole"),
     ],
 )
