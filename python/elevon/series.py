@@ -71,6 +71,8 @@ def read_series(path: str | os.PathLike[str], place: str) -> Points:
     FormatError
         A row does not hold two numbers; the message names file and line.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise InputError(f"{place}: {path!r} is not the path of a file")
     file = Path(path).expanduser()
     try:
         stamp = file.stat().st_mtime_ns

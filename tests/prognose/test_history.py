@@ -34,6 +34,9 @@ def history(place, *entries):
         ({"faults": [{**CAUSE, "severity": 5e-3}]}, "severity 0.005 is not within 0.001 to 0.003"),
         ({"faults": [], "detectable": [KEY]}, "0.json: detectable = "),
         ({"faults": [], "detectable": {KEY: 0.0}}, f"detectable {KEY} = 0.0 is no number above 0"),
+        ({"faults": [{**CAUSE, "severity": 10**400}]}, f"0.json: {KEY}: .* not numbers"),
+        ({"faults": [], "detectable": {KEY: 10**400}}, "is no number above 0"),
+        ({"faults": [{**CAUSE, "equivalents": []}]}, "'equivalents'; did you mean 'ambiguous_with"),
         ({"faults": [CAUSE], "reset": ["ply@transmission"]}, "reset: .*did you mean 'backlash@"),
     ],
 )

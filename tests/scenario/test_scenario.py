@@ -213,3 +213,11 @@ def test_malformed_files_of_points(tmp_path, text, message):
     file.write_text('duration = 1\n[[command.terms]]\nkind = "table"\nfile = "points.csv"\n')
     with pytest.raises(InputError, match=message):
         Scenario.load(file)
+
+
+@pytest.mark.parametrize("given", [1.5, ["a.csv"]])
+def test_a_table_file_that_is_no_path_is_refused(given):
+    from elevon.series import read_series
+
+    with pytest.raises(InputError, match=r"terms\[0\]: .* is not the path of a file"):
+        read_series(given, "terms[0]")

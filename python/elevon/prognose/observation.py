@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.errors import InputError, quoted
+from elevon.errors import InputError, quoted, unknown
 
 if TYPE_CHECKING:
     from elevon.prognose.law import Law
@@ -170,6 +170,10 @@ def inspection(
     return Inspection(usage, seen, tuple(reset), name, date, measured or {})
 
 
+_CAUSE = ("kind", "place", "probability", "severity", "unit", "interval", "ambiguous_with")
+"""What `elevon diagnose` writes of a cause."""
+
+
 def _common(kind: str, severity: float) -> float:
     relative, absolute = COMMON.get(kind, _COMMON)
     return float(np.hypot(relative * severity, absolute))
@@ -192,12 +196,15 @@ def _cause(data: Mapping[str, Any], law: Law, place: str) -> Mapping[str, Any] |
 
 def _named(cause: Any, place: str) -> tuple[list[tuple[str, str]], float]:
     """Return kind and place of a cause and of those like it, and its probability."""
+    for key in cause if isinstance(cause, Mapping) else ():
+        if key not in _CAUSE:
+            raise unknown("key", str(key), _CAUSE, place)
     try:
         names = [
             (str(n["kind"]), str(n["place"])) for n in (cause, *cause.get("ambiguous_with", []))
         ]
         probability = float(cause["probability"])
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(
             f"{place}: {quoted(str(cause))} has not kind, place and a number as probability, as "
             "`elevon diagnose` gives them"
@@ -217,7 +224,7 @@ def _detectable(data: Mapping[str, Any], law: Law, place: str) -> float | None:
         return None
     try:
         limit = float(known[name])
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         limit = float("nan")
     if not 0.0 < limit < np.inf:
         raise InputError(f"{place}: detectable {name} = {known[name]!r} is no number above 0")
@@ -235,7 +242,7 @@ def _read(cause: Mapping[str, Any], limit: float | None, place: str) -> Seen:
     try:
         severity = float(cause["severity"])
         low, high = (float(value) for value in cause["interval"])
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{place}: severity and interval are not numbers") from error
     if not (np.isfinite([severity, low, high]).all() and low <= severity <= high):
         raise InputError(f"{place}: severity {severity:g} is not within {low:g} to {high:g}")
