@@ -31,7 +31,7 @@ def lead(demo: LifeDemo) -> str:
     low, high = visit.prognosis.interval
     left = demo.life.end - visit.usage
     return (
-        f"At flight {_n(visit.usage)} one 20-second test said: "
+        f"At flight {_n(visit.usage)} one 20-second test gave: "
         f"{_n(visit.prognosis.median)} flights remain ({_n(low)} to {_n(high)}). "
         f"The unit failed {_n(left)} flights later."
     )
