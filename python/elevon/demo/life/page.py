@@ -54,7 +54,7 @@ def life_report(demo: LifeDemo) -> Report:
         "each saw one log of the bench, a model calibrated on the new unit, and the mission.",
     )
     passed = [check.passed for check in demo.checks]
-    report.fact("True end of life", f"{_n(demo.life.end)} flights", "nobody was told")
+    report.fact("True end of life", f"{_n(demo.life.end)} flights", "known to no step")
     report.fact("Inspections", str(len(demo.visits)), "one 20 s log each")
     report.fact("Checks passed", f"{sum(passed)} of {len(passed)}")
     report.fact("All steps", f"{demo.seconds:.0f} s", "on this machine")
@@ -78,9 +78,9 @@ def _actuator(report: Report, demo: LifeDemo) -> None:
     section = report.section(
         "The actuator at work",
         "A brushless motor drives a flap over a gear of 1:124. The gear wears: between the pin "
-        "that drives (orange) and the fork that is driven (blue) the backlash grows. When the "
-        "motion "
-        "or the load turns round, the motor first crosses the backlash, and the flap waits.",
+        "that drives (orange) and the fork that is driven (blue) the backlash grows. The load "
+        "holds the flap on one flank; where the load turns round, the flap crosses the backlash at "
+        "once, and the tracking error jumps.",
     )
     section.markup(
         moving_picture(demo),
