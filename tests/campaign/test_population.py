@@ -151,3 +151,10 @@ def test_populations_that_cannot_be_name_the_place(plan, name):
     with pytest.raises(InputError, match=message) as raised:
         resolved_of(plan, tail, head=head)
     assert "plan.toml" in str(raised.value)
+
+
+def test_a_bound_beyond_floats_is_refused():
+    from elevon.campaign.draw import _split
+
+    with pytest.raises(InputError, match=r"random.draw\[0\]: a whole number of 1329 bits is too"):
+        _split(10**400, "random.draw[0]")

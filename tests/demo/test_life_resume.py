@@ -155,6 +155,7 @@ def test_every_interruption_keeps_what_is_finished(story, tmp_path, capsys):
         assert json.dumps(resumed[key]) == json.dumps(once[key])
 
 
+@pytest.mark.long
 def test_an_edited_log_is_diagnosed_anew(story, tmp_path, monkeypatch):
     out = tmp_path / "demo"
     story.run(out, stop="report", fresh=True)

@@ -103,6 +103,7 @@ def test_calibration_holds_on_units_never_seen():
     assert scores["brier"] < 0.7 * scores["brier_by_rate"]
 
 
+@pytest.mark.long
 def test_units_are_judged_at_the_severities_asked():
     rng = np.random.default_rng(5)
     tables, plan = {"loaded": _table(40, rng, 0.0)}, TrainingPlan(folds=2, members=1, rounds=400)

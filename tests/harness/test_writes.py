@@ -21,8 +21,8 @@ KINDS = "wcosrtu"
 FEW = 3
 """Points of each fault in the short form."""
 
-SHORT = ("new", "dataset split")
-"""Commands of the short form: one file, and a change of a finished folder."""
+SHORT = ("new",)
+"""Commands of the short form; a split is cut short in `tests/campaign/test_transaction.py`, too."""
 
 preload = pytest.mark.skipif(
     not sys.platform.startswith("linux") or shutil.which("cc") is None,

@@ -17,6 +17,7 @@ LONG = (
     "reproduce torino-compliance",
     "compare ",
     "--faults-table",
+    "--loop ",
     "reproduce nasa-",
     "reproduce pisa-",
     "reproduce diagnosis-limits",

@@ -87,6 +87,7 @@ def drawn(seed, *, worse=1.0, units=6):
     return tuple(out)
 
 
+@pytest.mark.long
 def test_the_histories_pass_their_own_checks_and_worse_inspections_do_not():
     values = InspectionErrors(0, 6, drawn(0)).to_dict()
     assert values["status"] == "pass"
@@ -95,6 +96,7 @@ def test_the_histories_pass_their_own_checks_and_worse_inspections_do_not():
     assert sum("RMS" in name for name in failed) == 3
 
 
+@pytest.mark.long
 def test_the_rows_say_what_the_inspections_err_by():
     result = InspectionErrors(0, 6, drawn(1))
     rows = {(row["fault"], row["days"]): row for row in result.rows()}

@@ -128,6 +128,7 @@ def test_margins_of_a_double_lag():
     assert short.gain.to_dict() == {"value": None, "interval": None, "frequency_hz": None}
 
 
+@pytest.mark.long
 def test_intervals_hold_the_truth_as_often_as_they_say():
     """A known loop under known noise, 100 draws: 90 % within +-7."""
     s = 2j * np.pi * np.geomspace(0.5, 50.0, 40)

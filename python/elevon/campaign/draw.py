@@ -246,4 +246,9 @@ def _split(given: Any, place: str) -> tuple[float, str]:
         if match is None:
             raise InputError(f"{place}: {given!r} is not a number with a unit")
         return float(match[1]), match[2]
-    return float(given), ""
+    try:
+        return float(given), ""
+    except OverflowError:
+        raise InputError(
+            f"{place}: a whole number of {given.bit_length()} bits is too large"
+        ) from None
