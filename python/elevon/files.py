@@ -250,14 +250,18 @@ def atomic_path(path: str | os.PathLike[str], *, force: bool = False) -> Iterato
     except OutputError:
         raise
     except OSError as error:
-        # The system's own words: a library's for a full disk say it twice.
-        why = os.strerror(error.errno) if error.errno else str(error)
-        raise OutputError(f"{target}: cannot be written: {why}") from error
+        raise _unwritten(target, error) from error
     finally:
         with suppress(OSError):  # what is left is swept by the next writer
             step("unlink", temporary)
             temporary.unlink()
     sync_folder(target.parent)
+
+
+def _unwritten(target: Path, error: OSError) -> OutputError:
+    """Return the error in the system's own words: a library's for a full disk say it twice."""
+    why = os.strerror(error.errno) if error.errno else str(error)
+    return OutputError(f"{target}: cannot be written: {why}")
 
 
 def publish(waiting: Path, target: Path, *, force: bool) -> None:
@@ -270,8 +274,7 @@ def publish(waiting: Path, target: Path, *, force: bool) -> None:
     except OutputError:
         raise
     except OSError as error:
-        why = os.strerror(error.errno) if error.errno else str(error)
-        raise OutputError(f"{target}: cannot be written: {why}") from error
+        raise _unwritten(target, error) from error
     with suppress(FileNotFoundError):
         waiting.unlink()
     sync_folder(target.parent)

@@ -32,7 +32,7 @@ class Motion:
     Attributes
     ----------
     output, driver, command : ndarray
-        Flap, the motor's side of the backlash, what is asked.
+        Flap, the motor's side of the backlash, the command.
     motor : ndarray
         Motor angle [turns].
     backlash : float
